@@ -9,9 +9,11 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats, frozen
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(lower="J", upper="J", velocity="J", acceleration="J", jerk="J")
 class Limits:
     """Per joint (J,): travel (mm, rad), velocity, acceleration, jerk (mm/s.., rad/s..).
 
@@ -72,6 +74,7 @@ class ControlKinematics:
 
 
 @dataclass(frozen=True)
+@arrays(home="#axis_names")
 class Machine:
     """One machine as loaded from its file.
 

@@ -14,6 +14,7 @@ from scipy.spatial import HalfspaceIntersection, QhullError
 
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 _SMALL = 1e-12
 _HELD = 1e-9
@@ -21,6 +22,7 @@ _HELD = 1e-9
 
 
 @dataclass(frozen=True)
+@arrays(normals="N H 3", offsets="N H", joint="H")
 class Polytope:
     """Rates v of the tip with `normals @ v <= offsets` at N poses: the image of a box of joint rates, the axis kept.
 

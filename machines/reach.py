@@ -19,6 +19,7 @@ from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 
 BLOCK = 4096
 """points at a time"""
@@ -46,6 +47,7 @@ class SliderMachine(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(angular="M", values="N M")
 class Margins:
     """Signed margins: negative where a bound is passed, NaN where the joints have no pose.
 

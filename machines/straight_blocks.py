@@ -22,6 +22,7 @@ from machines.kinematics.serial import Serial
 from machines.kinematics.sliders import Legs, solved
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector, straight
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 _Z = (0.0, 0.0, 1.0)
 _ROUNDS = 6
@@ -108,6 +109,7 @@ def _h4(kin: H4Linear, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVect
 
 
 @dataclass(frozen=True)
+@arrays(rods="N K 3", arms="N K 3", step="N K")
 class _Loop:
     """The closed loops of a platform along straight slide moves.
 

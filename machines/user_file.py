@@ -10,7 +10,9 @@ import difflib
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path as FilePath
 from typing import Any, TypeVar, Union, get_args, get_origin
 
@@ -34,6 +36,7 @@ class UserModel(BaseModel):
 
 
 M = TypeVar("M", bound=BaseModel)
+_SHORT = 50_000
 _HOW = "write key = value, text in quotes, each [table] and each key on a line of its own"
 
 
@@ -159,15 +162,24 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
         return None, [problem] if problem else []
     name = source if source in builtin else path.stem
     try:
-        values = tomllib.loads(text)
+        values, lines = (_kept if len(text) < _SHORT else _parsed)(text)
     except tomllib.TOMLDecodeError as fault:
         return None, [_syntax(fault, str(path), text)]
     except (ValueError, RecursionError) as fault:  # of Python's own: digits of a number, depth of lists
         why = "its lists or tables are nested too deeply" if isinstance(fault, RecursionError) else str(fault).split(";")[0]
         return None, [error("file.syntax", f"not valid TOML: {why}", file=str(path),
                             hint=_HOW)]
-    origins = {p: ValueSource(str(path), line) for p, line in key_lines(text).items()}
-    return _with_base(UserFile(name, str(path), values, origins), builtin, kind, (*above, key))
+    origins = {p: ValueSource(str(path), line) for p, line in lines.items()}
+    return _with_base(UserFile(name, str(path), deepcopy(values), origins), builtin, kind, (*above, key))
+
+
+def _parsed(text: str) -> tuple[Values, dict[KeyPath, int]]:
+    """Values of a TOML text and the line of each; whoever changes them takes a copy."""
+    return tomllib.loads(text), key_lines(text)
+
+
+_kept = lru_cache(maxsize=64)(_parsed)
+"""texts of built-in files and set-ups, which one process reads over and over; long tables of errors are not kept"""
 
 
 def _resolve(source: str, builtin: Mapping[str, FilePath], wanted_by: UserFile | None) -> FilePath:

@@ -8,7 +8,7 @@ from functools import cache
 
 import pytest
 
-from tests import compile_once, environment
+from tests import compile_once, cover, environment
 from tests.linuxcnc import interpreter, simulator
 from tests.processor_time import (
     pytest_addoption,
@@ -24,7 +24,9 @@ __all__ = ["environment", "pytest_addoption", "pytest_runtest_protocol", "pytest
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`, the files of the quick tier with `-m quick`."""
+    """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`, the files of the quick tier with `-m quick`; the cases
+    that a test marked `covering` can do without with `-m slow`."""
+    cover.mark_slow(items)
     for item in items:
         if item.nodeid.split("::")[0] in QUICK:
             item.add_marker(pytest.mark.quick)

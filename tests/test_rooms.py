@@ -23,7 +23,7 @@ FLOORS = (
     ("machines.geometric_error.files", "error model files: reading, covariance, fingerprint"),
     ("machines.geometric_error.exchange", "to and from other forms, figures, surveys"),
     ("machines.calibration", "error models from measurements"),
-    ("postproc.base", "options, version, memory, compiled loops"),
+    ("postproc.base", "options, version, memory"),
     ("postproc.witness", "second witness: shares no code with the rest"),
     ("postproc.setup", "the set-up file"),
     ("postproc.feedrate.kernels", "compiled loops of the planner"),

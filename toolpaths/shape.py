@@ -8,6 +8,7 @@ import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints, taken
 from toolpaths.rotations import angle_between, cross, lengths, slerp
+from toolpaths.shapes import arrays
 
 _EPS = 1e-12
 
@@ -21,6 +22,7 @@ def turn_about(vector: Floats, normal: Floats, angle: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
+@arrays(start="N 3", end="N 3", axis0="N 3", axis1="N 3", is_arc="N", center="N 3", normal="N 3", sweep="N")
 class Curves:
     """N reference motions (DESIGN: straight tip or arc, axis on the great circle), each over u in [0, 1].
 

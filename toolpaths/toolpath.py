@@ -9,6 +9,7 @@ import numpy as np
 
 from toolpaths.arrays import Array, Floats, frozen, shared
 from toolpaths.diagnostics import Diagnostic
+from toolpaths.shapes import arrays
 
 
 class Kind(IntEnum):
@@ -135,6 +136,7 @@ class Cycle:
 
 
 @dataclass(frozen=True)
+@arrays(center="K 3", normal="K 3", radius="K", sweep="K")
 class Arcs:
     """K circular arcs or helices, in the part frame.
 
@@ -190,6 +192,8 @@ class ClSource:
 
 
 @dataclass(frozen=True)
+@arrays(tip="N 3", axis="N 3", feed="N", feed_mode="N", kind="N", role="N", arc="N", cycle="N", tool="N", operation="N",
+        pass_="N", line="N", normal="N 3", contact="N 3", spin="N")
 class Toolpath:
     """The path of the cutter in the part frame (the absolute frame of the CL file), one row per commanded position.
 

@@ -19,6 +19,7 @@ from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 MeasuredQuantity = Literal["position", "distance", "along"]
 BALL = ("ball.x", "ball.y", "ball.z")
@@ -26,6 +27,7 @@ SETUP = {"position": BALL, "distance": (*BALL, "bar.length"), "along": ("zero",)
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(q="N J", read="...", sigma="...", centre="3", toward="3", ways="N J")
 class Measurements:
     """N poses of the machine with what was read there.
 
@@ -88,6 +90,7 @@ def problem_of(model: ErrorModel, kinematics: Kinematics, measured: Measurements
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(nominal="N 3")
 class _Reader:
     """Readings (R,) of tips (N, 3), and their rates."""
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from machines.calibration.noise import Noise, noise_of
 from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.shapes import arrays
 
 RANK = 1e-9
 """singular values (of the scaled, weighted Jacobian) below this part of the largest count as none"""
@@ -27,6 +28,7 @@ STOPS = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(guess="P", free="P", observed="R", sigma="R")
 class CalibrationProblem:
     """P parameters, R readings.
 
@@ -56,6 +58,7 @@ class CalibrationProblem:
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(values="P", sigma="P", covariance="P P", residuals="R", weights="R")
 class CalibrationResult:
     """What a fit gives.
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from machines.calibration.problem import CalibrationProblem, CalibrationResult, solve
 from toolpaths.arrays import Bools, Floats
+from toolpaths.shapes import arrays
 
 
 def reversal_matrix(n: int, m: int, measured: Bools | None = None, closure: bool = True,
@@ -55,6 +56,7 @@ def conditioning(n: int, m: int, measured: Bools | None = None, shifts: Sequence
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(axis="n", indexer="n", axis_sigma="n", indexer_sigma="n", offsets="m", residuals="m n", covariance="2*n 2*n")
 class Reversal:
     """Signatures of axis and indexer, in the unit of the readings.
 

@@ -19,6 +19,7 @@ from machines.geometric_error.actual.serial_errors import Component, ErrorFrame,
 from machines.geometric_error.tables.curves import Fourier
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from toolpaths.arrays import Bools, Floats
+from toolpaths.shapes import arrays
 
 ENOUGH = 3
 """set-ups, turned by one increment each: more tell no other amplitudes"""
@@ -29,6 +30,7 @@ TOLD = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(amplitudes="6 2 H", sigma="6 2 H", covariance="12*H 12*H", residuals="m n 6")
 class RotaryFit:
     """Series of the six errors, (6, 2, H): cosine and sine amplitudes of harmonics 1 .. H, mm and rad.
 

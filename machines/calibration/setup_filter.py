@@ -14,9 +14,11 @@ import numpy as np
 from machines.calibration.problem import CalibrationResult, linear, solve
 from machines.calibration.simulator import MOUNTS, PARTS, Bench, mount_jacobian
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(span="n r", removed="n//2+1")
 class SetupFilter:
     """Of one kind of reading.
 

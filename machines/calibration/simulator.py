@@ -13,12 +13,14 @@ import numpy as np
 
 from machines.geometric_error.actual.transforms import carried, homogeneous, inverse
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 MOUNTS = ("C0", "RX0", "RL")
 PARTS = ("dx", "dy", "dz", "ex", "ey", "ez")
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(shift="3")
 class Bench:
     """The nominal set-up: n steps of a turn, heights (mm) from the axis's frame to the indexer and on to the reflector.
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(leg="R", shift="R 3", rail_offset="K 3", rail_ends="K 2")
 class ClearanceSizes:
     """Thickness and stops of rods, slides and spindle; a part that the machine file does not give is None.
 
@@ -37,6 +39,7 @@ class ClearanceSizes:
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(place="N 3", tilt="N", carriages="N K 3", ends="N K 3", gauge="N 3", axis="N 3")
 class ClearanceGeometry:
     """Where the parts are at N joints, in the machine frame, mm and rad.
 

@@ -12,6 +12,7 @@ import numpy as np
 from machines.kinematics.base import as_points
 from machines.kinematics.h4_linear import ROUND_OFF, H4Linear, Pair, tilted, unit, wrap
 from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,7 @@ class H4TableAxis(H4Linear):
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(pivot="3")
 class H4SpindleAxis(H4Linear):
     """The spindle on a B axis that the platform carries: about the platform's y through C + pivot.
 

@@ -17,6 +17,7 @@ from machines.kinematics.h4_modes import candidates
 from machines.kinematics.sliders import Legs, determinant, platform_rates, solved
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.shapes import arrays
 
 STEPS = 30
 """Newton steps at most"""
@@ -29,6 +30,7 @@ TRUSTED = 0.25
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(joints="4 3")
 class H4Platform:
     """Four legs (2 pairs, 2 rods) and the platform they carry.
 

@@ -17,6 +17,7 @@ from machines.kinematics.columns import blocks
 from machines.kinematics.sliders import Legs, determinant, three_spheres
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.shapes import arrays
 
 UP = np.array([0.0, 0.0, 1.0])
 ROUND_OFF = 1e-12
@@ -24,6 +25,7 @@ ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(platform="3 3")
 class LinearDelta(Kinematics):
     """Three legs whose platform joints are E + platform[k].
 

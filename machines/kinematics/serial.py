@@ -27,6 +27,7 @@ from machines.kinematics.frames import reference_x, spin_about
 from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular, wrap
 from toolpaths.arrays import Bools, Floats, frozen
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 
 ROUND_OFF = 1e-12
 """rad: directions nearer than this are the same (reach, singular direction)"""
@@ -39,6 +40,7 @@ Turning = dict[str, tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(direction="3", point="3")
 class Joint:
     """One axis: letter, kind, unit direction (3,), for a rotary one a point (3,) of its line in mm; all at q = 0."""
 
@@ -53,6 +55,7 @@ class Joint:
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(tool_axis="3")
 class Serial(Kinematics):
     """Three linear axes and up to two rotary ones.
 

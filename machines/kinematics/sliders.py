@@ -14,9 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(points="K 3", directions="K 3", lengths="K", roots="K")
 class Legs:
     """K legs.
 

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Floats, frozen
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(lower="3", upper="3")
 class Workspace:
     """Box `lower`..`upper` (3,) mm of the platform's reference point in the machine frame, tilt (2,) rad."""
 

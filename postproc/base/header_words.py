@@ -1,8 +1,18 @@
-"""Words of the program's header that the reader looks for."""
+"""The lines of a program's head that `verify` decides by: one place writes them, one reads them back (`read_head`).
+
+Controls change comments: capitals, accents, brackets. What is read is looked for without regard to case.
+"""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
+from typing import NamedTuple
+
+NO_FILE = "without a file"
+"""in the place of a file's name where a set-up came without one"""
+SETUP_MARK = "fingerprint of the set-up"
+"""before the eight hex digits of the set-up"""
 
 FINGERPRINT = "fingerprint of the geometric errors"
 """before the eight hex digits of the error model that a program was written with"""
@@ -29,3 +39,128 @@ def head_of(data: bytes) -> bytes:
     while at < len(text) and (line := _COMMENT.match(text, at)) is not None:
         at = line.end()
     return text[first.start():at]
+
+
+def corrected_here(model: str) -> str:
+    """That the program corrects geometric errors by itself."""
+    return f"geometric errors {model}: corrected in this program; the control must not correct them again"
+
+
+def corrected_by_control(model: str) -> str:
+    """That the program leaves geometric errors to the control."""
+    return f"geometric errors {model}: corrected by the control, not in this program"
+
+
+def model_mark(mark: str) -> str:
+    """The fingerprint of the errors that the program corrects."""
+    return f"{FINGERPRINT} {mark}"
+
+
+def chosen_axes(plan: str, max_tilt: float) -> str:
+    """That tool axes are others than those of the CL file."""
+    return f"tool axes chosen: orient {plan}, max tilt {max_tilt:g} degrees"
+
+
+def setup_line(name: str, mark: str) -> str:
+    """The set-up by its file's name and its fingerprint, either of which may be empty."""
+    return f"setup {name or NO_FILE}{f', {SETUP_MARK} {mark}' if mark else ''}"
+
+
+def feed_line(source: str, merged: float) -> str:
+    """Where F words come from, and the part by which they may be lowered to share one."""
+    return f"feed {source}, merged within {100.0 * merged:g} %"
+
+
+def feeds_line() -> str:
+    """The place of the fingerprint of planned feeds (`with_feeds_mark`)."""
+    return f"{FEEDS} {UNKNOWN}"
+
+
+class SetupNamed(NamedTuple):
+    """The set-up that a head names; "" for a mark that it does not state."""
+
+    name: str
+    mark: str
+
+
+class AxesNamed(NamedTuple):
+    """The plan of tool axes that a head names, in small letters."""
+
+    plan: str
+    max_tilt: str
+
+
+@dataclass(frozen=True)
+class Head:
+    """What the head of a program says.
+
+    Attributes:
+        ours: True where postproc wrote it
+        corrected: name of the error model that the program corrects ("" without a name), None where it corrects none
+        model: fingerprint of that model, "" where none is stated
+        by_control: True where it leaves geometric errors to the control
+        axes: None where those of the CL file are kept
+        setup: None where it names none
+        planned: True where its feeds were planned
+        feeds: fingerprint of its F words, "" where none is stated
+    """
+
+    ours: bool
+    corrected: str | None
+    model: str
+    by_control: bool
+    axes: AxesNamed | None
+    setup: SetupNamed | None
+    planned: bool
+    feeds: str
+
+
+_CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors ([^\n]*?):? corrected in this program")
+_MODEL = re.compile(rb"(?im)^[^\n]*" + FINGERPRINT.encode("ascii") + rb" ([0-9a-f]{8})\b")
+_BY_CONTROL = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
+_AXES = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
+_SETUP = re.compile(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
+_OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
+_PLANNED = re.compile(rb"(?im)^[ \t(;\d]*feed planned")
+_FEEDS = re.compile(rb"(?im)^[^\n]*" + FEEDS.encode("ascii") + rb" ([0-9a-f]{8})\b")
+_PLACE = re.compile(f"(?i){FEEDS} {UNKNOWN}")
+
+
+def read_head(data: bytes) -> Head:
+    """The head of a program as values; data may be the whole program."""
+    head = head_of(data)
+    named, axes, setup = _CORRECTED.search(head), _AXES.search(head), _SETUP.search(head)
+    marks = [found[1].decode("ascii").lower() if (found := mark.search(head)) else "" for mark in (_MODEL, _FEEDS)]
+    return Head(
+        ours=_OURS.search(head) is not None, by_control=_BY_CONTROL.search(head) is not None,
+        corrected=named[1].decode("utf-8", "replace") if named else None, model=marks[0],
+        axes=AxesNamed(*(text.decode("ascii", "replace").lower() for text in axes.groups())) if axes else None,
+        setup=_named(setup) if setup else None, planned=_PLANNED.search(head) is not None, feeds=marks[1])
+
+
+def _named(setup: re.Match[bytes]) -> SetupNamed:
+    """The set-up of a line; the bracket that ends a comment is no part of its name."""
+    name, mark = setup[1].decode("utf-8", "replace").strip(), (setup[2] or b"").decode("ascii").lower()
+    in_brackets = setup[0].lstrip(b" \tN0123456789").startswith(b"(")
+    return SetupNamed(name if mark or not in_brackets else name.removesuffix(")"), mark)
+
+
+def with_feeds_mark(text: str, mark: str) -> str:
+    """The text of a program with the fingerprint of its F words in the place that the head has left for it."""
+    place = _PLACE.search(text, 0, HEADER)
+    return text if place is None else text[:place.end() - len(UNKNOWN)] + mark + text[place.end():]
+
+
+def feeds_place(text: str) -> bool:
+    """Whether the head of a program has left a place for the fingerprint of its F words."""
+    return _PLACE.search(text, 0, HEADER) is not None
+
+
+def same_name(one: str, other: str) -> bool:
+    """Whether names are the same but for what the comments of some controls change of them."""
+    return _as_in_comments(one) == _as_in_comments(other)
+
+
+def _as_in_comments(name: str) -> str:
+    """A name without capitals, accents, brackets."""
+    return re.sub(r"[^a-z0-9]+", " ", name.lower())

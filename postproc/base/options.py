@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from postproc.base.header_words import chosen_axes, feed_line, setup_line
+
 FeedModeChoice = Literal["auto", "per-minute", "inverse-time"]
 OutputMode = Literal["auto", "axes", "tcp", "tilted"]
 FeedSource = Literal["programmed", "planned"]
 Orientation = Literal["keep", "per-pass", "whole-part", "auto"]
-SETUP_MARK = "fingerprint of the set-up"
-"""before the eight hex digits, in the header of a program, of the set-up that it was written with"""
-NO_FILE = "without a file"
-"""name, in the header of a program, of a set-up that was given as a SetupFile"""
 
 
 @dataclass(frozen=True)
@@ -56,17 +54,16 @@ class Options:
         if self.output != "auto":
             lines.append(f"output mode {self.output}")
         if self.feed != "programmed":
-            lines.append(f"feed {self.feed}, merged within {100.0 * self.merge_feeds:g} %")
+            lines.append(feed_line(self.feed, self.merge_feeds))
         if self.orient != "keep":
-            lines.append(f"tool axes chosen: orient {self.orient}, max tilt {self.max_tilt:g} degrees")
+            lines.append(chosen_axes(self.orient, self.max_tilt))
         if self.smooth:
             lines.append("points smoothed")
         if self.error_model:
             beyond = ", beyond its range too" if self.error_beyond else ""
             lines.append(f"error model {Path(self.error_model).name}{beyond}")
         if self.setup or self.setup_mark:
-            mark = f", {SETUP_MARK} {self.setup_mark}" if self.setup_mark else ""
-            lines.append(f"setup {Path(self.setup).name or NO_FILE}{mark}")
+            lines.append(setup_line(Path(self.setup).name, self.setup_mark))
         for name in ("units", "dialect"):
             if getattr(self, name):
                 lines.append(f"{name} {getattr(self, name)}")

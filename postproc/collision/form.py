@@ -14,6 +14,7 @@ from postproc.setup.bodies import HolderSection
 from postproc.setup.model import ToolSetup
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, info, warning
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Tool
 from toolpaths.units import DEG
 
@@ -25,6 +26,7 @@ _ANY = ToolSetup(gauge_length=1.0)
 
 
 @dataclass(frozen=True)
+@arrays(pieces="P 5", part="P")
 class ToolForm:
     """A tool's pieces (P, 5), see `revolution`, and which of PARTS each belongs to (P,).
 

@@ -17,6 +17,7 @@ from postproc.readback.execution.poses import BlockPoses, begins
 from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors, info
+from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:
     from postproc.job.job import Job
@@ -54,6 +55,7 @@ def touching_parts(motion: Motion, executed: BlockPoses, job: Job, owner: Ints, 
 
 
 @dataclass(frozen=True)
+@arrays(drilling="E", unbounded="U")
 class _Way:
     """All that one tool does in a program: its way beside the bodies.
 

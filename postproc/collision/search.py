@@ -14,11 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.compiled import compiled, wanted
 from postproc.collision.revolution import around, bend, lever, middle, raised, support
 from postproc.collision.solid import TriangleSolid
 from postproc.collision.swept import TURN, Swept
 from toolpaths.arrays import Floats, Ints
+from toolpaths.compiled import compiled, wanted
+from toolpaths.shapes import arrays
 
 EXACT = 1e-3
 """mm"""
@@ -181,6 +182,7 @@ def _next(pairs: Ints, bound: Floats, enough: float) -> tuple[Ints, Floats, Ints
 
 
 @dataclass(frozen=True)
+@arrays(corners="N 3 3", normal="N 3", tip="N 2 3", axis="N 2 3", place="N")
 class _Cells:
     """N pairs of a part of a triangle (N, 3, 3) with its normal and a part of a piece: tips and axes (N, 2, 3).
 

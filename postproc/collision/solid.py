@@ -11,12 +11,14 @@ import numpy as np
 from postproc.collision.tree import Tree, tree, z_order
 from postproc.setup.model import Placement
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
 
 @dataclass(frozen=True)
+@arrays(corners="T 3 3", normal="T 3")
 class TriangleSolid:
     """Closed surface of T triangles.
 

@@ -10,6 +10,7 @@ import numpy as np
 from postproc.collision.tree import Tree, tree
 from toolpaths.arrays import Floats, Ints
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
 OFF = 2e-3
 """mm that a point of a tool may be off its true place by what pieces leave out"""
@@ -20,6 +21,7 @@ _KEPT = 1_000_000
 
 
 @dataclass(frozen=True)
+@arrays(tip="N 2 3", axis="N 2 3", row="N")
 class Swept:
     """N pieces in the table frame, in order.
 

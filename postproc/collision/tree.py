@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 
 _BITS = 16
 """of each coordinate in the order along the Z curve"""
 
 
 @dataclass(frozen=True)
+@arrays(centre="L 3", half="L 3")
 class Tree:
     """Boxes of 2 L - 1 nodes over `count` <= L items: item i is node L - 1 + i.
 

@@ -13,9 +13,11 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.controllers.model import FeedRules
 from postproc.path.model import ARC, JointPath
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(feed="K", mode="K", seconds="K", slowed="K")
 class Feeds:
     """Feed words (K,) with their mode (K,), the time of each block (K,) s, and the blocks slowed for an axis (K,)."""
 
@@ -26,6 +28,7 @@ class Feeds:
 
 
 @dataclass(frozen=True)
+@arrays(needed="K")
 class PlannedTimes:
     """Least seconds (K,) of each block that keep the limits of the axes, and the part by which feeds may be merged."""
 

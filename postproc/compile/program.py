@@ -12,6 +12,7 @@ from postproc.control.control import InterpolationMode
 from postproc.control.planes import Plane
 from postproc.control.rollover import Rollover
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 PER_MINUTE, INVERSE = 0, 1
 
@@ -75,6 +76,8 @@ class Hole:
 
 
 @dataclass(frozen=True)
+@arrays(words="K J", write="K J", code="K", feed="K", mode="K", plane="K", ccw="K", center="K 3", home="K", link="K",
+        row="K", line="K", decimals="J", skip="K")
 class Program:
     """K blocks with the commands before them.
 

@@ -14,12 +14,14 @@ from postproc.control.word_arcs import PLANE_AXIS
 from postproc.path.model import ARC, FEED, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 SNAP = 2.5
 """X, Y, Z residues beside a rotary move, in units of the last decimal, that are not written"""
 
 
 @dataclass(frozen=True)
+@arrays(end="K J", start="K J", write="K J")
 class WordRows:
     """Words (K, J) at the end and, in the same meaning, at the start of each block, rounded; `write` those it states."""
 

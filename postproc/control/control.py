@@ -21,6 +21,7 @@ from machines.machine import Machine
 from postproc.control.planes import Plane
 from postproc.control.rollover import Rollover, parked
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 XYZ = ("X", "Y", "Z")
@@ -30,6 +31,7 @@ FeedLength = Literal["xyz-first", "all", "geometry"]
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(origin="3")
 class Control:
     """The control of a machine as programs see it, under one law; `under` gives it under another.
 

@@ -16,6 +16,7 @@ from postproc.setup.model import SetupFile
 from toolpaths.arrays import Array, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Toolpath
 
 ASKED = ("auto", "axes", "tcp", "tilted")
@@ -37,6 +38,7 @@ class WordFrame:
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(asked="O", decimals="J")
 class OutputModes:
     """What controller and machine can do, and what is asked for each operation.
 

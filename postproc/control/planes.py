@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 
 from toolpaths.arrays import Floats, frozen
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 Convention = Literal["ZXZ", "ZYX", "XYZ", "rotary"]
@@ -25,6 +26,7 @@ _GIMBAL = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(rotation="3 3", origin="3")
 class Plane:
     """A plane's frame in the table frame: columns of `rotation` (3, 3) are X', Y', Z'; `origin` (3,) mm."""
 

@@ -10,6 +10,7 @@ from machines.kinematics.base import Kinematics
 from postproc.control.control import Control
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
 PLANE_COLUMNS = {17: (0, 1), 18: (2, 0), 19: (1, 2)}
 """numbers (of X, Y, Z) of the first and second axis of G17, G18, G19; G3 turns the first towards the second"""
@@ -24,6 +25,7 @@ _RADIUS_SLACK = 0.002
 
 
 @dataclass(frozen=True)
+@arrays(keep="N", plane="N", ccw="N", center="N 3", parts="N")
 class WordArcs:
     """For N curves: `keep` (N,) True where the words describe the same arc; then `plane` (17, 18, 19), `ccw` as seen
     from the positive end of the third axis, `center` (N, 3) in the words X, Y, Z relative to the start point, and

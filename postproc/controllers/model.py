@@ -250,6 +250,11 @@ class ControllerFile(UserModel):
     modes: Modes = Modes()
     rollover: RolloverRules = RolloverRules()
 
+    @property
+    def keeps_length(self) -> bool:
+        """True where a tool change puts the length of the tool in force for good: no code takes it back."""
+        return self.tools.length_automatic and not self.codes.length_cancel
+
     def divided(self, files: bool) -> ControllerFile:
         """The controller that writes operations into files of their own, where that is asked for."""
         return self.model_copy(update={"subprograms": self.subprogram_files}) if files else self

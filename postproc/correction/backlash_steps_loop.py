@@ -1,57 +1,35 @@
-"""The steps of `postproc.correction.backlash_steps` in plain loops over numbers, which numba compiles for long programs.
+"""The walk of `postproc.correction.backlash_steps` block by block in loops over numbers, compiled for long programs.
 
-It does what the plain walk there does; tests compare the two. `joint` (T, 13) and `space` (3, 8) hold what counts at one
+`joint` (T, 13) and `space` (3, 8) hold what counts at one
 block: per joint START to BEFORE, and BY of the tip; per direction of space OFF, RATES, INVERSE and FREE.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cache
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
-COMPILE_FROM = 20_000
-"""blocks from which compiling pays"""
+from toolpaths.compiled import loop
+
 START, BACK, GAP, GOES_ON, LATER, BEFORE, BY = 0, 1, 4, 5, 6, 9, 10
 OFF, RATES, INVERSE, FREE = 0, 1, 4, 7
-HELPERS = "_take", "_fill", "_invert", "_cost", "_nearest", "_toward", "_by_ways", "_beside"
 
 
-def wanted(blocks: int) -> bool:
-    """Whether the compiled loop pays: for many blocks, or because it is compiled anyway."""
-    return blocks >= COMPILE_FROM or compiled.cache_info().currsize > 0
-
-
-@cache
-def compiled() -> Callable[..., Any]:
-    """`walk_all` compiled, kept on disk where the package's folder can be written; the module's helpers are replaced, so
-    that compiled code calls compiled code."""
-    from numba import njit
-
-    def jit(function: Callable[..., Any]) -> Callable[..., Any]:
-        try:
-            return cast(Callable[..., Any], njit(function, cache=True, error_model="numpy"))
-        except RuntimeError:
-            return cast(Callable[..., Any], njit(function, error_model="numpy"))
-
-    for name in HELPERS:
-        globals()[name] = jit(globals()[name])
-    return jit(walk_all)
-
-
+@loop(alone=True)
 def walk_all(off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, bend: Any, last: Any, later: Any, goes_on: Any,
              weight: Any, plain: Any, near: Any, enough: Any, free: Any, like: Any, weights: Any, rests: Any, nearer: Any,
              reach: Any) -> Any:
     """Steps (K, 3) and ways (K, T) for the attributes of `Ends`; `weights` are (PLAIN, BETWEEN), then RESTS, NEARER, REACH
-    of the plain walk."""
+    of `walk`."""
     blocks, lossy = gap.shape
     result, ways = np.zeros((blocks, 3)), np.zeros((blocks, lossy))
     joint, space, way, shifted = np.zeros((lossy, 13)), np.zeros((3, 8)), np.zeros(lossy), np.zeros(lossy)
     n, other, still = np.zeros(3), np.zeros(3), np.zeros(3)
     for k in range(blocks):
+        # Play operator: the way of a joint moves by two over its lost motion and stays in [-1, 1]; the words chosen before
+        # have moved it by `shifted`.
         for t in range(lossy):
             start = way[t] - 2.0 * shifted[t] / gap[k, t] + bend[0, k, t]
             joint[t, START] = min(max(start, bend[1, k, t]), bend[2, k, t]) + last[k, t]
@@ -77,12 +55,14 @@ def walk_all(off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, bend: A
     return result, ways
 
 
+@loop(alone=True)
 def _take(n: Any, other: Any) -> None:
     """n (3,) becomes the other; a loop, as numba compiles slices for seconds."""
     for i in range(3):
         n[i] = other[i]
 
 
+@loop(alone=True)
 def _fill(k: Any, joint: Any, space: Any, off: Any, by_way: Any, tip_rates: Any, back: Any, gap: Any, later: Any,
           goes_on: Any, free: Any, way: Any) -> None:
     """What counts at block k."""
@@ -97,6 +77,7 @@ def _fill(k: Any, joint: Any, space: Any, off: Any, by_way: Any, tip_rates: Any,
     _invert(space)
 
 
+@loop(alone=True)
 def _invert(space: Any) -> None:
     """The inverse of the rates (3, 3), by cofactors."""
     for i in range(3):
@@ -112,6 +93,7 @@ def _invert(space: Any) -> None:
             space[i, INVERSE + j] /= det
 
 
+@loop(alone=True)
 def _cost(joint: Any, space: Any, n: Any, weight: Any, weighed: Any, rests: Any) -> Any:
     """mm that the tip is off by after steps n (3,), and the weighted parts of what the next block begins off by and of a
     plain reading."""
@@ -135,12 +117,14 @@ def _cost(joint: Any, space: Any, n: Any, weight: Any, weighed: Any, rests: Any)
     return cost + weighed * math.sqrt(x2 * x2 + y2 * y2 + z2 * z2)
 
 
+@loop(alone=True)
 def _nearest(space: Any, other: Any, x: Any, y: Any, z: Any) -> None:
     """Put the steps (3,) that take back what the tip is off by into `other`."""
     for i in range(3):
         other[i] = -np.rint(space[i, INVERSE] * x + space[i, INVERSE + 1] * y + space[i, INVERSE + 2] * z) * space[i, FREE]
 
 
+@loop(alone=True)
 def _toward(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any, rests: Any) -> Any:
     """The nearest steps for the ways that the steps n (3,) make, those of the next, as long as it comes nearer."""
     while True:
@@ -163,6 +147,7 @@ def _toward(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, 
         _take(n, other)
 
 
+@loop(alone=True)
 def _by_ways(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any, rests: Any) -> Any:
     """The nearest steps for every way that is one of both or that before, where that comes nearer than n (3,)."""
     for number in range(3 ** len(joint)):
@@ -179,6 +164,7 @@ def _by_ways(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any,
     return cost
 
 
+@loop(alone=True)
 def _beside(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any, rests: Any, nearer: Any,
             reach: Any) -> Any:
     """The best steps around n (3,), near ones and far ones in turn, as long as one comes nearer."""

@@ -17,6 +17,7 @@ from postproc.correction.reversals import Divided
 from postproc.correction.runs import RowRuns
 from postproc.path.model import ARC, FEED, TRAVERSE, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 AT_ONCE = 50_000
 """blocks whose rates are found together"""
@@ -36,6 +37,7 @@ ROUNDED = 2.5
 
 
 @dataclass(frozen=True)
+@arrays(grain="J")
 class Writing:
     """How a path is written.
 

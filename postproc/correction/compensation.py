@@ -31,6 +31,7 @@ from postproc.path.model import JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 DOUBTS = 500
@@ -44,6 +45,7 @@ SETTLED = 5
 
 
 @dataclass(frozen=True)
+@arrays(residual_tip="K 3", residual_axis="K 3", moved="J", owner="L", part="L", apart="A")
 class ErrorCorrection:
     """What the correction did to the blocks that it corrects, mm and rad.
 
@@ -158,7 +160,9 @@ def _written_out(corrected: JointPath, path: JointPath, work: ErrorContext, writ
         again -= 1
         if not (again and len(far)):
             return whole, written, resolved, axis_left
-        corrected.q[far] = written.q[ends[far]]
+        q = corrected.q.copy()
+        q[far] = written.q[ends[far]]
+        corrected = replace(corrected, q=q)
         work.way[far[:, None], work.two_way] = ways[ends[far]]
         del starts, fitted, whole, written, ways  # not to be held beside the next
 

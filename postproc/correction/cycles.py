@@ -16,6 +16,7 @@ from postproc.correction.runs import RowRuns
 from postproc.path.model import FEED, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 
 SAME = 0.5 * GRAIN[0]
@@ -92,6 +93,7 @@ def _lifted(path: JointPath, q: Floats, work: ErrorContext, block: Ints) -> Floa
 
 
 @dataclass(frozen=True)
+@arrays(owner="H", wanted="M 3", found="M 3", feeds="M", plane="H", apart="H")
 class _Holes:
     """H holes of M blocks in words X, Y, Z.
 

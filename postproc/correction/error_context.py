@@ -18,6 +18,7 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.correction.error_sampling import changes
 from postproc.path.model import ARC, TRAVERSE, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 MOMENT = 1e-3
 """of a block: how far back its direction at a place is looked at"""
@@ -33,6 +34,7 @@ STANDS = 1e-9
 
 
 @dataclass(frozen=True)
+@arrays(q="K J", before="K 2", after="K 2", residual="K 6", partial="K", unmeasured="K J")
 class CorrectedEnds:
     """Corrected joints (K, J) and what `correct` said of them, for all blocks."""
 
@@ -240,8 +242,8 @@ class ErrorContext:
     def ends(self) -> CorrectedEnds:
         """All block ends, by the ways `way`; home blocks as they are."""
         n, joints = self.path.q.shape
-        out = CorrectedEnds(self.path.q.copy(), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 6)),
-                            np.zeros(n, dtype=bool), np.zeros((n, joints), dtype=bool))
+        ends, before, after, residual = self.path.q.copy(), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 6))
+        partial, unmeasured = np.zeros(n, dtype=bool), np.zeros((n, joints), dtype=bool)
         for k in groups(self.tools):
             rows = k[~self.path.home[k]]
             if not len(rows):
@@ -251,12 +253,12 @@ class ErrorContext:
             tip, axis = self.kinematics(tool).forward(q)
             found = correct(self.actual(tool), q, tip, axis, group=self.group[rows], direction=self.way[rows],
                             axis_tolerance=self.axis_tolerance, beyond=self.beyond[rows])
-            out.q[rows] = self._exact_turns(found.q, rows)
-            out.before[rows] = np.stack([found.tip_before, found.axis_before], axis=1)
-            out.after[rows] = np.stack([found.tip_after, found.axis_after], axis=1)
-            out.residual[rows] = np.concatenate([found.tip_residual, found.axis_residual], axis=1)
-            out.partial[rows], out.unmeasured[rows] = found.partial, found.unmeasured
-        return out
+            ends[rows] = self._exact_turns(found.q, rows)
+            before[rows] = np.stack([found.tip_before, found.axis_before], axis=1)
+            after[rows] = np.stack([found.tip_after, found.axis_after], axis=1)
+            residual[rows] = np.concatenate([found.tip_residual, found.axis_residual], axis=1)
+            partial[rows], unmeasured[rows] = found.partial, found.unmeasured
+        return CorrectedEnds(ends, before, after, residual, partial, unmeasured)
 
     def _exact_turns(self, q: Floats, rows: Ints) -> Floats:
         """The same joints, those of a group with the rotary axes of its first block to the last digit."""

@@ -12,6 +12,7 @@ from postproc.correction.error_sampling import looks_between
 from postproc.correction.reversals import LOOSE, SHORTEST, Divided, Starts, inserted, reversals, stretches
 from postproc.path.model import ARC, FEED, TRAVERSE, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 LOOKS = (1.0 / 64.0, *ARC_LOOKS)
@@ -47,6 +48,7 @@ def between(path: JointPath, work: ErrorContext, starts: Starts, allowed: float)
 
 
 @dataclass(frozen=True)
+@arrays(block="N", t0="N", t1="N", q0="N J", q1="N J", way="N J", behind="N")
 class BlockPieces:
     """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends, and the ways (N, J) at t0; mm (N,)
     that the tip is off at t0 of rapids behind holes that are corrected as a whole: no point between mends that."""

@@ -12,6 +12,7 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.correction.error_context import ALONE, EDGES, ErrorContext
 from postproc.path.model import ARC, FEED, TRAVERSE, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 BISECTIONS = 14
 """halvings to find where between two looks an axis turns back"""
@@ -44,6 +45,7 @@ def arcs_cut(path: JointPath, work: ErrorContext) -> Divided:
 
 
 @dataclass(frozen=True)
+@arrays(q="K J", way="K J", block="N")
 class Starts:
     """Joints (K, J) and ways (K, J) where blocks begin when corrected; those of `block` (N,) after taking up what an axis
     has lost."""
@@ -111,6 +113,7 @@ def _bisected(work: ErrorContext, block: Ints, edges: tuple[float, ...]) -> tupl
 
 
 @dataclass(frozen=True)
+@arrays(owner="K", part="K")
 class Divided:
     """A path made of another's blocks: `owner` (K,) which of them each block is of, `part` (K,) of its time."""
 

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(begin="H", size="H")
 class RowRuns:
     """H runs of rows that follow each other, N rows in all: `begin` (H,) row of each run's first, `size` (H,) rows."""
 

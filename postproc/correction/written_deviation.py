@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 
 @dataclass(frozen=True)
+@arrays(tip="M", axis="M", points="M", blocks="M")
 class AfterFormatting:
     """Deviation of the machine with errors at the CL points of a written program, mm and rad.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from machines.machine import Machine
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, frozen, shared, taken
+from toolpaths.shapes import arrays
 
 
 class CornerMode(IntEnum):
@@ -35,6 +36,7 @@ class Cause(IntEnum):
 
 
 @dataclass(frozen=True)
+@arrays(rotary="A", velocity="A", acceleration="A", jerk="A", xyz="3")
 class Axes:
     """What the columns of a program may do.
 
@@ -65,6 +67,7 @@ class Axes:
 
 
 @dataclass(frozen=True)
+@arrays(block="P", cause="P", seconds="P", line="P")
 class Pauses:
     """P times at rest, in order.
 
@@ -101,6 +104,8 @@ _COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
 
 
 @dataclass(frozen=True)
+@arrays(start="E A", end="E A", line="E", rapid="E", arc="E", center="E 3", normal="E 3", sweep="E", speed="E", path="E",
+        tolerance="E", chain="E", operation="E", cl_line="E", move="E", given="E", pieces="E")
 class MotionBlocks:
     """E blocks that move, in mm, rad and s.
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.compiled import compiled
 from postproc.cycle_time.blocks import CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_kernels import speeds
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, merge
@@ -18,6 +17,7 @@ from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import ramps
 from postproc.cycle_time.shape import Shape, axis_limit, shape
 from toolpaths.arrays import Floats
+from toolpaths.compiled import chosen
 
 
 def lower_bound(blocks: MotionBlocks, model: CycleTimeModel) -> float:
@@ -33,7 +33,7 @@ def lower_bound(blocks: MotionBlocks, model: CycleTimeModel) -> float:
     target = np.minimum(np.where(merged.rapid, np.inf, merged.speed * max(model.override, 1.0)), velocity)
     through = ~merged.forced
     free = np.full(len(merged), np.inf)
-    loop = compiled(speeds) if len(merged) >= KERNEL_FROM else speeds
+    loop = chosen(speeds, len(merged), KERNEL_FROM)
     lent = shared_feed(merged, form, target, model)
     first, last = loop(length, lent, lent, rate, through, free, free)
     seconds = np.maximum(ramps(length, first, last, lent, rate).seconds, at_feed(merged, form, length, target, lent, model))

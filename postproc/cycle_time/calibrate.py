@@ -21,6 +21,7 @@ from postproc.cycle_time.log import RunLog, matched
 from postproc.cycle_time.model import PARAMETERS, CalibrationRecord, CycleTimeModel
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, warning
+from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -46,6 +47,7 @@ SEEN = 0.5
 
 
 @dataclass(frozen=True)
+@arrays(measured="K", modelled="K")
 class CalibratedModel:
     """A calibrated model and how well it fits.
 

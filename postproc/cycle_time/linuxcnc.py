@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.compiled import compiled
 from postproc.base.memory import give_back
 from postproc.cycle_time.blocks import Cause, CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_corners import KINK, BlendArcs, Corners, blends, corners
@@ -22,6 +21,8 @@ from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE, Pla
 from postproc.cycle_time.phases import BlockTimes, Ramps, ramps, summed
 from postproc.cycle_time.shape import NOTHING, shape
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.compiled import chosen
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 STOP, TANGENT, OVERLAP = 0, 2, 3
@@ -61,6 +62,8 @@ class Settings:
 
 
 @dataclass(frozen=True)
+@arrays(owner="M", length="M", asked="M", most="M", rate="M", ends="M", kink="M", fresh="M", traverse="M",
+        overlap_speed="M")
 class Row:
     """M segments and blend arcs in the order of motion; fields as in `PlannerSegments`."""
 
@@ -239,14 +242,13 @@ def _along_arcs(s: PlannerSegments, rate: Floats, most: Floats, finished: Bools)
 
 def _timed(blocks: MotionBlocks, s: PlannerSegments, row: Row, settings: Settings) -> BlockTimes:
     """Speeds by look-ahead, ramps, and everything put on the clock."""
-    big = len(row.length) >= KERNEL_FROM
     through = (row.ends == TANGENT) & ~np.append(row.fresh[1:], True)
     behind = np.concatenate([[False], through[:-1]])
     inside = behind & ~np.append(row.fresh[1:], True)
     most = np.where(inside, clamped(row.length, row.most, LEAST_CYCLES * settings.cycle), row.most)
     target = np.minimum(row.asked, most)
     ahead = _ahead(row, settings.depth)
-    loop = compiled(speeds) if big else speeds
+    loop = chosen(speeds, len(row.length), KERNEL_FROM)
     first, last = loop(row.length, target, most, row.rate, through, row.kink, ahead)
     gentle = through & ~row.traverse & (2.0 * row.length < RAMP_TIME * (first + np.minimum(last, target))) & (last > 0.0)
     r = ramps(row.length, first, last, target, row.rate, gentle)
@@ -254,7 +256,7 @@ def _timed(blocks: MotionBlocks, s: PlannerSegments, row: Row, settings: Setting
     overlap = _overlapping(row, r, settings)
     settling = np.where(stops & (overlap == 0.0), settings.stop_cycles * settings.cycle, 0.0)
     pause, resting = _pauses(blocks, s, row)
-    clock = compiled(timeline) if big else timeline
+    clock = chosen(timeline, len(row.length), KERNEL_FROM)
     begin, end = clock(r.seconds + settling, overlap, resting, row.fresh)
     end[-1:] += SETTLED
     return _by_block(blocks, s, row, r.up + r.down, r.steady, begin, end, pause, stops, first, last, r.peak)

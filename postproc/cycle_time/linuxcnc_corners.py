@@ -14,6 +14,7 @@ import numpy as np
 
 from postproc.cycle_time.linuxcnc_segments import NORMAL_SHARE, PlannerSegments, clamped, plane_limit
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 KINK = 0.1
 """share of the acceleration that a corner passed as if tangent may take ([TRAJ] ARC_BLEND_KINK_RATIO)"""
@@ -24,6 +25,7 @@ QUARTER = 0.25
 
 
 @dataclass(frozen=True)
+@arrays(straight="N", back="N", speed="N", load="N", tangent="N", kinked="N")
 class Corners:
     """The N - 1 places where segment i runs into i + 1.
 
@@ -62,6 +64,7 @@ def corners(s: PlannerSegments, free: Bools, cycle: float) -> Corners:
 
 
 @dataclass(frozen=True)
+@arrays(good="K", trim="K 2", length="K", asked="K", most="K", acceleration="K")
 class BlendArcs:
     """Blend arcs at K corners: `trim` (K, 2) mm taken from both sides, `length`, `asked` and `most` speed,
     `acceleration`; `good` where there is an arc at all."""
@@ -75,6 +78,7 @@ class BlendArcs:
 
 
 @dataclass(frozen=True)
+@arrays(arc="K", arm="K", lean="K 3", ease="K", center="K 3", radius="K", convex="K", most="K")
 class _Side:
     """One side of K corners. `arm`: length that may be taken; `lean`: direction of the secant that stands for a convex
     arc; `ease`: rad by which it closes the corner; center, radius, convex, most: of arcs."""

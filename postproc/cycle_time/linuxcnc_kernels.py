@@ -1,5 +1,5 @@
 """Plain loops of the LinuxCNC model: interpreted for small programs, compiled for large ones, to the same bits
-(`base/compiled.py`)."""
+(`toolpaths/compiled.py`)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from toolpaths.compiled import loop
 
+
+@loop
 def chain_ends(xyz: Any, joins: Any, tolerance: Any) -> Any:
     """(E,) True where a block ends a chain of merged lines.
 
@@ -41,6 +44,7 @@ def chain_ends(xyz: Any, joins: Any, tolerance: Any) -> Any:
     return ends
 
 
+@loop
 def speeds(length: Any, target: Any, most: Any, rate: Any, through: Any, kink: Any, ahead: Any) -> Any:
     """(2, N) speed at begin and end of each segment.
 
@@ -68,6 +72,7 @@ def speeds(length: Any, target: Any, most: Any, rate: Any, through: Any, kink: A
     return result
 
 
+@loop
 def timeline(seconds: Any, overlap: Any, rest: Any, fresh: Any) -> Any:
     """(2, N) times at which each segment begins and ends.
 

@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.base.compiled import compiled
 from postproc.cycle_time.blocks import Axes, CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_kernels import chain_ends
 from postproc.cycle_time.shape import Shape, axis_limit, shape
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.compiled import chosen
+from toolpaths.shapes import arrays
 
 NORMAL_SHARE = np.sqrt(3.0) / 2.0
 """of the acceleration on a circle may point to its centre (`BLEND_ACC_RATIO_NORMAL`)"""
@@ -23,6 +24,7 @@ KERNEL_FROM = 20_000
 
 
 @dataclass(frozen=True)
+@arrays(block="N", fresh="N", length="N", asked="N", most="N", acceleration="N")
 class PlannerSegments:
     """N segments of the planner, in mm or rad of `length`, and s.
 
@@ -82,7 +84,7 @@ def merge(blocks: MotionBlocks) -> tuple[MotionBlocks, Ints]:
     for column in (blocks.speed, blocks.path, blocks.tolerance, blocks.chain):
         same &= np.concatenate([[False], column[1:] == column[:-1]])
     joins = line & ~turns & same & np.concatenate([[False], (line & ~turns & ~blocks.forced)[:-1]])
-    loop = compiled(chain_ends) if len(blocks) >= KERNEL_FROM else chain_ends
+    loop = chosen(chain_ends, len(blocks), KERNEL_FROM)
     keep = np.flatnonzero(loop(np.ascontiguousarray(blocks.xyz), joins, np.array(blocks.chain)))
     if len(keep) == len(blocks) and (blocks.start[1:] == blocks.end[:-1]).all():
         return blocks, rows

@@ -13,6 +13,7 @@ from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.source import read_file
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.shapes import arrays
 
 LEAST = 8
 """lines of the log that a fit needs"""
@@ -21,6 +22,7 @@ MOST_LINES, MOST_SECONDS = 1e9, 1e7
 
 
 @dataclass(frozen=True)
+@arrays(line="S", time="S", position="S A", row="S")
 class RunLog:
     """S samples in the order of the run.
 

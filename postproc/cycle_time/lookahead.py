@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.compiled import compiled
 from postproc.cycle_time.blocks import CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_kernels import speeds
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE
@@ -21,12 +20,15 @@ from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes, Ramps, ramps, summed
 from postproc.cycle_time.shape import Shape, axis_limit, shape
 from toolpaths.arrays import Bools, Floats
+from toolpaths.compiled import chosen
+from toolpaths.shapes import arrays
 
 TANGENT = 1e-3
 """|du| up to which an exact path goes on without a stop"""
 
 
 @dataclass(frozen=True)
+@arrays(first="E A", last="E A")
 class PathDerivatives:
     """(E, A) derivatives of the axes by path length at begin and end of each block."""
 
@@ -54,7 +56,7 @@ def lookahead(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
     through = np.append(corner > 0.0, False)
     kink = np.append(np.where(corner > 0.0, corner, np.inf), np.inf)
     ahead = window(form.length, rate, model.lookahead)
-    loop = compiled(speeds) if len(blocks) >= KERNEL_FROM else speeds
+    loop = chosen(speeds, len(blocks), KERNEL_FROM)
     first, last = loop(form.length, target, target, rate, through, kink, ahead)
     r = ramps(form.length, first, last, target, rate)
     extra = jerk_time(form.length, first, last, r, rate, jerk, target) if model.jerk else np.zeros(len(blocks))

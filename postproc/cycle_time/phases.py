@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(up="N", steady="N", down="N", peak="N")
 class Ramps:
     """A motion along N lengths under constant accelerations, s and mm or rad.
 
@@ -50,6 +52,7 @@ def ramps(length: Floats, first: Floats, last: Floats, target: Floats, rate: Flo
 
 
 @dataclass(frozen=True)
+@arrays(begin="E", end="E", ramp="E", steady="E", jerk="E", peak="E", lost_stop="E", lost_corner="E", pause="P")
 class BlockTimes:
     """What a model says of E blocks.
 

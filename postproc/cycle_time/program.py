@@ -16,6 +16,7 @@ from postproc.readback.text.canonical import LOADED, OFFSET, REGISTER, REST, SMO
 from postproc.readback.text.modal import columns, fill_values, modal_state
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 RESTING_M = (0.0, 1.0, 3.0, 4.0, 5.0, 7.0, 8.0, 9.0)
@@ -30,6 +31,7 @@ INCH = 25.4
 
 
 @dataclass(frozen=True)
+@arrays(operation="E", cl_line="E", move="E")
 class BlockOrigin:
     """Where motion blocks come from: operation (E,) of `names`; CL line and row of the job's moves (E,) or None."""
 

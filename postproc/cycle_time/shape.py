@@ -9,12 +9,14 @@ import numpy as np
 from postproc.cycle_time.blocks import Axes, MotionBlocks
 from toolpaths.arrays import Bools, Floats, repeated
 from toolpaths.rotations import lengths
+from toolpaths.shapes import arrays
 
 NOTHING = 1e-9
 """mm or rad below which an axis does not move (LinuxCNC: 1e-8 of its units)"""
 
 
 @dataclass(frozen=True)
+@arrays(length="E", turns="E", radius="E", climb="E", first="E 3", last="E 3", share="E A")
 class Shape:
     """What the geometry of E blocks is.
 

@@ -9,9 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from toolpaths.arrays import Floats, frozen
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(edges="M+1", values="M")
 class StepFeed:
     """Feeds of blocks: `values` (M,), each between two of the rising `edges` (M + 1,) of s."""
 

@@ -19,6 +19,7 @@ from scipy.linalg import solveh_banded
 
 from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 TAU = 0.99
 """Share of the way to the nearest bound that a step may go."""
@@ -28,6 +29,7 @@ MOST = 120
 
 
 @dataclass(frozen=True)
+@arrays(c="C")
 class InteriorSolution:
     """Coefficients (K + 2,), iterations used, last gap over time, whether the tolerance was reached, multipliers."""
 

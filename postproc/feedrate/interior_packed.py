@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.compiled import compiled
 from postproc.feedrate.interior import Multipliers, NumpySteps
 from postproc.feedrate.kernels.coefficients import advance, begin, relative, tie_ends
 from postproc.feedrate.kernels.interior import COMMON, LANES, PER_JOINT, assemble, band, direction, pentadiagonal
 from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats
+from toolpaths.compiled import compiled
 
 
 class PackedSteps:
@@ -67,9 +67,9 @@ class PackedSteps:
             self._first(mu)
         compiled(advance)(self._all, self._step, self._zc, self._rc, primal, dual)
         w, v = self._w.reshape(-1), self._v.reshape(-1)
-        gap, time = compiled(assemble, fused=True)(w, v, self._all, self._inverse, self._blocks, mu, dual)
+        gap, time = compiled(assemble)(w, v, self._all, self._inverse, self._blocks, mu, dual)
         gap += compiled(begin)(self._all, self._zc, mu, self._low, self._force)
-        compiled(band, fused=True)(w, self._blocks, self._low, self._force)
+        compiled(band)(w, self._blocks, self._low, self._force)
         return gap, time
 
     def direction(self, mu: float) -> tuple[float, float]:
@@ -79,10 +79,10 @@ class PackedSteps:
         compiled(tie_ends)(low, right, first, last)
         here = slice(first - 1, self._size - last + 1)
         room = self._scratch[:, here]
-        if not compiled(pentadiagonal, fused=True)(low[:, here], right[here], room[0], room[1:]):
+        if not compiled(pentadiagonal)(low[:, here], right[here], room[0], room[1:]):
             return 0.0, 0.0
         ends = compiled(relative)(right, first, last, self._all, self._zc, mu, self._step, self._rc)
         w, v = self._w.reshape(-1), self._v.reshape(-1)
-        inner = compiled(direction, fused=True)(w, v, self._step, self._inverse, self._blocks, mu)
+        inner = compiled(direction)(w, v, self._step, self._inverse, self._blocks, mu)
         fall, loss = (max(pair) for pair in zip(ends, inner, strict=True))
         return (1.0 / fall if fall > 0.0 else np.inf, 1.0 / loss if loss > 0.0 else np.inf)

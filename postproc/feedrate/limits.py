@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Floats, frozen
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class ToolLimits:
 
 
 @dataclass(frozen=True)
+@arrays(velocity="J", acceleration="J", jerk="J")
 class JointLimits:
     """Largest magnitudes per joint (J,), in joint units per s, s2, s3; inf means unlimited; `tool` where stated."""
 

@@ -14,9 +14,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy.interpolate import BSpline
 
-from postproc.base.compiled import compiled, wanted
 from postproc.feedrate.kernels.splines import spline
 from toolpaths.arrays import Floats
+from toolpaths.compiled import compiled, wanted
 
 KERNEL_FROM = 200_000
 """Places at once from which compiling the evaluation of a spline pays."""

@@ -13,9 +13,11 @@ from postproc.feedrate.paths import Eased
 from postproc.feedrate.rows import rows
 from postproc.feedrate.spline import Basis, rest_basis
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(dq="J K", d2q="J K", d3q="J K", cap="K", capped="K", weight="K", tight="2 K")
 class SpeedProblem:
     """Minimise sum w x^-1/2 over coefficients of x, K knots, J joints.
 
@@ -74,6 +76,7 @@ class SpeedProblem:
 
 
 @dataclass(frozen=True)
+@arrays(sigma="K", tight="3 K")
 class MotionKnots:
     """One motion from rest to rest on its knots; problems are made for stretches of it, so that memory stays small.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.feedrate.spline import Basis
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 
 _GAUSS = np.polynomial.legendre.leggauss(5)
 
@@ -24,6 +25,7 @@ class Places(NamedTuple):
 
 
 @dataclass(frozen=True)
+@arrays(sigma="K", pieces="4 K-1")
 class Profile:
     """x = sigma_dot^2 as a cubic in each interval: sigma (K,), pieces (4, K-1), powers of sigma - sigma[k] rising."""
 

@@ -14,9 +14,11 @@ import numpy as np
 from postproc.feedrate.interior import Multipliers
 from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats, frozen
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(limits="3 _")
 class LimitShares:
     """Seconds of each limit: `feed`, and `limits` (3, J + 1) for velocity, acceleration, jerk of the joints.
 

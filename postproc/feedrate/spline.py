@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 REST = 8
 
@@ -45,6 +46,7 @@ def rest_law(u: Floats, ease: float) -> Floats:
 
 
 @dataclass(frozen=True)
+@arrays(stencil="3 3 K")
 class Basis:
     """Stencils (3, 3, K) and how many coefficients at each end are one unknown (1: none tied)."""
 

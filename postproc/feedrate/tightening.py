@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.base.compiled import compiled
 from postproc.feedrate.kernels.tightening import worst
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import Derivatives
@@ -14,6 +13,7 @@ from postproc.feedrate.problem import MotionKnots
 from postproc.feedrate.profile import Profile
 from postproc.feedrate.rows import tool
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.compiled import compiled
 
 ENOUGH = 1.002
 """Ratio between knots that is left to the final slowing down."""

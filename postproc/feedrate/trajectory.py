@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.feedrate.limits import JointLimits, ToolLimits
 from toolpaths.arrays import Floats, Ints, frozen
+from toolpaths.shapes import arrays
 
 REST_PAD = 3
 """Samples at rest before and behind, so that differences see the start and the end."""
@@ -18,6 +19,7 @@ ORDERS = ("velocity", "acceleration", "jerk")
 
 
 @dataclass(frozen=True)
+@arrays(velocity="J", acceleration="J", jerk="J", tool="3")
 class Usage:
     """Largest ratios to the limits, per joint (J,), of the feed, and of the tool's (3,): tilt rate, acceleration, jerk.
 
@@ -60,6 +62,7 @@ class Binding(NamedTuple):
 
 
 @dataclass(frozen=True)
+@arrays(t="N", s="N", q="N J", qd="N J", qdd="N J", qddd="N J", sd="N", feed="N", tool="N 3")
 class JointTrajectory:
     """Samples at equal times (by `Plan.at` at given places), by default from rest to rest.
 

@@ -15,11 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.base.compiled import wanted
 from postproc.feedrate.interior import InteriorSolution, NewtonSteps, NumpySteps, solve
 from postproc.feedrate.problem import MotionKnots, SpeedProblem
 from postproc.feedrate.shares import weigh
 from toolpaths.arrays import Floats
+from toolpaths.compiled import wanted
+from toolpaths.shapes import arrays
 
 WINDOW, OVERLAP = 8192, 1024
 """Knots of a window, and on each side beyond it."""
@@ -59,6 +60,7 @@ class Method:
 
 
 @dataclass(frozen=True)
+@arrays(c="C", weights="3 R")
 class SolvedWindows:
     """Coefficients (K + 2,); most iterations of a window; worst stitch (relative difference); whether all were solved;
     seconds of each row (3, R + 1), see `shares.weigh`."""

@@ -217,7 +217,7 @@ def _measured(control: Control, controller: ControllerFile, axis: Floats, setup:
         why = f"the control runs the kinematics of {name} and needs the length of the tool"
     elif words_depend_on_length(control, control.machine.kinematics, axis) or not control.length_on_z:
         why = f"on {name} the axis positions depend on the tool's length in other directions than Z"
-    elif controller.tools.length_automatic and not controller.codes.length_cancel:
+    elif controller.keeps_length:
         why = "this control adds the length of the tool in the spindle by itself"
     else:
         return []

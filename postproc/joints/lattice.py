@@ -16,11 +16,13 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Limits
 from postproc.joints.tracks import TRAVEL_SLACK, TWO_PI, branches_of, following, wrap
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 _MANY = 1 << 30
 
 
 @dataclass(frozen=True)
+@arrays(tip="N 3", axis="N 3", rest="N", away="N", held="J")
 class PoseRun:
     """Poses that the tool goes through without retracting.
 
@@ -41,6 +43,8 @@ class PoseRun:
 
 
 @dataclass(frozen=True)
+@arrays(values="B N J", family="B N", leads="B N-1", free="N-1", inside="B N", wound="W", least="B N W", most="B N W",
+        rotary="R", rest="N", away="N")
 class Lattice:
     """States of N poses on B branches; `wound` (W,) are the joints whose turns count, `limits` those of the machine.
 

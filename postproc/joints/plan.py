@@ -19,9 +19,11 @@ from postproc.joints.search import RunPiece, SegmentChoice, cheapest, pieces, wr
 from postproc.joints.states import BAD, NEVER, SECONDS, Segment, least_of, rough_segments, tidy_segments
 from postproc.joints.tracks import TRAVEL_SLACK, TWO_PI, wrap
 from toolpaths.arrays import Bools, Floats
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(before="J", after="J")
 class Rewind:
     """After pose `row` of a run the tool is drawn back, the joints go from `before` to `after` (J,), and it comes back."""
 
@@ -33,6 +35,7 @@ class Rewind:
 
 
 @dataclass(frozen=True)
+@arrays(q="J", dearer="5")
 class RejectedStart:
     """A state that a run could have begun in: joints (J,), and by how much (5,) the best end from there is dearer.
 
@@ -44,6 +47,7 @@ class RejectedStart:
 
 
 @dataclass(frozen=True)
+@arrays(q="N J", singular="N")
 class RunSolution:
     """Joints (N, J) of a run, rotaries unwound; NaN rows where the machine cannot take the pose."""
 

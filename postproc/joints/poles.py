@@ -11,9 +11,11 @@ from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(frame="3 3")
 class Pole:
     """A singular direction (3,) with a frame (3, 3) whose third row it is, and the joint that turns about it."""
 

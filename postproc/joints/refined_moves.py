@@ -9,10 +9,12 @@ import numpy as np
 
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints, as_slice, repeated, shared, taken
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Arcs, Kind
 
 
 @dataclass(frozen=True)
+@arrays(origin="R", u0="R", u1="R", rewind="R")
 class Refined:
     """Moves (R) of which number k is part u0..u1 (R,) of the move `origin` (R,) of the CL file.
 

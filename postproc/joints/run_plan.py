@@ -19,6 +19,7 @@ from postproc.joints.spin import held_joints
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints, shared
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
 
@@ -50,6 +51,7 @@ class RunOptions:
 
 
 @dataclass(frozen=True)
+@arrays(q="R J", singular="R", moved="R", left="R")
 class RunPlan:
     """All runs: parts of moves, and at each part's end joints (R, J), family (R,), what the axis was moved by (R,).
 
@@ -69,6 +71,7 @@ class RunPlan:
 
 
 @dataclass(frozen=True)
+@arrays(rows="N", axis="N 3", moved="N", _tip="N 3")
 class _Part:
     """One run while it is planned: its rows of Moves, the axes they are given, the curves after its first pose."""
 

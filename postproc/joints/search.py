@@ -25,9 +25,11 @@ from postproc.joints.states import (
     staying,
 )
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(to="S", at="S", next="S")
 class SegmentChoice:
     """What is done in a segment from each state: a rewind to state `to` (S,) at pose `at` (S,), -1 for none; then the state
     `next` (S,) of the segment after."""

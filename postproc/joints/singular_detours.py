@@ -21,6 +21,7 @@ from postproc.joints.taut_string import taut_string
 from toolpaths.arrays import Bools, Floats, Ints, repeated
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
 _WIDE = 25.0
 """the axis is led within this many tolerances of the pole: farther off it can gain 0.04 rad of azimuth at most"""
@@ -56,6 +57,7 @@ class SingularPassage:
 
 
 @dataclass(frozen=True)
+@arrays(parent="K", u0="K", u1="K")
 class Led:
     """Curves (K) that follow a run's curves with their axes led: number k is part u0..u1 (K,) of curve `parent` (K,)."""
 
@@ -112,6 +114,7 @@ def _lead(pole: Pole, led: Led, seconds: Floats, tolerance: float, velocity: flo
 
 
 @dataclass(frozen=True)
+@arrays(curve="P", u="P", axis="P 3")
 class _Window:
     """New axes (P, 3) at places (curve (P,), u (P,)) of a stretch of curves, ends included, and what that does."""
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.joints.lattice import Lattice
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 BranchState = tuple[int, tuple[int, ...]]
 """branch, turns of each wound joint"""
@@ -19,6 +20,7 @@ NEVER = np.array([np.inf] * 5)
 
 
 @dataclass(frozen=True)
+@arrays(bad="S")
 class Segment:
     """Poses first..last of a run, the states of them, and the poses (S,) where each is outside travel: all or none."""
 

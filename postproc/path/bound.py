@@ -21,6 +21,7 @@ from postproc.control.control import Control
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
 SHORT = 0.1
 """mm: on shorter curves the axis is compared where the curve's own parameter stands, not at the nearest tip"""
@@ -28,6 +29,7 @@ _MOST_SKEW = 0.25
 
 
 @dataclass(frozen=True)
+@arrays(u0="N", u1="N", q0="N J", q1="N J", start="* _ 3", end="* _ 3")
 class CurveBlocks:
     """N blocks and what they follow: joints q0 -> q1 (N, J), curves[u0..u1], poses at both ends (tip, axis), (N, 3)."""
 
@@ -73,6 +75,7 @@ def _bounds(control: Control, kin: Kinematics, s: CurveBlocks, tolerance: float,
 
 
 @dataclass(frozen=True)
+@arrays(tip="N", axis="N", along="N")
 class _Seen:
     """Largest |e| (N,) at the places looked at: of the tip, of the axis, of the tip's part along the curve's chord."""
 
@@ -94,6 +97,7 @@ class _Seen:
 
 
 @dataclass(frozen=True)
+@arrays(turn="N")
 class _Offset:
     """e(t) of N blocks: what was seen of it, bounds of |e''| (same meanings), and the reference's parameter.
 

@@ -26,12 +26,14 @@ from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Floats, Ints, as_slice, taken
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 
 Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
+@arrays(operation="O")
 class _Road:
     """What building a path needs throughout; `home_rows`: linked rows whose link goes by home."""
 
@@ -124,8 +126,9 @@ def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,
         curves = _with_axes(curves, taken(runs.axis, starts), taken(runs.axis, ends))
         where, joints = approached(kin, curves, runs.q[starts], runs.q[ends])
         if len(where):
-            runs = replace(runs, q=runs.q.copy())
-            runs.q[rows[where]] = joints
+            q = runs.q.copy()
+            q[rows[where]] = joints
+            runs = replace(runs, q=q)
         left, turned, broken = add_run(out, some[0].frame, kin, moves, rows, curves, runs.q[starts], runs.q[ends].copy(),
                                        tolerance, some[0].left)
         worst = np.maximum(worst, left)
@@ -215,7 +218,8 @@ def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs)
         _leg(out, legs.after, legs.kin_after, begin, link.approach, row)
         return
     n = len(link.approach)
-    ways = np.linalg.norm(np.diff(np.concatenate([begin[None], link.approach]), axis=0), axis=1)
+    tips, _ = legs.kin_after.forward(np.concatenate([begin[None], link.approach]))
+    ways = np.linalg.norm(np.diff(tips, axis=0), axis=1)
     seconds = ways / moves.feed[row] if moves.feed[row] > 0.0 else np.full(n, moves.seconds[row] / n)
     out.link(legs.after, link.approach, row, code=np.full(n, FEED, dtype=np.int8), seconds=seconds)
 

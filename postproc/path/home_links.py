@@ -26,6 +26,7 @@ from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 
 RETRACT, HOME, INDEX, APPROACH = 0, 1, 2, 5
@@ -33,6 +34,7 @@ RETRACT, HOME, INDEX, APPROACH = 0, 1, 2, 5
 
 
 @dataclass(frozen=True)
+@arrays(tip="K 3", axis="K 3", q="K J", tool="K")
 class _Poses:
     """K poses with their joints, and the tools of each by number: tip, axis (K, 3), q (K, J), tool (K,)."""
 

@@ -17,6 +17,7 @@ from postproc.path.bound import CurveBlocks, bounds
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
 _SMALLEST = 1e-9
 """of a curve: a block that short and still outside is a jump"""
@@ -31,6 +32,7 @@ _NARROW = 1.05
 
 
 @dataclass(frozen=True)
+@arrays(curve="K", u="K", q="K J", broken="B")
 class CurvePieces:
     """Blocks that follow curves: piece k ends at `q` (K, J), at `u` (K,) of curve `curve` (K,).
 

@@ -21,6 +21,7 @@ from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 
 RISE = 10.0
@@ -35,6 +36,7 @@ LEG_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True)
+@arrays(centre="3", corners="8 3")
 class SafeSpace:
     """Centre (3,) of the part in the table frame, radius about it and box (8, 3) of all that is cut, distances in mm."""
 
@@ -99,6 +101,7 @@ def _outermost(curves: Curves) -> Floats:
 
 
 @dataclass(frozen=True)
+@arrays(retract="R J", home="H J", index="I J", approach="A J", home_state="H J", index_state="I J")
 class Link:
     """Joints (K, J) of the four parts of a linking move.
 
@@ -118,6 +121,7 @@ class Link:
 
 
 @dataclass(frozen=True)
+@arrays(tip="3", axis="3", q="J")
 class Pose:
     """A pose with its joints; `law` is the control under which the tool leaves it or comes to it along its axis."""
 

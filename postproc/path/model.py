@@ -9,12 +9,15 @@ from postproc.control.control import Control
 from postproc.control.modes import WordFrame
 from postproc.joints.singular_detours import SingularPassage
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 TRAVERSE, FEED, ARC = 0, 1, 2
 """codes of blocks"""
 
 
 @dataclass(frozen=True)
+@arrays(q="K J", move="K", u="K", code="K", home="K", seconds="K", plane="K", ccw="K", center="K 3", state="K J",
+        frame="K", begin="M+1", singular="M", turns="T", rewinds="W")
 class JointPath:
     """Blocks in joints, K of them, and where the rows of Moves begin among them.
 

@@ -14,6 +14,7 @@ from postproc.joints.run_plan import RunPlan
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class SolvedRun:
 
 
 @dataclass(frozen=True)
+@arrays(axis="R 3", q="R J")
 class SolvedRuns:
     """All runs, and the axes (R, 3) and joints (R, J) of their rows."""
 

@@ -20,6 +20,7 @@ from postproc.control.modes import table_axes
 from postproc.path.links import Link, SafeSpace, stays_clear
 from toolpaths.arrays import Bools, Floats
 from toolpaths.diagnostics import Diagnostic, info
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 _CHORD = 10.0 * DEG
@@ -32,6 +33,7 @@ _PLACES = np.linspace(0.0, 1.0, 9)
 
 
 @dataclass(frozen=True)
+@arrays(before="K J", state="K J", inside="L J")
 class ZeroEntry:
     """Joints (K, J) of the blocks up to the mode, with the axes that they state, and (L, J) of those in the mode; `seconds`
     that the whole takes longer than indexing the tables before it."""

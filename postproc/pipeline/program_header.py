@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from postproc.base.header_words import FEEDS, FINGERPRINT, PENDING, UNKNOWN
+from postproc.base.header_words import PENDING, corrected_by_control, corrected_here, feeds_line, model_mark
 from postproc.base.version import VERSION
 from postproc.compile.program import Program
 from postproc.control.modes import table_axes
@@ -31,7 +31,7 @@ def header_lines(made: CompiledStage) -> list[str]:
     if any(d.code == "feed.of_setup" for d in made.diagnostics):
         header.append(f"feed {made.setup.output.feed:g} mm/min of the set-up where the CL file states none")
     if made.motion is not None:
-        header.append(f"{FEEDS} {UNKNOWN}")
+        header.append(feeds_line())
     header += [f"T{number}: {what}, of the set-up" for number, what in job.stated]
     header += [*_tip_frame(made), *_corrections(made), *_orientations(made), *_tools(job)]
     if made.toolpath.name:
@@ -93,12 +93,12 @@ def _corrections(made: CompiledStage) -> list[str]:
         return []
     name = made.job.errors.name
     if made.compensation is None:
-        return [f"geometric errors {name}: corrected by the control, not in this program"]
+        return [corrected_by_control(name)]
     from machines.geometric_error.files.fingerprint import fingerprint
 
-    return [f"geometric errors {name}: corrected in this program; the control must not correct them again",
+    return [corrected_here(name),
             "they are corrected for this work offset and these gauge lengths: convert again for others",
-            f"{FINGERPRINT} {fingerprint(made.job.errors)}", *made.compensation.lines()]
+            model_mark(fingerprint(made.job.errors)), *made.compensation.lines()]
 
 
 def _meanings(program: Program) -> str:

@@ -69,7 +69,7 @@ class StationaryBodies:
     def tool(self, work: PassContext) -> str:
         """What the tools would touch on the passes of `work` with the axes of the file."""
         beside = PassBodies(work, self.standing, self.forms)
-        return next((why for one in work.passes if (why := beside.touching(one, one.axis))), "")
+        return next((str(why) for one in work.passes if (why := beside.touching(one, one.axis))), "")
 
     @cached_property
     def _standing(self) -> Any:

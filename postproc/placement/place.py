@@ -12,6 +12,7 @@ from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import load_controller
 from postproc.job.job import prepare
+from postproc.orientation.candidates.ranking import load_compiler
 from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.path.links import safe_space
 from postproc.placement.bodies import beside
@@ -142,6 +143,7 @@ def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     _, found = prepare(toolpath, machine, spec, setup, options)
     if has_errors(found):
         return None, None, found
+    load_compiler()
     work, more = work_of(toolpath, machine, setup.model_copy(update={"part": PartPlacement()}), options,
                          turning=options.orient != "keep")
     if work is None:

@@ -12,7 +12,6 @@ from machines.machine import Machine
 from machines.singular_distance import NAMES as SINGULAR
 from machines.singular_distance import has_singular_distance, singular_distance
 from postproc.orientation.candidates.candidate_times import Candidate, turned
-from postproc.orientation.candidates.ranking import prepare
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.index_time import PassEnds, ends, ways_between
 from postproc.orientation.plans.shortest_sequence import seconds
@@ -20,6 +19,7 @@ from postproc.placement.bodies import StationaryBodies
 from postproc.placement.rigid_move import moved
 from postproc.placement.space import Space
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 _WORTH = 1e-4
 """least part of the time that a place must gain to be planned"""
@@ -30,6 +30,7 @@ _DIGITS = 7
 
 
 @dataclass(frozen=True)
+@arrays(place="6", low="J", high="J")
 class TimedPlace:
     """A place that was looked at.
 
@@ -98,7 +99,6 @@ class Timer:
         self.unsolved: set[int] = set()
         self._cuts: dict[tuple[int, bytes], _Cut] = {}
         self._known: dict[bytes, TimedPlace] = {}
-        prepare(work.passes)
         sites = sum(len(each.s) for one in work.passes for each in one.stretches)
         self.most = min(_MOST, max(_LEAST, _SITES // max(1, sites)))
 

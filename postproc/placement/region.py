@@ -25,6 +25,7 @@ from postproc.path.reach import is_checked
 from postproc.placement.rigid_move import moved
 from postproc.placement.space import ANGLES, Space
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 _MARGIN = 0.1
@@ -58,6 +59,7 @@ class Region(Protocol):
 
 
 @dataclass(frozen=True)
+@arrays(g="K 3", c="K", joint="K")
 class Slabs:
     """A serial machine: each row is how far one end of travel of joint `joint` is from a pose, g . p + c, of p (3,).
 

@@ -16,6 +16,7 @@ from postproc.setup.model import PartPlacement, Placement
 from postproc.setup.place import PlaceBox, PlacementLimits
 from toolpaths.arrays import Floats
 from toolpaths.rotations import rotation
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 NAMES = ("x", "y", "z", "turn", "tilt_y", "tilt_x")
@@ -72,6 +73,7 @@ class Dimension:
 
 
 @dataclass(frozen=True)
+@arrays(point="3", corners="8 3", now="6")
 class Space:
     """All places that the set-up allows.
 

@@ -21,6 +21,7 @@ from postproc.planning.geometry_poles import near_poles, past_poles
 from postproc.planning.geometry_sites import sites
 from toolpaths.arrays import Array, Bools, Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 from toolpaths.smoothing.smooth import Smooth
 
 DEGREE = 5
@@ -34,6 +35,7 @@ JointsNearby = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True)
+@arrays(s="N", values="N V", led="N")
 class MachinePath:
     """Joints along s between two stops, three times continuously differentiable; a `feedrate.paths.ToolPath`.
 

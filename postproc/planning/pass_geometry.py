@@ -21,6 +21,7 @@ from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.smoothing.blend import SHARPEST
 from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all
 from toolpaths.toolpath import Kind, Toolpath
@@ -32,6 +33,7 @@ LED = 1e-7
 
 
 @dataclass(frozen=True)
+@arrays(move="C", share="C", block="k", begin="k", ends="k")
 class PassGeometry:
     """One pass.
 
@@ -116,6 +118,7 @@ def _blocks(path: JointPath, first: int, last: int) -> Ints:
 
 
 @dataclass(frozen=True)
+@arrays(block="k", move="C", share="C", curve="k", u="k")
 class _Written:
     """Curves as the blocks (k,) follow them: `curve` (k,) of each block, and where on it the block ends, `u` (k,)."""
 
@@ -154,6 +157,7 @@ def _written(path: JointPath, block: Ints, reference: Curves, kin: Kinematics) -
 
 
 @dataclass(frozen=True)
+@arrays(begin="k", ends="k")
 class _Placed:
     """A pass with its blocks placed along s, and its stretches between stops."""
 
@@ -201,6 +205,7 @@ def _machine_paths(passes: list[_Placed], moves: Moves, kinematics: Callable[[in
 
 
 @dataclass(frozen=True)
+@arrays(s="N", q="N J")
 class _Near:
     """Joints of the blocks at s, linear between their ends."""
 

@@ -23,6 +23,7 @@ from postproc.planning.steady_feed import CORNER, steady_seconds
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, require
+from toolpaths.shapes import arrays
 from toolpaths.smoothing.blend import SHARPEST
 from toolpaths.smoothing.smooth import Tolerance
 
@@ -35,6 +36,7 @@ def joint_limits(limits: Limits) -> JointLimits:
 
 
 @dataclass(frozen=True)
+@arrays(s="C+1", feed="C", seconds="C")
 class PassFeed:
     """Largest ds/dt along a pass: the tip at the feed of each move, or the way of a move in its time.
 
@@ -76,6 +78,7 @@ STANDS = 1e-9
 
 
 @dataclass(frozen=True)
+@arrays(needed="K")
 class PlannedMotion:
     """What is planned of a program: its passes, from rest to rest each.
 
@@ -140,6 +143,7 @@ class PlannedMotion:
 
 
 @dataclass(frozen=True)
+@arrays(stops="S")
 class Source:
     """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it stops, and how
     geometric errors are corrected, where they are."""

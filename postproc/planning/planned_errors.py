@@ -14,6 +14,7 @@ from postproc.correction.error_sampling import changes
 from postproc.path.model import JointPath
 from postproc.planning.geometry import MachinePath
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:
     from postproc.correction.compensation import ErrorCorrection
@@ -26,6 +27,7 @@ STANDS = 1e-9
 
 
 @dataclass(frozen=True)
+@arrays(owner="K")
 class PlannedCorrection:
     """How a conversion corrects its path.
 

@@ -14,6 +14,7 @@ import numpy as np
 from postproc.planning.pass_geometry import chains
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.smoothing.smooth import STILL, Smooth, Tolerance, smooth_all
 
 HALVINGS = 3
@@ -25,6 +26,7 @@ LENGTH = 1e-3
 
 
 @dataclass(frozen=True)
+@arrays(stay="M", moved="M")
 class Smoothed:
     """Moves with smoothed points.
 

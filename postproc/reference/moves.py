@@ -20,6 +20,7 @@ from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, sha
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Arcs, Kind, Role, Toolpath
 from toolpaths.units import DEG
 
@@ -28,6 +29,8 @@ _PART = 50_000
 
 
 @dataclass(frozen=True)
+@arrays(tip="M 3", axis="M 3", kind="M", feed="M", seconds="M", arc="M", row="M", hole="M", phase="M", cycle="M",
+        link="M", tool="M", line="M", spin="M")
 class Moves:
     """Elementary moves, one row each; the start of a row is the end of the row before.
 

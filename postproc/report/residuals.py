@@ -13,6 +13,7 @@ from postproc.pipeline.result import PostResult
 from postproc.reference.holes import Phase
 from postproc.verification.residual_errors import last_blocks, planned_moves
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 UM, ARCSEC = 1e-3, DEG / 3600.0
@@ -21,6 +22,7 @@ WAY = 1e-9
 
 
 @dataclass(frozen=True)
+@arrays(line="M", tip="M 3", axis="M 3", q="M J", before="M 6", after="M 6")
 class Residuals:
     """What geometric errors do at M CL points (ends of cuts, bottoms of holes) of a written program, in the part frame.
 

@@ -17,6 +17,7 @@ from postproc.setup.place import PlacementLimits
 from postproc.setup.spindle import CoolantKind, SpindleSetup
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Frame, Toolpath
 
 SetupVector = Annotated[tuple[float, float, float], Field(description="x, y, z")]
@@ -173,6 +174,7 @@ class SetupFile(UserModel):
 
 
 @dataclass(frozen=True)
+@arrays(rotation="3 3", origin="3")
 class Placement:
     """A rigid change of frame: `rotation` (3, 3) and `origin` (3,), to the outer frame."""
 

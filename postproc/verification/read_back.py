@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from postproc.base.header_words import FINGERPRINT, HEADER, head_of
+from postproc.base.header_words import HEADER, NO_FILE, Head, read_head, same_name
 from postproc.base.memory import give_back
-from postproc.base.options import NO_FILE, SETUP_MARK, Options
+from postproc.base.options import Options
 from postproc.job.job import Job
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
@@ -31,25 +30,18 @@ from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warni
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 
-_CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors ([^\n]*?):? corrected in this program")
-_FINGERPRINT = re.compile(rb"(?im)^[^\n]*" + FINGERPRINT.encode("ascii") + rb" ([0-9a-f]{8})\b")
-_BY_CONTROL = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
-_ORIENTED = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
-_SETUP = re.compile(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
-_OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
 CAUSES = frozenset({"verify.start", "verify.tool", "verify.tool_change", "verify.state", "verify.tap", "verify.hole"})
 """told first: a path that is off follows from them"""
 
 
 def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
     """An error where the header of a program names other chosen tool axes than the options; nothing without our header."""
-    head = head_of(data)
-    stated, chosen = _ORIENTED.search(head), options.orient != "keep"
+    head, chosen = read_head(data), options.orient != "keep"
     given = f"--orient {options.orient} --max-tilt {options.max_tilt:g}" if chosen else "no --orient"
-    if stated is None:
+    if head.axes is None:
         return [error("verify.orient", f"the header names no chosen tool axes, {given} is given", file=gcode,
-                      hint="verify without --orient")] if chosen and _OURS.search(head) else []
-    plan, tilt = (text.decode("ascii", "replace").lower() for text in stated.groups())
+                      hint="verify without --orient")] if chosen and head.ours else []
+    plan, tilt = head.axes
     if chosen and (plan, tilt) == (options.orient, f"{options.max_tilt:g}"):
         return []
     return [error("verify.orient", f"the header says orient {plan}, max tilt {tilt} degrees, {given} is given", file=gcode,
@@ -58,13 +50,12 @@ def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
 
 def other_setup(data: bytes, options: Options, off: bool, gcode: str) -> list[Diagnostic]:
     """What the header of a program says of its set-up where that is not the one given; `off`: the program fails."""
-    head = head_of(data)
-    stated = _SETUP.search(head)
-    then = stated[2].decode("ascii").lower() if stated and stated[2] else ""
-    if then == options.setup_mark or (stated and not then) or not _OURS.search(head):
+    head = read_head(data)
+    stated, then = head.setup, head.setup.mark if head.setup else ""
+    if then == options.setup_mark or (stated and not then) or not head.ours:
         return []
     given = f"{Path(options.setup).name or NO_FILE} (fingerprint {options.setup_mark})" if options.setup_mark else "none"
-    named = stated[1].decode("utf-8", "replace").strip() if stated else ""
+    named = stated.name if stated else ""
     says = f"the set-up {named} (fingerprint {then})" if stated else "no set-up"
     judge, so = (error, "what is off may follow from that alone") if off else (warning, "it is right under the one given")
     hint = "verify with the SetupFile as it was" if named == NO_FILE else f"verify with --setup {named} as it was"
@@ -85,9 +76,9 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls)
     code, diagnostics = reader.read(data, gcode, others)
-    head = head_of(as_bytes(data[:HEADER]))
+    head = read_head(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file) for d in diagnostics]
-    if gcode and not _by_post(job) and _CORRECTED.search(head):
+    if gcode and not _by_post(job) and head.corrected is not None:
         return None, [_twice(job, gcode), *diagnostics]
     if code is not None:
         diagnostics += placed([_located(d, job.toolpath.file) for d in check_stated(code, reader, gcode)], code.files)
@@ -118,8 +109,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
               *_bodies(motion, executed, job, comparison, faults)]
     told = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     if gcode and _by_post(job):
-        named = _CORRECTED.search(head)
-        told = [*(_of_model(named[1], head, job, gcode, has_errors(told)) if named else
+        told = [*(_of_model(head, job, gcode, has_errors(told)) if head.corrected is not None else
                   _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(told) else []), *told,
                 *_unmeasured(motion, executed, job, faults)]
     return replace(comparison, executed=(code, motion), poses=executed, planned=planned), [*diagnostics, *told]
@@ -147,31 +137,29 @@ def _twice(job: Job, gcode: str) -> Diagnostic:
                  "into it and take its errors out of the control")
 
 
-def _uncorrected(head: bytes, job: Job, motion: Motion, executed: BlockPoses, comparison: Comparison,
+def _uncorrected(head: Head, job: Job, motion: Motion, executed: BlockPoses, comparison: Comparison,
                  gcode: str) -> list[Diagnostic]:
     """Why a program is off on the machine with errors: its header names none that it corrects.
 
     A program of another post may correct them all the same, so that no amounts are known.
     """
-    by_control = _BY_CONTROL.search(head)
-    if not (by_control or _OURS.search(head)):
+    if not (head.by_control or head.ours):
         return [warning("verify.error_model", "the header of the program names no error model, it is verified on the "
                         "machine with errors", file=gcode, hint="verify without --error-model, if it corrects none")]
-    why = "by its header the control does" if by_control else "its header names no error model"
+    why = "by its header the control does" if head.by_control else "its header names no error model"
     return [error("verify.error_model", f"the program corrects no geometric errors ({why}): verified on the machine with "
                   "errors" + _amounts(job, motion, executed, comparison), file=gcode,
                   hint="verify without --error-model, or convert with it")]
 
 
-def _of_model(named: bytes, head: bytes, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
-    """What its header tells of the model that a program corrects, `named` and by its fingerprint, where that is not the one
+def _of_model(head: Head, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
+    """What its header says of the model that a program corrects, its name and fingerprint, where that is not the one
     that it is verified with; `off`: the program fails. Programs without a fingerprint have only the name."""
     from machines.geometric_error.files.fingerprint import fingerprint
 
     assert job.errors is not None
-    name, stated, now = named.decode("utf-8", "replace"), _FINGERPRINT.search(head), fingerprint(job.errors)
-    then = stated[1].decode("ascii").lower() if stated else ""
-    same = not name or _as_in_comments(name) == _as_in_comments(job.errors.name)
+    name, then, now = head.corrected, head.model, fingerprint(job.errors)
+    same = not name or same_name(name, job.errors.name)
     if then == now or (not then and (same or not off)):
         return []
     marks = f" (fingerprint {then} then, {now} now)" if then else ""
@@ -183,11 +171,6 @@ def _of_model(named: bytes, head: bytes, job: Job, gcode: str, off: bool) -> lis
     return [tell("verify.error_model", f"the header of the program names the error model {name}, it is verified with "
                  f"{job.errors.name}{marks}: {so}", file=gcode,
                  hint="verify with the model that the program was written with")]
-
-
-def _as_in_comments(name: str) -> str:
-    """A name without what the comments of some controls change of it: capitals, accents, brackets."""
-    return re.sub(r"[^a-z0-9]+", " ", name.lower())
 
 
 def _amounts(job: Job, motion: Motion, executed: BlockPoses, comparison: Comparison) -> str:

@@ -75,7 +75,8 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
         return end - before
 
     by_tip = np.asarray(motion.frame > 0) | (control.base == "tcp")
-    lengthless = np.array([f.law == "axes" for f in motion.frames])[motion.frame] & (not control.length_on_z)
+    lengthless = np.array([f.law == "axes" for f in motion.frames])[motion.frame]
+    lengthless = lengthless & (not control.length_on_z) & (not job.controller.keeps_length)
     start = motion.start / degrees if control.base != "tcp" else job.machine.home
     return ExecutedBlocks(job.machine.axis_names, joints, start, motion.line, motion.code, np.asarray(straight),
                           arc_sweeps(motion, control), motion.feed, motion.inverse, motion.inch, by_tip, control.feed_rule,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 REACH = 3
@@ -16,6 +17,7 @@ NEAR = 0.25
 
 
 @dataclass(frozen=True)
+@arrays(pole="2", end="2")
 class PolarArc:
     """An arc in its plane: `pole` (2,) mm and `angle` in degrees as they are written, the `end` (2,) that they lead to."""
 

@@ -22,7 +22,7 @@ def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle
 
 def _own_length(controller: ControllerFile, program: Program, file: str, length_offsets: bool) -> list[Diagnostic]:
     """A length that a tool change puts in force for good, where the words hold it already."""
-    if length_offsets or not controller.tools.length_automatic or controller.codes.length_cancel:
+    if length_offsets or not controller.keeps_length:
         return []
     tools = sorted({float(command.args[0]) for _, command in program.ordered() if command.name == "CHANGE_TOOL"})
     if not tools:

@@ -18,6 +18,7 @@ from toolpaths.diagnostics import has_errors
 FILES = sorted((Path(__file__).parent / "corpus").iterdir())
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.name)
 @pytest.mark.parametrize("dialect", [None, *DIALECTS])
 def test_no_text_makes_the_reader_stumble(path: Path, dialect: str | None) -> None:

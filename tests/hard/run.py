@@ -36,7 +36,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
 SAMPLES = ROOT / "samples"
 ENDINGS = frozenset({".cls", ".cl", ".apt", ".aptsource", ".clt", ".ncl", ".as", ".ncd", ".tap", ".txt", ".cldata"})
 SETUPS = (("h4a", "h4a.setup.toml"), ("delta", "delta.setup.toml"), ("uranesx", "delta.setup.toml"),
-          ("linuxcnc-lineardelta", "delta.setup.toml"), ("", "tools.setup.toml"))
+          ("", "tools.setup.toml"))
 """set-up by how the machine's name begins, unless FILE.setup.toml stands with the file"""
 LONGEST = 900
 """s that one conversion may take, edits included"""

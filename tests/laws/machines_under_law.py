@@ -28,13 +28,11 @@ def joints(m: Machine, n: int, seed: int = 1) -> np.ndarray:
 def poses(m: Machine, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(q, tip, axis) of n random joint positions; for a parallel machine, whose legs seldom meet at those, of up to n
     random poses around the ones that do, `calm` without those next to a singular one."""
-    q = joints(m, n if m.kinematics.slides_affine else 1000, seed)
-    tip, axis = m.kinematics.forward(q)
     if m.kinematics.slides_affine:
-        return q, tip, axis
-    met = np.isfinite(tip).all(axis=1)
+        q = joints(m, n, seed)
+        return q, *m.kinematics.forward(q)
     rng = np.random.default_rng(seed)
-    tip = rng.uniform(tip[met].min(axis=0), tip[met].max(axis=0), (4 * n, 3))
+    tip = rng.uniform(*box(m.name), (4 * n, 3))
     axis = m.kinematics.nearest_axis(unit(rng.normal(size=(4 * n, 3))))
     branches = m.kinematics.inverse(tip, axis)
     real = np.isfinite(branches).all(axis=(0, 2)) & (branches[0] >= m.limits.lower).all(axis=1)
@@ -43,6 +41,14 @@ def poses(m: Machine, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndar
     q, tip, axis = branches[0][real][:n], tip[real][:n], axis[real][:n]
     keep = condition(m, q, tip, axis) < CALM if calm else slice(None)
     return q[keep], tip[keep], axis[keep]
+
+
+@cache
+def box(name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest tip (3,) of a parallel machine at random joint positions at which its legs meet."""
+    tip, _ = machine(name).kinematics.forward(joints(machine(name), 1000))
+    met = tip[np.isfinite(tip).all(axis=1)]
+    return met.min(axis=0), met.max(axis=0)
 
 
 def unit(v: np.ndarray) -> np.ndarray:

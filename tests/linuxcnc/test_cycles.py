@@ -41,6 +41,7 @@ def places(points: np.ndarray) -> list[tuple[float, ...]]:
     return [p for before, p in zip([(), *rounded], rounded, strict=False) if p != before]
 
 
+@pytest.mark.covering(count=5)
 @pytest.mark.parametrize("seed", range(12))
 def test_cycles_go_where_the_interpreter_goes(interpret, tmp_path: Path, seed: int) -> None:
     text = program(np.random.default_rng(seed))

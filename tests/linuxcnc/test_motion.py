@@ -125,7 +125,7 @@ def passed(result: PostResult, run: Run) -> Floats:
 
 
 @pytest.mark.parametrize(("sample", "machine", "stopping"), [(*CASES[0], True), (*CASES[1], False), (*CASES[2], True),
-                                                             (*CASES[2], False)])
+                                                             pytest.param(*CASES[2], False, marks=pytest.mark.slow)])
 def test_tool_stays_on_the_path(simulate, tmp_path: Path, sample: str, machine: str, stopping: bool) -> None:
     """Tip inside the tolerance, of which G64 P and Q have their share; the axis too where the control does not blend."""
     (tmp_path / "exact-stop.toml").write_text(EXACT_STOP)

@@ -27,18 +27,19 @@ ROUNDED = 1e-4
 """mm and degrees: half a last decimal of a word, and what the rounding of an angle does to the slides"""
 RESIDUE = 2e-4
 """mm: shorter X, Y, Z moves beside a rotary one would set its speed"""
-MADE = {"bicubic.cls": ("mill-3axis", "uranesx"), "blade.cls": ("linuxcnc-xyzbc-trt", "head-table"),
-        "five_faces.cls": ("mikron-ucp710", "linuxcnc-xyzac-trt", "trunnion-bc"),
-        "five_tilted.cls": ("fork-head-ab", "nutating-head", "linuxcnc-xyzbc-trt"),
-        "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
-        "inch_plate.apt": ("mill-4axis", "nutating-head"),
-        "indexed_4axis.cls": ("mill-4axis",),
-        "pocket.cls": ("mill-3axis", "mikron-ucp710", "delta-cone", "delta-coplanar", "delta-hybrid",
-                       "linuxcnc-lineardelta"),
-        "test_part.cls": ("mill-3axis", "trunnion-bc", "delta-parallel-x", "delta-parallel-x-compact", "delta-parallel-z",
-                          "delta-parallel-z-compact", "delta-star"),
+MADE = {"bicubic.cls": ("mill-3axis",), "blade.cls": ("linuxcnc-xyzbc-trt",), "five_faces.cls": ("trunnion-bc",),
+        "five_tilted.cls": ("nutating-head",), "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
+        "inch_plate.apt": ("mill-4axis",), "indexed_4axis.cls": ("mill-4axis",),
+        "pocket.cls": ("uranesx", "delta-cone", "delta-coplanar", "delta-hybrid", "linuxcnc-lineardelta"),
+        "test_part.cls": ("delta-parallel-x", "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact",
+                          "delta-star"),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
 """machines on which each sample is made: every sample, and every machine whose letters LinuxCNC's interpreter has"""
+MORE = {"bicubic.cls": ("uranesx",), "blade.cls": ("head-table",),
+        "five_faces.cls": ("mikron-ucp710", "linuxcnc-xyzac-trt"),
+        "five_tilted.cls": ("fork-head-ab", "linuxcnc-xyzbc-trt"), "inch_plate.apt": ("nutating-head",),
+        "pocket.cls": ("mill-3axis", "mikron-ucp710"), "test_part.cls": ("mill-3axis", "trunnion-bc")}
+"""further ones, with -m slow"""
 CODES = {73, 81, 82, 83, 84, 85, 86, 89}
 
 CYCLES = """PARTNO CYCLES
@@ -88,10 +89,10 @@ def convert(path: Toolpath, found: list, machine: str, setup: SetupFile | None =
                             postproc.Options(feed_mode=feed_mode), found)  # type: ignore[arg-type]
 
 
-def all_outputs(interpret, sample: str) -> list[Output]:
-    """The sample on each of its machines."""
+def all_outputs(interpret, sample: str, names: tuple[str, ...]) -> list[Output]:
+    """The sample on each of the machines."""
     path, found = toolpaths.read(SAMPLES / sample)
-    made = [convert(path, found, name) for name in MADE[sample]]
+    made = [convert(path, found, name) for name in names]
     assert all(r.ok for r in made), [(r.machine.name, [str(d) for d in r.diagnostics]) for r in made if not r.ok]
     with ThreadPoolExecutor(2) as pool:
         return list(pool.map(lambda r: outputs.output(r, interpret), made))
@@ -193,9 +194,11 @@ def check_text(o: Output) -> None:
         code = cycle
 
 
-@pytest.mark.parametrize("sample", samples())
-def test_linuxcnc_reads_what_we_meant(interpret, sample: str) -> None:
-    for o in all_outputs(interpret, sample):
+@pytest.mark.parametrize(("sample", "names"), [
+    *MADE.items(), *(pytest.param(*pair, marks=pytest.mark.slow) for pair in MORE.items())],
+    ids=lambda v: v if isinstance(v, str) else f"{len(v)} machines")
+def test_linuxcnc_reads_what_we_meant(interpret, sample: str, names: tuple[str, ...]) -> None:
+    for o in all_outputs(interpret, sample, names):
         try:
             check(o)
         except AssertionError as fault:
@@ -218,15 +221,16 @@ def test_every_cycle(interpret, tmp_path: Path, machine: str) -> None:
     assert said == {81, 82, 83, 73, 85}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("machine", ["mikron-ucp710", "linuxcnc-xyzac-trt"])
-def test_inverse_time_everywhere(interpret, machine: str) -> None:
+@pytest.mark.parametrize("sample", ["tool_axis_tour.apt", "five_tilted.cls", "blade.cls"])
+def test_inverse_time_everywhere(interpret, machine: str, sample: str) -> None:
     """Every feed block by its time; LinuxCNC's least rate of 0.1 mm/min and tiny residues show in its times."""
-    for sample in ("tool_axis_tour.apt", "five_tilted.cls", "blade.cls"):
-        result = convert(*toolpaths.read(SAMPLES / sample), machine, feed_mode="inverse-time")
-        assert result.ok, result.diagnostics
-        o = outputs.output(result, interpret)
-        assert o.motion.inverse[(o.motion.code > 0) & ~o.motion.hole].mean() > 0.9
-        check(o)
+    result = convert(*toolpaths.read(SAMPLES / sample), machine, feed_mode="inverse-time")
+    assert result.ok, result.diagnostics
+    o = outputs.output(result, interpret)
+    assert o.motion.inverse[(o.motion.code > 0) & ~o.motion.hole].mean() > 0.9
+    check(o)
 
 
 def test_no_tiny_residues_beside_a_turn(interpret, tmp_path: Path) -> None:
@@ -251,6 +255,7 @@ TURNED = PartPlacement(origin=(30.0, -20.0, 40.0), x_axis=(np.cos(np.pi / 6), 0.
                        y_axis=(-0.5, np.cos(np.pi / 6), 0.0))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("machine", ["mikron-ucp710", "linuxcnc-xyzac-trt", "trunnion-bc", "fork-head-ab", "head-table"])
 @pytest.mark.parametrize("system", [0, 1])
 def test_machine_coordinates_are_our_joints(interpret, machine: str, system: int) -> None:

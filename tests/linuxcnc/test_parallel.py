@@ -81,6 +81,7 @@ def test_lineardeltakins_at_the_points_of_a_posted_program(standstill) -> None:
     machine, motion = result.machine, outputs.read(result)[1]
     gauge = np.unique(motion.end[(motion.register >= 0) & (motion.code > 0)], axis=0)
     assert len(gauge) > 30
+    gauge = gauge[::3]
     theirs = standstill(machine, gauge)
     ours = machine.kinematics.inverse(gauge, np.tile([0.0, 0.0, 1.0], (len(gauge), 1)))[0]
     assert np.abs(theirs - ours).max() < TIGHT

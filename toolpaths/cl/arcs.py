@@ -9,6 +9,7 @@ import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.cl.text.log import DiagnosticLog
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Arcs
 
 UNIT_EXACT = 1e-14
@@ -55,6 +56,7 @@ class ArcTable:
 
 
 @dataclass(frozen=True)
+@arrays(start="K 3", end="K 3", center="K 3", normal="K 3", radius="K", times="K", sweep="K", line="K")
 class CircleRecords:
     """The same as arrays in mm and the part frame, one per arc (K rows); start and end are tips (K, 3)."""
 

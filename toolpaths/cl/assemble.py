@@ -85,8 +85,8 @@ def _rows(b: ToolpathBuilder) -> PointRows:
     axis, third = points.axis, points.third
     if b.pieces == [(0, len(points))] or (not b.pieces and not len(points)):
         given = np.zeros(len(points), bool) if axis is None else ~np.isnan(axis[:, 0])
-        return PointRows(points.xyz, axis if axis is not None else np.full((len(points), 3), np.nan), third, points.line,
-                         given)
+        own = axis.copy() if axis is not None else np.full((len(points), 3), np.nan)
+        return PointRows(points.xyz.copy(), own, third, points.line, given)
     source = _source(b)
     tip = _merged(points.xyz, extras.xyz, len(points))[source]
     axis = _merged(axis, extras.axis, len(points))[source]

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.smoothing.members import Members
 
 HIGHEST = 5.0 / 32.0
@@ -35,6 +36,7 @@ def ramp(u: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
+@arrays(s="G", half="G", stop="G", turn="G")
 class SegmentBlends:
     """The G - 1 joints between segments: parameter, half length a (0 at stops), which are stops, and the turn in rad."""
 

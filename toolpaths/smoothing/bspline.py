@@ -13,12 +13,14 @@ from functools import cached_property
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 DEGREE = 5
 ORDER = DEGREE + 1
 
 
 @dataclass(frozen=True)
+@arrays(t="T", first="G")
 class KnotVectors:
     """Knots of G stretches.
 

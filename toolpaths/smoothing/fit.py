@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.smoothing.bspline import DEGREE, ORDER, KnotVectors
 from toolpaths.smoothing.sweep import WIDTH, Data, Normal, evaluate, sweep_for
 
@@ -31,6 +32,7 @@ GOOD = 0.95
 
 
 @dataclass(frozen=True)
+@arrays(c="K 6")
 class SplineFit:
     """Splines of G stretches: knots and coefficients (K, 6)."""
 
@@ -39,6 +41,7 @@ class SplineFit:
 
 
 @dataclass(frozen=True)
+@arrays(t="T", c="K 6", ratio="C")
 class Spline:
     """One stretch: clamped knots t, coefficients c (k, 6), `ratio` (P - 1,) bound of deviation over tolerance on each
     chord of its polyline."""
@@ -58,6 +61,7 @@ def assembled(splines: list[Spline], shift: float) -> SplineFit | None:
 
 
 @dataclass(frozen=True)
+@arrays(s="N", p="N 6", stretch="N", weight="N", ends="P", chord="C", row="C")
 class _Polyline:
     """The points with the middles of their chords: s, p, stretch and weight of N places in order.
 

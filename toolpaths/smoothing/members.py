@@ -9,6 +9,7 @@ import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.smoothing.bspline import KnotVectors
 from toolpaths.smoothing.fit import SplineFit
 from toolpaths.smoothing.sweep import WIDTH, Data, evaluate
@@ -17,6 +18,7 @@ CHUNK = 65536
 
 
 @dataclass(frozen=True)
+@arrays(ends="E", first="G+1", spline="G")
 class Members:
     """G segments over a chain of M moves.
 

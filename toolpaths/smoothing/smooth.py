@@ -16,6 +16,7 @@ import numpy as np
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.smoothing.blend import SHARPEST, SegmentBlends, chosen
 from toolpaths.smoothing.fit import Spline, assembled, fit
 from toolpaths.smoothing.members import Members
@@ -43,6 +44,7 @@ class Tolerance:
 
 
 @dataclass(frozen=True)
+@arrays(s="E")
 class Smooth:
     """A smoothed chain of M moves.
 

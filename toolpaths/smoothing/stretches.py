@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 FEWEST = 4
 """Chords that make a spline; fewer stay lines."""
@@ -23,6 +24,7 @@ TURN_SPAN = 2.0
 
 
 @dataclass(frozen=True)
+@arrays(first="G+1", spline="G")
 class ChainSegments:
     """G segments of a chain of moves.
 

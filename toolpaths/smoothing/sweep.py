@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
-from functools import cache
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
 from toolpaths.arrays import Floats, Ints
+from toolpaths.compiled import compiled, loaded, loop
 from toolpaths.smoothing.bspline import ORDER, basis
 
 WIDTH = 6
@@ -67,6 +66,7 @@ def sweep(t: Floats, data: Data, c: Floats, weight: Floats, tolerance: float, ra
             normal.bands[j - i, first + i] += squares[i, j]
 
 
+@loop(alone=True)
 def _loop(t: Floats, s: Floats, p: Floats, k: Ints, first: Ints, c: Floats, weight: Floats, tolerance: float,
           ratio: Floats, bands: Floats, right: Floats) -> None:
     """`sweep` place by place."""
@@ -104,24 +104,12 @@ def _loop(t: Floats, s: Floats, p: Floats, k: Ints, first: Ints, c: Floats, weig
                 right[f + a, column] += part * p[i, column]
 
 
-@cache
-def _compiled() -> Callable[..., None]:
-    """The loop compiled, kept on disk where the package's folder can be written."""
-    from numba import njit
-
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
-    try:
-        return cast(Callable[..., None], njit(_loop, cache=True, **options))
-    except RuntimeError:
-        return cast(Callable[..., None], njit(_loop, **options))
-
-
 def compiled_sweep(t: Floats, data: Data, c: Floats, weight: Floats, tolerance: float, ratio: Floats,
                    normal: Normal) -> None:
     """See `sweep`."""
-    _compiled()(t, data.s, data.p, data.k, data.first, c, weight, tolerance, ratio, normal.bands, normal.right)
+    compiled(_loop)(t, data.s, data.p, data.k, data.first, c, weight, tolerance, ratio, normal.bands, normal.right)
 
 
 def sweep_for(count: int) -> Callable[..., None]:
     """The one that is sooner done with so many places; a compiler that is loaded already is used."""
-    return compiled_sweep if count >= COMPILE or "numba" in sys.modules else sweep
+    return compiled_sweep if count >= COMPILE or loaded() else sweep

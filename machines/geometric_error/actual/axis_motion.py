@@ -16,6 +16,7 @@ from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x
 from machines.kinematics.serial import Joint, Serial
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 X, Y, Z = np.eye(3)
 SERIES = 1e-5
@@ -25,6 +26,7 @@ ALONG = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(direction="3", point="3", reference="3")
 class Line:
     """An axis as its location errors leave it: direction (3,), a point of its line (3,), reference point (3,), and by how
     much it stands farther than it counts."""

@@ -21,6 +21,7 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import Actual
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 POLE = 0.0175
@@ -38,6 +39,8 @@ STEPS = 20
 
 
 @dataclass(frozen=True)
+@arrays(q="N J", tip_before="N", axis_before="N", tip_after="N", axis_after="N", tip_residual="N 3", axis_residual="N 3",
+        partial="N", unmeasured="N J")
 class CorrectedCommands:
     """Corrected commands and what they do on the machine with errors.
 

@@ -26,6 +26,7 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.serial import Joint, Serial
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import rotation
+from toolpaths.shapes import arrays
 
 LARGEST_TURN = 0.1
 """rad: errors that turn the tool by more have no bound here"""
@@ -34,6 +35,7 @@ STEEPEST_GAP = 0.1
 
 
 @dataclass(frozen=True)
+@arrays(tip="N J", axis="N J", tip_way="N J", axis_way="N J")
 class ErrorRates:
     """Bounds for N poses and J joints.
 

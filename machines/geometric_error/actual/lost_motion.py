@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats
+from toolpaths.shapes import arrays
 
 GRAIN = 5e-5, 1e-6
 """mm and rad, half of a last decimal: motion below it turns nothing, and play below it counts as that much"""
 
 
 @dataclass(frozen=True)
+@arrays(shift="...", low="...", high="...")
 class PlaySteps:
     """Functions of the way: clip(way + shift, low, high); arrays of one shape."""
 

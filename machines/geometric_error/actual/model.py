@@ -20,6 +20,7 @@ from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats, frozen
+from toolpaths.shapes import arrays
 
 CorrectedBy = Literal["post", "control"]
 BLOCK = 2048
@@ -27,6 +28,7 @@ BLOCK = 2048
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(covariance="P P")
 class ErrorModel:
     """Errors of one machine. Zero parameters give exactly the nominal machine.
 
@@ -138,6 +140,7 @@ def _check_axes(kinematics: Kinematics, axes: SerialErrors) -> None:
 
 
 @dataclass(frozen=True)
+@arrays(tip="N 3", tip_worst="N", axis="N")
 class Uncertainty:
     """Standard deviations that the covariance of a model gives at places of a path.
 

@@ -17,11 +17,13 @@ from typing import Self
 
 import numpy as np
 
-from machines.geometric_error.actual.rods_loop import compiled, wanted
+from machines.geometric_error.actual.rods_loop import COMPILE_FROM, close_all
 from machines.geometric_error.actual.transforms import turns
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from toolpaths.arrays import Floats, Ints, frozen
+from toolpaths.compiled import compiled, wanted
+from toolpaths.shapes import arrays
 
 RODS = 6
 STEPS = 12
@@ -33,6 +35,7 @@ LEAST_GAIN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(rail="K 3", guide="K 3", carriage="6 3", platform="6 3", length="6")
 class RodErrors:
     """Errors of K legs and six rods, mm and rad; the order of the parameters is that of E-14.
 
@@ -90,6 +93,7 @@ class RodErrors:
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(leg="6", rail="K 3", direction="K 3", arm="6 3", joint="6 3", length="6", guide="K 3 3")
 class RodFrame:
     """Nominal geometry of six rods, mm, machine frame.
 
@@ -129,10 +133,11 @@ class RodFrame:
 
         Chord iteration from the nominal platform `place` (N, 3), `turned` (N, 3, 3); NaN where it does not close.
         """
-        if wanted(len(q)):
+        if wanted(len(q), COMPILE_FROM, close_all):
             place, turned = np.array(place), np.array(turned)
-            worst = compiled()(np.ascontiguousarray(q), self.leg, *self._carriages(errors), self.joint + errors.platform,
-                               (self.length + errors.length) ** 2, place, turned, STEPS, CLOSED, LEAST_GAIN)
+            lengths = (self.length + errors.length) ** 2
+            worst = compiled(close_all)(np.ascontiguousarray(q), self.leg, *self._carriages(errors),
+                                        self.joint + errors.platform, lengths, place, turned, STEPS, CLOSED, LEAST_GAIN)
             return _where_closed(place, turned, worst)
         with np.errstate(over="ignore", invalid="ignore"):  # what does not close grows out of bounds
             return self._by_chords(q, place, turned, errors)

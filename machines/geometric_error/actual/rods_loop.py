@@ -1,42 +1,20 @@
-"""The closure of six rods point by point: a plain loop that numba compiles for many points, beside `RodFrame.solve`."""
+"""The closure of six rods point by point, compiled for many points. For few `RodFrame.solve` does all of them at once with
+numpy, which needs no compiler: interpreted, this loop takes a hundred times as long."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cache
-from importlib.util import find_spec
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
+
+from toolpaths.compiled import loop
 
 COMPILE_FROM = 20_000
 """points from which compiling pays"""
 
 
-def wanted(points: int) -> bool:
-    """Whether the compiled loop pays: for many points, or because it is compiled anyway."""
-    return (points >= COMPILE_FROM or compiled.cache_info().currsize > 0) and find_spec("numba") is not None
-
-
-@cache
-def compiled() -> Callable[..., Any]:
-    """`close_all` compiled, kept on disk where the package's folder can be written."""
-    from numba import njit
-
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
-
-    def jit(function: Callable[..., Any]) -> Callable[..., Any]:
-        try:
-            return cast(Callable[..., Any], njit(function, cache=True, **options))
-        except RuntimeError:
-            return cast(Callable[..., Any], njit(function, **options))
-
-    for name in ("_factored", "_solve", "_turn", "_close"):
-        globals()[name] = jit(globals()[name])
-    return jit(close_all)
-
-
+@loop(alone=True)
 def close_all(q: Any, leg: Any, base: Any, along: Any, joint: Any, squares: Any, place: Any, turned: Any, steps: Any,
               closed: Any, least_gain: Any) -> Any:
     """Close the rods of every point: `place` (N, 3) and `turned` (N, 3, 3) change from the nominal to the actual platform.
@@ -59,6 +37,7 @@ def close_all(q: Any, leg: Any, base: Any, along: Any, joint: Any, squares: Any,
     return worst
 
 
+@loop(alone=True)
 def _close(a: Any, joint: Any, squares: Any, x: Any, turn: Any, steps: Any, closed: Any, least_gain: Any, rows: Any,
            end: Any, gap: Any, order: Any) -> Any:
     """Chord iteration on one platform (x (3,), turn (3, 3), changed in place); the last four arguments are scratch."""
@@ -90,6 +69,7 @@ def _close(a: Any, joint: Any, squares: Any, x: Any, turn: Any, steps: Any, clos
     return worst
 
 
+@loop(alone=True)
 def _factored(m: Any, order: Any) -> None:
     """L U of a square matrix (6, 6) in its place, rows exchanged as `order` says (partial pivots)."""
     for k in range(6):
@@ -107,6 +87,7 @@ def _factored(m: Any, order: Any) -> None:
                 m[i, j] -= m[i, k] * m[k, j]
 
 
+@loop(alone=True)
 def _solve(m: Any, order: Any, x: Any) -> None:
     """Solution of the factored system, in the place of its right side x (6,)."""
     for k in range(6):
@@ -119,6 +100,7 @@ def _solve(m: Any, order: Any, x: Any) -> None:
         x[k] /= m[k, k]
 
 
+@loop(alone=True)
 def _turn(turn: Any, a: Any, b: Any, c: Any) -> Any:
     """A rotation matrix turned by a small rotation vector (Rodrigues, series as in `rods.turned_by`), in its place."""
     square = a * a + b * b + c * c

@@ -23,6 +23,7 @@ from machines.kinematics.serial import Serial
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.rotations import rotation
+from toolpaths.shapes import arrays
 
 NONE = 1e-12
 """an entry of a turn below this everywhere is 0"""
@@ -31,6 +32,7 @@ ON_LINE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(direction="3")
 class RotatedCurve(Curve):
     """Sum of curves of one axis, each times an entry of the axis's turn.
 

@@ -13,6 +13,7 @@ from machines.geometric_error.exchange.bed_frame import RotatedCurve
 from machines.geometric_error.tables.curves import Curve, Fourier, TableCurve
 from machines.geometric_error.tables.names import ErrorName
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 PROBES = 16
 """places in each cell of a table at which it is compared with its curve"""
@@ -23,6 +24,7 @@ ROUND = 12
 
 
 @dataclass(frozen=True)
+@arrays(x="M")
 class TablePositions:
     """Positions (M,) mm or rad of a table, and the period after which it repeats (0 for never)."""
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Literal, Self
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -75,6 +76,7 @@ class Curve(ABC):
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(x="M", values="V")
 class TableCurve(Curve):
     """Values measured at M ascending positions, both ways where `both`.
 
@@ -197,6 +199,7 @@ class TableCurve(Curve):
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(values="V")
 class Fourier(Curve):
     """mean + sum over k = 1.. of cosine_k cos(k phase) + sine_k sin(k phase), phase = 2 pi (x - origin) / period.
 
@@ -258,6 +261,7 @@ class Fourier(Curve):
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(values="V")
 class Polynomial(Curve):
     """sum over k = 0.. of values_k ((x - origin) / scale)^k."""
 

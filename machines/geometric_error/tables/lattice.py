@@ -16,6 +16,7 @@ from typing import Self
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints, frozen
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 COLUMNS = ("dx", "dy", "dz", "rx", "ry", "rz")
@@ -24,6 +25,7 @@ ROTARY = "ABC"
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(nodes="* _", table="...")
 class ErrorMap:
     """Values on a full lattice.
 

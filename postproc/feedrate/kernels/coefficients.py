@@ -1,13 +1,16 @@
 """Plain loops of `interior_packed.py` over the coefficients themselves: their rows c >= 0, and tied ends.
 
-How they are rounded: `compiled.py`.
+How they are rounded: `toolpaths/compiled.py`.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from toolpaths.compiled import loop
 
+
+@loop
 def advance(c: Any, step: Any, z: Any, rate: Any, primal: Any, dual: Any) -> None:
     """Take the last step: c (n,) and the multipliers z (n,) of c >= 0, whose relative changes are `rate`."""
     for i in range(z.shape[0]):
@@ -15,6 +18,7 @@ def advance(c: Any, step: Any, z: Any, rate: Any, primal: Any, dual: Any) -> Non
         z[i] *= 1.0 + dual * rate[i]
 
 
+@loop
 def begin(c: Any, z: Any, mu: Any, low: Any, force: Any) -> Any:
     """Begin lower band (3, padded) and right side (padded,) with the rows c >= 0; returns their gap."""
     n, gap = z.shape[0], 0.0
@@ -27,6 +31,7 @@ def begin(c: Any, z: Any, mu: Any, low: Any, force: Any) -> Any:
     return gap
 
 
+@loop
 def tie_ends(low: Any, right: Any, first: Any, last: Any) -> None:
     """As `interior.tie`."""
     n = right.shape[0]
@@ -47,6 +52,7 @@ def tie_ends(low: Any, right: Any, first: Any, last: Any) -> None:
         low[1, n - last - 1] += low[2, n - last - 1]
 
 
+@loop
 def relative(right: Any, first: Any, last: Any, c: Any, z: Any, mu: Any, step: Any, rate: Any) -> Any:
     """Spread the answer over the tied ends into `step`, relative changes of z into `rate`; largest decreases of c and z."""
     n = right.shape[0]

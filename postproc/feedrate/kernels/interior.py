@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.base.compiled import compiled
+from toolpaths.compiled import loop
 
 _N = np.uint64
 LANES = 32
@@ -32,6 +32,7 @@ F1, F2, F3, F4, F5, F6, F7, F8 = (_N(i * LANES) for i in range(1, 9))
 F9, F10, F11 = _N(9 * LANES), _N(10 * LANES), _N(11 * LANES)
 
 
+@loop(fused=True)
 def _knots(w: Any, c: Any, b: Any, k: Any, mu: Any, dual: Any) -> None:
     """Block b of w from coefficients c[k:]: x and derivatives, roots, the velocity row, sums of the others at zero."""
     for i in range(L):
@@ -56,6 +57,7 @@ def _knots(w: Any, c: Any, b: Any, k: Any, mu: Any, dual: Any) -> None:
         w[p + SUM_Z] = 0.0
 
 
+@loop(fused=True)
 def _joint(w: Any, v: Any, b: Any, q: Any, ia: Any, ij: Any, mu: Any, dual: Any) -> None:
     """Add the rows of one joint, block q of v, to block b of w; ia, ij one over its limits of acceleration and jerk."""
     for i in range(L):
@@ -96,9 +98,7 @@ def _joint(w: Any, v: Any, b: Any, q: Any, ia: Any, ij: Any, mu: Any, dual: Any)
         w[p + H22] += ratio * j2 * j2
 
 
-knots_of_block, joint_of_block = compiled(_knots, fused=True), compiled(_joint, fused=True)
-
-
+@loop(fused=True)
 def assemble(w: Any, v: Any, c: Any, inverse: Any, blocks: Any, mu: Any, dual: Any) -> Any:
     """Update z by the dual step; leave each knot's part of the Newton equations in G and H. Returns gap and time.
 
@@ -108,9 +108,9 @@ def assemble(w: Any, v: Any, c: Any, inverse: Any, blocks: Any, mu: Any, dual: A
     gap, time = 0.0, 0.0
     for block in range(blocks):
         b = block * BLOCK
-        knots_of_block(w, c, b, block * L, mu, dual)
+        _knots(w, c, b, block * L, mu, dual)
         for joint in range(joints):
-            joint_of_block(w, v, b, (block * joints + joint) * F11, inverse[0, joint], inverse[1, joint], mu, dual)
+            _joint(w, v, b, (block * joints + joint) * F11, inverse[0, joint], inverse[1, joint], mu, dual)
         for i in range(L):
             p = b + i
             gap += (1.0 - w[p + PAD]) * w[p + GAP]
@@ -118,6 +118,7 @@ def assemble(w: Any, v: Any, c: Any, inverse: Any, blocks: Any, mu: Any, dual: A
     return gap, time
 
 
+@loop(fused=True)
 def band(w: Any, blocks: Any, low: Any, force: Any) -> None:
     """Add the knots' parts to the lower band (3, n) and the right side (n,) in the coefficients, n padded to the lanes."""
     for block in range(blocks):
@@ -126,6 +127,7 @@ def band(w: Any, blocks: Any, low: Any, force: Any) -> None:
         for i in range(L):
             p = b + i
             root = w[p + ROOT]
+            # The Hessian by x, x', x'' becomes one by the three coefficients: S' H S with the stencil S in w[0:9].
             h00 = w[p + H00] + 1.5 * root * root * w[p + HALF] * max(w[p + WEIGHT] - w[p + SUM_Z], 0.0)
             h01, h02, h11, h12, h22 = w[p + H01], w[p + H02], w[p + H11], w[p + H12], w[p + H22]
             s, t, u = w[p], w[p + F3], w[p + F6]
@@ -157,12 +159,14 @@ def band(w: Any, blocks: Any, low: Any, force: Any) -> None:
             force[n + _TWO] += w[p + G2]
 
 
+@loop(fused=True)
 def pentadiagonal(low: Any, x: Any, inverse: Any, below: Any) -> Any:
     """Solve by LDL': lower band (3, n), x (n,) right side, then answer; room inverse (n,), below (2, n).
 
     False where the matrix is not positive definite.
     """
     n = x.shape[0]
+    # l: rows of L; d: entries below before they are divided by their pivot; y: right sides of the two rows before.
     l1, l2, second, a1, d2, d22, y1, y2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(n):
         pivot = low[0, i] - l1 * a1 - second * d22
@@ -183,8 +187,11 @@ def pentadiagonal(low: Any, x: Any, inverse: Any, below: Any) -> Any:
     return True
 
 
+@loop(fused=True)
 def direction(w: Any, v: Any, dc: Any, inverse: Any, blocks: Any, mu: Any) -> Any:
     """Relative changes of z for the step dc; returns the largest relative decrease of a slack and of a z."""
+    # Largest fall of a slack by itself and of a z by itself: one over them are the steps to the nearest bound.
+    # One division serves a pair: 1 / (slack z) times z or slack. B0 to B2 hold the changes of x, x', x''.
     joints = _N(inverse.shape[1])
     primal, dual = 0.0, 0.0
     for block in range(blocks):

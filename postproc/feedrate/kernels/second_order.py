@@ -1,7 +1,4 @@
-"""Plain loops of `second_order.py`, compiled for long grids. The numpy functions there are the reference.
-
-Both do the same operations in the same order, so that they agree to the last bit on any processor (`compiled.py`).
-"""
+"""The loop of `second_order.py`, compiled for long grids, with the same bits on any processor (`toolpaths/compiled.py`)."""
 
 from __future__ import annotations
 
@@ -9,10 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from toolpaths.compiled import loop
+
 STEPS = 100
 """Most steps of Newton's method."""
 
 
+@loop
 def sweep(h: Any, dq: Any, d2q: Any, x: Any, flat: Any) -> None:
     """Both passes. h (N-1,), dq and d2q (N, J) over the acceleration limits; x (N,) holds the bound, then the result.
 
@@ -32,7 +32,7 @@ def sweep(h: Any, dq: Any, d2q: Any, x: Any, flat: Any) -> None:
                 a[j] = -a[j]
             b[j] = abs(b[j])
             over[j] = 1.0 / b[j]
-        if backward:
+        if backward:  # what x0 may be for any x1 in [0, cap], and how far x1 can go
             for j in range(2 * joints):
                 x0 = min(x0, (1.0 + b[j] * cap) / abs(a[j]))
             reach = cap
@@ -42,7 +42,7 @@ def sweep(h: Any, dq: Any, d2q: Any, x: Any, flat: Any) -> None:
             for j in range(2 * joints):
                 if not b[j] * reach > flat:
                     x0 = min(x0, (1.0 - b[j] * reach) / abs(a[j]))
-        for _ in range(STEPS):
+        for _ in range(STEPS):  # Newton's method on upper less lower bound of x1, concave in x0, from the right
             low, high, lowest, highest = 0.0, cap, -1, -1
             for j in range(2 * joints):
                 if b[j] * reaches[i] > flat:
@@ -62,6 +62,6 @@ def sweep(h: Any, dq: Any, d2q: Any, x: Any, flat: Any) -> None:
         if backward:
             x[i] = x0
             continue
-        if high < low and highest >= 0:
+        if high < low and highest >= 0:  # by rounding alone: x1 that exceeds both limits by the same
             high = low + (high - low) * (b[highest] / (b[lowest] + b[highest])) if lowest >= 0 else low
         x[i + 1] = min(max(high, 0.0), cap)

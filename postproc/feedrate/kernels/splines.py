@@ -1,6 +1,6 @@
 """Plain loop of `paths.SplinePath.derivatives`, compiled for long paths; scipy's splines there are the reference.
 
-How it is rounded: `compiled.py`.
+How it is rounded: `toolpaths/compiled.py`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from toolpaths.compiled import loop
 
+
+@loop
 def spline(knots: Any, degree: Any, c0: Any, c1: Any, c2: Any, c3: Any, s: Any, out: Any) -> None:
     """Joints and three derivatives, out (4, N, J), of a B-spline at s (N,), any order; quick where s rises.
 

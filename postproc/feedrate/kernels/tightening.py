@@ -1,6 +1,6 @@
 """Plain loop of `tightening.worst_ratios`, compiled for long motions; the numpy function there is the reference.
 
-How it is rounded: `compiled.py`.
+How it is rounded: `toolpaths/compiled.py`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from toolpaths.compiled import loop
 
+
+@loop
 def worst(d1: Any, d2: Any, d3: Any, x: Any, inverse: Any, out: Any) -> None:
     """Velocity, acceleration, jerk over their limits, the worst joint, out (3, N).
 

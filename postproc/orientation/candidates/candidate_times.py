@@ -18,24 +18,27 @@ from postproc.feedrate.shares import LimitShares
 from postproc.orientation.passes.allowed import SAME
 from postproc.orientation.passes.passes import CuttingStretch, Pass
 from postproc.orientation.passes.poses import held_poses, poses
+from postproc.orientation.passes.reasons import Refusal, Touching
 from postproc.planning.geometry import MachinePath
 from postproc.planning.planned import ORDERS, joint_limits
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 _ROUND = 1.002
 """for the slope of a joint between sites, which is taken from its differences"""
 
 
-def no_bodies(one: Pass, axis: Floats) -> str:
+def no_bodies(one: Pass, axis: Floats) -> Touching | None:
     """Where nothing is known that could be touched, nothing touches."""
-    return ""
+    return None
 
 
 @dataclass(frozen=True)
+@arrays(axis="3", q="n J", sites="* _ _")
 class Candidate:
     """A pass turned to `axis` (3,) (the CL's own where it is fixed): joints of its rows `q` (n, J) and of the sites of
-    each stretch; `refused` says why the machine cannot run it, else ""; `held` is the angle, rad, asked for of the rotary
+    each stretch; `refused` says why the machine cannot run it, else None; `held` is the angle, rad, asked for of the rotary
     joint that the axis leaves free, NaN where none is; `told`: see `slim`."""
 
     one: Pass
@@ -43,8 +46,8 @@ class Candidate:
     machine: Machine
     q: Floats
     sites: tuple[Floats, ...]
-    refused: str = ""
-    collides: Callable[[Pass, Floats], str] = no_bodies
+    refused: Refusal | None = None
+    collides: Callable[[Pass, Floats], Touching | None] = no_bodies
     held: float = np.nan
     told: float | None = None
 
@@ -56,8 +59,8 @@ class Candidate:
         return float(gap @ gap) < (2.0 * sin(0.5 * apart)) ** 2
 
     @cached_property
-    def touching(self) -> str:
-        """Which bodies touch and by how much, "" where none do; looked at once, when first asked for."""
+    def touching(self) -> Touching | None:
+        """Which bodies touch and by how much, None where none do; looked at once, when first asked for."""
         return self.collides(self.one, self.axis)
 
     @cached_property
@@ -183,13 +186,13 @@ def _largest_feed(stretch: CuttingStretch) -> float:
     return float(stretch.feed.values[first:max(last, first + 1)].max())
 
 
-def turned(one: Pass, axis: Floats, machine: Machine, collides: Callable[[Pass, Floats], str] = no_bodies,
+def turned(one: Pass, axis: Floats, machine: Machine, collides: Callable[[Pass, Floats], Touching | None] = no_bodies,
            held: float = np.nan) -> Candidate:
     """The pass with its tool along `axis` (3,), on the branch inside travel whose rotary joints are least turned."""
     return turned_all(one, axis[None], machine, collides, held)[0]
 
 
-def turned_all(one: Pass, axes: Floats, machine: Machine, collides: Callable[[Pass, Floats], str] = no_bodies,
+def turned_all(one: Pass, axes: Floats, machine: Machine, collides: Callable[[Pass, Floats], Touching | None] = no_bodies,
                held: float = np.nan) -> list[Candidate]:
     """`turned` along each of `axes` (S, 3); a pass whose axis is fixed stays as it is."""
     if one.fixed:

@@ -48,7 +48,7 @@ def tried(one: Pass, machine: Machine, allowed: AllowedAxes, before: PassSearch 
         tilt = np.pi / 2.0 if len(one.normal) else allowed.tilt
         seeds = search.add(reaching_axes(one, machine, tilt, lambda axes: allowed.mask(one, axes)))
     seeds += [] if before is None else search.add(before.best.axis[None])
-    if search.own.refused.startswith("travel") and not seeds:
+    if search.own.refused is not None and search.own.refused.kind == "travel" and not seeds:
         seeds = search.add(nearest_inside(one, machine, allowed).axis[None])
     again = next((made for made in seeds if before is not None and made.same(before.best.axis)), None)
     best = search.own

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from postproc.orientation.candidates.search import PassSearch, Rejection
 from postproc.orientation.candidates.travel import MissingTravel, nearest_inside
 from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import Pass, PassContext
-from postproc.orientation.passes.poses import OUT_OF_REACH
+from postproc.orientation.passes.reasons import Refusal, Touching
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -24,8 +24,6 @@ _TURN = ("turn the part in the set-up (part.x_axis, part.y_axis) or use another 
          "wherever the part is")
 _APART_FIXED = "check part, fixtures and holder of the set-up, turn the part in it, or take a longer tool"
 _APART = "check part, fixtures and holder of the set-up, allow more tilt (--max-tilt) or take a longer tool"
-_BY = re.compile(r"(.+) by ([\d.]+) mm")
-_BEYOND = re.compile(r"(travel: axis \w+) at .*: ([\d.]+) (too \w+)$")
 _SURE = 5.0
 """mm that every axis lacks at least: where it is less, the search decides"""
 
@@ -33,76 +31,76 @@ _SURE = 5.0
 def out_of_travel(work: PassContext, allowed: AllowedAxes) -> list[Diagnostic]:
     """Errors, before any search, where travel rules out passes whatever their tool axis: of those whose own axis is outside
     alike, the one that is farthest is looked at."""
-    alike: dict[tuple[str, str], list[tuple[Pass, str]]] = {}
+    alike: dict[tuple[object, str], list[tuple[Pass, Refusal]]] = {}
     for one in work.passes:
         own = turned(one, one.axis, work.machine).refused
-        if own.startswith("travel"):
-            alike.setdefault((_pair(own), one.fixed), []).append((one, own))
+        if own is not None and own.kind == "travel":
+            alike.setdefault((own.alike, one.fixed), []).append((one, own))
     found = []
     for some in alike.values():
-        one, own = max(some, key=lambda each: _depth(each[1]))
+        one, own = max(some, key=lambda each: each[1].depth)
         least = nearest_inside(one, work.machine, allowed)
         if _SURE < least.size < np.inf:
-            found.append(_hopeless(work, some, one, f"{own}; {_no_other(one, least)}"))
+            rotary = own.rotary or (not one.fixed and least.why is not None and least.why.rotary)
+            found.append(_hopeless(work, some, one, f"{own}; {_no_other(one, least)}", _TURN if rotary else REACH))
     return found
 
 
-def _hopeless(work: PassContext, some: list[tuple[Pass, str]], one: Pass, why: str) -> Diagnostic:
+def _hopeless(work: PassContext, some: list[tuple[Pass, Refusal]], one: Pass, why: str, hint: str) -> Diagnostic:
     more = f"; the CL's axis is outside alike in {len(some) - 1} more passes" if len(some) > 1 else ""
     lines = [one.line, *(each.line for each, _ in some if each is not one)]
     return error("orient.travel", f"pass {one.number} with the axis of the CL file: {why}{more}", file=work.toolpath.file,
-                 lines=lines[:6], count=len(some), hint=_hint(why, one.fixed))
+                 lines=lines[:6], count=len(some), hint=hint)
 
 
 def _no_other(one: Pass, least: MissingTravel) -> str:
     """Why no other axis is left."""
     if one.fixed:
         return f"no other axis is allowed ({one.fixed})"
-    return f"no other axis is inside travel, the nearest to it has {least.why.removeprefix('travel: ')}"
+    return f"no other axis is inside travel, the nearest to it has {least.why.place if least.why else ''}"
 
 
 def unfit(work: PassContext, results: list[PassSearch]) -> list[Diagnostic]:
     """Warnings where another axis was found, else errors."""
     reached = [one for one in results if not one.own.refused]
     return [*_told(work, [one for one in results if one.own.refused], ("orient.own_reach", "orient.reach"),
-                   lambda one: one.own.refused + _off(one.own)),
+                   lambda one: _missing(one.own)),
             *_told(work, [one for one in reached if one.own.touching], ("orient.own_touches", "orient.touches"),
                    lambda one: one.own.touching)]
 
 
-def _off(own: Candidate) -> str:
-    """By how much a serial machine misses an axis that it cannot take at all."""
-    if own.refused != OUT_OF_REACH or not own.one.kin.slides_affine:
-        return ""
+def _missing(own: Candidate) -> Refusal | None:
+    """Why a pass cannot be run, with the angle by which a serial machine misses an axis that it cannot take at all."""
+    if own.refused is None or own.refused.kind != "reach" or not own.one.kin.slides_affine:
+        return own.refused
     off = angle_between(own.one.kin.nearest_axis(own.one.axes), own.one.axes)
-    return f": the rotary axes bring the tool no nearer to it than {off.max() / DEG:.3f} degrees" if off.max() > 0.0 else ""
+    return replace(own.refused, missing=float(off.max()) / DEG)
 
 
-def _hint(why: str, fixed: str) -> str:
+def _hint(why: Refusal | Touching, fixed: str) -> str:
     """What to do about it."""
-    if why.startswith(OUT_OF_REACH) or (why.startswith("travel") and " degrees, " in why):
-        return _TURN
-    if why.startswith("travel") or "reach" in why:
-        return REACH
-    return _APART_FIXED if fixed else _APART
+    if isinstance(why, Touching):
+        return _APART_FIXED if fixed else _APART
+    return _TURN if why.rotary else REACH
 
 
 def _told(work: PassContext, bad: list[PassSearch], codes: tuple[str, str],
-          why: Callable[[PassSearch], str]) -> list[Diagnostic]:
+          why: Callable[[PassSearch], Refusal | Touching | None]) -> list[Diagnostic]:
     """One diagnostic per kind; the deepest and the farthest beyond travel stands for all."""
-    alike: dict[tuple[bool, str, str], list[PassSearch]] = {}
+    alike: dict[tuple[bool, object, str], list[tuple[PassSearch, Refusal | Touching]]] = {}
     for one in bad:
-        alike.setdefault((one.best is not one.own, _pair(why(one)), one.own.one.fixed), []).append(one)
+        if (reason := why(one)) is not None:
+            alike.setdefault((one.best is not one.own, reason.alike, one.own.one.fixed), []).append((one, reason))
     result = []
-    for (other, _, fixed), some in alike.items():
-        worst = max(some, key=lambda one: _depth(why(one)))
-        first = worst.own.one
+    for (other, _, fixed), same in alike.items():
+        worst, reason = max(same, key=lambda each: each[1].depth)
+        some, first = [one for one, _ in same], worst.own.one
         more = f" and {len(some) - 1} more" if len(some) > 1 else ""
         left = "" if other else "; " + (f"no other axis is allowed ({fixed})" if fixed else _others(some))
         make, code = (warning, codes[0]) if other else (error, codes[1])
-        result.append(make(code, f"pass {first.number}{more} with the axis of the CL file: {why(worst)}{left}",
+        result.append(make(code, f"pass {first.number}{more} with the axis of the CL file: {reason}{left}",
                            file=work.toolpath.file, lines=[one.own.one.line for one in some][:6], count=len(some),
-                           hint=_hint(why(worst), fixed)))
+                           hint=_hint(reason, fixed)))
     return result
 
 
@@ -117,17 +115,5 @@ def _others(some: list[PassSearch]) -> str:
 
 def _nearest(lost: list[Rejection]) -> str:
     """The candidate that touches least."""
-    least = min((each.why for each in lost if each.kind == "touches" and _BY.match(each.why)), key=_depth, default="")
-    return f" (the least: {least})" if least else ""
-
-
-def _pair(why: str) -> str:
-    """What touches, which axis ends, without by how much and where; another reason as it stands."""
-    found, beyond = _BY.match(why), _BEYOND.match(why)
-    return f"{beyond[1]} {beyond[3]}" if beyond else found[1] if found else why
-
-
-def _depth(why: str) -> float:
-    """mm that something touches by, mm or degrees that an axis is beyond its travel; 0 where the reason is another."""
-    found = _BY.match(why) or _BEYOND.match(why)
-    return float(found[2]) if found else 0.0
+    touching = [each.why for each in lost if isinstance(each.why, Touching)]
+    return f" (the least: {min(touching, key=lambda why: why.depth)})" if touching else ""

@@ -7,13 +7,12 @@ own for each axis; what is chosen here is planned so in the end.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_matrix, diags, identity, vstack
 
-from postproc.base.compiled import compiled, wanted
 from postproc.feedrate.feed import AllowedFeed
 from postproc.feedrate.kernels.interior import pentadiagonal
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
@@ -23,24 +22,23 @@ from postproc.feedrate.problem import SpeedProblem
 from postproc.feedrate.rows import UNBOUND
 from postproc.feedrate.second_order import least_time, second_order
 from postproc.feedrate.spline import rest_basis
-from postproc.feedrate.windows import KERNEL_FROM, Method, solve_problem
+from postproc.feedrate.windows import Method, solve_problem
 from postproc.orientation.candidates.candidate_times import Candidate
-from postproc.orientation.passes.passes import Pass
 from postproc.planning.geometry import DEGREE, MachinePath
 from toolpaths.arrays import Floats
+from toolpaths.compiled import available, compiled
 
 _MOVES = 1e-9
 """mm or rad: joints that move less along a stretch stand still"""
-_KNOTS = 20
-"""of all plans of a pass together that count for each of its sites, where it is asked whether a compiler pays"""
 LONG = 50_000
 """knots of a pass from which each axis is planned in full, in windows"""
 
 
-def prepare(passes: Sequence[Pass]) -> None:
-    """Load the compiler where so many passes are worth it; then all of them are planned by compiled loops, else none."""
-    if wanted(_KNOTS * sum(len(stretch.s) for one in passes for stretch in one.stretches), KERNEL_FROM):
-        compiled(pentadiagonal, fused=True)
+def load_compiler() -> None:
+    """Load the compiler: all candidates are planned by compiled loops, so that a choice between two that are equally fast
+    but for rounding does not hang on what else has been compiled."""
+    if available():
+        compiled(pentadiagonal)
 
 
 class Ranking:

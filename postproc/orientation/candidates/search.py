@@ -12,6 +12,7 @@ from postproc.orientation.candidates.candidate_times import Candidate, turned, t
 from postproc.orientation.candidates.ranking import Ranking
 from postproc.orientation.passes.allowed import SAME, AllowedAxes
 from postproc.orientation.passes.passes import Pass
+from postproc.orientation.passes.reasons import Refusal, Touching
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -24,11 +25,19 @@ RejectionKind = Literal["limits", "reach", "travel", "touches", "bound", "slower
 """What a candidate can lose by."""
 
 
+Reason = Refusal | Touching | str
+
+
+def _kind(refused: Refusal | None) -> RejectionKind:
+    """What a candidate that the machine cannot run loses by."""
+    return "travel" if refused is not None and refused.kind == "travel" else "reach"
+
+
 class Rejection(NamedTuple):
     """A candidate that was not taken, why and by what kind of reason; `Candidate.slim` but for the CL's own axis."""
 
     made: Candidate
-    why: str
+    why: Reason
     kind: RejectionKind
 
 
@@ -97,11 +106,10 @@ class CandidateSearch:
         """Whether a candidate is allowed and inside travel; why not is noted."""
         why = self.allowed.refused(self.one, made.axis)
         if why or made.refused:
-            kind: RejectionKind = "limits" if why else "travel" if made.refused.startswith("travel") else "reach"
-            self.lose(made, why or made.refused, kind)
+            self.lose(made, why or made.refused or "", "limits" if why else _kind(made.refused))
         return not (why or made.refused)
 
-    def lose(self, made: Candidate, why: str, kind: RejectionKind) -> None:
+    def lose(self, made: Candidate, why: Reason, kind: RejectionKind) -> None:
         """Note what a candidate lost by; times are told at the end."""
         told = made if made is self.own else made.slim(self._times.get(id(made), np.nan))
         self.lost[id(made)] = Rejection(told, why, kind)
@@ -145,7 +153,7 @@ class CandidateSearch:
     def _beaten(self, best: Candidate) -> None:
         """Note why one that was the best no longer is."""
         if best.refused:
-            self.lose(best, best.refused, "travel" if best.refused.startswith("travel") else "reach")
+            self.lose(best, best.refused, _kind(best.refused))
         elif best.touching:
             self.lose(best, best.touching, "touches")
         else:

@@ -13,8 +13,10 @@ from postproc.orientation.candidates.initial_axes import around, cap, ring
 from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import Pass
 from postproc.orientation.passes.poses import Solved, held_poses
+from postproc.orientation.passes.reasons import Refusal
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 _APART = 10.0 * DEG
@@ -30,11 +32,12 @@ _SOME = 24
 
 
 @dataclass(frozen=True)
+@arrays(axis="3")
 class MissingTravel:
-    """What lacks least: mm, in words, under a tool axis (3,)."""
+    """What lacks least: mm, why, under a tool axis (3,)."""
 
     size: float
-    why: str
+    why: Refusal | None
     axis: Floats
 
 
@@ -89,7 +92,7 @@ def _descended(start: MissingTravel, some: Pass, machine: Machine, allowed: Allo
 
 def _held(some: Pass, machine: Machine, angles: Floats) -> MissingTravel:
     """The own axis with the joint that it leaves free held at one of `angles` (H,), some of them first."""
-    best, at = MissingTravel(np.inf, "", some.axis), 0
+    best, at = MissingTravel(np.inf, None, some.axis), 0
     for step in (6, 2, 1) if len(angles) else ():
         near = range(0, len(angles), step) if step == 6 else (at - 2 * step, at - step, at + step, at + 2 * step)
         for k in near:
@@ -112,7 +115,7 @@ def _lacks(some: Pass, machine: Machine, axes: Floats, held: float = np.nan) -> 
 def _size(solved: Solved, machine: Machine) -> float:
     """mm by which the worst joint is beyond its travel, 0 where none is; inf where a position is out of reach."""
     q, why = solved
-    if why and not why.startswith("travel"):
+    if why is not None and why.kind != "travel":
         return np.inf
     over = np.maximum(machine.limits.lower - q, q - machine.limits.upper).max(axis=0)
     worst = float((np.maximum(over, 0.0) * np.where(machine.rotary, _PER_RAD, 1.0)).max())
@@ -127,4 +130,5 @@ def _thinned(one: Pass) -> Pass:
     ways = np.array([way for way in np.ndindex(3, 3, 3) if way != (1, 1, 1)], dtype=np.float64) - 1.0
     rows = np.unique([*(tips @ ways.T).argmax(axis=0).tolist(),
                       *np.linspace(0, len(tips) - 1, min(len(tips), _SOME)).astype(int).tolist()])
-    return replace(one, tip=tips[rows], axes=np.tile(one.axis, (len(rows), 1)), stretches=())
+    return replace(one, tip=tips[rows], axes=np.tile(one.axis, (len(rows), 1)), rapid=np.zeros(len(rows), dtype=bool),
+                   stretches=())

@@ -14,6 +14,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.polytope import box_vertices, held_axis_rates
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 _GRID = 24
 """seeds round each rotary joint"""
@@ -27,6 +28,7 @@ _CHECKED = np.array([[0.3, 0.7], [-0.8, 2.0], [1.9, -2.6]])
 
 
 @dataclass(frozen=True)
+@arrays(first="3", second="3", rates="3 3")
 class TwoAxisTable:
     """A part that turns about two axes, the slides standing as ever: G = rates Rot(second, -t2) Rot(first, -t1).
 

@@ -8,9 +8,11 @@ from typing import Protocol
 import numpy as np
 
 from postproc.orientation.passes.passes import Pass
+from postproc.orientation.passes.reasons import Touching
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 SAME = 1e-4
@@ -23,11 +25,12 @@ NO_LIMITS = OrientationLimits()
 class CollisionBodies(Protocol):
     """Part, fixtures and table beside cutter, shank and holder."""
 
-    def touching(self, one: Pass, axis: Floats) -> str:
-        """Which pair touches where a pass is run with its tool along `axis` (3,), and by how much; "" where none does."""
+    def touching(self, one: Pass, axis: Floats) -> Touching | None:
+        """Which pair touches where a pass is run with its tool along `axis` (3,), and by how much; None where none does."""
 
 
 @dataclass(frozen=True)
+@arrays(values="...")
 class _Bound:
     """An angle that must be inside [low, high], rad, at every point of a pass."""
 
@@ -90,9 +93,9 @@ class AllowedAxes:
         axes = lattice(apart)
         return axes[self.mask(one, axes)]
 
-    def touching(self, one: Pass, axis: Floats) -> str:
+    def touching(self, one: Pass, axis: Floats) -> Touching | None:
         """As `CollisionBodies.touching`; the own axis of a pass can touch as well."""
-        return "" if self.bodies is None else self.bodies.touching(one, axis)
+        return None if self.bodies is None else self.bodies.touching(one, axis)
 
     def _planes(self, one: Pass) -> list[tuple[Floats, float]]:
         """The limits as half-spaces: axes a with a . w <= offset for every row w (K, 3), NaN rows bound nothing.

@@ -9,6 +9,7 @@ import numpy as np
 
 from toolpaths.arrays import Floats, Ints
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.smoothing.tangents import rates
 
 _ALONG = 1e-3
@@ -18,6 +19,7 @@ _MANY = 4_000_000
 
 
 @dataclass(frozen=True)
+@arrays(normal="K 3", way="K 3", line="K")
 class Contact:
     """Points of a pass where the surface is known, one row for each direction of feed: K rows in the table frame.
 

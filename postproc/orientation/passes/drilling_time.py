@@ -11,10 +11,12 @@ from postproc.feedrate.rest_to_rest import PointToPointMode, rest_seconds
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind, Toolpath
 
 
 @dataclass(frozen=True)
+@arrays(rows="K", fed="K")
 class Drilled:
     """Moves at feed in the holes of a pass.
 

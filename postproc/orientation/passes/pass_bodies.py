@@ -10,6 +10,7 @@ from postproc.collision.bodies import Scene, Touch, scene, touches
 from postproc.collision.form import ToolForm, tool_form
 from postproc.collision.swept import Swept, along_curves, joined
 from postproc.orientation.passes.passes import Pass, PassContext
+from postproc.orientation.passes.reasons import Touching
 from postproc.reference.moves import Phase
 from toolpaths.arrays import Bools, Floats
 from toolpaths.diagnostics import Diagnostic, has_errors
@@ -27,13 +28,14 @@ class PassBodies:
         self.work, self.bodies, self.forms = work, bodies, forms
         self._ways: dict[int, Swept] = {}
 
-    def touching(self, one: Pass, axis: Floats) -> str:
+    def touching(self, one: Pass, axis: Floats) -> Touching | None:
         """Which pair comes nearest to being through each other where a pass is run with its tool along `axis` (3,)."""
         found = self.touches(one, axis)
         if not found:
-            return ""
+            return None
         worst = min(found, key=lambda touch: touch.distance - touch.limit)
-        return f"{worst} (at line {int(self.work.moves.line[worst.place])})"
+        return Touching(worst.tool, worst.part, worst.body.name, worst.limit - worst.distance,
+                        f"{worst} (at line {int(self.work.moves.line[worst.place])})")
 
     def touches(self, one: Pass, axis: Floats) -> list[Touch]:
         """All pairs that come too near.

@@ -26,6 +26,7 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all
 from toolpaths.toolpath import Kind, Role, Toolpath
 from toolpaths.units import DEG
@@ -35,6 +36,7 @@ TURNS = 1e-6
 
 
 @dataclass(frozen=True)
+@arrays(s="N", tip="N 3", axis="N 3")
 class CuttingStretch:
     """Cutting motion from stop to stop: sites s (N,), the smoothed tip and axis (N, 3) there, and the feed along s."""
 
@@ -56,6 +58,7 @@ class CuttingStretch:
 
 
 @dataclass(frozen=True)
+@arrays(tip="n 3", axes="n 3", rapid="n", axis="3")
 class Pass:
     """Motion that is turned as a whole: rapids, then cuts with one tool axis, in the table frame.
 
@@ -158,6 +161,7 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
 
 
 @dataclass(frozen=True)
+@arrays(normals="M 3")
 class _Cutting:
     """What all passes are cut from: moves in the table frame, normals (M, 3) of the file at their ends, NaN for none.
 

@@ -12,12 +12,12 @@ from machines.machine import Machine
 from postproc.joints.joint_path import reachable_axes
 from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.orientation.passes.passes import Pass
+from postproc.orientation.passes.reasons import Refusal
 from toolpaths.arrays import Bools, Floats
 from toolpaths.units import DEG
 
-Solved = tuple[Floats, str]
-"""Joints (N, J), and why the machine cannot run through them, "" where it can."""
-OUT_OF_REACH = "out of reach"
+Solved = tuple[Floats, Refusal | None]
+"""Joints (N, J), and why the machine cannot run through them, None where it can."""
 _ROUNDED = 1e-4
 """rad, by which an axis of a CL file may be off by its decimals"""
 _OVER = 1e6
@@ -84,12 +84,12 @@ def _least_turned(one: Pass, machine: Machine, found: Floats) -> Solved:
     size = np.abs(found[:, :, rotary]).mean(axis=1).sum(axis=1) + _OVER * np.maximum(over, 0.0).max(axis=1)
     best = int(np.argmin(np.where(np.isfinite(size), size, np.inf)))
     if not np.isfinite(size[best]):
-        return found[best], OUT_OF_REACH
+        return found[best], Refusal("reach")
     if over[best].max() > TRAVEL_SLACK:
         return found[best], _outside(found[best], over[best], machine)
     if reach.is_checked(one.kin) and not reach.inside(one.kin, found[best]):
-        return found[best], "out of the reach of the parallel machine"
-    return found[best], ""
+        return found[best], Refusal("rods")
+    return found[best], None
 
 
 def _wound(q: Floats, machine: Machine, rotary: Bools) -> Floats:
@@ -103,11 +103,12 @@ def _wound(q: Floats, machine: Machine, rotary: Bools) -> Floats:
     return result
 
 
-def _outside(q: Floats, over: Floats, machine: Machine) -> str:
+def _outside(q: Floats, over: Floats, machine: Machine) -> Refusal:
     """The joint that is worst outside its travel."""
     j = int(over.argmax())
-    limits, unit, name = machine.limits, (1.0 / DEG if machine.rotary[j] else 1.0), "degrees" if machine.rotary[j] else "mm"
-    low, high = float(q[:, j].min()), float(q[:, j].max())
-    value, beyond = (high, "too high") if high > limits.upper[j] else (low, "too low")
-    return (f"travel: axis {machine.axis_names[j]} at {value * unit:.3f} {name}, allowed {limits.lower[j] * unit:.3f} to "
-            f"{limits.upper[j] * unit:.3f}: {over[j] * unit:.3f} {beyond}")
+    limits, unit = machine.limits, 1.0 / DEG if machine.rotary[j] else 1.0
+    above = float(q[:, j].max()) > limits.upper[j]
+    value = float(q[:, j].max() if above else q[:, j].min())
+    low, high, beyond = (float(x) * unit for x in (limits.lower[j], limits.upper[j], over[j]))
+    return Refusal("travel", machine.axis_names[j], value * unit, low, high, beyond,
+                   "degrees" if machine.rotary[j] else "mm", above)

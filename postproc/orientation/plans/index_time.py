@@ -22,6 +22,7 @@ from postproc.planning.planned import joint_limits
 from postproc.reference.events import tool_changes
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 _RISE = 10.0
@@ -33,6 +34,7 @@ _STRAIGHT = 1e-3
 
 
 @dataclass(frozen=True)
+@arrays(axis="3", first="J", last="J", second="J", last_but_one="J", above_first="J", above_last="J")
 class PassEnds:
     """A turned pass as its neighbours see it: joints (J,) where it begins, ends and stands above both, and the seconds of
     its own rapids, of coming down and drawing back; inf where no height above is inside travel. `held` is where the rotary

@@ -12,7 +12,7 @@ from postproc.base.options import Options, Orientation
 from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.candidates import tried
 from postproc.orientation.candidates.infeasible_passes import REACH, out_of_travel, unfit
-from postproc.orientation.candidates.ranking import prepare
+from postproc.orientation.candidates.ranking import load_compiler
 from postproc.orientation.candidates.search import APART, PassSearch, Rejection
 from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.limit_checks import limit_faults
@@ -48,6 +48,7 @@ def planned_choice(toolpath: Toolpath, machine: Machine, setup: SetupFile, optio
                    progress: Progress | None = None, workers: int | None = None
                    ) -> tuple[OrientationChoice | None, list[Diagnostic]]:
     """The plans of a toolpath as they were made; arguments as of `orient`."""
+    load_compiler()
     work, found = work_of(toolpath, machine, setup, options)
     if work is None:
         return None, found
@@ -60,7 +61,6 @@ def planned_choice(toolpath: Toolpath, machine: Machine, setup: SetupFile, optio
     if has_errors(found):
         return None, found
     try:
-        prepare(work.passes)
         results = each_pass(partial(_tried, work, allowed), work, allowed, "orienting", progress, workers)
         found += _fixed(work) + unfit(work, results)
         if has_errors(found):

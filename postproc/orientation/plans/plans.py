@@ -16,6 +16,7 @@ from postproc.orientation.plans.index_time import PassEnds, all_ends, unwinding,
 from postproc.orientation.plans.shortest_sequence import groupwise, shortest
 from postproc.orientation.plans.states import CLUSTER, groups_of, index, pools_of, ranked, states_of
 from toolpaths.arrays import Bools, Floats
+from toolpaths.shapes import arrays
 
 _EQUAL = 2e-4
 """part of the time of a cut by which its best orientations may differ; turns decide among them"""
@@ -24,6 +25,7 @@ _Row = tuple[list[Candidate], Floats, list[PassEnds]]
 
 
 @dataclass(frozen=True)
+@arrays(cuts="N", rapids="N", ways="N+1")
 class OrientationPlan:
     """One axis per pass.
 

@@ -102,7 +102,7 @@ def _pass(tried: PassSearch, made: Candidate, work: PassContext) -> dict[str, An
 def _short(made: Candidate | None) -> dict[str, Any] | None:
     """An orientation and its planned time."""
     return None if made is None else {"orientation_deg": angles(made), "held_deg": held(made),
-                                      "time_s": finite(made.seconds), "touches": made.touching}
+                                      "time_s": finite(made.seconds), "touches": str(made.touching or "")}
 
 
 def _reach(made: Candidate) -> dict[str, Any]:

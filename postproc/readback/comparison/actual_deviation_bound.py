@@ -16,12 +16,14 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, coordinates, signed_sweep
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 
 LINE, JOINTS, TIP, CIRCLE = range(4)
 """laws of a block: tip straight and axis standing; straight in joints; tip straight and rotary joints even; arc"""
 
 
 @dataclass(frozen=True)
+@arrays(half="N J", back="N J")
 class _Travel:
     """Of N pieces and J joints: how far a joint goes in either half, at most (N, J), as speed times time; how much of that
     it may go back (N, J), 0 where it cannot turn back."""

@@ -1,18 +1,18 @@
-"""Which block ends each CL move: one pass over both, in plain loops that numba compiles for long files."""
+"""Which block ends each CL move: one pass over both, a loop that is compiled for long files."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.compiled import chosen, loop
 from toolpaths.shape import Curves
 
 _COMPILE_FROM = 20_000
-_compiled: list[Callable[..., Any]] = []
+_ROWS, _NUMBERS, _KINDS, _NUMBER = ("float64", 2), ("float64", 1), ("int8", 1), ("float64", 0)
 
 
 def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools, tolerance: float,
@@ -35,49 +35,24 @@ def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools,
         serves (M for blocks after the last move).
     """
     kind = np.where(link, 2, np.where(curves.is_arc, 1, 0)).astype(np.int8)
-    walk = _walk if len(tip) < _COMPILE_FROM else _fast()
+    walk = chosen(_walk, len(tip), _COMPILE_FROM)
     match, owner = walk(tip, axis, sweep, curves.start, curves.end, curves.axis0, curves.axis1, kind, curves.center,
                         curves.normal, curves.sweep, tolerance, axis_tolerance, *grain)
     return match, owner
 
 
-def _fast() -> Callable[..., Any]:
-    """The same functions compiled; the module's helpers are replaced, so that compiled code calls compiled code."""
-    if not _compiled:
-        for name in ("_apart", "_angle", "_turned", "_line_done", "_nearer"):
-            globals()[name] = _jit(globals()[name])
-        _compiled.append(_jit(_walk, _signature()))
-    return _compiled[0]
-
-
-def _signature() -> Any:
-    """Of `_walk`: one for arrays of any layout, so that no file waits for a compiler that another did not."""
-    from numba import types
-
-    rows, numbers, kinds = (types.Array(kind, n, "A", readonly=True) for kind, n in (
-        (types.float64, 2), (types.float64, 1), (types.int8, 1)))
-    return (rows, rows, numbers, rows, rows, rows, rows, kinds, rows, rows, numbers, *[types.float64] * 4)
-
-
-def _jit(function: Callable[..., Any], signature: Any = None) -> Callable[..., Any]:
-    """Compiled when first called; kept on disk where the package's folder can be written."""
-    from numba import njit
-
-    try:
-        return cast(Callable[..., Any], njit(signature, cache=True)(function))
-    except RuntimeError:
-        return cast(Callable[..., Any], njit(signature)(function))
-
-
+@loop(alone=True)
 def _apart(a: Any, b: Any) -> Any:
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
+@loop(alone=True)
 def _angle(a: Any, b: Any) -> Any:
     """Angle between unit vectors."""
     return 2.0 * math.atan2(_apart(a, b), math.sqrt((a[0] + b[0]) ** 2 + (a[1] + b[1]) ** 2 + (a[2] + b[2]) ** 2))
 
 
+@loop(alone=True)
 def _turned(a: Any, b: Any, center: Any, normal: Any) -> Any:
     """Angle in (-pi, pi] about the axis (center, normal) from point a to point b."""
     px, py, pz = a[0] - center[0], a[1] - center[1], a[2] - center[2]
@@ -88,6 +63,7 @@ def _turned(a: Any, b: Any, center: Any, normal: Any) -> Any:
     return math.atan2(cross, px * qx + py * qy + pz * qz - h * g)
 
 
+@loop(alone=True)
 def _line_done(tip: Any, axis: Any, start: Any, end: Any, axis0: Any, axis1: Any, tol: float, axis_tol: float) -> Any:
     """True where a pose has come to the end of a straight move."""
     length = _apart(start, end)
@@ -100,6 +76,7 @@ def _line_done(tip: Any, axis: Any, start: Any, end: Any, axis0: Any, axis1: Any
     return past >= -min(tol, 0.5 * length)
 
 
+@loop(alone=True)
 def _nearer(tip: Any, axis: Any, after: Any, axis_after: Any, end: Any, axis1: Any, grain: float, axis_grain: float) -> Any:
     """True where a pose is off the end of its move by more than rounding, and the block after it comes nearer."""
     off, turn = _apart(tip, end), _angle(axis, axis1)
@@ -110,13 +87,16 @@ def _nearer(tip: Any, axis: Any, after: Any, axis_after: Any, end: Any, axis1: A
     return comes and off_after <= max(off, grain) and turn_after <= max(turn, axis_grain)
 
 
+@loop(alone=True, takes=(_ROWS, _ROWS, _NUMBERS, _ROWS, _ROWS, _ROWS, _ROWS, _KINDS, _ROWS, _ROWS, _NUMBERS, *[_NUMBER] * 4))
 def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axis1: Any, kind: Any, center: Any,
           normal: Any, sweep: Any, tol: float, axis_tol: float, grain: float, axis_grain: float) -> tuple[Any, Any]:
+    # Blocks and moves are gone through once, in order: j is the last block of the move before, k the block looked at.
     count, moves = len(tip), len(end)
     match = np.full(moves, -1, np.int64)
     owner = np.full(count, moves, np.int64)
     j = -1
     for i in range(moves):
+        # A move that goes nowhere, or to where the tool stands, ends with block j unless the next block ends there too.
         short = kind[i] == 0 or (kind[i] == 1 and sweep[i] < math.pi)
         still = short and _apart(start[i], end[i]) < grain and _angle(axis0[i], axis1[i]) < axis_grain and j >= 0
         there = short and j >= 0 and _apart(start[i], end[i]) < 2.0 * grain and (
@@ -135,7 +115,7 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
             elif kind[i] == 1:
                 before = start[i] if k == j + 1 else tip[k - 1]
                 step = _turned(before, tip[k], center[i], normal[i])
-                if swept[k] > 0.0:
+                if swept[k] > 0.0:  # whole turns, which the tips do not show
                     step += 2.0 * math.pi * math.floor((swept[k] - step) / (2.0 * math.pi) + 0.5)
                 angle += step
                 slack = max(0.5 * tol, grain) / max(_apart(start[i], center[i]), tol)
@@ -143,10 +123,11 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
             else:
                 done = _line_done(tip[k], axis[k], start[i], end[i], axis0[i], axis1[i], tol, axis_tol)
             k += 1
-        if not done:
+        if not done:  # all that is left belongs to the move that is not reached
             for r in range(j + 1, count):
                 owner[r] = i
             return match, owner
+        # Several blocks may end within the tolerance of the end: the move keeps those that come nearer to it.
         while k < count and _nearer(tip[k - 1], axis[k - 1], tip[k], axis[k], end[i], axis1[i], grain, axis_grain):
             owner[k] = i
             k += 1

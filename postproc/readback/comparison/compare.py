@@ -37,11 +37,13 @@ from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
 
 
 @dataclass(frozen=True)
+@arrays(tip="E 3", axis="E 3", match="M", owner="E")
 class Comparison:
     """Worst deviations (mm, rad) with the CL line and program line of each, and the poses and matching they rest on.
 

@@ -3,7 +3,7 @@
 Between two places of a block the difference e of the executed pose and a pose of its curve bends by at most M, so that it
 stays within M / 32 of the largest value at the begin, middle and end (interpolation error, see `postproc.path.bound`). M
 comes from the law of the block by Taylor's theorem (`machines.straight_blocks`); the values themselves are poses of the
-reader. Blocks whose bound is above the worst that was seen anywhere are halved until bound and worst meet.
+reader. Blocks whose bound is above the worst that was seen anywhere are divided until bound and worst meet.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
-TIGHT = 1.01
-"""bound over worst pose that is near enough"""
+TIGHT = 1.01  # bound over worst pose that is near enough
 HALVINGS = 26
 """at most, of one block"""
 GRAIN = 1e-7, 1e-9
@@ -38,12 +38,15 @@ GRAIN = 1e-7, 1e-9
 SAME = 1e-5
 """mm: what the law of a block and the reader may differ by in its middle"""
 CHUNK = 20_000
+_FEW, _AT_ONCE = 250, 8
+"""few pieces cost what one does: so many parts of each instead of halves"""
 _STANDS = 1e-12
 _REACH = 0.9
 """of the tolerance: how far from the nearest point the axis may be compared"""
 
 
 @dataclass(frozen=True)
+@arrays(unbounded_rows="U")
 class DeviationBound:
     """Upper bounds over all blocks: tip (mm), axis (rad), each with the block (row) that has it, -1 where there are none;
     how many blocks have no bound, because kinematics or law give none (they are only checked at places), and which."""
@@ -57,6 +60,7 @@ class DeviationBound:
 
 
 @dataclass(frozen=True)
+@arrays(rows="K", owner="K", begin="K", share="K")
 class _Ends:
     """What bounds need of blocks `rows`: where each begins and ends on its curve, by count (a guess for helices)."""
 
@@ -67,6 +71,7 @@ class _Ends:
 
 
 @dataclass(frozen=True)
+@arrays(k="N", a="N", b="N")
 class _Pieces:
     """Parts [a, b] of blocks: `k` (N,) numbers of `_Ends.rows`."""
 
@@ -77,11 +82,11 @@ class _Pieces:
     def __len__(self) -> int:
         return len(self.k)
 
-    def halves(self) -> _Pieces:
-        """Twice as many, half as long."""
-        middle = 0.5 * (self.a + self.b)
-        return _Pieces(np.repeat(self.k, 2), np.stack([self.a, middle], axis=1).ravel(),
-                       np.stack([middle, self.b], axis=1).ravel())
+    def divided(self, parts: int) -> _Pieces:
+        """Each in so many equal parts."""
+        cuts = self.a[:, None] + np.linspace(0.0, 1.0, parts + 1) * (self.b - self.a)[:, None]
+        cuts[:, -1] = self.b
+        return _Pieces(np.repeat(self.k, parts), cuts[:, :-1].ravel(), cuts[:, 1:].ravel())
 
     def take(self, index: Ints | Bools | slice) -> _Pieces:
         """Some of them."""
@@ -89,6 +94,7 @@ class _Pieces:
 
 
 @dataclass(frozen=True)
+@arrays(seen_tip="N", seen_axis="N", tip="N", axis="N")
 class _Values:
     """Of N pieces: worst deviation at places, and bound, of tip (mm) and axis (rad); inf where there is no bound."""
 
@@ -124,11 +130,12 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
         for pieces in _whole(motion, executed, ends, np.arange(at, min(at + CHUNK, len(rows)))):
             worst.add(pieces, _values(motion, executed, moves, ends, pieces, allowed))
     for _ in range(HALVINGS):
-        halves = worst.taken().halves()
-        if not len(halves):
+        pieces = worst.taken()
+        if not len(pieces):
             break
-        for at in range(0, len(halves), CHUNK):
-            part = halves.take(slice(at, at + CHUNK))
+        pieces = pieces.divided(_AT_ONCE if len(pieces) < _FEW else 2)
+        for at in range(0, len(pieces), CHUNK):
+            part = pieces.take(slice(at, at + CHUNK))
             worst.add(part, _values(motion, executed, moves, ends, part, allowed))
     return worst.result(rows)
 
@@ -279,6 +286,7 @@ def _angle(chord: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
+@arrays(known="N", straight_tip="N", strays="2 N")
 class _PieceMotion:
     """Jets of N pieces by the law of their blocks: tip, axis; `known` where there are any; `straight_tip` where the tip is
     straight and even by the law itself; `strays` (2, N): what the machine may add to it, mm and rad."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.header_words import FEEDS, HEADER, UNKNOWN, head_of
+from postproc.base.header_words import feeds_place, read_head, with_feeds_mark
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.job.job import Job
@@ -25,9 +25,6 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import lengths
 from toolpaths.toolpath import Kind
 
-_PLANNED = re.compile(rb"(?im)^[ \t(;\d]*feed planned")
-_STATED = re.compile(rb"(?im)^[^\n]*" + FEEDS.encode("ascii") + rb" ([0-9a-f]{8})\b")
-_PLACE = re.compile(f"(?i){FEEDS} {UNKNOWN}")
 _FEED = re.compile(rb"(?i)(?<![A-Z])F *(\d[\d.]*|\.\d+)")
 
 
@@ -39,13 +36,13 @@ def planned_feeds(data: bytes, others: Mapping[str, bytes], gcode: str) -> tuple
     Feeds that were planned keep acceleration and jerk, which the program does not show: they count as explained only as they
     were written.
     """
-    head = head_of(data)
-    if not _PLANNED.search(head):
+    head = read_head(data)
+    if not head.planned:
         return False, []
-    stated, now = _STATED.search(head), feed_fingerprint(data, others)
-    if stated is not None and stated[1].decode("ascii").lower() == now:
+    now = feed_fingerprint(data, others)
+    if head.feeds == now:
         return True, []
-    found = f"its header names {stated[1].decode('ascii').lower()}, the F words are {now}" if stated else \
+    found = f"its header names {head.feeds}, the F words are {now}" if head.feeds else \
         "its header names no fingerprint of them"
     return True, [error("verify.slow", f"feeds that were planned are not as they were written: {found}", file=gcode,
                         hint="convert again; where feeds were lowered by hand, no plan explains them")]
@@ -61,12 +58,9 @@ def feed_fingerprint(data: bytes, others: Mapping[str, bytes]) -> str:
 
 def with_fingerprint(text: str, files: Mapping[str, str]) -> str:
     """The text of a program with the fingerprint of its F words in the place that the header has left for it."""
-    place = _PLACE.search(text, 0, HEADER)
-    if place is None:
+    if not feeds_place(text):
         return text
-    at = place.end() - len(UNKNOWN)
-    mark = feed_fingerprint(text.encode(), {name: t.encode() for name, t in files.items()})
-    return text[:at] + mark + text[at + len(UNKNOWN):]
+    return with_feeds_mark(text, feed_fingerprint(text.encode(), {name: t.encode() for name, t in files.items()}))
 
 
 def check_slow(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, owner: Ints, match: Ints, tip: Floats,

@@ -29,12 +29,14 @@ from postproc.reference.events import (
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints, shared
 from toolpaths.diagnostics import Diagnostic
+from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 
 _SPINDLE = {-1: "anti-clockwise (M4)", 0: "stopped (M5)", 1: "clockwise (M3)"}
 
 
 @dataclass(frozen=True)
+@arrays(tool="N", register="N", direction="N", rpm="N", coolant="N", side="N", radius="N")
 class _Asked:
     """What the CL file asks for while it cuts: by row of the Toolpath, the work offset of the set-up."""
 
@@ -150,8 +152,9 @@ def check_lengths(motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
 
 def _registers_of(motion: Motion, job: Job, rows: Ints, named: Ints) -> Ints:
     """(K,) length register that should be in force in the blocks `rows`: that which the CL file names (K,); none where axis
-    positions hold the length of the tool already, and where the program calls none."""
-    if job.control.length_on_z:
+    positions hold the length of the tool already, and where the program calls none. A control that takes the length with
+    every tool change and cannot cancel it has it in force in any case (0 in its table, `tool.length_twice`)."""
+    if job.control.length_on_z or job.controller.keeps_length:
         return named
     joints = np.array([frame.law == "axes" for frame in motion.frames])[motion.frame[rows]]
     return np.where(joints, -1, named)

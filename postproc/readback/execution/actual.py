@@ -144,7 +144,8 @@ class ActualBlockPoses(BlockPoses):
     def _steps(self, motion: Motion, rows: Ints, t: float | Floats) -> PlaySteps:
         """What the motion of blocks up to fraction t does to the ways (K, T)."""
         share = np.broadcast_to(np.asarray(t, dtype=np.float64), len(rows))
-        result = self._between(motion, rows, np.zeros(len(rows)), share)
+        even = self._between(motion, rows, np.zeros(len(rows)), share)
+        result = {name: getattr(even, name).copy() for name in ("shift", "low", "high")}
         bent = np.flatnonzero(self._curved[rows])
         for at in range(0, len(bent), AT_ONCE):
             k = bent[at:at + AT_ONCE]
@@ -155,9 +156,9 @@ class ActualBlockPoses(BlockPoses):
                 last / LOOKS, 0.5 * (last / LOOKS + share[k]), share[k]))
             turn = _turning(before, middle, q)
             whole = gone.then(self._of(before, turn)).then(self._of(turn, q))
-            for name in ("shift", "low", "high"):
-                getattr(result, name)[k] = getattr(whole, name)
-        return result
+            for name, values in result.items():
+                values[k] = getattr(whole, name)
+        return PlaySteps(**result)
 
     def _looked_at(self, motion: Motion, rows: Ints) -> tuple[Floats, Floats, Floats]:
         """Shift, low and high, each (LOOKS, K, T), from the beginning of blocks to each look; kept for the next time."""

@@ -44,14 +44,17 @@ def walk(kin: Kinematics, q0: Floats, q1: Floats, pose: Floats) -> Floats:
     """Pose (N, 6) at joints q1 (N, J), reached straight in the joints from q0 where it is `pose` (N, 6).
 
     The rotary axes are outside the closed loops: no turn changes the mode, so that the steps are those of the slides.
+    Where a block leaves what the machine can reach, however far it goes, the walk ends, NaN.
     """
-    count = steps(kin, q0, q1, np.inf)
     result, at = np.array(pose), np.array(q0)
-    for i in range(1, int(count.max(initial=0)) + 1):
-        rows = np.flatnonzero(count >= i)
+    count = np.where(np.isfinite(result).all(axis=1), steps(kin, q0, q1, np.inf), 1)
+    i, rows = 0, np.arange(len(q0))
+    while len(rows):
+        i += 1
         here = q0[rows] + (i / count[rows])[:, None] * (q1 - q0)[rows]
         result[rows] = np.hstack(kin.forward(here, near=kin.carried(result[rows], at[rows], here)))
         at[rows] = here
+        rows = rows[(count[rows] > i) & np.isfinite(result[rows]).all(axis=1)]
     return result
 
 

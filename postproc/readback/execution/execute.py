@@ -19,9 +19,13 @@ from postproc.readback.text.words import Words
 from postproc.reference.coolant import FLOOD, MIST
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(line="E", code="E", end="E J", start="J", plane="E", ccw="E", center="E 3", feed="E", inverse="E", tool="E",
+        register="E", spindle="E", rpm="E", coolant="E", hole="E", missing_feed="E", dwell="E", compensation="E",
+        offset="E", blend="E", frame="E", block="E", radius="E", pitch="E", floating="E", inch="E")
 class Motion:
     """E executed blocks.
 

@@ -19,6 +19,7 @@ from postproc.readback.text.canonical import InterpolationModeName, WordMeaning
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 ANGLE_SLACK = 0.01
@@ -30,6 +31,7 @@ _TURN = 360.0
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(rotation="3 3", origin="3")
 class ExecutionFrame:
     """One law in force: its plane, and the kinematics at the tip of the tool that the control reckons with."""
 
@@ -49,6 +51,7 @@ class ExecutionFrame:
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(owner="F", rotation="F 3 3", origin="F 3")
 class FrameTable:
     """F frames side by side: the blocks of all that share control and tool length are placed at once."""
 

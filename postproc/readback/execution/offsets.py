@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 from postproc.control.control import Control
 from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
+@arrays(work="J", xyz="3", home="J")
 class Offsets:
     """What the control holds: work offset (J,) in machine coordinates, column of Z, tool lengths by register.
 

@@ -14,12 +14,14 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.readback.execution import assembly
 from postproc.readback.execution.execute import Motion
 from toolpaths.arrays import Bools, Floats, Ints, repeated, taken
+from toolpaths.shapes import arrays
 
 SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)
 """where each block is looked at; other places than those that linearising looks at"""
 
 
 @dataclass(frozen=True)
+@arrays(before="E 6")
 class BlockPoses:
     """Gives the poses of a program's blocks: control, kinematics by tool number, gauge length by register.
 
@@ -181,6 +183,7 @@ def _whole(t: float | Floats) -> bool:
 
 
 @dataclass(frozen=True)
+@arrays(rows="K", before="K J", end="K J", frame="K", first="K J", last="K J")
 class BlockMotions:
     """Blocks `rows` (K,) with what of their motion does not depend on the fraction: machine coordinates (K, J) at both ends,
     and the coordinates of their frames there."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats, Ints, joined
+from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:
     from postproc.readback.execution.offsets import Offsets
@@ -17,6 +18,8 @@ INCH = 25.4
 
 
 @dataclass(frozen=True)
+@arrays(motion="N", plane="N", machine="N", level="N", inch="N", columns="N J", steps="N J", rest="N", length="N",
+        relative="N 3", absolute="N 3", extra="N 7", deep="N 3", repeats="N", call="N")
 class BlockSection:
     """Blocks `first` and on (N), as their words and modal state have them.
 
@@ -66,6 +69,7 @@ class BlockSection:
 
 
 @dataclass(frozen=True)
+@arrays(block="R", code="R", end="R J", center="R 3", frame="R", hole="R", feed="R", dwell="R")
 class MotionRows:
     """R rows of motion: block, code, end (R, J) in machine coordinates, centre (R, 3) in those of the frame, number of the
     frame; hole, feed (NaN: the F word in force), rest of cycles."""

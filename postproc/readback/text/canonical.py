@@ -15,6 +15,7 @@ import numpy as np
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
+from toolpaths.shapes import arrays
 
 REGISTER = "@"
 """length register in force from this block on, -1 for none"""
@@ -75,6 +76,7 @@ RotaryDirection = Literal["nearest", "+", "-"]
 
 
 @dataclass(frozen=True)
+@arrays(rotation="3 3", shift="3")
 class WordMeaning:
     """What words mean from a block on.
 
@@ -120,6 +122,7 @@ class Drill:
 
 
 @dataclass(frozen=True)
+@arrays(line="B")
 class Canonical:
     """B blocks in the order in which the control runs them; words count blocks from 1.
 

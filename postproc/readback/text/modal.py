@@ -11,6 +11,7 @@ from postproc.readback.text.canonical import COOLANT, LOADED, OFFSET, REGISTER, 
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Array, Floats, Ints, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.shapes import arrays
 
 MOTION = (0, 1, 2, 3, 73, 74, 80, 81, 82, 83, 84, 85, 86, 89)
 CYCLES = (73, 74, 81, 82, 83, 84, 85, 86, 89)
@@ -26,6 +27,8 @@ _PART = 200_000
 
 
 @dataclass(frozen=True)
+@arrays(motion="B", plane="B", inverse="B", per_turn="B", inch="B", level="B", length_register="B", tool="B",
+        spindle="B", rpm="B", coolant="B", machine="B", compensation="B", offset="B", blend="B")
 class Modal:
     """State at every block (index 0 is before block 1; B + 1 entries)."""
 

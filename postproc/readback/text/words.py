@@ -10,6 +10,7 @@ import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, warning
+from toolpaths.shapes import arrays
 
 _COMMENT = re.compile(rb"\([^()\n]*\)|;[^\n]*")
 _WORD = re.compile(rb"\s*([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
@@ -25,6 +26,7 @@ _NUMBER[list(b"0123456789.+- \t\n")] = True
 
 
 @dataclass(frozen=True)
+@arrays(letter="W", value="W", line="W", point="W")
 class Words:
     """W words in file order.
 
@@ -104,19 +106,19 @@ def read_words(text: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
     if not text.endswith(b"\n"):
         text += b"\n"
     count = len(text.translate(None, _NO_LETTERS))
-    words = Words(np.empty(count, dtype=np.uint8), np.empty(count), np.empty(count, dtype=np.int64), text.count(b"\n"),
-                  np.zeros(count, dtype=bool))
+    letter, value, line = np.empty(count, dtype=np.uint8), np.empty(count), np.empty(count, dtype=np.int64)
+    point = np.zeros(count, dtype=bool)
     at, lines = 0, 0
     for stretch in _stretches(text):
         here = _quickly(stretch)
         if here is None:
             return _slowly(text, file)
         stop = at + len(here.letter)
-        words.letter[at:stop], words.value[at:stop], words.line[at:stop] = here.letter, here.value, here.line + lines
-        if words.point is not None and here.point is not None:
-            words.point[at:stop] = here.point
+        letter[at:stop], value[at:stop], line[at:stop] = here.letter, here.value, here.line + lines
+        if here.point is not None:
+            point[at:stop] = here.point
         at, lines = stop, lines + here.lines
-    return words, []
+    return Words(letter, value, line, text.count(b"\n"), point), []
 
 
 def _stretches(text: bytes) -> Iterator[bytes]:

@@ -24,6 +24,7 @@ def covered(times: float, readings: int, seed: int, robust: bool = False) -> flo
     return inside / (3 * RUNS)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("times", [1.0, 3.0, 10.0])
 @pytest.mark.parametrize(("readings", "robust"), [(8, False), (40, False), (40, True)])
 def test_bounds_hold_the_truth_whatever_the_noise(times: float, readings: int, robust: bool) -> None:

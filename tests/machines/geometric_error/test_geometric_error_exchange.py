@@ -58,6 +58,7 @@ def test_curves_become_tables_that_lose_what_is_told_and_keep_the_doubt(name: st
     assert np.median(after.tip / before.tip) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", ["mikron-ucp710", "nutating-head", "head-table", "h4a-c-table", "h4a-spindle-axis"])
 @pytest.mark.parametrize("frame", ["fixed", "moving"])
 def test_errors_of_a_rotary_axis_in_any_frame_are_the_same_machine_in_that_of_the_bed(name: str, frame: str) -> None:
@@ -122,6 +123,7 @@ def as_linuxcnc(machine: Machine, texts: dict[str, str], q: Floats, way: float) 
     return result
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", ["mikron-ucp710", "linuxcnc-xyzac-trt", "nutating-head", "mill-3axis"])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_linuxcnc_with_the_files_leaves_the_rest(name: str, way: float) -> None:

@@ -67,6 +67,7 @@ def drawn(folder: Path, name: str, seed: int, both: bool = False, n: int = 8, si
     return Case(own, file, kin, load(file, machine), q)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name", NAMES)
 def test_the_machine_with_errors_is_where_the_second_implementation_has_it(name: str, seed: int, tmp_path: Path) -> None:

@@ -113,6 +113,7 @@ class Map:
         return result
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("name", "letters"), CASES)
 def test_a_second_reading_of_the_map_agrees(name: str, letters: str, seed: int, tmp_path: Path) -> None:

@@ -187,7 +187,7 @@ def test_the_compiled_closure_is_the_one_of_numpy(name: str, monkeypatch: pytest
     slides[9] += 5000.0
     found = []
     for compiled in (False, True):
-        monkeypatch.setattr(rods, "wanted", lambda n, use=compiled: use)
+        monkeypatch.setattr(rods, "wanted", lambda *_, use=compiled: use)
         before = place.copy(), turned.copy()
         found.append(frame.solve(slides, place, turned, errors))
         np.testing.assert_array_equal(before[0], place)

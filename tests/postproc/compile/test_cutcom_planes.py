@@ -20,6 +20,7 @@ def square(lean: float) -> list[str]:
     return ["RAPID", first, "CUTCOM/LEFT,1", *rest, "CUTCOM/OFF", "RAPID", first]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["linuxcnc", "generic-iso", "fanuc-30i", "haas-ngc", "siemens-840d",
                                         "heidenhain-tnc640"])
 @pytest.mark.parametrize("lean", [0.0, 30.0])

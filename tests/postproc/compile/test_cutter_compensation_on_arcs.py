@@ -61,6 +61,7 @@ def test_a_plunge_between_is_no_way_in(controller: str) -> None:
     assert [d.code for d in errors(made(controller, *lines))] == ([] if controller == "linuxcnc" else ["cutcom.arc"])
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc"])
 @pytest.mark.parametrize("way", ["into", "arc", "plunge"])
 def test_it_is_the_same_in_a_tilted_plane(controller: str, way: str) -> None:
@@ -167,6 +168,7 @@ def test_a_register_that_cutcom_names_stays() -> None:
     assert "names none" not in "".join(d.message for d in result.diagnostics)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", MODAL)
 @pytest.mark.parametrize(("new", "found"), [("G41\n", "none"), ("G41 D2\n", "2"), ("G41 D1\nD2\n", "2")])
 def test_verify_knows_the_register_that_holds(controller: str, new: str, found: str) -> None:

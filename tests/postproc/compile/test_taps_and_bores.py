@@ -18,6 +18,7 @@ def tapped(kind: str = "TAP,DEPTH,12,MMPR,1.0") -> list[str]:
             "CYCLE/OFF", "RAPID", "GOTO/20,10,80"]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("kind", ["TAP,DEPTH,12,MMPR,1.0", "BORE,DEPTH,12,MMPM,100", "REAM,DEPTH,12,MMPM,100"])
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_every_control_writes_them_as_cycles(controller: str, kind: str) -> None:

@@ -47,6 +47,7 @@ def tilted_arcs(seed: int) -> Toolpath:
     return path
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize(("controller", "machine"), PAIRS)
 def test_arcs_stay_arcs(controller: str, machine: str, seed: int) -> None:
@@ -57,6 +58,7 @@ def test_arcs_stay_arcs(controller: str, machine: str, seed: int) -> None:
     assert result.comparison.worst_tip < (0.002 if tables_about_y else 0.0003)
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("seed", range(6))
 def test_a_tnc_climbs_in_the_xy_plane_only(seed: int) -> None:
     """CP with IZ turns about Z: an arc in another plane whose ends rounding parts must not become one."""

@@ -70,6 +70,7 @@ def follows(result: object, within: float = 0.0101, axis_within: float = 9e-4) -
     assert off.min(axis=1).max() < axis_within + 5e-4
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("output", ["axes", "tcp", "tilted", "auto"])
 @pytest.mark.parametrize("name", FOUR)
 def test_indexed_work_is_the_same_by_every_mode(name: str, output: str, tmp_path: Path) -> None:
@@ -79,6 +80,7 @@ def test_indexed_work_is_the_same_by_every_mode(name: str, output: str, tmp_path
     assert laws == {"tilted" if output == "auto" else output}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("output", ["axes", "tcp", "auto"])
 @pytest.mark.parametrize("name", FOUR)
 def test_turning_work_is_the_same_by_every_mode(name: str, output: str, tmp_path: Path) -> None:
@@ -87,6 +89,7 @@ def test_turning_work_is_the_same_by_every_mode(name: str, output: str, tmp_path
     assert {b.law for b in run(result) if b.code > 0} == {"tcp" if output == "auto" else output}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("convention", ["ZXZ", "ZYX", "XYZ", "rotary"])
 @pytest.mark.parametrize("name", ["mikron-ucp710", "trunnion-bc"])
 def test_every_convention_of_angles_gives_the_same_part(name: str, convention: str, tmp_path: Path) -> None:

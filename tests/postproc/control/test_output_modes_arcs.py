@@ -53,6 +53,7 @@ def frame_of(name: str) -> np.ndarray:
 SWEEPS = 0.7, 2.5, 4.9, 2.0 * np.pi
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "plane", "sweep"), [
     (name, plane, SWEEPS[(k + plane + other) % 4]) for k, name in enumerate(FRAMES) for plane in (17, 18, 19)
     for other in (0, 2)])
@@ -116,6 +117,7 @@ def holes(axis: np.ndarray) -> list[str]:
             *goto(np.stack([10 * side, -10 * side]), axis[None].repeat(2, axis=0)), "CYCLE/OFF"]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("output", "count"), [("tilted", 2), ("tcp", 0)])
 @pytest.mark.parametrize("name", ["mikron-ucp710", "fork-head-ab"])
 def test_cycles_are_native_in_planes_only(name: str, output: str, count: int, tmp_path: Path) -> None:
@@ -215,6 +217,7 @@ def test_linking_moves_are_clear_along_their_dog_legs(tmp_path: Path) -> None:
 # ---- feeds -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("output", ["tcp", "axes"])
 @pytest.mark.parametrize("name", FOUR)
 def test_a_turning_cut_takes_its_time_by_every_rule(name: str, output: str, tmp_path: Path) -> None:

@@ -56,6 +56,7 @@ def test_the_tables_stand_at_zero_where_the_mode_is_entered(machine: str, tables
     assert "SWITCHED ON WITH THE TABLES AT ZERO" in result.text
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("machine", MACHINES)
 @pytest.mark.parametrize("frame", ["table", "entry"])
 def test_the_program_is_right_under_both_readings(tmp_path: Path, machine: str, frame: str) -> None:

@@ -13,15 +13,16 @@ import postproc
 import toolpaths
 from postproc.base.options import Options
 from postproc.correction import backlash_steps as walking
-from postproc.correction import backlash_steps_loop
 from postproc.correction.backlash_steps import BlockEnds
 from postproc.path.model import TRAVERSE
 from postproc.pipeline.result import PostResult
 from postproc.readback.comparison.checks import _turning_points
 from postproc.setup.model import SetupFile, load_setup
 from postproc.verification.residual_errors import after_formatting
+from tests.postproc.correction import walk_by_numpy
 from tests.postproc.correction.test_compensation_points import two_ways_of_all
 from toolpaths.arrays import Floats
+from toolpaths.compiled import compiled
 from toolpaths.toolpath import Kind
 
 SAMPLES = Path("samples")
@@ -63,19 +64,22 @@ def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float, 
 
 
 def steps_of(ends: BlockEnds) -> Floats:
-    """(K, 3) of the plain walk."""
-    return np.asarray(walking._walk(*vars(ends).values())[0])
+    """(K, 3) of the walk."""
+    return walking.walk(ends)[0]
 
 
 @pytest.mark.numeric
 @pytest.mark.parametrize("lossy", [1, 2, 3])
-def test_the_compiled_walk_is_the_plain_one(lossy: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_walk_interpreted_and_compiled_is_the_one_of_numpy(lossy: int, monkeypatch: pytest.MonkeyPatch) -> None:
     ends = random_ends(np.random.default_rng(lossy), 400, lossy, 8.7e-5)
-    plain, ways = (np.asarray(x) for x in walking._walk(*vars(ends).values()))
-    monkeypatch.setattr(backlash_steps_loop, "COMPILE_FROM", 400)
+    plain, ways = walk_by_numpy.walk(ends)
+    monkeypatch.setattr(walking, "chosen", lambda function, *_: function)
+    as_it_stands = walking.walk(ends)
+    monkeypatch.setattr(walking, "chosen", lambda function, *_: compiled(function))
     fast = walking.walk(ends)
-    assert backlash_steps_loop.wanted(1)
     np.testing.assert_array_equal(fast[0], plain)
+    np.testing.assert_array_equal(as_it_stands[0], plain)
+    np.testing.assert_array_equal(as_it_stands[1], fast[1])
     np.testing.assert_allclose(fast[1], ways, rtol=0.0, atol=1e-12)  # sums of other order
     assert np.abs(ways).max() == 1.0 and (np.abs(ways) < 1.0).any()
     assert np.abs(plain).max() > 3.0 and (plain == 0.0).all(axis=1).any()
@@ -129,6 +133,7 @@ def converted(sample: str | Path, machine: str, controller: str, model: str | Pa
     return postproc.convert(path, machine, controller, setup, options, found)
 
 
+@pytest.mark.covering(of=("controller", "output", "law"))
 @pytest.mark.parametrize(("sample", "machine", "controller", "output", "law", "seed"), [
     ("five_faces.cls", "mikron-ucp710", "linuxcnc", "axes", "axes", 3),
     ("five_faces.cls", "mikron-ucp710", "fanuc-30i", "auto", "tilted", 4),
@@ -173,6 +178,7 @@ def back_and_forth(slanting: bool) -> str:
     return "\n".join([*lines, "FINI\n"])
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["fanuc-30i", "linuxcnc"])
 @pytest.mark.parametrize("slanting", [True, False])
 def test_rapids_that_begin_by_turning_back_get_one_point(controller: str, slanting: bool, tmp_path: Path) -> None:

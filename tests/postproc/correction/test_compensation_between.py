@@ -55,6 +55,7 @@ def worst(result: PostResult, folder: Path) -> float:
     return off
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("period", [2.0, 4.0, 5.0, 7.3])
 def test_errors_with_a_period_are_corrected_along_a_long_line(period: float, tmp_path: Path) -> None:
     result = converted(tmp_path, LINE, *periodic(period))

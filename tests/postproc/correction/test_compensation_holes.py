@@ -84,6 +84,7 @@ def checked(result: PostResult) -> PostResult:
     return result
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", CONTROLLERS)
 @pytest.mark.parametrize("tilted", [False, True])
 def test_taps_at_several_heights_stay_cycles(controller: str, tilted: bool, tmp_path: Path) -> None:
@@ -110,6 +111,7 @@ def test_the_tool_is_lifted_before_it_crosses(tmp_path: Path) -> None:
     assert rises(checked(drilled(tmp_path, "mill-3axis", "linuxcnc", "TAP,DEPTH,8,CLEAR,4,MMPR,1")).text) == [True] * 3
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "siemens-840d"])
 @pytest.mark.parametrize("cycle", ["DRILL,DEPTH,3,CLEAR,2,RETURN,2,MMPM,250",
                                    "DEEP,DEPTH,15,CLEAR,2,RETURN,2,STEP,5,MMPM,180",
@@ -140,6 +142,7 @@ def test_what_a_level_is_off_by_is_taken_up_before_a_feed_and_at_its_beginning()
     assert np.flatnonzero(_taken_up(job, motion, tip)).tolist() == [2, 4]  # type: ignore[arg-type]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", CONTROLLERS)
 @pytest.mark.parametrize("two_ways", [False, True])
 def test_taps_have_planes_of_their_own_and_are_come_to_from_afar(controller: str, two_ways: bool, tmp_path: Path) -> None:

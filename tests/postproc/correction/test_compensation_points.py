@@ -43,6 +43,7 @@ def converted(sample: str, machine: str, controller: str, setup: str) -> PostRes
     return postproc.convert(path, machine, controller, options=options, diagnostics=found)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("sample", "machine", "controller", "setup"), CASES)
 def test_points_are_inside_the_rounding_of_their_words(sample: str, machine: str, controller: str, setup: str) -> None:
     result = converted(sample, machine, controller, setup)
@@ -53,7 +54,21 @@ def test_points_are_inside_the_rounding_of_their_words(sample: str, machine: str
     assert np.median(found.tip) > 0.1 * result.job.rounding.tip
 
 
-@pytest.mark.parametrize("sample", ["blade.cls", "tool_axis_tour.apt"])
+@pytest.mark.covering
+@pytest.mark.parametrize(("sample", "machine", "controller", "setup"), CASES)
+def test_corrected_programs_are_proved_on_the_machine_with_errors(sample: str, machine: str, controller: str,
+                                                                  setup: str) -> None:
+    result = converted(sample, machine, controller, setup)
+    assert result.ok, [str(d) for d in result.diagnostics]
+    found, comparison = result.compensation, result.comparison
+    assert found is not None and comparison is not None
+    assert found.tip_before > 0.02 and found.tip_after < 1e-4
+    assert comparison.tip_bound < 0.01 and comparison.axis_bound < 0.05 * DEG
+    assert (comparison.unbounded == 0) == (machine not in ("uranesx", "h4a-c-table")), "of rods no bound is known"
+    assert found.axis_after < found.axis_before or machine == "uranesx"
+
+
+@pytest.mark.parametrize("sample", [pytest.param("blade.cls", marks=pytest.mark.slow), "tool_axis_tour.apt"])
 def test_between_points_the_tool_stays_where_lost_motion_is_taken_up(sample: str) -> None:
     """Joints bow a little at every point of a program by the tip: that is no turning back, which would be 6 to 10 um off."""
     result = converted(sample, "mikron-ucp710", "fanuc-30i", "tools")

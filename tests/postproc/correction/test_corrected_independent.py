@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,6 +60,12 @@ CASES: list[Case] = [
     ("pocket.cls", "head-table", "fanuc-30i", "auto", 13),  # holes beside a steep error
     ("pocket.cls", "mill-4axis", "haas-ngc", "auto", 12),  # holes whose levels need unlike corrections
 ]
+AGAIN = (CASES[1], CASES[4], CASES[6], CASES[9], CASES[10], CASES[14], CASES[15])
+"""samples, machines and controls that other cases hold: with -m slow"""
+
+
+def each(cases: list[Case]) -> list[Any]:
+    return [pytest.param(case, marks=pytest.mark.slow if case in AGAIN else ()) for case in cases]
 
 
 def name(case: Case) -> str:
@@ -126,7 +133,7 @@ def converted(case: Case, corrected: bool = True) -> Run:
         return run_of(result, own, Errors(file), controller)
 
 
-@pytest.mark.parametrize("case", CASES, ids=name)
+@pytest.mark.parametrize("case", each(CASES), ids=name)
 def test_the_second_reading_finds_the_points_inside_the_printed_bound(case: Case) -> None:
     """What the product's own read-back finds is what this one finds."""
     run = converted(case)
@@ -142,7 +149,7 @@ def test_without_correction_the_points_are_as_far_off_as_is_told(case: Case) -> 
     assert found is not None and 0.01 < bare.tip.max() <= found.tip_before + 1e-3
 
 
-@pytest.mark.parametrize("case", [case for case in CASES if case[0].startswith(("five", "h4a_indexed"))], ids=name)
+@pytest.mark.parametrize("case", each([c for c in CASES if c[0].startswith(("five", "h4a_indexed"))]), ids=name)
 def test_rotary_axes_stand_still_where_the_tool_axis_does(case: Case) -> None:
     """At neighbouring CL points of one orientation the words of the rotary axes are the same, to the last decimal."""
     run = converted(case)

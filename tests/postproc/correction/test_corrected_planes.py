@@ -37,6 +37,7 @@ ERRORS = "[location]\nEA0S = 10\nEB0S = 8\n"
 TILTED = ("siemens-840d", "heidenhain-tnc640", "fanuc-30i")
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", TILTED)
 @pytest.mark.parametrize("machine", ["trunnion-bc", "mikron-ucp710"])
 def test_small_tilts_on_a_turned_table_are_exact(machine: str, controller: str, tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ frame = "{1}"
 """
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("frame", ["fixed", "moving"])
 @pytest.mark.parametrize(("machine", "letter"), [("nutating-head", "B"), ("fork-head-ab", "A"), ("mikron-ucp710", "C")])
 def test_first_order_of_turns_about_a_point_off_the_axis(machine: str, letter: str, frame: str, tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from ruckig import InputParameter, Ruckig, Trajectory
 
-from postproc.base.compiled import compiled
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.estimate import estimate, timed, total
@@ -21,6 +20,7 @@ from postproc.cycle_time.shape import shape
 from postproc.cycle_time.shares import most_expensive, operations, shares
 from tests.linuxcnc import time_programs
 from tests.postproc.time_kit import HEAD, blocks, machine, model, random_program
+from toolpaths.compiled import compiled
 
 KINDS = ("linuxcnc", "lookahead", "ideal")
 CASES = [("mill-3axis", "", 300.0), ("mikron-ucp710", "AC", 150.0), ("mill-4axis", "A", 400.0)]
@@ -47,6 +47,7 @@ def test_stop_in_every_corner_adds_up() -> None:
     assert timed(b, model("linuxcnc")).end[-1] == pytest.approx(alone.sum() + SETTLED, abs=1e-9)
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("seed", range(5))
 def test_rest_to_rest_is_ruckigs(seed: int) -> None:
     rng = np.random.default_rng(seed)

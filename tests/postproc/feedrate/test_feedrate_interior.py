@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, make_interp_spline
 
-from postproc.base.compiled import compiled
 from postproc.feedrate.interior import NumpySteps, solve_tied
 from postproc.feedrate.interior_packed import PackedSteps
 from postproc.feedrate.kernels.coefficients import tie_ends
@@ -18,6 +17,7 @@ from postproc.feedrate.spline import REST, rest_basis, rest_law, stencils
 from postproc.feedrate.windows import solve_problem
 from tests.postproc.feedrate_kit import MIKRON, bezier, random_path, uniform, unlimited
 from tests.postproc.feedrate_reference import least_jerk_time
+from toolpaths.compiled import compiled
 
 
 def test_stencils_are_those_of_the_b_spline() -> None:
@@ -64,6 +64,7 @@ def test_compiled_equals_numpy(first: int, last: int) -> None:
     np.testing.assert_allclose(fast.c, plain.c, rtol=1e-9)
 
 
+@pytest.mark.covering(count=5)
 @pytest.mark.parametrize("seed", range(12))
 def test_time_is_the_optimum(seed: int) -> None:
     """At most 1e-4 above a converged sequence of convex problems (Clarabel) on the same knots, within 40 iterations."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.base.compiled import compiled
 from postproc.feedrate.kernels.splines import spline
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
 from postproc.feedrate.mesh import FEWEST, Spacing, mesh
 from postproc.feedrate.paths import Eased, SplinePath
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, random_path, unlimited
+from toolpaths.compiled import compiled
 
 
 def test_eased_derivatives_are_those_of_the_eased_path() -> None:

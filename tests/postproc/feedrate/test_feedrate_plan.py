@@ -59,6 +59,7 @@ def test_pass_of_the_bicubic_part(options: PlannerOptions, close: float) -> None
     assert made.seconds == pytest.approx(0.7268, rel=close)
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("seed", range(4))
 def test_strict_exceeds_nothing_and_costs_little(seed: int) -> None:
     path = random_path(seed, bend=(1.0, 2.0)[seed % 2])

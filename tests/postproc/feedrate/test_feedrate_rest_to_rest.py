@@ -99,7 +99,7 @@ def test_bad_moves_are_refused() -> None:
     free = JointLimits(np.array([1.0]), np.array([np.inf]), np.array([np.inf]))
     with pytest.raises(ValueError, match="without limits"):
         rest_seconds(np.array([[0.0]]), np.array([[1.0]]), free, "dog-leg")
-    with pytest.raises(ValueError, match="not a valid Law"):
+    with pytest.raises(ValueError, match="not a valid PointToPointMode"):
         rest_seconds(np.array([[0.0]]), np.array([[1.0]]), free, "curved")
 
 

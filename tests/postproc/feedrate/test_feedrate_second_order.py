@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from postproc.feedrate import second_order as planner
 from postproc.feedrate.limits import JointLimits, squared_speed
 from postproc.feedrate.paths import Derivatives, SplinePath
 from postproc.feedrate.plan import PlannerOptions, plan_second_order
 from postproc.feedrate.second_order import FLAT, least_time, second_order
+from tests.postproc.feedrate import second_order_by_numpy
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, bezier, random_path, zigzag
 from tests.postproc.feedrate_reference import exact_rows, exact_second_order, largest_second_order
 from toolpaths.arrays import Floats
@@ -53,10 +55,12 @@ def toppra_time(path: SplinePath, sigma: Floats, unit: float = 10.0) -> float:
 
 @pytest.mark.numeric
 @pytest.mark.parametrize("path", [bezier(1), bezier(2), bezier(3), zigzag(100.0), random_path(1)])
-def test_compiled_equals_numpy_and_toppra(path: SplinePath) -> None:
+def test_compiled_equals_numpy_and_toppra(path: SplinePath, monkeypatch: pytest.MonkeyPatch) -> None:
     sigma = np.linspace(path.start, path.end, 301)
     fast, plain = planned(path, sigma, True), planned(path, sigma, False)
+    monkeypatch.setattr(planner, "sweep", second_order_by_numpy.sweep)
     np.testing.assert_array_equal(fast, plain)
+    np.testing.assert_array_equal(planned(path, sigma, False), plain)
     assert least_time(sigma, plain) == pytest.approx(toppra_time(path, sigma), rel=1e-6)
 
 
@@ -76,6 +80,7 @@ def reversing(way: str, small: float, seed: int) -> tuple[Floats, Floats, Floats
     return sigma, dq, d2q, 0.05 / np.abs(dq).max(axis=1) ** 2
 
 
+@pytest.mark.covering
 @pytest.mark.numeric
 @pytest.mark.parametrize("way", ["slope", "sum"])
 @pytest.mark.parametrize("power", range(-14, -5))

@@ -10,7 +10,7 @@ PROGRAM = """
 import sys
 sys.modules["numba"] = None
 import numpy as np
-from postproc.feedrate.plan import Options, plan, plan_second_order
+from postproc.feedrate.plan import PlannerOptions, plan, plan_second_order
 from postproc.feedrate.windows import Method
 from tests.postproc.feedrate_kit import MIKRON, uniform, zigzag
 from postproc.feedrate import windows
@@ -18,7 +18,7 @@ windows.KERNEL_FROM = 1_500
 path = zigzag(160.0)
 made = plan(path, MIKRON, knots=uniform(path, 1_600).sigma)
 assert made.solved and made.seconds > plan_second_order(path, MIKRON).seconds
-small = plan(zigzag(60.0), MIKRON, options=Options(strict=True))
+small = plan(zigzag(60.0), MIKRON, options=PlannerOptions(strict=True))
 assert small.usage().worst <= 1.0
 print(f"{made.seconds:.9f} {small.seconds:.9f}")
 """

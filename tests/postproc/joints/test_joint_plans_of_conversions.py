@@ -113,6 +113,7 @@ travel = [-720, 720]
 """
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("base", "sign"), [("trunnion-bc", "-"), ("trunnion-bc", ""), ("head-table", "")])
 @pytest.mark.parametrize("seed", range(3))
 def test_nutating_axes_pass_the_direction_of_the_table(base: str, sign: str, seed: int, tmp_path: Path) -> None:

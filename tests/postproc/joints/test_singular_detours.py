@@ -72,6 +72,7 @@ def test_taut_string_has_the_least_largest_slope() -> None:
         assert np.abs(np.diff(got) / np.diff(at)).max() == pytest.approx(best.fun, abs=1e-7)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("step", [2.0, 0.05])
 @pytest.mark.parametrize("miss", [0.001, 0.015, 0.021, 0.1])
 def test_led_axis_stays_inside_the_tolerance_and_turns_the_table_less(miss: float, step: float) -> None:

@@ -15,6 +15,7 @@ from postproc.orientation.candidates.infeasible_passes import unfit
 from postproc.orientation.candidates.travel import nearest_inside
 from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import Pass, work_of
+from postproc.orientation.passes.reasons import Touching
 from postproc.orientation.plans.orient import orient
 from postproc.setup.model import PartPlacement, SetupFile, ToolSetup
 from tests.postproc.kit import SAMPLES, machine, toolpath
@@ -33,8 +34,10 @@ LINES = ["MULTAX", *(line for k in range(3) for line in (
 class Everywhere:
     """Bodies that every axis touches, deeper in later passes and where the tool stands upright."""
 
-    def touching(self, one: Pass, axis: Floats) -> str:
-        return f"holder of T1 touches fixture vise by {one.number + 1.0 + axis[2]:.2f} mm (at line {one.line})"
+    def touching(self, one: Pass, axis: Floats) -> Touching:
+        depth = one.number + 1.0 + float(axis[2])
+        return Touching(1, 2, "fixture vise", depth,
+                        f"holder of T1 touches fixture vise by {depth:.2f} mm (at line {one.line})")
 
 
 def test_passes_that_always_touch_are_one_error() -> None:

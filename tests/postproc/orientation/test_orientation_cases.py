@@ -171,6 +171,7 @@ def test_a_ball_on_the_h4a_stands_up_and_the_table_turns() -> None:
     assert aside.own.seconds == pytest.approx(found.best.seconds, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_h4a_turns_its_table_once() -> None:
     """Strips along y are slow on the H4a: turned by 90 degrees they run along x, worth it for twelve, not for two."""
     many, few = (strips([90.0] * count, "16,1") for count in (12, 2))
@@ -209,7 +210,8 @@ def test_an_angle_for_passes_in_many_directions() -> None:
 
 
 @pytest.mark.parametrize(("controller", "plan", "count"), [
-    ("siemens-840d", "per-pass", 2), ("heidenhain-tnc640", "per-pass", 2), ("linuxcnc", "auto", 12)])
+    ("siemens-840d", "per-pass", 2), ("heidenhain-tnc640", "per-pass", 2),
+    pytest.param("linuxcnc", "auto", 12, marks=pytest.mark.slow)])
 def test_a_flat_cutter_on_a_trunnion(controller: str, plan: Orientation, count: int) -> None:
     """C at 45 degrees, A at 0, in planes or as axis positions; tips and axes of the file are as they were."""
     path = strips([0.0] * count, "16,1")
@@ -247,7 +249,7 @@ def test_a_turned_part_is_held_as_a_straight_one() -> None:
     assert result.ok and standing(result, "C") == {round(placed.tried[0].best.held / DEG, 3)}
 
 
-@pytest.mark.parametrize(("direction", "cap"), [(25.0, 4.0), (0.0, 2.5)])
+@pytest.mark.parametrize(("direction", "cap"), [(25.0, 4.0), pytest.param(0.0, 2.5, marks=pytest.mark.slow)])
 def test_search_beside_a_full_grid(direction: float, cap: float) -> None:
     """Every axis of a coarse grid within the cap planned in full: none is better by more than half a percent."""
     m = machine("mikron-ucp710")

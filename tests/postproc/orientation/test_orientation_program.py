@@ -37,7 +37,7 @@ def strips() -> Toolpath:
     return path
 
 
-@pytest.mark.parametrize("name", ["mikron-ucp710", "head-table"])
+@pytest.mark.parametrize("name", ["mikron-ucp710", pytest.param("head-table", marks=pytest.mark.slow)])
 def test_a_plan_takes_as_long_as_its_program(name: str) -> None:
     """From home to home with the tool change: `keep` winds C up, which the way home undoes. The program rounds
     corners between rapids, the count stops there, so that it is above by some percent at most."""

@@ -93,7 +93,7 @@ def test_verify_chooses_the_same(tmp_path: Path) -> None:
     assert verified.ok, [str(d) for d in verified.diagnostics]
 
 
-@pytest.mark.parametrize(("plan", "count"), [("per-pass", 2), ("whole-part", POSTED)])
+@pytest.mark.parametrize(("plan", "count"), [("per-pass", 2), pytest.param("whole-part", POSTED, marks=pytest.mark.slow)])
 def test_other_plans_avoid_it_too(plan: Orientation, count: int) -> None:
     result = converted(strips([0.0] * count), beside(*POSTS), plan)
     assert result.ok and result.choice is not None and not result.choice.plans[plan].barred

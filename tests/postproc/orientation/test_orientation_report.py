@@ -29,9 +29,9 @@ from postproc.orientation.report import figures_of_choice as report
 from postproc.orientation.report import text
 from postproc.setup.model import SetupFile
 from tests.postproc.kit import SAMPLES, machine
+from tests.postproc.orientation.part_choice import part
 from toolpaths import drawing
 
-PART = SAMPLES / "test_part.cls"
 BALL = ["UNITS/MM", "CUTTER/16,8", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,30000", "MULTAX"]
 
 
@@ -51,10 +51,6 @@ def of_text(content: str, name: str = "passes.apt") -> OrientationChoice:
     choice, found = orient(path, machine("mikron-ucp710"), SetupFile(), Options())
     assert choice is not None, found
     return choice
-
-
-def part() -> OrientationChoice:
-    return of_text(PART.read_text(), "test_part.cls")
 
 
 def repeated(plan: OrientationPlan) -> OrientationPlan:

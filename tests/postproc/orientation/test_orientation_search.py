@@ -22,12 +22,14 @@ from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.parallel_map import CHUNK, PassFault, each_pass
 from postproc.orientation.passes.passes import Pass, PassContext, work_of
 from postproc.orientation.passes.poses import held_poses
+from postproc.orientation.passes.reasons import Touching
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import orient
 from postproc.orientation.plans.plans import plans_of, table_of
 from postproc.orientation.plans.shortest_sequence import groupwise, seconds
 from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, machine
+from tests.postproc.orientation.part_choice import part
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Toolpath
@@ -79,10 +81,11 @@ def test_joints_of_a_pass_follow_from_four_poses(name: str) -> None:
     for axis, (q, refused) in zip(axes, held_poses(one, m, axes), strict=True):
         tip = np.concatenate([one.tip, *(s.tip for s in one.stretches)]) + one.shift(axis)
         found_tip, found_axis = one.kin.forward(q)
-        assert not refused or refused.startswith("travel")
+        assert refused is None or refused.kind == "travel"
         assert np.abs(found_tip - tip).max() < 1e-9 and angle_between(found_axis, axis).max() < 1e-9
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", ["mikron-ucp710", "h4a-c-table"])
 @pytest.mark.parametrize("jerk", [True, False])
 def test_times_on_shared_knots_are_those_of_plans(name: str, jerk: bool) -> None:
@@ -179,7 +182,7 @@ def test_the_pass_before_lends_its_axis() -> None:
 
 def test_rapids_count_in_whole_plans() -> None:
     """The swiftest axis minds the rapids of its pass, the best only its cuts."""
-    choice = chosen(toolpaths.read(SAMPLES / "test_part.cls")[0], machine("mikron-ucp710"))
+    choice = part()
     found, plans = choice.tried, choice.plans
     assert plans["auto"].seconds == min(plan.seconds for plan in plans.values())
     assert plans["whole-part"].seconds <= plans["keep"].seconds
@@ -187,6 +190,7 @@ def test_rapids_count_in_whole_plans() -> None:
     assert any(one.swift.rapids < 0.999 * one.best.rapids for one in found)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "walls"), [("mikron-ucp710", True), ("mikron-ucp710", False), ("trunnion-bc", True),
                                              ("head-table", False), ("mill-4axis", True), ("nutating-head", True),
                                              ("uranesx", False)])
@@ -234,8 +238,8 @@ def test_an_axis_outside_travel_is_replaced_with_a_warning() -> None:
 def test_states_that_touch_are_in_no_plan_but_keep() -> None:
     """Bodies that the upright tool touches: every other plan leans."""
     class Ceiling:
-        def touching(self, one: Pass, axis: Floats) -> str:
-            return "holder touches ceiling" if axis[2] > 0.97 else ""
+        def touching(self, one: Pass, axis: Floats) -> Touching | None:
+            return Touching(1, 2, "ceiling", 1.0, "holder touches ceiling") if axis[2] > 0.97 else None
 
     made, allowed = work(strips([0.0, 30.0, 60.0]), machine("mikron-ucp710")), AllowedAxes(60.0 * DEG, Ceiling())
     results = [tried(one, made.machine, allowed) for one in made.passes]

@@ -97,6 +97,7 @@ LAWS = [(name, law) for name in NAMES for law in ("axes", "tcp") if law == "axes
     machine(name).kinematics.slides_affine and any(machine(name).rotary))]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "law"), LAWS)
 def test_bound_is_never_below_dense_truth(name: str, law: str) -> None:
     """Whole moves, far too long to pass, and the pieces that linearising makes of them."""

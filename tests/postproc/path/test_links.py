@@ -85,6 +85,7 @@ def _between_cl_points(tip: np.ndarray, cl: np.ndarray) -> np.ndarray:
     return result
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", MACHINES)
 @pytest.mark.parametrize("tool_change", [False, True])
 def test_random_pairs_of_faces(name: str, tool_change: bool) -> None:

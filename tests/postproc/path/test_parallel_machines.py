@@ -54,8 +54,9 @@ def test_bicubic_on_uranesx() -> None:
 
 
 @pytest.mark.parametrize(("name", "file", "moves"), [
-    *((name, file, moves) for name in H4A for file, moves in (("h4a_dome.cls", 780), ("h4a_indexed.cls", 20))),
-    ("h4a-c-table", "pocket.cls", 80)])
+    (H4A[0], "h4a_dome.cls", 780), (H4A[1], "h4a_indexed.cls", 20), (H4A[0], "pocket.cls", 80),
+    pytest.param(H4A[1], "h4a_dome.cls", 780, marks=pytest.mark.slow),
+    pytest.param(H4A[0], "h4a_indexed.cls", 20, marks=pytest.mark.slow)])
 def test_five_axes_on_both_h4a(name: str, file: str, moves: int) -> None:
     result = sample(file, name, "h4a")
     tip, axis, compared = deviations(result)
@@ -312,7 +313,8 @@ def test_a_leg_on_its_other_root_is_caught(name: str, setup_name: str, letter: s
 
 
 @pytest.mark.parametrize(("file", "name", "setup_name"), [
-    ("pocket.cls", "uranesx", "delta"), ("h4a_dome.cls", "h4a-c-table", "h4a"), ("h4a_dome.cls", "h4a-spindle-axis", "h4a")])
+    ("pocket.cls", "uranesx", "delta"), ("h4a_dome.cls", "h4a-c-table", "h4a"),
+    pytest.param("h4a_dome.cls", "h4a-spindle-axis", "h4a", marks=pytest.mark.slow)])
 def test_every_cutting_block_states_its_time(file: str, name: str, setup_name: str) -> None:
     """60 / F seconds: no axis beyond its velocity, and over each block the tip's length at the programmed feed."""
     result = sample(file, name, setup_name)

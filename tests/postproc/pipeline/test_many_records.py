@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import cProfile
 from collections.abc import Callable
 from typing import Any
 
@@ -31,18 +31,9 @@ def converted(kind: str, count: int, machine: str = "mill-3axis", controller: st
 
 def calls(work: Callable[[], Any]) -> int:
     """How many functions of Python and C were called."""
-    count = 0
-
-    def counting(frame: Any, event: str, arg: Any) -> None:
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    sys.setprofile(counting)
-    try:
-        work()
-    finally:
-        sys.setprofile(None)
-    return count
+    profile = cProfile.Profile()
+    profile.runcall(work)
+    return sum(entry.callcount for entry in profile.getstats())
 
 
 @pytest.mark.parametrize("kind", KINDS)

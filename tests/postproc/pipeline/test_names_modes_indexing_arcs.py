@@ -66,6 +66,7 @@ def test_a_short_arc_of_a_large_radius_asks_for_no_more_room(controller: str) ->
     assert np.ptp(result.job.space.corners, axis=0).max() < 25.0
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("seed", range(6))
 def test_the_room_is_that_of_dense_points_of_the_arcs(seed: int) -> None:
     """Random arcs and helices in random planes: the box is that of 20001 points of each."""

@@ -61,6 +61,7 @@ def test_the_tool_goes_through_every_point_in_order(file: str, name: str, contro
         assert not len(chunk) or gap.max() < 0.0101
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "a", "b", "step"), [
     ("mikron-ucp710", (10, 0), (20, 140), 0.0), ("head-table", (10, 0), (20, 140), 0.0),
     ("mikron-ucp710", (10, 0), (20, 140), 0.05), ("fork-head-ab", (10, 0), (20, 140), 0.05),

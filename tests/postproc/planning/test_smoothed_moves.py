@@ -53,6 +53,7 @@ def moved(result: PostResult) -> Floats:
     return np.asarray(np.linalg.norm(result.moves.tip - result.job.moves.tip, axis=1))
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("seed", [1, 6, 7, 70, 71])
 def test_what_converts_without_converts_with(seed: int) -> None:
     """Points nearer to each other than smoothing moves them passed for their neighbours: the rapid behind the pass then
@@ -64,6 +65,7 @@ def test_what_converts_without_converts_with(seed: int) -> None:
         assert "smooth.taken_back" not in codes(smooth.diagnostics) and moved(smooth).max() <= 0.005
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("seed", range(6))
 def test_each_point_stays_nearest_to_its_own(seed: int) -> None:
     smooth = good(convert(passes(dense(seed)), "head-table", smooth=True))

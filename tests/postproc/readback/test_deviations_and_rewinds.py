@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import machines
 from postproc.readback.comparison.align import align
+from postproc.readback.execution import assembly
 from tests.postproc.kit import convert, good, goto, sample, toolpath
 from toolpaths.shape import Curves
 from toolpaths.units import DEG
@@ -80,3 +82,23 @@ def test_where_travel_is_short_a_jump_is_told_as_that() -> None:
     result = convert(toolpath("RAPID", rows[0], "FEDRAT/MMPM,1000", *rows[1:]), "fork-head-ab")
     errors = [d for d in result.diagnostics if d.severity.name == "ERROR"]
     assert {d.code for d in errors} == {"travel.exceeded"} and any("axis A" in d.message for d in errors)
+
+
+@pytest.mark.parametrize("far", [1e5, 1e12])
+def test_a_walk_ends_where_the_machine_cannot_follow(far: float) -> None:
+    """A coordinate that slipped by digits is NaN at once, not after a step every 20 mm."""
+    kin = machines.load("delta-star").kinematics
+    home = kin.inverse(np.array([[0.0, 0.0, 300.0]]), np.array([[0.0, 0.0, 1.0]]))[0]
+    pose = np.hstack(kin.forward(home))
+    count = 0
+    given = kin.forward
+
+    class Counted:
+        rotary, carried = kin.rotary, staticmethod(kin.carried)
+
+        def forward(self, q: np.ndarray, near: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+            nonlocal count
+            count += 1
+            return given(q, near)
+    found = assembly.walk(Counted(), home, home + np.array([[far, 0.0, 0.0]]), pose)  # type: ignore[arg-type]
+    assert np.isnan(found).all() and count < 200

@@ -75,6 +75,7 @@ def again(result: PostResult, motion: Motion) -> Comparison:
         return compare(motion, result.job, result.comparison.poses)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "control", "between", "change"), CASES)
 def test_what_is_fed_on_the_way_to_a_tool_change_has_the_states_of_before(name: str, control: str, between: str,
                                                                           change: str) -> None:

@@ -25,6 +25,8 @@ FLAT = [("pocket.cls", "mill-3axis", "linuxcnc"), ("inch_plate.apt", "mill-3axis
         ("five_faces.cls", "mikron-ucp710", "linuxcnc"), ("indexed_4axis.cls", "mill-4axis", "linuxcnc")]
 FIVE = [("tool_axis_tour.apt", "mikron-ucp710", "linuxcnc"), ("tool_axis_tour.apt", "linuxcnc-xyzac-trt", "linuxcnc")]
 MOST = 4
+BLOCKS = pytest.mark.parametrize("most", [2, pytest.param(6, marks=pytest.mark.slow)])
+"""how many blocks of a program have all their numbers changed"""
 
 
 def found(result: PostResult, lines: list[str]) -> set[str]:
@@ -76,31 +78,34 @@ def test_unspoilt_programs_pass(case: tuple[str, str, str]) -> None:
     assert not found(result, result.text.splitlines())
 
 
+@BLOCKS
 @pytest.mark.parametrize("case", FLAT)
-def test_wrong_number(case: tuple[str, str, str]) -> None:
+def test_wrong_number(case: tuple[str, str, str], most: int) -> None:
     """0.02 mm off, and far off, in every word of every kind of cutting block."""
     result = sample(*case)
-    rows = some(cutting(case))
+    rows = some(cutting(case), most)
     assert not survivors(result, numbers(result, "XYZ", (0.021, -0.3, 7.0), rows))
     if case == FLAT[0]:
         arcs = [i for i in cutting(case) if re.search(r"\b[IJ]", result.text.splitlines()[i])]
         assert not survivors(result, numbers(result, "IJ", (-0.3, 7.0), some(arcs, 2)))
 
 
+@BLOCKS
 @pytest.mark.parametrize("case", FIVE)
-def test_wrong_number_in_five_axes(case: tuple[str, str, str]) -> None:
+def test_wrong_number_in_five_axes(case: tuple[str, str, str], most: int) -> None:
     result = sample(*case)
-    assert not survivors(result, numbers(result, "XYZ", (0.05, -7.0), some(cutting(case), 3)))
-    assert not survivors(result, numbers(result, "ABC", (10.0, -25.0), some(cutting(case), 3)))
+    assert not survivors(result, numbers(result, "XYZ", (0.05, -7.0), some(cutting(case), most)))
+    assert not survivors(result, numbers(result, "ABC", (10.0, -25.0), some(cutting(case), most)))
 
 
+@BLOCKS
 @pytest.mark.parametrize("case", FLAT[:2])
-def test_wrong_number_in_a_canned_cycle(case: tuple[str, str, str]) -> None:
+def test_wrong_number_in_a_canned_cycle(case: tuple[str, str, str], most: int) -> None:
     result = sample(*case)
     lines = result.text.splitlines()
     rows = [i for i, n in enumerate(lines) if re.search(r"G8[1-9]|G73", n)]
     rows += [i + 1 for i in rows if re.fullmatch(r"X\S+ Y\S+", lines[i + 1])]
-    assert not survivors(result, numbers(result, "XYZR", (0.021, -0.3, 7.0), some(rows, 3)))
+    assert not survivors(result, numbers(result, "XYZR", (0.021, -0.3, 7.0), some(rows, most)))
 
 
 @pytest.mark.parametrize("case", FLAT[:3])
@@ -119,6 +124,7 @@ def test_swapped_blocks(case: tuple[str, str, str]) -> None:
                                    [*lines[:i], lines[i + 1], lines[i], *lines[i + 2:]]) for i in some(pairs)))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("case", [*FLAT[:3], FIVE[0]])
 @pytest.mark.parametrize(("code", "other"), [("G1", "G0"), ("G2", "G3"), ("G3", "G2"), ("G93", "G94")])
 def test_wrong_motion_code(case: tuple[str, str, str], code: str, other: str) -> None:
@@ -151,6 +157,7 @@ def test_feed_doubled_all_over_a_five_axis_move() -> None:
     assert "verify.feed" in found(result, [re.sub(r"F([\d.]+)$", lambda m: f"F{2 * float(m[1]):.4f}", n) for n in lines])
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("case", FLAT)
 @pytest.mark.parametrize(("pattern", "code"), [
     (r"T1 M6", ""), (r"T2 M6", ""), (r"S\d+ M3", "verify.state"), (r"M8", "verify.state"), (r"G43 H1", ""), (r"G43 H2", "")])
@@ -163,6 +170,7 @@ def test_missing_change_of_state(case: tuple[str, str, str], pattern: str, code:
     assert got and (not code or code in got)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("case", FLAT)
 @pytest.mark.parametrize(("pattern", "text"), [(r"T1 M6", "T2 M6"), (r"G43 H1", "G43 H2"), (r"G43 H2", "G43 H1"),
                                                (r"S\d+ M3", "S1 M3"), (r"G43 H1", "G43 H9")])
@@ -279,6 +287,7 @@ def judged(source: Path, controller: str, mode: str, count: int | None, start: i
     return [f"{one}: {said}" for one, said in verdicts if said.split()[0] not in ("caught", *HARMLESS)]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("source", "controller", "mode"), CHANGED, ids=lambda v: getattr(v, "stem", v))
 def test_no_change_is_silent_and_harmful(source: Path, controller: str, mode: str) -> None:
     assert judged(source, controller, mode, EACH, SIX.index(controller)) == []

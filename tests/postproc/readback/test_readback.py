@@ -176,6 +176,7 @@ def random_program(rng: np.random.Generator) -> str:
     return "\n".join(lines) + "\n"
 
 
+@pytest.mark.covering(count=6)
 @pytest.mark.parametrize("seed", range(12))
 def test_random_programs_as_the_own_executor_runs_them(seed: int) -> None:
     text = random_program(np.random.default_rng(seed))
@@ -277,14 +278,13 @@ def walked(data: tuple, blocks: slice = slice(None)) -> tuple[np.ndarray, np.nda
 def test_compiled_walk_is_the_plain_walk(monkeypatch: pytest.MonkeyPatch) -> None:
     cases = [random_walk(np.random.default_rng(seed), 150) for seed in range(8)]
     plain = [walked(c) for c in cases] + [walked(c, slice(0, 90)) for c in cases]
-    for name in ("_apart", "_angle", "_turned", "_line_done", "_nearer"):
-        monkeypatch.setattr(align, name, getattr(align, name))
     monkeypatch.setattr(align, "_COMPILE_FROM", 0)
     fast = [walked(c) for c in cases] + [walked(c, slice(0, 90)) for c in cases]
     for (m0, o0), (m1, o1) in zip(plain, fast, strict=True):
         assert np.array_equal(m0, m1) and np.array_equal(o0, o1)
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("seed", range(6))
 def test_walk_gives_each_move_its_own_blocks(seed: int) -> None:
     (_, end, *_), tips, _, _ = data = random_walk(np.random.default_rng(100 + seed), 80)

@@ -59,6 +59,7 @@ def changed(lines: list[str], i: int, block: str | None) -> tuple[str, list[str]
     return f"{i + 1}: {lines[i]} -> {block}", [*lines[:i], *([] if block is None else [block]), *lines[i + 1:]]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("file", "controller"), CASES)
 def test_every_number_of_a_cut_counts(file: str, controller: str) -> None:
     """0.05 mm or 0.5 degrees beside it, in any word of any cutting block; but not C where the tool stands along it."""
@@ -78,6 +79,7 @@ def test_every_number_of_a_cut_counts(file: str, controller: str) -> None:
     assert survivors(result, mutants) == []
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("file", "controller"), CASES)
 def test_every_code_of_a_mode_counts(file: str, controller: str) -> None:
     """Without a code that enters or leaves a mode, or with a plane that is turned by half a degree.

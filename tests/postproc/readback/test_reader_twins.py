@@ -74,6 +74,7 @@ def same(a: Motion, b: Motion) -> None:
     assert np.array_equal(a.feed[cutting], b.feed[cutting])
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("dialect", [FANUC, HAAS, SIEMENS])
 def test_incremental_twin(dialect: str, seed: int) -> None:

@@ -29,6 +29,7 @@ def errors(found: list[Diagnostic]) -> list[tuple[str, tuple[int, ...]]]:
     return [(d.code, d.lines) for d in found if d.severity is Severity.ERROR]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("dialect", sorted(DIALECTS))
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_hole_of_depth_0_is_refused_in_every_dialect(kind: str, dialect: str) -> None:
@@ -42,6 +43,7 @@ def test_a_hole_of_depth_0_is_refused_in_every_dialect(kind: str, dialect: str) 
         assert all(d.hint for d in found if d.code == "cl.cycle-depth")
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", CONTROLLERS)
 @pytest.mark.parametrize(("record", "code", "remedy"), [
     ("DRILL,DEPTH,0.000001,MMPM,60,CLEAR,3", "cycle.depth", "DRILL,DEPTH,1,MMPM,60,CLEAR,3"),

@@ -66,6 +66,7 @@ def level_of(out: str) -> float:
     return LEVEL if number == "AUTO" else TOP + max(float(number), PLANE)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("kind", "out", "between", "control"), CASES)
 def test_the_cut_begins_where_the_hole_was_left_to(kind: str, out: str, between: str, control: int) -> None:
     result = converted(cl(kind, out, between), CONTROLS[control])
@@ -80,6 +81,7 @@ def test_the_cut_begins_where_the_hole_was_left_to(kind: str, out: str, between:
         assert tip[came - 1] == pytest.approx([20.0, 0.0, level_of(out)], abs=1e-3)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("cut", ["GOTO/20,0,20\n", "GOTO/20,0,11\n", "GOTO/20,0,70\n", "GOTO/20,0,-5\n"])
 @pytest.mark.parametrize(("kind", "out", "control"), [
     ("DRILL", "RTRCTO,10,", "fanuc-30i"), ("BORE", "RTRCTO,10,", "haas-ngc"), ("BORE", "RTRCTO,AUTO,", "linuxcnc")])

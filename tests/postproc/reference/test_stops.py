@@ -79,6 +79,7 @@ KINDS = (*CONTROLLERS[3:5], CONTROLLERS[0]), (*CONTROLLERS[3:5], CONTROLLERS[2])
 """each kind of control: its own words, and in turn one of those with the same"""
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("case", "controller"), [(case, name) for k, case in enumerate(CASES) for name in KINDS[k % 4]])
 def test_nothing_is_cut_with_a_standing_spindle(case: str, controller: str) -> None:
     text = good(convert(path_of(case), "mikron-ucp710", controller, OFF_AXIS)).text

@@ -49,6 +49,7 @@ def hinted(result: PostResult) -> str:
     return "\n".join(line for line in lines if not line.startswith("or,")) + "\n"
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("file", "controller"), [
     *((file, CONTROLLERS[k]) for k, file in enumerate(FILES)), *(("several forms", one) for one in CONTROLLERS)])
 def test_the_hint_numbers_the_tools(file: str, controller: str, tmp_path: Path) -> None:
@@ -200,6 +201,7 @@ TWO = toolpath("LOADTL/1", *SPINDLE, *CUT, "LOADTL/2", *CUT, head=["UNITS/MM"])
 LENGTHS = {"different": {"tools": {"1": {"gauge_length": 100.0}, "2": {"gauge_length": 130.0}}}, "not stated": {}}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("lengths", LENGTHS)
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_a_program_without_the_length_or_with_another_one_fails(controller: str, lengths: str, tmp_path: Path) -> None:

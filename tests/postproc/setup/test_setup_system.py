@@ -43,6 +43,7 @@ def body(text: str) -> list[str]:
     return [row for row in text.splitlines() if not row.startswith("(") and "fingerprint of the set-up" not in row]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "heidenhain-tnc640"])
 @pytest.mark.parametrize("system", [True, "MSYS 1", "msys 1"])
 def test_the_words_are_those_of_the_system_alone(controller: str, system: bool | str) -> None:

@@ -70,6 +70,7 @@ def program(block: str) -> str:
     return re.sub(r"([XYZRQIJF]-?\d+)(?![\d.])", r"\1.", text)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("block", "code"), [
     (f"G1 X{'9' * 400} F100", "gcode.number"), (f"G4 P{'9' * 11}", "gcode.number"), ("G2 X5 Y0 F100", "gcode.arc"),
     ("G2 X5 Y0 I0 J0 F100", "gcode.arc"), ("G2 X5 Y0 I5 J0 F100", "gcode.arc"),

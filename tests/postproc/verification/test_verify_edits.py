@@ -80,6 +80,7 @@ def test_a_program_of_our_own_has_nothing_to_be_told(controller: str) -> None:
     assert [d for d in read_back(result.text.encode(), result.job, "part.apt")[1] if d.severity is not Severity.INFO] == []
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("controller", "old", "new"), [
     ("linuxcnc", "R5 F600", "R5 F500"), ("fanuc-30i", "R5. F600.", "R5. F500."), ("haas-ngc", "R5. F600.", "R5. F500."),
     ("linuxcnc", "G84", "G74"), ("fanuc-30i", "G84", "G74"), ("haas-ngc", "G84", "G74"),

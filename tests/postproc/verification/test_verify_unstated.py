@@ -41,6 +41,7 @@ def test_programs_as_written_state_everything(controller: str) -> None:
     assert not errors(pocket(controller), pocket(controller).text)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", WORDED)
 @pytest.mark.parametrize(("codes", "named"), [
     ("G17", "G17"), ("G90", "G90"), ("G94", "G94"), ("G40", "G40"), ("G54", "work offset"), ("G98|G99", "G98"),
@@ -98,6 +99,7 @@ def test_a_program_that_is_left_in_the_part() -> None:
     assert "verify.end" in caught(result, "\n".join(lines[:last] + lines[last + 2:]) + "\n")
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ALL)
 @pytest.mark.parametrize("share", [0.995, 0.97, 0.7])
 def test_feeds_that_are_a_little_too_low(controller: str, share: float) -> None:

@@ -26,6 +26,7 @@ def converted(text: bytes, setup: dict[str, object], control: str = "linuxcnc", 
                             Options(**options), diagnostics=found)  # type: ignore[arg-type]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("control", ["linuxcnc", "fanuc-30i", "siemens-840d", "haas-ngc", "generic-iso"])
 @pytest.mark.parametrize(("text", "number"), [(BARE, "0"), (LOADED, "1")])
 def test_a_tool_measured_into_the_work_offset(control: str, text: bytes, number: str) -> None:

@@ -129,6 +129,7 @@ WAITS = toolpath("GOTO/0,0,0", "STOP", "GOTO/5,0,0", "OPSTOP", "GOTO/9,0,0", "DE
                  "GOTO/9,9,0")
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["linuxcnc", FANUC, HAAS, SIEMENS, "heidenhain-tnc640"])
 @pytest.mark.parametrize(("code", "fault"), [
     (r"M0", "verify.stop"), (r"M1", "verify.stop"), (r"(G4 [PF]1\.?5(00)?|CYCL DEF 9\.1 DWELL 1\.5)", "verify.dwell"),
@@ -149,6 +150,7 @@ def test_stops_and_rests_are_missed(controller: str, code: str, fault: str, tmp_
         assert {d.code for d in result.diagnostics if d.severity.name == "ERROR"} == expected
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("radius", [0.012, 0.03, 0.1])
 @pytest.mark.parametrize("controller", [FANUC, SIEMENS])
 def test_chords_of_tiny_arcs_are_not_taken_for_too_fast(controller: str, radius: float) -> None:

@@ -10,6 +10,7 @@ from postproc.pipeline.program_header import header_lines
 from tests.postproc.kit import convert, good, toolpath
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("length", [60, 72])
 @pytest.mark.parametrize("base", ["linuxcnc", "fanuc-30i", "heidenhain-tnc640"])
 def test_no_word_of_the_head_is_lost_where_blocks_are_short(base: str, length: int, tmp_path: Path) -> None:

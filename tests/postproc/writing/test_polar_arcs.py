@@ -174,6 +174,7 @@ def test_the_bound_counts_helices_where_there_are_some() -> None:
         assert job.rounding.tip == pytest.approx(words + more, rel=1e-12)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("sense", [1, -1])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_whole_circle_behind_a_helix_begins_where_it_ends(tmp_path: Path, sense: int, seed: int) -> None:

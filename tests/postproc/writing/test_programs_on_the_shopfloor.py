@@ -134,6 +134,7 @@ def test_positions_beyond_a_turn_name_the_setting_that_they_need(controller: str
     assert not any("NEEDS" in t.upper() for t in near)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("level", [8, 20])
 @pytest.mark.parametrize("controller", [*CONTROLLERS, "linuxcnc"])
 def test_a_tap_with_a_retract_level_of_its_own_is_a_cycle(controller: str, level: int) -> None:

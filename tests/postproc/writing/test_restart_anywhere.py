@@ -91,6 +91,7 @@ def taken_up(result: PostResult, text: str, at: int, start: np.ndarray, whole: M
     assert cuts(motion, first) == cuts(whole, int(np.searchsorted(whole.line, label + 1)))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("controller", "machine"), PAIRS)
 def test_after_a_stop_anywhere_in_the_operation_before(controller: str, machine: str) -> None:
     """The program is broken off at a block and goes on at a label, in the modes and at the place that it left."""
@@ -107,6 +108,7 @@ def test_after_a_stop_anywhere_in_the_operation_before(controller: str, machine:
             taken_up(result, "\n".join(broken), stop, home, whole, label)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("controller", "machine"), PAIRS)
 def test_from_an_arbitrary_pose_in_modes_of_another_program(controller: str, machine: str) -> None:
     result = restartable(controller, machine)

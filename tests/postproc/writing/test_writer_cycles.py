@@ -112,6 +112,7 @@ def test_a_command_between_holes_ends_the_first_level_too(controller: str) -> No
     assert [b.split(" Z")[0] for b in got if b.startswith("G9")] == ["G99 G81 X10. Y0.", "G98 G81 X20. Y0."]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640", "fanuc-30i"])
 @pytest.mark.parametrize("kind", ["DRILL", "TAP"])
 @pytest.mark.parametrize("seed", [1, 3])
@@ -128,6 +129,7 @@ def test_holes_of_one_plane_may_differ_by_the_last_decimal(controller: str, kind
     assert result.ok, [str(d) for d in result.diagnostics]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640", "fanuc-30i"])
 @pytest.mark.parametrize("seed", [5, 8])
 def test_a_tool_in_a_tilted_plane_rises_before_it_goes_to_a_higher_hole(controller: str, seed: int) -> None:

@@ -36,6 +36,7 @@ def test_statements_behind_a_label_are_read(label: str) -> None:
     assert [t.number for t in found.toolpath.tools] == [7]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("line", ["GOTO(1,2,3)", "RAPID;1", "{GOTO/1,2,3}", "N10 GOTO/1,2,3", "@ CIRCLE/0,0,0,0,0,1,5",
                                   '"GODLTA/1"', "IF (X1) L1,L2,L3"])
 @pytest.mark.parametrize("at", [0, 1, 2])

@@ -77,6 +77,7 @@ class Walk:
         self.file.end()
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("seed", range(SEEDS))
 @pytest.mark.parametrize("name", list(SYSTEMS))
 def test_random_path(name: str, seed: int) -> None:

@@ -71,6 +71,7 @@ def meaning(result: ReadResult) -> list[object]:
     return [*columns, cycles, events, [(t.number, t.diameter, t.cutter) for t in p.tools], len(p.operations), result.dialect]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("spelling", SPELLINGS)
 @pytest.mark.parametrize("name", [*FILES, "cycle"])
 def test_the_meaning_is_the_same(name: str, spelling: str) -> None:

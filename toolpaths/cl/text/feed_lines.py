@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.cl.text.scan import Scan
+from toolpaths.shapes import arrays
 
 Bytes = npt.NDArray[np.uint8]
 FEWEST = 1000
@@ -32,6 +33,7 @@ _LONGEST = 32
 
 
 @dataclass(frozen=True)
+@arrays(value="S", stop="S")
 class FeedLines:
     """Slow lines by their index in the scan: the first of the form, `value` (S,) of each, `stop` (S,) one past the last
     of the unbroken run that it stands in; 0 for lines of other forms."""

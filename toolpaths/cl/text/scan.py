@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 CHUNK = 1 << 22
 _NUMERIC = np.zeros(256, bool)
@@ -31,6 +32,7 @@ ReadProgress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
+@arrays(xyz="F 3", axis="F 3", third="F 3", line="F")
 class Points:
     """Plain GOTO lines (F rows), as written: file units, local frame.
 

@@ -1,0 +1,64 @@
+"""Each machine with each control: a small part is written and proved, whatever the words hold."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import machines
+import postproc
+import toolpaths
+from postproc.base.options import Options
+from postproc.controllers.model import builtin_files
+from postproc.setup.model import load_setup
+from toolpaths.diagnostics import Severity
+
+SAMPLES = Path(__file__).parents[3] / "samples"
+PART = """UNITS/MM
+LOAD/TOOL,1
+SPINDL/RPM,3000,CLW
+COOLNT/ON
+RAPID
+GOTO/2,3,30
+FEDRAT/MMPM,400
+GOTO/2,3,-1
+GOTO/9,5,-1
+CIRCLE/9,9,-1,0,0,1,4
+GOTO/13,9,-1
+RAPID
+GOTO/13,9,30
+STOP
+SPINDL/RPM,3000,CLW
+GOTO/2,8,30
+LOAD/TOOL,2
+SPINDL/RPM,900,CLW
+GOTO/4,4,30
+CYCLE/DRILL,DEPTH,6,MMPM,100,CLEAR,3
+GOTO/4,4,0
+GOTO/8,4,0
+CYCLE/OFF
+RAPID
+GOTO/8,4,30
+FINI
+"""
+
+
+@cache
+def part_for(machine: str) -> tuple[toolpaths.Toolpath, object]:
+    """The part, and the set-up that puts it where the machine reaches."""
+    kind = "h4a" if machine.startswith("h4a") else "delta" if machine.startswith(("delta", "uranesx")) else "tools"
+    setup, _ = load_setup(SAMPLES / f"{kind}.setup.toml")
+    return toolpaths.read_bytes(PART)[0], setup
+
+
+@pytest.mark.parametrize("control", sorted(builtin_files()))
+@pytest.mark.parametrize("machine", machines.names())
+def test_a_small_part_is_written_and_proved(machine: str, control: str) -> None:
+    path, setup = part_for(machine)
+    tolerance = 0.02 if (machine, control) == ("h4a-spindle-axis", "haas-ngc") else 0.01  # three decimals of a degree
+    result = postproc.convert(path, machine, control, setup, Options(tolerance=tolerance))  # type: ignore[arg-type]
+    assert result.ok, [str(d) for d in result.diagnostics if d.severity is Severity.ERROR]
+    assert result.comparison is not None and result.comparison.unbounded == 0 and result.witness is not None
+    assert not [d for d in result.diagnostics if d.code.startswith("witness")]

@@ -1,0 +1,62 @@
+"""Text is taken apart where files are read, and nowhere else: what the project says itself is made of values, not parsed."""
+
+from __future__ import annotations
+
+import ast
+
+from tests.test_imports import ROOT, texts
+
+READERS = {
+    "toolpaths.cl": "CL files", "toolpaths.cl.text": "CL files", "machines.geometric_error.tables": "CSV tables",
+    "postproc.controllers": "controller files",
+    "postproc.readback.text": "programs", "postproc.readback.dialects": "programs",
+    "postproc.witness": "CL files and machine files, by itself"}
+"""rooms that read text files, and what they read"""
+FILES = {
+    "toolpaths.interrupted_runs": "names of temporary files", "toolpaths.shapes": "tables of shapes",
+    "machines.toml_lines": "lines of TOML files", "machines.value_words": "values in TOML files",
+    "machines.serial_models": "structures of machines (ISO 10791-6)",
+    "machines.calibration.folded_names": "names of parameters",
+    "machines.geometric_error.exchange.imports": "tables of others",
+    "postproc.reference.records": "blocks of INSERT records",
+    "postproc.base.header_words": "heads of programs: written and read in one place",
+    "postproc.cycle_time.source": "whether a file is a CL file or a program",
+    "postproc.readback.comparison.slow_moves": "F words of programs",
+    "postproc.readback.comparison.unstated_codes": "codes of programs",
+    "postproc.writing.linuxcnc": "comments that LinuxCNC obeys", "postproc.writing.state": "decimals of words",
+    "postproc.writing.writer": "labels of blocks"}
+"""single files besides"""
+SENTENCES = {"message", "why", "refused", "touching", "hint", "text", "reason"}
+"""names under which sentences are held"""
+TAKEN_APART = {"startswith", "endswith", "removeprefix", "removesuffix", "partition", "rpartition", "split"}
+OF_OTHERS = {("machines.user_file", "partition"), ("machines.user_file", "removeprefix")}
+"""messages of the libraries that read TOML and check models"""
+
+
+def parsed(tree: ast.Module) -> set[str]:
+    """Methods by which a file takes sentences apart that it has from a value (`x.why.startswith(...)`)."""
+    return {node.func.attr for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
+            and node.func.attr in TAKEN_APART and isinstance(node.func.value, ast.Attribute | ast.Name)
+            and (node.func.value.attr if isinstance(node.func.value, ast.Attribute) else node.func.value.id) in
+            SENTENCES - {"text"}}
+
+
+def test_regular_expressions_stand_where_files_are_read() -> None:
+    users = {name for name, text in texts().items() if "re" in text.imports}
+    outside = {name for name in users if name not in FILES and name.rpartition(".")[0] not in READERS}
+    assert outside == set()
+    assert set(FILES) - users == set()
+
+
+def test_no_sentence_is_taken_apart() -> None:
+    found = set[tuple[str, str]]()
+    for name in texts():
+        path = ROOT / (name.replace(".", "/") + ".py")
+        if path.exists() and name.rpartition(".")[0] not in READERS:
+            found |= {(name, method) for method in parsed(ast.parse(path.read_text("utf-8")))}
+    assert found <= OF_OTHERS, found - OF_OTHERS
+
+
+def test_a_sentence_taken_apart_is_noticed() -> None:
+    assert parsed(ast.parse('a = own.refused.startswith("travel")\nb = why.removeprefix("x")\nc = name.split()')) == {
+        "startswith", "removeprefix"}

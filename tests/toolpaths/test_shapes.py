@@ -1,0 +1,148 @@
+"""Values that hold arrays: read-only, shapes checked against each other; every frozen dataclass of the project is one."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import pkgutil
+import re
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from toolpaths.arrays import Array, Floats
+from toolpaths.shapes import TABLE, arrays
+
+WITNESS = "postproc.witness."
+"""shares no code with the rest"""
+IN_WORK = {"toolpaths.cl.assemble.PointRows", "toolpaths.cl.text.scan._Chunk", "toolpaths.cl.text.scan._Lines",
+           "postproc.joints.plan._Stage", "postproc.readback.execution.rows.SectionState",
+           "postproc.readback.text.cycles.Sticky"}
+"""dataclasses that are not frozen: what one function works on; no stage gets them from another"""
+ARRAY = re.compile(r"\b(Floats|Ints|Bools|Array|NDArray)\b")
+NO_ARRAY = re.compile(r"\b(Callable|list|dict|Mapping|Sequence|tuple\[tuple)\[")
+"""functions of arrays, and collections that are not values"""
+
+
+@cache
+def dataclasses_of_the_project() -> dict[str, type]:
+    found = dict[str, type]()
+    for top in ("toolpaths", "machines", "postproc"):
+        package = importlib.import_module(top)
+        for info in pkgutil.walk_packages(package.__path__, f"{top}."):
+            if not info.name.endswith("__main__"):
+                for value in vars(importlib.import_module(info.name)).values():
+                    if isinstance(value, type) and dataclasses.is_dataclass(value) and value.__module__ == info.name:
+                        found[f"{info.name}.{value.__qualname__}"] = value
+    return found
+
+
+def array_fields(cls: type) -> set[str]:
+    """Fields that hold an array, several of them, or none at times."""
+    return {field.name for field in dataclasses.fields(cls) if ARRAY.search(str(field.type))
+            and not NO_ARRAY.search(str(field.type))}
+
+
+def unchecked(cls: type) -> set[str]:
+    return array_fields(cls) - set(getattr(cls, TABLE, ()))
+
+
+def test_every_value_with_arrays_is_checked() -> None:
+    every = {name: cls for name, cls in dataclasses_of_the_project().items() if not name.startswith(WITNESS)}
+    with_arrays = {name for name, cls in every.items() if array_fields(cls)}
+    assert len(with_arrays) > 170
+    assert {name: unchecked(every[name]) for name in with_arrays - IN_WORK if unchecked(every[name])} == {}
+    frozen = {name for name in with_arrays if every[name].__dataclass_params__.frozen}  # type: ignore[attr-defined]
+    assert with_arrays - frozen == IN_WORK
+    assert {name: set(getattr(cls, TABLE, ())) - {field.name for field in dataclasses.fields(cls)}
+            for name, cls in every.items() if hasattr(cls, TABLE)} == {name: set() for name in every
+                                                                     if hasattr(every[name], TABLE)}
+
+
+def test_a_value_without_the_check_is_noticed() -> None:
+    @dataclass(frozen=True)
+    class Bare:
+        tip: Floats
+        parts: tuple[Floats, ...]
+        count: int
+
+    assert unchecked(Bare) == {"tip", "parts"}
+
+
+@dataclass(frozen=True)
+@arrays(tip="N 3", line="N", ends="N+1", more="M", pairs="M 2", home="#letters", parts="* _ 3", free="...", loose="N _")
+class Value:
+    tip: Floats
+    line: Array
+    ends: Floats
+    letters: str = "XY"
+    home: Any = (0.0, 0.0)
+    more: Floats | None = None
+    pairs: Floats | None = None
+    parts: tuple[Floats, ...] = ()
+    free: Any = 0.0
+    loose: Floats | None = None
+
+
+def value(**changed: Any) -> Value:
+    return Value(**{"tip": np.zeros((4, 3)), "line": np.arange(4), "ends": np.zeros(5), **changed})
+
+
+def test_arrays_become_read_only_and_are_not_copied() -> None:
+    tip, parts = np.zeros((4, 3)), (np.zeros((2, 3)),)
+    made = value(tip=tip, parts=parts, more=np.zeros(6), pairs=np.zeros((6, 2)))
+    assert np.shares_memory(made.tip, tip) and tip.flags.writeable and made.home.tolist() == [0.0, 0.0]
+    for held in (made.tip, made.line, made.ends, made.home, made.more, made.pairs, made.parts[0], made.free):
+        assert not held.flags.writeable
+    with pytest.raises(ValueError, match="read-only"):
+        made.tip[0] = 1.0
+
+
+@pytest.mark.parametrize(("changed", "said"), [
+    ({"line": np.zeros(3)}, "Value.line has shape (3,), expected (4,)"),
+    ({"tip": np.zeros((4, 2))}, "Value.tip has shape (4, 2), expected (N, 3)"),
+    ({"tip": np.zeros(3)}, "Value.tip has shape (3,), expected (N, 3)"),
+    ({"ends": np.zeros(4)}, "Value.ends has shape (4,), expected (5,)"),
+    ({"home": np.zeros(3)}, "Value.home has shape (3,), expected (2,)"),
+    ({"home": 5.0}, "Value.home has shape (), expected (2,)"),
+    ({"loose": np.zeros((3, 7))}, "Value.loose has shape (3, 7), expected (4, any)"),
+    ({"pairs": np.zeros((6, 3))}, "Value.pairs has shape (6, 3), expected (M, 2)"),
+    ({"parts": (np.zeros((2, 3)), np.zeros((2, 2)))}, "Value.parts[1] has shape (2, 2), expected (any, 3)"),
+])
+def test_a_shape_that_does_not_fit_names_class_and_field(changed: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError) as fault:
+        replace(value(), **changed)
+    assert str(fault.value) == said
+
+
+def test_a_letter_that_no_field_gives_is_a_mistake_of_the_table() -> None:
+    @dataclass(frozen=True)
+    @arrays(ends="N+1")
+    class Wrong:
+        ends: Floats
+
+    with pytest.raises(TypeError, match="no field gives the length N"):
+        Wrong(np.zeros(3))
+
+
+def test_what_a_class_does_when_made_comes_first_and_heirs_check_their_own() -> None:
+    @dataclass(frozen=True)
+    @arrays(tip="N 3")
+    class Base:
+        tip: Any
+
+        def __post_init__(self) -> None:
+            object.__setattr__(self, "tip", np.reshape(self.tip, (-1, 3)))
+
+    @dataclass(frozen=True)
+    @arrays(line="N")
+    class Heir(Base):
+        line: Floats
+
+    assert Base(range(6)).tip.shape == (2, 3)
+    assert Heir(np.zeros((2, 3)), np.zeros(2)).line.shape == (2,)
+    with pytest.raises(ValueError, match=r"Heir\.line has shape \(3,\), expected \(2,\)"):
+        Heir(np.zeros((2, 3)), np.zeros(3))
