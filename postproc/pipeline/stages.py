@@ -23,7 +23,7 @@ from postproc.path.singular import check_singular
 from postproc.path.travel import check_travel
 from postproc.path.turn_steps import with_short_turns
 from postproc.pipeline.program_header import header_lines
-from postproc.pipeline.program_lines import with_cl_lines
+from postproc.pipeline.program_lines import cl_lines
 from postproc.pipeline.result import PostResult, shared_fields
 from postproc.pipeline.smoothed_stages import ExcludedPasses, written_moves
 from postproc.pipeline.stage_values import (
@@ -228,9 +228,9 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
     """The text executed as the control would, held against the CL file; then by the second witness."""
     job, witness = made.job, None
     comparison, found = read_back(made.text, job, made.toolpath.file, progress,
-                                  others={name: text.encode() for name, text in made.files.items()})
-    if not made.files:
-        found = with_cl_lines(found, made.text, made.program, made.controller)
+                                  others={name: text.encode() for name, text in made.files.items()},
+                                  of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.program,
+                                                                                      made.controller))
     if comparison is not None and not has_errors(found):
         witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison,
                                        b"" if made.files else made.text)

@@ -16,6 +16,7 @@ from postproc.readback.text.modal import codes, fill
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.shapes import arrays
 
 WAY = ">"
 """the way that a word states: 8 times the number of its letter, and one of the following"""
@@ -25,6 +26,7 @@ CODES = {126.0: SHORTEST, 127.0: DIRECT}
 
 
 @dataclass(frozen=True)
+@arrays(block="N", value="N", relative="N")
 class _Axis:
     """Words of one axis in order: block, value, relative (N,)."""
 

@@ -104,7 +104,7 @@ def test_one_operation_takes_the_next_mode_and_the_warning_names_it(controller: 
 
 
 def test_all_operations_take_the_next_mode_where_none_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("postproc.pipeline.stages.with_cl_lines", lambda found, *rest: found)
+    monkeypatch.setattr("postproc.pipeline.stages.cl_lines", lambda *rest: ())
     refusing(monkeypatch, lambda law, q: True)
     result = casting("siemens-840d")
     assert result.ok and set(map(tuple, output_modes(result).values())) == {("axes",)}
