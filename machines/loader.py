@@ -14,7 +14,7 @@ from pydantic import create_model
 import machines.kinds as kinds
 from machines.kind_check import build_faults, contract_faults
 from machines.kinematics.base import Kinematics
-from machines.machine import Limits, Machine, Timing
+from machines.machine import Limits, Machine, Timing, Turns
 from machines.models import KeyProblem, KinematicsModel, MachineModel
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
@@ -157,7 +157,8 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         home=np.array([model.axes[name].home for name in names]) * _scale(kinematics), retract_axis=retract,
         timing=Timing(timing.tool_change, timing.clamp, timing.unclamp, frozenset(timing.assumed)),
         control_kinematics=model.control_kinematics(), file=file.file,
-        stop=model.control.stop or "" if model.control is not None else "")
+        stop=model.control.stop or "" if model.control is not None else "",
+        turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))
 
 
 def _limits(model: MachineModel, kinematics: Kinematics) -> Limits:

@@ -46,6 +46,22 @@ class Timing:
 
 
 @dataclass(frozen=True)
+class Turns:
+    """How a rotary axis counts its turns.
+
+    Attributes:
+        modulo: it is counted modulo 360 degrees, in the turn that begins at `low` (degrees)
+        rollover: which path the control takes to a word, "shortest", "sign", "none", "" where the machine file does not say
+        park: "turn", at the whole turn nearest to home, or "home", all turns unwound
+    """
+
+    modulo: bool = False
+    low: float = 0.0
+    rollover: str = ""
+    park: str = "turn"
+
+
+@dataclass(frozen=True)
 class ControlKinematics:
     """A kinematics module that the control itself runs, so that programs hold tip coordinates in the part.
 
@@ -75,6 +91,7 @@ class Machine:
         control_kinematics: set where the control owns the kinematics (programs in tip coordinates)
         stop: what a stop of the program switches off: "spindle and coolant", "spindle", "nothing", or "" where the machine
             file does not say
+        turns: per joint, how it counts its turns; () as by `Turns()`
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
 
@@ -92,6 +109,8 @@ class Machine:
     file: str = ""
     stop: str = ""
     stated: Limits | None = None
+    turns: tuple[Turns, ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
         object.__setattr__(self, "home", frozen(self.home, np.float64, (len(self.axis_names),), "Machine.home"))

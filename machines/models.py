@@ -27,6 +27,13 @@ def _upward(travel: Any) -> Any:
     return travel
 
 
+def _whole_turn(turn: tuple[float, float]) -> tuple[float, float]:
+    if not (turn[1] - turn[0] == 360.0 and turn[0] <= 0.0 < turn[1]):
+        raise ValueError(f"{list(turn)} is no turn with 0 in it; write [0, 360] or [-180, 180]")
+    return turn
+
+
+Turn = Annotated[tuple[float, float], AfterValidator(_whole_turn)]
 Travel = Annotated[tuple[float, float] | Literal["unlimited"], AfterValidator(_upward)]
 
 
@@ -80,6 +87,17 @@ class AxisModel(UserModel):
     """mm/s3 or deg/s3"""
     home: float
     """position for tool change and programme start, mm or degrees"""
+    modulo: bool = False
+    """the control counts this rotary axis modulo 360 degrees (roll-over): its words stay inside one turn. Fanuc: parameter
+    1008#0 ROA = 1 and 1260 = 360; Siemens: MD30310 $MA_ROT_IS_MODULO; LinuxCNC: WRAPPED_ROTARY = 1"""
+    modulo_range: Turn = (0.0, 360.0)
+    """degrees, the turn that words of a modulo axis are written in"""
+    rollover: Literal["shortest", "sign", "none"] | None = None
+    """which path the control takes to a word of a modulo axis: the shorter one (Fanuc 1008#1 RAB = 0, Heidenhain M126), that
+    of the word's sign (Fanuc RAB = 1, LinuxCNC), or none: it counts the turns after all. Default: that of the controller"""
+    park: Literal["turn", "home"] = "turn"
+    """where an axis that turns on and on is parked: at the whole turn that is nearest to home, or at home itself, all turns
+    unwound; a modulo axis that rolls over has no turns to unwind"""
     assumed: tuple[Literal["travel", "velocity", "acceleration", "jerk"], ...] = ()
     """keys of this table whose figure no document states"""
 
@@ -167,6 +185,27 @@ class MachineModel(UserModel):
             elif axis.travel == "unlimited" and not rotary[name]:
                 yield KeyProblem("machine.travel", ("axes", name, "travel"),
                                  f"linear axis {name} cannot have unlimited travel", "write travel = [lower, upper] in mm")
+            elif problem := _modulo_problem(name, axis, rotary[name]):
+                yield problem
             elif not axis.range[0] <= axis.home <= axis.range[1]:
                 yield KeyProblem("machine.home", ("axes", name, "home"),
                                  f"home {axis.home:g} of {name} lies outside its travel {list(axis.range)}")
+
+
+def _modulo_problem(name: str, axis: AxisModel, rotary: bool) -> KeyProblem | None:
+    """What stands against the keys of roll-over of an axis."""
+    used = [key for key in ("modulo", "modulo_range", "rollover", "park") if key in axis.model_fields_set]
+    path = ("axes", name, *used[:1])
+    if axis.modulo and not rotary:
+        return KeyProblem("machine.modulo", path, f"linear axis {name} cannot be modulo", "take modulo out")
+    if used and axis.travel != "unlimited" and (axis.modulo or "park" in used):
+        return KeyProblem("machine.modulo", path, f"axis {name} has {used[0]}, and its travel ends at {list(axis.range)}",
+                       'write travel = "unlimited" for an axis that turns on and on, else take it out')
+    stray = [key for key in used if key in ("modulo_range", "rollover")]
+    if stray and not axis.modulo:
+        return KeyProblem("machine.modulo", ("axes", name, stray[0]), f"axis {name} has {stray[0]}, and is not modulo",
+                       f"add modulo = true, or take {stray[0]} out")
+    if axis.rollover == "sign" and axis.modulo_range[0] != 0.0:
+        return KeyProblem("machine.modulo", ("axes", name, "modulo_range"), f"axis {name}: where the sign of a word is the "
+                       f"direction, words are 0 to 360 degrees, not {list(axis.modulo_range)}", "modulo_range = [0, 360]")
+    return None

@@ -63,6 +63,16 @@ def test_script_reproduces_the_indexed_parts(monkeypatch: pytest.MonkeyPatch, tm
         assert (tmp_path / "indexing" / name).read_bytes() == (FOLDER / "indexing" / name).read_bytes()
 
 
+def test_script_reproduces_the_casting(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.syspath_prepend(FOLDER)
+    import make_casting
+
+    make_casting.main(tmp_path)
+    assert {p.name for p in (FOLDER / "casting").iterdir()} == set(make_casting.FILES)
+    for name in make_casting.FILES:
+        assert (tmp_path / "casting" / name).read_bytes() == (FOLDER / "casting" / name).read_bytes()
+
+
 @pytest.mark.parametrize("name", DIALECTS)
 def test_dialects_are_small_explained_and_listed(name: str) -> None:
     data = (FOLDER / "dialects" / name).read_bytes()

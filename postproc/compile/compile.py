@@ -11,6 +11,7 @@ from postproc.compile.canned import holes_of
 from postproc.compile.commands import commands_of
 from postproc.compile.cycle_refusals import not_native
 from postproc.compile.feed import Feeds, PlannedTimes, plan_feeds
+from postproc.compile.long_turns import long_turns, without_standing
 from postproc.compile.program import Command, Commands, Hole, Program
 from postproc.compile.sections import sections_of, with_sections
 from postproc.compile.word_rows import WordRows, block_tools, joints_of, with_turns, word_rows
@@ -41,18 +42,21 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                        planned)
     commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.apart,
                                         job.setup.output.tool_call)
-    keep = words.write.any(axis=1) | (path.code == ARC)
+    end = np.where(path.home[:, None], np.round(path.q * control.unit, int(places.max())), words.end)
+    write = without_standing(words.write, end, control.rolls)
+    keep = write.any(axis=1) | (path.code == ARC)
     new = np.concatenate([[0], np.cumsum(keep)])
     sections = sections_of(path, new)
     kept_holes = tuple(Hole(int(new[h.first]), int(new[h.last + 1]) - 1, h.cycle, h.plane_level, h.bottom, h.retract,
                             h.initial, h.key, int(new[h.drill])) for h in holes)
-    end = np.where(path.home[:, None], np.round(path.q * control.unit, int(places.max())), words.end)
     line = moves.line[path.move[keep]]
     placed, found = with_skips(with_sections(_moved(commands, new), sections), skip[keep], line, toolpath.file)
-    program = Program(control.machine.axis_names, end[keep], words.write[keep], path.code[keep], feeds.feed[keep],
+    program = Program(control.machine.axis_names, end[keep], write[keep], path.code[keep], feeds.feed[keep],
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], path.center[keep], path.home[keep],
                       np.isnan(path.u[keep]), moves.row[path.move[keep]], line,
-                      placed, kept_holes, places, sections, skip[keep])
+                      placed, kept_holes, places, sections, skip[keep], control.rolls,
+                      control.machine.home * control.unit)
+    found += long_turns(program, toolpath.file)
     return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, toolpath.file),
                             *_mapped(feeds, moves, path, job),
                             *not_native(toolpath, moves, path, native, controller, skip)]

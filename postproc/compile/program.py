@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from postproc.control.control import InterpolationMode
 from postproc.control.planes import Plane
+from postproc.control.rollover import Rollover
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.shapes import arrays
 
@@ -74,8 +76,8 @@ class Hole:
 
 
 @dataclass(frozen=True)
-@arrays(words="K J", write="K J", code="K", feed="K", mode="K", plane="K", ccw="K", center="K 3", home="K", link="K",
-        row="K", line="K", decimals="J", skip="K")
+@arrays(begins="_", words="K J", write="K J", code="K", feed="K", mode="K", plane="K", ccw="K", center="K 3", home="K",
+        link="K", row="K", line="K", decimals="J", skip="K")
 class Program:
     """K blocks with the commands before them.
 
@@ -93,6 +95,8 @@ class Program:
         holes: by running number
         decimals (J,): of the words
         skip (K,): True for blocks that the block switch leaves out ("/")
+        rolls: modulo axes by column; `words` count their turns, the text does not
+        begins (J,): words of the machine's home
         sections: in order, the first begins at block 0 in the law that the control starts with
     """
 
@@ -114,10 +118,24 @@ class Program:
     decimals: Ints
     sections: tuple[Section, ...] = (Section(0, "axes"),)
     skip: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    rolls: dict[int, Rollover] = field(default_factory=dict)
+    begins: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         if not len(self.skip):
             object.__setattr__(self, "skip", np.zeros(len(self), dtype=bool))
+
+    def before(self, axis: int) -> Floats:
+        """(K,) degrees where a modulo axis stands before each block: as the block before has stated it last."""
+        if axis not in self._before:
+            rows = np.where(self.write[:, axis], np.arange(1, len(self) + 1), 0)
+            last = np.maximum.accumulate(np.concatenate([[0], rows[:-1]])) if len(self) else rows
+            self._before[axis] = np.concatenate([self.begins[axis:axis + 1], self.words[:, axis]])[last]
+        return self._before[axis]
+
+    @cached_property
+    def _before(self) -> dict[int, Floats]:
+        return {}
 
     def __len__(self) -> int:
         return len(self.words)

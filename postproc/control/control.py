@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -19,6 +19,7 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.frames import reference_x
 from machines.machine import Machine
 from postproc.control.planes import Plane
+from postproc.control.rollover import Rollover, parked
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
@@ -49,6 +50,7 @@ class Control:
         feed_rule: what a feed per minute refers to under the law "axes", see `feed_length`
         entry_frame: what the frame of the tip is where its mode is entered with turned tables, see `TcpMode.frame`
         own_kinematics: at the gauge point, as the control holds it; None: the machine's
+        rolls: modulo axes by joint
         measured: mm of tool length that the work offset holds, where the program calls none
     """
 
@@ -65,6 +67,11 @@ class Control:
     arc_planes: tuple[int, ...] = (17, 18, 19)
     entry_frame: Literal["table", "entry", "either"] = "table"
     measured: float = 0.0
+    rolls: dict[int, Rollover] = field(default_factory=dict)
+
+    def parked(self, q: Floats) -> Floats:
+        """Home (J,) or (N, J) as axes stand there that come from joints q, see `rollover.parked`."""
+        return parked(self.machine, self.rolls, q)
 
     @cached_property
     def _others(self) -> dict[tuple[object, ...], Control]:

@@ -19,6 +19,10 @@ from toolpaths.shapes import arrays
 from toolpaths.toolpath import Toolpath
 
 ASKED = ("auto", "axes", "tcp", "tilted")
+PREFERRED: dict[bool, tuple[InterpolationMode, ...]] = {True: ("tilted", "axes", "tcp"), False: ("tcp", "axes")}
+"""modes that "auto" takes, the first that can be had: where the tool axis of a run stands still, and where it turns"""
+Refused = frozenset[tuple[int, InterpolationMode]]
+"""(operation, mode) that "auto" passes over, because that mode could not be written or proved for it"""
 CONSTANT = 0.1
 """share of the axis tolerance within which the tool axis of a run counts as standing still"""
 
@@ -42,6 +46,7 @@ class OutputModes:
         asked (operations,): index into ASKED
         decimals (J,): of the axis words
         tool_call: False where no length register is ever in force
+        refused: what "auto" passes over
     """
 
     control: Control
@@ -49,6 +54,7 @@ class OutputModes:
     asked: Array
     decimals: Ints
     tool_call: bool = True
+    refused: Refused = frozenset()
 
     @cached_property
     def lacking(self) -> dict[InterpolationMode, str]:
@@ -96,16 +102,21 @@ class OutputModes:
         """The frame that programs begin in, and that home and indexing moves are made in."""
         return WordFrame(self.control)
 
-    def law(self, asked: int, constant: bool) -> InterpolationMode:
-        """The law of a run, `constant` where its tool axis stands still."""
-        if ASKED[asked] != "auto":
-            return ASKED[asked]  # type: ignore[return-value]
-        wanted: tuple[InterpolationMode, ...] = ("tilted", "axes", "tcp") if constant else ("tcp", "axes")
-        return next(law for law in wanted if not self.lacking[law])
+    def law(self, operation: int, constant: bool) -> InterpolationMode:
+        """The law of a run of that operation, `constant` where its tool axis stands still."""
+        asked = ASKED[int(self.asked[operation])]
+        return self.possible(operation, constant)[0] if asked == "auto" else asked  # type: ignore[return-value]
+
+    def possible(self, operation: int, constant: bool) -> list[InterpolationMode]:
+        """The laws that "auto" may take for such a run, in order: those that are refused only where there is no other."""
+        had = [law for law in PREFERRED[constant] if not self.lacking[law]]
+        return [law for law in had if (operation, law) not in self.refused] or had[-1:]
 
     def cutting_laws(self) -> set[InterpolationMode]:
         """The laws that runs may come to have."""
-        return {self.law(int(asked), constant) for asked in np.unique(self.asked) for constant in (True, False)}
+        apart = {operation for operation, _ in self.refused}
+        alike = {int(asked): k for k, asked in enumerate(self.asked) if k not in apart}
+        return {self.law(k, constant) for k in (*alike.values(), *apart) for constant in (True, False)}
 
     def plane(self, kin: Kinematics, q: Floats) -> tuple[WordFrame, Floats]:
         """(the tilted frame for joints q (J,), q with its rotary joints as the words state them).
@@ -139,12 +150,12 @@ def _with_arcs(control: Control, mode: Mode | None) -> Control:
 
 
 def output_modes(control: Control, controller: ControllerFile, setup: SetupFile, options: Options, toolpath: Toolpath,
-                 decimals: Ints) -> tuple[OutputModes, list[Diagnostic]]:
+                 decimals: Ints, refused: Refused = frozenset()) -> tuple[OutputModes, list[Diagnostic]]:
     """The modes of a job, and what is asked for but cannot be had."""
     default = setup.output.default if options.output == "auto" else options.output
     names = [setup.output.operations.get(op.name, default) for op in toolpath.operations]
     modes = OutputModes(control, controller, np.array([ASKED.index(name) for name in names], dtype=np.int8), decimals,
-                        setup.output.tool_call)
+                        setup.output.tool_call, refused)
     return modes, [*_not_available(modes, toolpath), *_unknown_operations(setup, options, toolpath),
                    *_no_subprograms(controller, setup, options)]
 

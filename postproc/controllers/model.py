@@ -14,6 +14,8 @@ from postproc.controllers.spelling import Codes, Comment, Format, ProgramBlocks,
 from postproc.controllers.texts import CYCLE_VALUES, placeholders
 from toolpaths.diagnostics import Diagnostic
 
+Worded = Annotated[str, placeholders("letter", "value")]
+
 
 class ArcRules(UserModel):
     """Which arcs the controller takes."""
@@ -113,6 +115,28 @@ class InterpolationRules(UserModel):
     """mm that it takes instead of a share, where its tolerance is a parameter of the control"""
     axis_smoothing_share: float = Field(default=0.0, ge=0.0, le=0.8)
     """share of the axis tolerance left to it"""
+
+
+class RolloverRules(UserModel):
+    """Modulo (roll-over) rotary axes: which path the control takes from word to word, and how words say it."""
+
+    default: Literal["shortest", "sign", "none"] = "none"
+    """of modulo axes whose machine file has no rollover; "none": they count their turns like others"""
+    rules: tuple[Literal["shortest", "sign", "none"], ...] = ("shortest", "sign", "none")
+    """those that the control can have, by its parameters"""
+    shortest: Worded = ""
+    """how a word says that the shorter path is taken, with {letter} and {value}; empty: a parameter says it"""
+    positive: Worded = ""
+    """how it says that the axis turns in its positive direction; used for half a turn and more"""
+    negative: Worded = ""
+    """the same for the negative one"""
+    zero_negative: Literal["-0", "-360"] = "-0"
+    """the word of 0 degrees that is reached in the negative direction, where the sign is the direction"""
+    on: tuple[str, ...] = ()
+    """blocks of the safe start that put the shorter path in force, in programs for machines with modulo axes"""
+    needs: dict[Literal["shortest", "sign"], Annotated[str, placeholders("axes")]] = Field(default_factory=dict)
+    """settings that each rule needs: a comment at the head of programs for machines with modulo axes; {axes} are their
+    letters"""
 
 
 class Start(UserModel):
@@ -224,6 +248,7 @@ class ControllerFile(UserModel):
     cutter_compensation: CutterCompensation = CutterCompensation()
     kinematics: InterpolationRules = InterpolationRules()
     modes: Modes = Modes()
+    rollover: RolloverRules = RolloverRules()
 
     @property
     def keeps_length(self) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.control.control import Control, InterpolationMode
+from postproc.control.rollover import rollovers
 from postproc.controllers.model import ControllerFile
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.program import BlockOrigin, blocks_of
@@ -52,7 +53,7 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     law: InterpolationMode = "tcp" if tip_law else "axes"
     control = Control(machine, law, placement.points(np.zeros((1, 3)))[0], base=law, rapids=controller.kinematics.rapids,
-                      feed_rule=controller.feed.length)
+                      feed_rule=controller.feed.length, rolls=rollovers(machine, controller)[0])
     lengths = {int(number): tool.length for number, tool in setup.tools.items()}
     code, motion, more = _executed(data, controller, control, lengths, file, others)
     found += more
@@ -75,7 +76,7 @@ def _executed(data: bytes, controller: ControllerFile, control: Control, lengths
     """Text to canonical words to motion."""
     machine = control.machine
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(controller, machine.axis_names, home, machine.stop)
+    reader = reader_for(controller, machine.axis_names, home, machine.stop, control.rolls)
     code, found = reader.read(data, file, others)
     if code is None or has_errors(found):
         return None, None, found

@@ -12,7 +12,8 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.control.control import Control, InterpolationMode
-from postproc.control.modes import OutputModes, output_modes
+from postproc.control.modes import OutputModes, Refused, output_modes
+from postproc.control.rollover import rollovers
 from postproc.controllers.model import ControllerFile
 from postproc.job.pivots import control_kinematics
 from postproc.job.rounding import Rounding, decimals, helix_bound, rounding_bound
@@ -152,8 +153,9 @@ class Job:
 
 
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,
-            options: Options) -> tuple[Job | None, list[Diagnostic]]:
-    """The job (its path has plain records, see `plain_records`), or None and why there is none."""
+            options: Options, refused: Refused = frozenset()) -> tuple[Job | None, list[Diagnostic]]:
+    """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`: output modes
+    that "auto" passes over."""
     toolpath, diagnostics = numbered(toolpath, setup, options.setup)
     toolpath, found = plain_records(toolpath, controller)
     diagnostics += found
@@ -188,14 +190,16 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     errors, found = _error_model(machine, options)
     diagnostics += found
+    rolls, found = rollovers(machine, controller)
+    diagnostics += found
     corrects = errors is not None and errors.corrected_by == "post"  # tables that are corrected do not stand at zero
     entry = "table" if corrects or controller.modes.tcp is None else controller.modes.tcp.frame
     control = Control(machine, law, origin, largest, law, rapids=controller.kinematics.rapids, entry_frame=entry,
                       feed_rule=controller.feed.length, own_kinematics=own,
                       helix_planes=controller.arcs.helix_planes,
-                      measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
+                      rolls=rolls, measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
     diagnostics += _measured(control, controller, moves.axis, setup, options)
-    modes, found = output_modes(control, controller, setup, options, toolpath, decimals(control, controller))
+    modes, found = output_modes(control, controller, setup, options, toolpath, decimals(control, controller), refused)
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
               modes, errors, tuple(stated))

@@ -218,7 +218,7 @@ def has_retract_axis(control: Control) -> bool:
 def _all_home(control: Control, kin: Kinematics, space: SafeSpace, up: Pose | None, share: float,
               slack: float) -> tuple[Floats, bool]:
     """All axes home at once, clear of the part, on machines without an axis that lifts the tool by itself."""
-    home = control.machine.home
+    home = control.machine.home if up is None else control.parked(up.q)
     if up is None:
         return home[None, :], True
     tip, axis = kin.forward(home[None, :])
@@ -234,7 +234,7 @@ def _lift_home(control: Control, up: Pose | None, whole: bool) -> tuple[Floats, 
     state[0, machine.retract_axis] = True
     state[1] = ~state[0]
     count = 2 if whole else 1
-    return np.stack([lifted, machine.home])[:count], state[:count]
+    return np.stack([lifted, control.parked(lifted)])[:count], state[:count]
 
 
 def _from_home(control: Control, begin: Floats, up: Pose) -> tuple[Floats, Bools]:

@@ -51,14 +51,14 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
     starts = np.flatnonzero(moves.link)
     lasts, firsts = [*starts[1:].tolist(), len(moves)], starts.tolist()
     still = _still(moves.axis, starts, axis_tolerance)
-    asked, left, tool = modes.asked[operation[np.array(lasts) - 1]].tolist(), plan.left[starts].tolist(), moves.tool[starts]
+    owner, left, tool = operation[np.array(lasts) - 1].tolist(), plan.left[starts].tolist(), moves.tool[starts]
     good = machine.kinematics.straight_slides and bool(np.isfinite(plan.q).all()) and not bool((plan.moved > 1e-6).any()) \
         and not bool(np.isfinite(moves.spin).any())
-    laws = {(a, s): modes.law(a, s) for a, s in set(zip(asked, still.tolist(), strict=True))}
+    laws = {(op, s): modes.law(op, s) for op, s in set(zip(owner, still.tolist(), strict=True))}
     tools = {k: kinematics(k) for k in np.unique(tool).tolist()}
     q, axis, found, each = plan.q, moves.axis, list[Diagnostic](), list[SolvedRun]()
     for k, (first, last) in enumerate(zip(firsts, lasts, strict=True)):
-        kin, law = tools[int(tool[k])], laws[asked[k], bool(still[k])]
+        kin, law = tools[int(tool[k])], laws[owner[k], bool(still[k])]
         if not good:
             more = _faults(plan, modes, kin, np.arange(first, last), axis_tolerance, file)
             found += more

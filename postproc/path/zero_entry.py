@@ -49,7 +49,19 @@ class ZeroEntry:
 def needed(control: Control, link: Link) -> bool:
     """True where the tables would not stand at zero where a link leads into the mode."""
     tables = table_axes(control)
-    return bool(len(link.index) and (np.abs(link.index[-1][tables]) > _ZERO).any())
+    if not len(link.index):
+        return False
+    last = link.index[-1]
+    return bool((np.abs(last - _at_zero(control, last))[tables] > _ZERO).any())
+
+
+def _at_zero(control: Control, q: Floats) -> Floats:
+    """Joints (J,) with the rotary tables at zero: modulo axes at the nearest whole turn."""
+    result = q.copy()
+    for j in table_axes(control).tolist():
+        turn = 2.0 * np.pi
+        result[j] = turn * np.round(q[j] / turn) if j in control.rolls else 0.0
+    return result
 
 
 def zero_entry(base: Control, tcp: Control, kin: Kinematics, space: SafeSpace, link: Link) -> ZeroEntry:
@@ -60,7 +72,7 @@ def zero_entry(base: Control, tcp: Control, kin: Kinematics, space: SafeSpace, l
     machine, tables = base.machine, table_axes(base)
     turned, moved, up = link.index
     zero = np.stack([turned, moved, moved])
-    zero[:, tables] = 0.0
+    zero[:, tables] = _at_zero(base, moved)[tables]
     turn = moved - zero[1]
     count = max(int(np.ceil(np.abs(turn[tables]).max() / _CHORD - 1e-9)), 1)
     steps = zero[1] + np.arange(1, count + 1)[:, None] / count * turn

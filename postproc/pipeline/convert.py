@@ -11,8 +11,9 @@ from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.job.job import prepare
+from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
-from postproc.pipeline.smoothed_stages import with_passes_taken_back
+from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
 from postproc.pipeline.stages import Progress, staged
 from postproc.setup.fingerprint import fingerprint
 from postproc.setup.model import SetupFile, load_setup
@@ -102,10 +103,11 @@ def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diag
 
 
 def _stages(result: PostResult, progress: Progress | None) -> PostResult:
-    """All stages; with --smooth passes that cannot be smoothed are taken back."""
-    if result.options.smooth:
-        return with_passes_taken_back(result, lambda begun, left: staged(begun, progress, left))
-    return staged(result, progress)
+    """All stages; with --smooth passes that cannot be smoothed are taken back; "auto" takes the next output mode where one
+    cannot be written or proved."""
+    def one(begun: PostResult, left: ExcludedPasses = frozenset()) -> PostResult:
+        return with_next_modes(begun, lambda again: staged(again, progress, left))
+    return with_passes_taken_back(result, one) if result.options.smooth else one(result)
 
 
 def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FilePath,
@@ -138,6 +140,6 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more]
     said = None
     if comparison is not None and not has_errors(found):
-        said, more = second_witness(start.source, start.asked or start.setup, options, job, comparison)
+        said, more = second_witness(start.source, start.asked or start.setup, options, job, comparison, data)
         found += more
     return replace(begun, comparison=comparison, diagnostics=tuple(found), witness=said)

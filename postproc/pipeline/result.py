@@ -9,6 +9,7 @@ from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.compile.feed import Feeds
 from postproc.compile.program import Program
+from postproc.control.modes import Refused
 from postproc.controllers.model import ControllerFile
 from postproc.job.job import Job
 from postproc.path.model import JointPath
@@ -64,6 +65,8 @@ class PostResult:
     """what the second witness says"""
     after_formatting: AfterFormatting | None = None
     """what is left of geometric errors at the CL points; None where none are corrected"""
+    refused: Refused = frozenset()
+    """(operation, mode) that "auto" has passed over"""
     reached: str = ""
     """name of the last stage that ran, "" where none did"""
 

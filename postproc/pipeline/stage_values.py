@@ -12,6 +12,7 @@ from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.compile.feed import Feeds
 from postproc.compile.program import Program
+from postproc.control.modes import Refused
 from postproc.controllers.model import ControllerFile
 from postproc.job.job import Job
 from postproc.path.model import JointPath
@@ -33,7 +34,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BegunStage:
-    """A conversion before its first stage; `left`: passes that --smooth leaves; `diagnostics`: of all stages so far."""
+    """A conversion before its first stage; `left`: passes that --smooth leaves; `refused`: output
+    modes that "auto" passes over; `diagnostics`: of all stages so far."""
 
     options: Options
     machine: Machine
@@ -46,6 +48,7 @@ class BegunStage:
     source: ClSource | None
     asked: SetupFile | None
     left: ExcludedPasses
+    refused: Refused
 
 
 @dataclass(frozen=True)

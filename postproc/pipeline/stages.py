@@ -21,7 +21,9 @@ from postproc.path.reach import check_reach
 from postproc.path.rewinds import drawing_of
 from postproc.path.singular import check_singular
 from postproc.path.travel import check_travel
+from postproc.path.turn_steps import with_short_turns
 from postproc.pipeline.program_header import header_lines
+from postproc.pipeline.program_lines import cl_lines
 from postproc.pipeline.result import PostResult, shared_fields
 from postproc.pipeline.smoothed_stages import ExcludedPasses, written_moves
 from postproc.pipeline.stage_values import (
@@ -95,7 +97,7 @@ def _recorded(result: PostResult, made: BegunStage, found: DiagnosticList) -> Po
 def prepared(begun: BegunStage, progress: Progress | None) -> tuple[BegunStage | PreparedStage, DiagnosticList]:
     """Records, tools, cycles, output modes and linking moves of the path, as the machine and the control take them."""
     options = begun.options
-    job, found = prepare(begun.toolpath, begun.machine, begun.controller, begun.setup, options)
+    job, found = prepare(begun.toolpath, begun.machine, begun.controller, begun.setup, options, begun.refused)
     found = [*found, *_bad_meshes(begun.setup, options.setup)]
     if job is None:
         return begun, found
@@ -132,7 +134,9 @@ def solved(made: PlacedStage, progress: Progress | None) -> tuple[PlacedStage | 
                              shares["linearising"], shares["axis_linearising"] * DEG, made.toolpath.file, progress,
                              made.drawing)
     found = with_system(found, job.work_system, job.placement)
-    return (made if path is None else handed_on(SolvedStage, made, path=path)), found
+    if path is None:
+        return made, found
+    return handed_on(SolvedStage, made, path=with_short_turns(path, made.moves, job.control, job.kinematics)), found
 
 
 def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage | CorrectedStage, DiagnosticList]:
@@ -224,9 +228,12 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
     """The text executed as the control would, held against the CL file; then by the second witness."""
     job, witness = made.job, None
     comparison, found = read_back(made.text, job, made.toolpath.file, progress,
-                                  others={name: text.encode() for name, text in made.files.items()})
+                                  others={name: text.encode() for name, text in made.files.items()},
+                                  of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.program,
+                                                                                      made.controller))
     if comparison is not None and not has_errors(found):
-        witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison)
+        witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison,
+                                       b"" if made.files else made.text)
         found = [*found, *more]
     value = handed_on(VerifiedStage, made, comparison=comparison, witness=witness, after_formatting=None)
     if made.compensation is None:

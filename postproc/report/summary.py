@@ -12,6 +12,7 @@ import numpy as np
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.events import cutting, spindle_states
+from postproc.report.unwinding import unwinding, unwinding_lines
 from postproc.verification.proof_text import statement
 from postproc.witness.evidence import Testimony
 from toolpaths.diagnostics import Severity
@@ -49,6 +50,7 @@ def as_dict(result: PostResult, output: str, estimate: Estimate | None = None) -
         "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
         "tolerance_shares": result.shares or {},
         "output_modes": output_modes(result),
+        "unwinding": unwinding(result),
         "geometric_errors": _errors(result),
         "orientation": _orientation(result),
         "tool_call": result.setup.output.tool_call,
@@ -238,6 +240,7 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None) -
         lines.append(f"singular directions passed: {d['singular_events']}")
     if d["rewinds"]:
         lines.append(f"rewinds: {d['rewinds']}")
+    lines += unwinding_lines(result)
     return "\n".join(lines)
 
 

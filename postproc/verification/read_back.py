@@ -64,24 +64,26 @@ def other_setup(data: bytes, options: Options, off: bool, gcode: str) -> list[Di
 
 
 def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, int, int], None] | None = None,
-              gcode: str = "", others: Mapping[str, bytes] | None = None) -> tuple[Comparison | None, list[Diagnostic]]:
+              gcode: str = "", others: Mapping[str, bytes] | None = None,
+              of_cl: Callable[[int], tuple[int, ...]] | None = None) -> tuple[Comparison | None, list[Diagnostic]]:
     """Execute a program on the job's machine and compare its motion with the job's CL file.
 
     A text becomes bytes only where it is read, so that memory holds it once.
 
-    `others`: files of its subprograms, by the names that the program calls them by.
+    `others`: files of its subprograms, by the names that the program calls them by; `of_cl`: the lines of the CL file that a
+    line of the program is written from, where that is known.
     """
     give_back()
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(job.controller, machine.axis_names, home, machine.stop)
+    reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls)
     code, diagnostics = reader.read(data, gcode, others)
     head = read_head(as_bytes(data[:HEADER]))
-    diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file) for d in diagnostics]
+    diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]
     if gcode and not _by_post(job) and head.corrected is not None:
         return None, [_twice(job, gcode), *diagnostics]
     if code is not None:
-        diagnostics += placed([_located(d, job.toolpath.file) for d in check_stated(code, reader, gcode)], code.files)
+        diagnostics += placed([_located(d, job.toolpath.file, of_cl) for d in check_stated(code, reader, gcode)], code.files)
     if code is None or has_errors(diagnostics):
         return None, diagnostics
     offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
@@ -91,7 +93,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     faults = Faults(job.toolpath.file, gcode)
     unseen = check_start(code, job, faults)
     code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))
-    diagnostics += [_located(d, job.toolpath.file) for d in found]
+    diagnostics += [_located(d, job.toolpath.file, of_cl) for d in found]
     if has_errors(diagnostics):
         return None, diagnostics
     if not len(motion):
@@ -200,11 +202,12 @@ def _judged(d: Diagnostic, stays: bool) -> Diagnostic:
     return d if d.code != UNITS_UNSTATED or stays else replace(d, severity=Severity.ERROR)
 
 
-def _located(d: Diagnostic, file: str) -> Diagnostic:
+def _located(d: Diagnostic, file: str, of_cl: Callable[[int], tuple[int, ...]] | None) -> Diagnostic:
     """A fault of a program without a file of its own: of the CL file it is made from, the line in the message."""
     if d.file or not d.lines:
         return d
-    return replace(d, file=file, lines=(), message=f"{d.message} (line {d.lines[0]} of the program)")
+    message = f"{d.message} (line {d.lines[0]} of the program)"
+    return replace(d, file=file, lines=of_cl(d.lines[0]) if of_cl else (), message=message)
 
 
 def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> BlockPoses:

@@ -16,6 +16,7 @@ from postproc.base.options import Options
 from postproc.control.control import Control
 from postproc.job.job import Job
 from postproc.readback.comparison.compare import Comparison
+from postproc.readback.dialects.base import as_bytes
 from postproc.readback.execution.poses import BlockPoses as Poses
 from postproc.readback.execution.poses import arc_sweeps, begins, coordinates
 from postproc.reference.coolant import COMMANDS, switching
@@ -97,12 +98,13 @@ def _units(letters: tuple[str, ...]) -> Floats:
 
 
 def second_witness(source: ClSource | None, setup: SetupFile, options: Options, job: Job,
-                   comparison: Comparison) -> tuple[Testimony, list[Diagnostic]]:
+                   comparison: Comparison, program: bytes | str = b"") -> tuple[Testimony, list[Diagnostic]]:
     """What the second witness says of a program that was read back, and its findings as errors.
 
     Args:
         source: what the path was read from
         setup: as the shop wrote it, [part] by whatever it names
+        program: its text, which is looked at where the machine has modulo axes
     """
     if options.orient != "keep" or source is None or comparison.executed is None or comparison.poses is None:
         why = "the tool axes were chosen" if options.orient != "keep" else "the path is not as it was read from a file"
@@ -112,6 +114,8 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
                 "{register}" in codes.length_offset,
                 sum(COMMANDS[kind] for kind, (on, _) in switching(codes).items() if on),
+                program=as_bytes(program) if control.rolls else b"",
+                modulo={job.machine.axis_names[j]: roll.rule for j, roll in control.rolls.items()},
                 origin=control.origin, work_offset=offset_joints(control))
     try:
         said = testify(case, executed_of(comparison, comparison.poses, job))

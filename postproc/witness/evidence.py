@@ -32,6 +32,10 @@ class Case:
     coolants: int = 15
     """bits of the kinds of coolant that the control has codes for: it gives the nearest of them for others"""
     oriented: bool = False
+    program: bytes = b""
+    """the text of the program, where it is one file"""
+    modulo: dict[str, str] = field(default_factory=dict)
+    """"shortest" or "sign" by letter of axes that the control counts modulo 360 degrees: which path a word turns them"""
     origin: Array | None = None
     """(3,) the zero of the work offset in the table frame, as the program takes it"""
     work_offset: Array | None = None

@@ -23,6 +23,7 @@ from postproc.witness.states import (
 )
 from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
 from postproc.witness.text import Array
+from postproc.witness.turning import check_turning
 
 _NAMES = {"tool": "tools", "length": "length registers", "spindle": "spindle states", "coolant": "coolant states"}
 ZERO = 1e-6
@@ -95,12 +96,15 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     faults, states, silent = check_states(w, c, case)
     found += faults
     found += _rods(poses)
+    faults, turned = check_turning(case, executed)
+    found += faults
     faults, zeros = _zero(case, c, place, poses)
     found += faults
     good = w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM))
     worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
     counts = {"positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()),
-              "holes": holes, "feeds": feeds, **{_NAMES[k]: v for k, v in states.items()}, "work offset": zeros}
+              "holes": holes, "feeds": feeds, **{_NAMES[k]: v for k, v in states.items()}, "work offset": zeros,
+              "turns of modulo axes": turned}
     return found, worst, counts, silent
 
 

@@ -10,10 +10,12 @@ from itertools import chain
 import numpy as np
 
 from postproc.compile.program import PER_MINUTE, Command, Hole
+from postproc.control.rollover import HALF
 from postproc.controllers.model import Mode
 from postproc.controllers.texts import blocks_of
 from postproc.reference.coolant import COMMANDS, switching
 from postproc.writing.state import WriterState
+from toolpaths.arrays import Ints
 
 _LABEL = re.compile(r"%|[NO]\d")
 """blocks that carry a number of their own"""
@@ -111,6 +113,7 @@ class Writer(WriterState, ABC):
         """Safe start: modes that the program uses off, then the preamble."""
         for mode in self.used_modes():
             yield from mode.start
+        yield from self.controller.rollover.on if self.program.rolls else ()
         if (self.program.plane[self.program.code == 2] > 17).any():
             yield from self.controller.arcs.start
         for block in self.controller.program.preamble:
@@ -127,13 +130,17 @@ class Writer(WriterState, ABC):
         needed = [text for mode in self.used_modes() for text in mode.relies_on]
         letters, text = self.beyond_a_turn(), self.controller.program.relies_on_turns
         needed += [text.format(axes=" ".join(letters))] if letters and text else []
+        for rule in ("shortest", "sign"):
+            axes, text = [self.program.letters[j] for j, r in self.program.rolls.items() if r.rule == rule], \
+                self.controller.rollover.needs.get(rule, "")
+            needed += [text.format(axes=" ".join(axes))] if axes and text else []
         return list(dict.fromkeys(f"needs {text}" for text in needed))
 
     def beyond_a_turn(self) -> list[str]:
         """Rotary axes with words of a full turn or more, which a control may roll over."""
         p = self.program
         far = np.flatnonzero(((np.abs(p.words) >= FULL_TURN) & p.write & ~p.home[:, None]).any(axis=0)).tolist()
-        return [p.letters[j] for j in far if p.letters[j] in "ABC"]
+        return [p.letters[j] for j in far if p.letters[j] in "ABC" and j not in p.rolls]
 
     def smoothing_blocks(self) -> list[str]:
         """Blocks that set the control's own smoothing, where something is left to it."""
@@ -205,11 +212,27 @@ class Writer(WriterState, ABC):
         for j, letter in enumerate(p.letters):
             rows = np.flatnonzero(p.write[at:stop, j])
             column = [""] * (stop - at)
-            head = self.space + letter
-            for row, text in zip(rows.tolist(), self.number_text(p.words[at + rows, j], int(p.decimals[j])), strict=True):
-                column[row] = head + text
+            texts = self.rolled(j, at + rows) if j in p.rolls else [
+                letter + text for text in self.number_text(p.words[at + rows, j], int(p.decimals[j]))]
+            for row, text in zip(rows.tolist(), texts, strict=True):
+                column[row] = self.space + text
             columns.append(column)
         return ["".join(row) for row in zip(*columns, strict=True)]
+
+    def rolled(self, axis: int, rows: Ints) -> list[str]:
+        """The words of a modulo axis in blocks `rows`: inside one turn, with their direction where words state it."""
+        p, rules, letter = self.program, self.controller.rollover, self.program.letters[axis]
+        here, before, roll = p.words[rows, axis], p.before(axis)[rows], p.rolls[axis]
+        values, back = roll.words(here, before)
+        texts = self.number_text(values, int(p.decimals[axis]))
+        if roll.rule == "sign":
+            zero, = self.number_text(np.array([-FULL_TURN]), 0) if rules.zero_negative == "-360" else ["-0"]
+            return [letter + (zero if b and v == 0.0 else text) for text, v, b in zip(texts, values, back, strict=True)]
+        if not roll.stated:
+            return [letter + text for text in texts]
+        far = np.abs(here - before) > HALF
+        return [(rules.shortest if not f else rules.negative if b else rules.positive).format(letter=letter, value=text)
+                for text, f, b in zip(texts, far.tolist(), back.tolist(), strict=True)]
 
     @abstractmethod
     def blocks(self, at: int, stop: int) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.control.rollover import off_home
 from postproc.job.job import Job
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.tool_changes import AWAY, lifting
@@ -69,7 +70,7 @@ def _error(code: Canonical, faults: Faults, block: int, message: str, hint: str)
 
 def check_end(motion: Motion, job: Job, home: Floats, faults: Faults) -> list[Diagnostic]:
     """The tool is lifted to home at the end; axes that stand elsewhere are a warning."""
-    away = np.abs(motion.end[-1] - home)
+    away = off_home(job.machine, job.control.rolls, motion.end[-1], home)
     axes, names = lifting(job), job.machine.axis_names
     bad = [int(j) for j in np.flatnonzero(~(away <= AWAY))]
     if job.errors is not None and job.errors.corrected_by == "post":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.control.rollover import off_home
 from postproc.job.job import Job
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
@@ -28,7 +29,7 @@ def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, fault
     before = np.searchsorted(motion.block, changes) - 1
     place = np.where((before >= 0)[:, None], motion.end[np.maximum(before, 0)], motion.start)
     axes = lifting(job)
-    away = np.abs(place[:, axes] - home[axes])
+    away = off_home(job.machine, job.control.rolls, place, home)[:, axes]
     away = np.where(np.isfinite(away), away, np.inf)
     spindle, coolant = _on(code, (3, 4, 5), 5.0, changes), _on(code, (7, 8, 9), 9.0, changes)
     lines = in_files(code.line[changes], code.files)

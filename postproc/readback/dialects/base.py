@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from postproc.control.rollover import Rollover
 from postproc.controllers.model import ControllerFile, Stops
 from postproc.readback.text.canonical import (
     COOLANT,
@@ -26,6 +27,7 @@ from postproc.readback.text.canonical import (
 from postproc.readback.text.flow import Structure, expand
 from postproc.readback.text.magnitude import negative_smoothing, too_large
 from postproc.readback.text.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
+from postproc.readback.text.rollover import unrolled
 from postproc.readback.text.words import Words
 from postproc.reference.coolant import ALL, switched_by
 from toolpaths.arrays import Floats, Ints
@@ -52,12 +54,14 @@ class Reader(ABC):
         leaving: by law, the codes that switch it off; modes_named: what the control calls it
         stop: what M0 and M1 switch off, by the controller file or by that of the machine (`[control] stop`)
         changes: what a tool change switches off
+        rolls: modulo axes by joint; turn_codes: M126 and M127 say which path they take
     """
 
     groups: Groups = GROUPS
     m_codes: tuple[float, ...] = M_CODES
     letters = "GMFSTHDNIJKRPQLO"
     rises_first = False
+    turn_codes = False
     arc_slack = float("inf")
     sides: ClassVar[dict[int, str]] = {40: "off (G40)", 41: "left (G41)", 42: "right (G42)"}
     smoothing_hint = "G64 P Q as the post writes it, or G61"
@@ -73,8 +77,8 @@ class Reader(ABC):
                                                                "tilted": "the tilted plane"}
 
     def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None,
-                 stop: str = "") -> None:
-        self.axes, self.controller, self.home = axes, controller, home
+                 stop: str = "", rolls: dict[int, Rollover] | None = None) -> None:
+        self.axes, self.controller, self.home, self.rolls = axes, controller, home, rolls or {}
         stops = controller.stops if controller is not None else Stops()
         self.stop, self.changes = stop or stops.switch_off, stops.tool_change
         self.main_file = ""
@@ -140,7 +144,8 @@ class Reader(ABC):
     def translated(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words of blocks in running order, with what turns and flows behind stops."""
         code, found = self.canonical(text, line, file)
-        return replace(code, words=self.cooled(self.stopped(code.words))), found
+        words, more = unrolled(code.words, line, self.axes, self.rolls, self.home, self.turn_codes, file)
+        return replace(code, words=self.cooled(self.stopped(words))), [*found, *more]
 
     def stopped(self, words: Words) -> Words:
         """The words with the blocks before which the control itself has stopped the spindle."""

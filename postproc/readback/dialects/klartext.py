@@ -53,7 +53,8 @@ class KlartextReader(Reader):
 
     groups: Groups = GROUPS | {"offset": (), "length": (), "level": (), "path": (), "once": (), "arc_distance": (),
                                "distance": (), "units": (), "feed_mode": (), "plane": ()}
-    m_codes = (*M_CODES, 13.0, 14.0, 91.0, 99.0, 127.0, 128.0, 129.0)
+    turn_codes = True
+    m_codes = (*M_CODES, 13.0, 14.0, 91.0, 99.0, 126.0, 127.0, 128.0, 129.0)
     letters = "GMFSR?"
     sides: ClassVar[dict[int, str]] = {40: "off (R0)", 41: "left (RL)", 42: "right (RR)"}
     smoothing_hint = "CYCL DEF 32.1 T as the post writes it"

@@ -75,8 +75,8 @@ class KlartextRun:
         both = {13.0: (3.0, 8.0), 14.0: (4.0, 8.0)}
         for b, m in zip(*codes(words, "M", (13, 14)), strict=True):
             self.new += [(int(b), "M", v) for v in both[float(m)]]
-        drop = (words.letter == ord(STATEMENT)) | ((words.letter == ord("M")) & np.isin(words.value, (13, 14, 91, 99, 127,
-                                                                                                128, 129)))
+        drop = (words.letter == ord(STATEMENT)) | ((words.letter == ord("M")) & np.isin(words.value, (13, 14, 91, 99, 128,
+                                                                                                129)))
         return Canonical(added(words, self.new, drop), self.line, tuple(self.laws), tuple(self.drills))
 
     def one(self, b: int, s: DialectStatement) -> None:

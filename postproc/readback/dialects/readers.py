@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from postproc.control.rollover import Rollover
 from postproc.controllers.model import ControllerFile
 from postproc.readback.dialects.base import Reader
 from toolpaths.arrays import Floats
 
 
 def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Floats | None = None,
-               stop: str = "") -> Reader:
+               stop: str = "", rolls: dict[int, Rollover] | None = None) -> Reader:
     """The reader of the dialect that the controller file's writer writes; `home` (J,): machine coordinates, mm, degrees;
-    `stop`: what stops switch off where the machine file says it."""
+    `stop`: what stops switch off where the machine file says it; `rolls`: modulo axes by joint."""
     from postproc.readback.dialects.fanuc import FanucReader
     from postproc.readback.dialects.haas import HaasReader
     from postproc.readback.dialects.iso import IsoReader
@@ -19,4 +20,4 @@ def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Float
 
     readers: dict[str, type[Reader]] = {"iso": IsoReader, "linuxcnc": IsoReader, "fanuc": FanucReader, "haas": HaasReader,
                                         "siemens": SiemensReader, "heidenhain": KlartextReader}
-    return readers[controller.writer](letters, controller, home, stop)
+    return readers[controller.writer](letters, controller, home, stop, rolls)

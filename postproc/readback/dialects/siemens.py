@@ -36,6 +36,7 @@ from postproc.readback.text.canonical import (
 )
 from postproc.readback.text.flow import Call, Structure
 from postproc.readback.text.modal import GROUPS, Groups, codes, number_of
+from postproc.readback.text.rollover import DIRECTION, NEGATIVE, POSITIVE, SHORTEST
 from postproc.readback.text.words import Words, block_delete, lines_of, read_words
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -55,6 +56,8 @@ _PROGRAM = re.compile(rb"(?m)^[ \t]*%_N_([A-Z0-9_]+)_([MS]PF)[^\n]*$")
 PASSIVE = frozenset({"MSG", "SOFT", "BRISK", "FFWON", "FFWOF", "CFTCP", "CFC", "CFIN", "RTLION", "STOPRE", "NORM", "DIAMOF",
                      "WORKPIECE", "ORIMKS", "PROC", "COMPOF"})
 """names that change nothing of what is read back here"""
+DIRECTIONS = {"DC": SHORTEST, "ACP": POSITIVE, "ACN": NEGATIVE}
+"""of modulo axes"""
 KNOWN = PASSIVE.union(CYCLES, ("SUPA", "TRAORI", "TRAFOOF", "ORIAXES", "CYCLE800", "CYCLE832", "MCALL", "RET", "CALL",
                          LENGTH_AXIS))
 
@@ -66,7 +69,7 @@ class SiemensReader(Reader):
         "motion": (0, 1, 2, 3), "units": (70, 71, 700, 710), "offset": (54, 55, 56, 57, 500, *range(505, 600)),
         "path": (9, 60, 64), "once": (4,), "exact_stop": (601, 602, 603), "length": (), "level": (), "arc_distance": ()}
     m_codes = (*M_CODES, 17.0)
-    letters = "GMFSTDNIJKRLP?~"
+    letters = "GMFSTDNIJKRLP?~>"
     stating = {k: v for k, v in Reader.stating.items() if k != "level"} | {"length": "D, or a tool"}
     leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {"tcp": ("TRAFOOF",), "tilted": ("CYCLE800",)}
     units_codes = "G70, G71, G700 or G710"
@@ -233,6 +236,8 @@ def _assigned(match: re.Match[str], line: int, new: New) -> bool:
     elif len(key) == 1 and how in (None, "AC", "IC"):
         code = ord(key) + (0 if how is None else FORCED if how == "AC" else 32)
         new.append((line, chr(code), value))
+    elif key in "ABC" and how in DIRECTIONS:
+        new += [(line, chr(ord(key) + FORCED), value), (line, DIRECTION, 8.0 * ord(key) + DIRECTIONS[how])]
     else:
         return False
     return True

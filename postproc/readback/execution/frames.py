@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from machines.kinematics.base import Kinematics
+from machines.kinematics.frames import tool_x
 from postproc.control.control import Control
 from postproc.control.modes import table_axes
 from postproc.readback.text.canonical import InterpolationModeName, WordMeaning
@@ -118,21 +119,10 @@ AXES = ExecutionFrame("axes")
 
 
 def tool_frame(kin: Kinematics, q: Floats) -> Floats:
-    """(3, 3) columns are the tool's x, y, z seen from the table at joints q (J,).
-
-    The x direction at spin 0 is the table's x carried by the least rotation that takes z to the axis (Rodrigues), which
-    is what `Kinematics.pose` counts spin from.
-    """
+    """(3, 3) columns are the tool's x, y, z seen from the table at joints q (J,), upside down too."""
     _, axis, spin = kin.pose(q[None, :])
-    a = axis[0]
-    if a[2] < -1.0 + 1e-12:
-        least = np.diag([1.0, -1.0, -1.0])
-    else:
-        v = np.array([-a[1], a[0], 0.0])
-        cross = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-        least = np.eye(3) + cross + cross @ cross / (1.0 + a[2])
-    c, s = np.cos(spin[0]), np.sin(spin[0])
-    return np.asarray(least @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+    x = tool_x(axis, spin)
+    return np.stack([x[0], np.cross(axis[0], x[0]), axis[0]], axis=1)
 
 
 def frame_of(law: WordMeaning, control: Control | None, length: float, position: Floats, at: tuple[str, int],

@@ -12,7 +12,9 @@ from postproc.control.planes import angles_of, rotation_of, stated
 from postproc.report import summary
 from postproc.setup.model import SetupFile, load_setup
 from tests.postproc.kit import SAMPLES, angle, codes, convert, goto, tilted, tool_setup, toolpath
-from tests.postproc.modes_kit import TCP, TILTED, made, run, shop
+from tests.postproc.modes_kit import TCP, TILTED, first_mode, made, run, shop
+
+__all__ = ["first_mode"]
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 FOUR = ["mikron-ucp710", "trunnion-bc", "head-table", "fork-head-ab"]

@@ -18,7 +18,9 @@ from postproc.path.travel import extremes
 from postproc.setup.model import load_setup
 from tests.postproc.control.test_output_modes import FOUR, indexed, turning
 from tests.postproc.kit import angle, codes, convert, goto, machine, tilted, tool_setup, toolpath
-from tests.postproc.modes_kit import TCP, TILTED, made, run, shop
+from tests.postproc.modes_kit import TCP, TILTED, first_mode, made, run, shop
+
+__all__ = ["first_mode"]
 
 NX = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW"]
 AXIS = tilted(30.0, 50.0)

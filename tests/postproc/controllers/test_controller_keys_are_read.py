@@ -26,9 +26,11 @@ OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "
           "tools.length_automatic", "program.operation", "program.relies_on_turns",
           "subprograms.call", "subprograms.begin", "subprograms.end",
           "subprograms.place", "subprograms.file", "subprogram_files.call", "subprogram_files.begin", "subprogram_files.end",
-          "subprogram_files.place", "subprogram_files.file"}
-"""keys of what LinuxCNC has not: test_controllers_*.py, test_compensated_arcs.py, test_parts.py and
-test_output_modes*.py show what they do"""
+          "subprogram_files.place", "subprogram_files.file",
+          *(f"rollover.{key}" for key in ("default", "rules", "shortest", "positive", "negative", "zero_negative", "on",
+                                          "needs"))}
+"""keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py, test_compensated_arcs.py,
+test_parts.py, test_rollover.py and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states"""
 OTHER: dict[str, Any] = {

@@ -1,0 +1,165 @@
+"""`auto` takes the next output mode where one cannot be written or proved for an operation, and says so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.control.control import InterpolationMode
+from postproc.control.modes import ASKED, OutputModes, Refused
+from postproc.job.job import Job
+from postproc.pipeline.result import PostResult
+from toolpaths.arrays import Ints
+from toolpaths.diagnostics import Diagnostic, Severity, warning
+
+Staged = Callable[[PostResult], PostResult]
+"""A conversion with the output modes that it is given"""
+TURNS = 3
+"""conversions in which only the operations that errors name take the next mode; then all of that mode do"""
+SAME_IN_ALL = frozenset({"reach.axis", "reach.position", "axis.spin"})
+"""errors that no output mode changes"""
+NAMES: dict[InterpolationMode, str] = {"axes": "axis positions", "tcp": "the tool-centre-point mode",
+                                       "tilted": "a tilted plane"}
+ASK_AUTO = "--output-mode auto takes the next mode where one cannot be proved"
+NONE_DOES = "no output mode of this control and machine is proved for it: "
+COARSER = "a coarser --tolerance may do; else report CL file, machine and controller file as a fault of postproc"
+_LAWS: tuple[InterpolationMode, ...] = ("tilted", "tcp", "axes")
+_SHOWN = 6
+
+
+def with_next_modes(result: PostResult, staged: Staged) -> PostResult:
+    """A conversion; where an error stands against it, again with the next mode of the operations that it names, then of all,
+    then with each mode alone: what one mode converts "auto" does. The first failure where none does."""
+    first = made = staged(result)
+    if made.ok or not _depends(made):
+        return with_way_out(made)
+    refused, why, tried = Refused(), dict[tuple[int, InterpolationMode], Diagnostic](), {_assigned(made)}
+    for turn in range(TURNS + len(_LAWS)):
+        more = _refusals(made, turn)
+        if not more or not _depends(made):
+            break
+        why |= dict.fromkeys(more, _reason(made))
+        refused |= more
+        made = staged(replace(result, refused=refused))
+        tried.add(_assigned(made))
+        if made.ok:
+            return _said(first, made, why)
+    for alone in _each_alone(first):
+        begun = replace(result, refused=alone)
+        if _assigned(first, alone) in tried:
+            continue
+        made = staged(begun)
+        if made.ok:
+            return _said(first, made, why)
+    return with_way_out(first)
+
+
+def _depends(made: PostResult) -> bool:
+    """True where another output mode may do better."""
+    if made.job is None or not _auto(made.job.modes):
+        return False
+    return any(d.severity is Severity.ERROR and d.code not in SAME_IN_ALL for d in made.diagnostics)
+
+
+def _auto(modes: OutputModes) -> list[int]:
+    """Operations whose mode is "auto", where there is more than one to take."""
+    if sum(not why for why in modes.lacking.values()) < 2:
+        return []
+    return np.flatnonzero(modes.asked == ASKED.index("auto")).tolist()
+
+
+def _assigned(made: PostResult, refused: Refused | None = None) -> tuple[tuple[InterpolationMode, ...], ...]:
+    """The mode of each operation where the tool axis stands still, and where it turns."""
+    assert made.job is not None
+    modes = made.job.modes if refused is None else replace(made.job.modes, refused=refused)
+    return tuple(tuple(modes.law(k, constant) for k in range(len(modes.asked))) for constant in (True, False))
+
+
+def _refusals(made: PostResult, turn: int) -> frozenset[tuple[int, InterpolationMode]]:
+    """The modes that are to be passed over next: those that the errors name, else the first of all that are in use."""
+    assert made.job is not None
+    modes = made.job.modes
+    free = {(k, some[0]) for k in _auto(modes) for constant in (True, False)
+            if len(some := modes.possible(k, constant)) > 1}
+    named = free & set(_named(made, made.job))
+    if named and turn < TURNS:
+        return frozenset(named)
+    laws = {law for _, law in named or free}
+    worst = next((law for law in _LAWS if law in laws), None)
+    return frozenset((k, law) for k, law in free if law == worst)
+
+
+def _named(made: PostResult, job: Job) -> Iterator[tuple[int, InterpolationMode]]:
+    """(operation, mode) of the blocks that errors name, by line of the CL file."""
+    errors = [d for d in made.diagnostics if d.severity is Severity.ERROR]
+    lines = np.array(sorted({line for d in errors for line in d.lines}), dtype=np.int64)
+    path = made.path
+    if path is not None and len(lines):
+        laws = np.array([_LAWS.index(frame.control.law) for frame in path.frames])
+        rows = np.flatnonzero(np.isin(job.moves.line[path.move], lines))
+        for k, law in np.unique(np.stack([job.operation[path.move[rows]], laws[path.frame[rows]]]), axis=1).T.tolist():
+            yield k, _LAWS[law]
+    elif len(lines):
+        for k in np.unique(job.operation[np.isin(job.moves.line, lines)]).tolist():
+            yield from ((k, job.modes.law(k, constant)) for constant in (True, False))
+
+
+def _reason(made: PostResult) -> Diagnostic:
+    return next(d for d in made.diagnostics if d.severity is Severity.ERROR)
+
+
+def _each_alone(made: PostResult) -> Iterator[Refused]:
+    """What is refused where all operations take one mode."""
+    assert made.job is not None
+    modes = made.job.modes
+    for law in ("axes", "tcp", "tilted"):
+        if not modes.lacking[law]:
+            yield frozenset((k, other) for k in _auto(modes) for other in _LAWS if other != law)
+
+
+def _said(first: PostResult, made: PostResult, why: dict[tuple[int, InterpolationMode], Diagnostic]) -> PostResult:
+    """With a warning for each mode that another was taken for: operations, both modes, the reason."""
+    assert first.job is not None and made.job is not None
+    path, groups = made.toolpath, dict[tuple[InterpolationMode, InterpolationMode], list[int]]()
+    pairs = zip(_assigned(first), _assigned(made), strict=True)
+    for before, after in pairs:
+        for k, (old, new) in enumerate(zip(before, after, strict=True)):
+            if old != new and k not in groups.setdefault((old, new), []):
+                groups[old, new].append(k)
+    used = _in_use(made)
+    found = []
+    for (old, new), some in groups.items():
+        rows = [k for k in some if (k, new) in used]
+        if not rows:
+            continue
+        reason = why.get((rows[0], old), _reason(first))
+        names = ", ".join(path.operations[k].name or f"operation {k + 1}" for k in rows[:_SHOWN])
+        more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
+        found.append(warning("output.next_mode", f"{names}{more}: written in {NAMES[new]}, since in {NAMES[old]} "
+                             f"[{reason.code}] {reason.message}", file=path.file, count=len(rows),
+                             lines=[path.operations[k].line for k in rows[:_SHOWN]],
+                             hint=f'[output.operations] of the set-up with "{new}" for it asks for that mode'))
+    return made.with_found(found)
+
+
+def _in_use(made: PostResult) -> set[tuple[int, InterpolationMode]]:
+    """(operation, mode) of all blocks that are on the path."""
+    assert made.path is not None and made.job is not None
+    path = made.path
+    laws: Ints = np.array([_LAWS.index(frame.control.law) for frame in path.frames])[path.frame]
+    own = np.isfinite(path.u)
+    pairs = np.unique(np.stack([made.job.operation[path.move[own]], laws[own]]), axis=1).T.tolist()
+    return {(k, _LAWS[law]) for k, law in pairs}
+
+
+def with_way_out(made: PostResult) -> PostResult:
+    """A failure of the read-back with what the user of `convert` can do about it."""
+    if made.ok or made.reached != "verify" or made.job is None:
+        return made
+    others = [law for law, lack in made.job.modes.lacking.items() if not lack and law != made.options.output]
+    hint = ASK_AUTO if made.options.output != "auto" and others else (NONE_DOES if others else "") + COARSER
+    return replace(made, diagnostics=tuple(
+        d if d.severity is not Severity.ERROR or (d.hint and not d.code.startswith("gcode.")) else replace(
+            d, hint=f"{d.hint}; {hint}" if d.hint else hint) for d in made.diagnostics))

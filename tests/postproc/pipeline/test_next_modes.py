@@ -1,0 +1,160 @@
+"""`auto` takes the next output mode where one cannot be written or proved for an operation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import machines
+import postproc
+import postproc.readback.execution.frames as frames
+import toolpaths
+from postproc.base.options import Options
+from postproc.control.control import tool_frames
+from postproc.pipeline.next_modes import COARSER
+from postproc.pipeline.result import PostResult
+from postproc.readback.execution.frames import tool_frame
+from postproc.report.summary import output_modes
+from toolpaths.diagnostics import Severity, error, has_errors
+from toolpaths.rotations import rotation
+
+SAMPLES = Path(__file__).parents[3] / "samples"
+CASTING = SAMPLES / "casting"
+CONTROLS = ("fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc", "linuxcnc", "generic-iso")
+WITH_PLANES = CONTROLS[:4]
+MODES = ("axes", "tcp", "tilted")
+BOTTOM = ("FEATNO 204", "FEATNO 304")
+
+
+@cache
+def read(name: str) -> toolpaths.Toolpath:
+    path, found = toolpaths.read(SAMPLES / name)
+    assert not has_errors(found)
+    return path
+
+
+def casting(controller: str, output: str = "auto", setup: str = "casting.setup.toml") -> PostResult:
+    return postproc.convert(read("casting/casting.ncl"), machines.load(CASTING / "trunnion_over.toml"), controller,
+                            CASTING / setup, Options(output=output))  # type: ignore[arg-type]
+
+
+def errors_of(result: PostResult) -> set[str]:
+    return {d.code for d in result.diagnostics if d.severity is Severity.ERROR}
+
+
+def refusing(monkeypatch: pytest.MonkeyPatch, bad: Callable[[frames.Law, np.ndarray], bool]) -> None:
+    """The read-back refuses the tilted planes that `bad` names by their law and the joints that they are entered at."""
+    whole = frames._wrong_pose
+
+    def wrong(law, control, kin, q, file, line):  # type: ignore[no-untyped-def]
+        if bad(law, q):
+            return [error("gcode.plane_pose", "planted", file=file, lines=[line])]
+        return whole(law, control, kin, q, file, line)
+    monkeypatch.setattr(frames, "_wrong_pose", wrong)
+
+
+@pytest.mark.parametrize("controller", CONTROLS)
+def test_a_part_that_is_turned_over_converts_on_every_control(controller: str) -> None:
+    result = casting(controller)
+    assert result.ok, errors_of(result)
+    assert "output.next_mode" not in {d.code for d in result.diagnostics}
+    assert result.extents is not None and result.extents["A"][1] > 179.9
+    laws = {law for laws in output_modes(result).values() for law in laws}
+    assert laws == ({"tilted"} if controller in WITH_PLANES else {"axes"})
+    assert result.witness is not None and not result.witness.findings and result.witness.worst_tip < 0.01
+
+
+@pytest.mark.parametrize("name", ["mikron-ucp710", "linuxcnc-xyzac-trt", "trunnion-bc", "head-table", "fork-head-ab",
+                                  "nutating-head", "mill-4axis"])
+def test_frame_of_the_tool_is_that_of_its_axes_in_every_pose(name: str) -> None:
+    """Writer's and reader's frames of the tool against turns about the lines of the machine, poles and near them too."""
+    kin = machines.load(name).kinematics.with_tool(100.0)
+    rotary = np.flatnonzero(kin.rotary)
+    special = [0.0, 90.0, -90.0, 180.0, -180.0, 179.9999, 179.99999, -179.999999, 1e-7, 37.123, 200.5]
+    for first in special:
+        for second in special[:: 1 if len(rotary) > 1 else len(special)]:
+            q = np.zeros(kin.joints)
+            q[rotary] = np.radians([first, second][:len(rotary)])
+            seen = np.eye(3)
+            for joint in kin.chain:
+                if joint.rotary:
+                    turn = rotation(joint.direction, np.array([q[kin.axis_names.index(joint.name)]]))[0]
+                    seen = seen @ turn
+            assert np.abs(tool_frame(kin, q) - seen).max() < 1e-9, (first, second)
+            assert np.abs(tool_frames(kin, q[None])[0] - seen).max() < 1e-9, (first, second)
+
+
+@pytest.mark.parametrize("controller", ["siemens-840d", "fanuc-30i"])
+def test_one_operation_takes_the_next_mode_and_the_warning_names_it(controller: str,
+                                                                    monkeypatch: pytest.MonkeyPatch) -> None:
+    refusing(monkeypatch, lambda law, q: law.rotation is not None and law.rotation[2, 2] < -0.999)
+    result = casting(controller)
+    assert result.ok, errors_of(result)
+    modes = output_modes(result)
+    assert {name for name, laws in modes.items() if laws == ["axes"]} == set(BOTTOM)
+    assert all(laws == ["tilted"] for name, laws in modes.items() if name not in BOTTOM)
+    said = [d for d in result.diagnostics if d.code == "output.next_mode"]
+    assert len(said) == 1 and said[0].severity is Severity.WARNING and said[0].count == 2
+    assert all(name in said[0].message for name in BOTTOM) and "planted" in said[0].message
+    assert "axis positions" in said[0].message and "tilted plane" in said[0].message and len(said[0].lines) == 2
+
+
+def test_all_operations_take_the_next_mode_where_none_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("postproc.pipeline.stages.cl_lines", lambda *rest: ())
+    refusing(monkeypatch, lambda law, q: True)
+    result = casting("siemens-840d")
+    assert result.ok and set(map(tuple, output_modes(result).values())) == {("axes",)}
+    said = [d for d in result.diagnostics if d.code == "output.next_mode"]
+    assert len(said) == 1 and said[0].count == 10 and "and 4 more" in said[0].message
+
+
+def test_an_error_of_the_read_back_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    refusing(monkeypatch, lambda law, q: law.rotation is not None and law.rotation[2, 2] < -0.999)
+    asked = casting("siemens-840d", "tilted")
+    assert not asked.ok and asked.text == ""
+    bad = [d for d in asked.diagnostics if d.severity is Severity.ERROR]
+    assert bad and all("--output-mode auto" in d.hint and d.lines for d in bad)
+    assert casting("siemens-840d", "auto").ok  # the hint, followed
+
+
+def test_what_no_mode_converts_fails_once_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(*rest: object, **more: object) -> list[object]:
+        return [error("verify.path", "planted", file="x")]
+    monkeypatch.setattr("postproc.verification.read_back.check_stops", nothing)
+    result = casting("siemens-840d")
+    bad = [d for d in result.diagnostics if d.severity is Severity.ERROR]
+    assert not result.ok and result.text == "" and {d.code for d in bad} == {"verify.path"}
+    assert all(d.hint.endswith(COARSER) for d in bad)
+    assert "output.next_mode" not in {d.code for d in result.diagnostics}
+
+
+@pytest.mark.parametrize("controller", ["fanuc-30i", "heidenhain-tnc640"])
+@pytest.mark.parametrize("sample", ["five_faces.cls", "joints/singular_pass.cls"])
+def test_auto_converts_what_another_mode_converts(sample: str, controller: str) -> None:
+    path, setup = read(sample), SAMPLES / "tools.setup.toml"
+    done = {mode: postproc.convert(path, "trunnion-bc", controller, setup, Options(output=mode)).ok  # type: ignore[arg-type]
+            for mode in ("auto", *MODES)}
+    assert done["auto"] or not any(done.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("controller", WITH_PLANES)
+@pytest.mark.parametrize("machine", ["mikron-ucp710", "trunnion-bc", "head-table", "fork-head-ab", "nutating-head",
+                                     "linuxcnc-xyzac-trt", "linuxcnc-xyzbc-trt", "mill-4axis", "casting/trunnion_over.toml"])
+def test_auto_converts_all_samples_that_another_mode_converts(machine: str, controller: str) -> None:
+    loaded = machines.load(SAMPLES / machine if machine.endswith("toml") else machine)
+    for file in sorted(p for p in SAMPLES.rglob("*") if p.suffix in (".cls", ".apt", ".ncl", ".clt", ".as", ".aptsource")):
+        own = [file.with_suffix(".setup.toml"), file.parent / f"{file.parent.name}.setup.toml", SAMPLES / "tools.setup.toml"]
+        setup = next(p for p in own if p.exists())
+        path, found = toolpaths.read(file)
+        auto = postproc.convert(path, loaded, controller, setup, diagnostics=found)
+        if auto.ok:
+            continue
+        assert all(d.hint for d in auto.diagnostics if d.severity is Severity.ERROR and auto.reached == "verify"), file
+        for mode in MODES:
+            asked = postproc.convert(path, loaded, controller, setup, Options(output=mode), found)  # type: ignore[arg-type]
+            assert not asked.ok, (file, mode, errors_of(auto))
