@@ -26,20 +26,20 @@ from machines.kinematics.taylor import TaylorVector, straight
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, Ints, frozen
 
-Made = TypeVar("Made", covariant=True)
+ErrorForm = TypeVar("ErrorForm", covariant=True)
 UP = frozen(np.array([0.0, 0.0, 1.0]), np.float64, (3,), "UP")
 
 
-class ErrorForms(Protocol[Made]):
+class ErrorForms(Protocol[ErrorForm]):
     """The paths to give a machine its geometric errors; `Kinematics.with_errors` takes the one that is the machine's."""
 
-    def chain(self, kinematics: Any) -> Made:
+    def chain(self, kinematics: Any) -> ErrorForm:
         """Of a chain of axes (`Kinematics.chain`)."""
 
-    def translating_rods(self, kinematics: Any) -> Made:
+    def translating_rods(self, kinematics: Any) -> ErrorForm:
         """Of a platform on rods that only translates."""
 
-    def tilting_rods(self, kinematics: Any) -> Made:
+    def tilting_rods(self, kinematics: Any) -> ErrorForm:
         """Of one that tilts about x, with a rotary axis."""
 
 
@@ -220,7 +220,7 @@ class Kinematics(ABC):
         """Letters whose own motion may have geometric errors; those of carriages are errors of rods."""
         return ()
 
-    def with_errors(self, forms: ErrorForms[Made]) -> Made:
+    def with_errors(self, forms: ErrorForms[ErrorForm]) -> ErrorForm:
         """The machine with geometric errors, by the form that is its own.
 
         Raises:

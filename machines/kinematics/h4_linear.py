@@ -14,7 +14,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from machines.kinematics.base import ErrorForms, Made, as_points
+from machines.kinematics.base import ErrorForm, ErrorForms, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about
@@ -231,7 +231,7 @@ class H4Linear(OnSlides):
         """The rotary axis."""
         return self.axis_names[4:]
 
-    def with_errors(self, forms: ErrorForms[Made]) -> Made:
+    def with_errors(self, forms: ErrorForms[ErrorForm]) -> ErrorForm:
         """See the base class."""
         return forms.tilting_rods(self)
 

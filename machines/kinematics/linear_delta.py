@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from machines.kinematics.base import ErrorForms, Made, as_points
+from machines.kinematics.base import ErrorForm, ErrorForms, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.columns import blocks, of_one
 from machines.kinematics.on_slides import OnSlides
@@ -123,7 +123,7 @@ class LinearDelta(OnSlides):
         """See the base class: the inverse."""
         return np.asarray(self.inverse(tip, np.broadcast_to(UP, tip.shape))[0])
 
-    def with_errors(self, forms: ErrorForms[Made]) -> Made:
+    def with_errors(self, forms: ErrorForms[ErrorForm]) -> ErrorForm:
         """See the base class."""
         return forms.translating_rods(self)
 

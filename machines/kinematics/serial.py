@@ -21,7 +21,7 @@ from typing import Self
 import numpy as np
 
 from machines.kinematics import columns
-from machines.kinematics.base import ErrorForms, Kinematics, Made, as_points
+from machines.kinematics.base import ErrorForm, ErrorForms, Kinematics, as_points
 from machines.kinematics.chain import Joint, unit_vector
 from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x, spin_about
@@ -210,7 +210,7 @@ class Serial(Kinematics):
         """All axes."""
         return self.axis_names
 
-    def with_errors(self, forms: ErrorForms[Made]) -> Made:
+    def with_errors(self, forms: ErrorForms[ErrorForm]) -> ErrorForm:
         """See the base class."""
         return forms.chain(self)
 

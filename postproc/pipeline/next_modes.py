@@ -14,7 +14,7 @@ from postproc.pipeline.result import PostResult
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, warning
 
-Staged = Callable[[PostResult], PostResult]
+StagedAgain = Callable[[PostResult], PostResult]
 """A conversion with the output modes that it is given"""
 TURNS = 3
 """conversions in which only the operations that errors name take the next mode; then all of that mode do"""
@@ -29,12 +29,12 @@ _LAWS: tuple[InterpolationMode, ...] = ("tilted", "tcp", "axes")
 _SHOWN = 6
 
 
-def with_next_modes(result: PostResult, staged: Staged) -> PostResult:
+def with_next_modes(result: PostResult, staged: StagedAgain) -> PostResult:
     """A conversion; where an error stands against it, again with the next mode of the operations that it names, then of all,
     then with each mode alone: what one mode converts "auto" does. The first failure where none does."""
     first = made = staged(result)
     if made.ok or not _depends(made):
-        return with_way_out(made)
+        return with_remedies(made)
     refused, why, tried = Refused(), dict[tuple[int, InterpolationMode], Diagnostic](), {_assigned(made)}
     for turn in range(TURNS + len(_LAWS)):
         more = _refusals(made, turn)
@@ -53,7 +53,7 @@ def with_next_modes(result: PostResult, staged: Staged) -> PostResult:
         made = staged(begun)
         if made.ok:
             return _said(first, made, why)
-    return with_way_out(first)
+    return with_remedies(first)
 
 
 def _depends(made: PostResult) -> bool:
@@ -154,7 +154,7 @@ def _in_use(made: PostResult) -> set[tuple[int, InterpolationMode]]:
     return {(k, _LAWS[law]) for k, law in pairs}
 
 
-def with_way_out(made: PostResult) -> PostResult:
+def with_remedies(made: PostResult) -> PostResult:
     """A failure of the read-back with what the user of `convert` can do about it."""
     if made.ok or made.reached != "verify" or made.job is None:
         return made

@@ -21,6 +21,7 @@ import numpy as np
 from machines.geometric_error.actual.error_rates import LARGEST_TURN, AxisSizes, ErrorRates
 from machines.geometric_error.actual.rods import RodErrors, RodFrame, inverted
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 _ROUNDS = 8
 _GROWTH = 1.05
@@ -29,6 +30,7 @@ UNBOUNDED = 1e30
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(place="N 3", turned="N 3 3", shift="N 3 K", turn="N 3 K", shift_change="N K", turn_change="N K", swing="N")
 class PlatformMotion:
     """N platforms and how K slides move them.
 
@@ -88,6 +90,7 @@ def platform_motion(frame: RodFrame, errors: RodErrors, q: Floats, pose: tuple[F
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(least="N", rates="N R K", turn="N K", arm="R", length="R", reach="N K")
 class _Loops:
     """What bounds need of N platforms: least singular value of W (N,), mm that each rod's vector changes by per mm of each
     slide (N, 6, K), rad of the platform (N, K), arms and lengths (6,), the lever, how far the slides go (N, K)."""
@@ -130,7 +133,8 @@ class _Loops:
 
 
 @dataclass(frozen=True, eq=False)
-class ToolMotion:
+@arrays(tip="N K", axis="N K", nominal_tip="N K", nominal_axis="N K", apart="N", turned="N")
+class ToolRates:
     """N tools on the platform: mm (or rad, of the axis) per mm of each slide with errors less without, and how large it is
     without them at most (N, K) each; how far apart the tips and how many rad the platforms are, at most (N,)."""
 
@@ -142,8 +146,8 @@ class ToolMotion:
     turned: Floats
 
 
-def tool_motion(actual: PlatformMotion, nominal: PlatformMotion, arms: tuple[Floats, Floats], axes: tuple[Floats, Floats],
-                reach: Floats, arm_reach: Floats) -> ToolMotion:
+def tool_rates(actual: PlatformMotion, nominal: PlatformMotion, arms: tuple[Floats, Floats], axes: tuple[Floats, Floats],
+                reach: Floats, arm_reach: Floats) -> ToolRates:
     """Tools at `arms` (N, 3) from X with `axes` (N, 3), machine frame, with errors and without, while slides go by `reach`
     (N, K) and the arms' ends move on the platform by up to `arm_reach` (N,) mm."""
     rates, sizes = [], []
@@ -157,11 +161,11 @@ def tool_motion(actual: PlatformMotion, nominal: PlatformMotion, arms: tuple[Flo
     turn_rate = np.linalg.norm(actual.turn - nominal.turn, axis=1) + actual.turn_change + nominal.turn_change
     tips = actual.place + arms[0] - nominal.place - arms[1]
     angle = np.linalg.norm(np.einsum("nji,njk->nik", nominal.turned, actual.turned) - np.eye(3), axis=(1, 2))
-    return ToolMotion(rates[0], rates[1], sizes[0], sizes[1], np.linalg.norm(tips, axis=1) + (rates[0] * reach).sum(axis=1),
+    return ToolRates(rates[0], rates[1], sizes[0], sizes[1], np.linalg.norm(tips, axis=1) + (rates[0] * reach).sum(axis=1),
                       angle + (turn_rate * reach).sum(axis=1))
 
 
-def with_rotary(tool: ToolMotion, size: AxisSizes, spindle: AxisSizes, arm: Floats, length: float,
+def with_rotary(tool: ToolRates, size: AxisSizes, spindle: AxisSizes, arm: Floats, length: float,
                 at_spindle: bool) -> ErrorRates | None:
     """Rates of K slides and the rotary axis that stands under the part or carries the spindle (the formulas of `error_rates`
     for one turning axis). `arm` (N,): the tip's largest distance from the axis; None where errors are too large."""

@@ -10,6 +10,7 @@ from postproc.job.job import Job
 from postproc.path.model import FEED, TRAVERSE
 from postproc.readback.comparison.align import align, unreached
 from postproc.readback.comparison.approaches import leads_down
+from postproc.readback.comparison.bound_search import DeviationBound
 from postproc.readback.comparison.checks import (
     CHUNK,
     block_seconds,
@@ -21,7 +22,7 @@ from postproc.readback.comparison.checks import (
     check_travel,
 )
 from postproc.readback.comparison.compensated import check_compensated
-from postproc.readback.comparison.deviation_bound import DeviationBound, deviation_bound
+from postproc.readback.comparison.deviation_bound import deviation_bound
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.free_rotary import check_spins
 from postproc.readback.comparison.reach_bounds import check_reach_bounds

@@ -8,7 +8,7 @@ reader. Blocks whose bound is above the worst that was seen anywhere are divided
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from postproc.control.word_arcs import PLANE_AXIS, PLANE_COLUMNS
 from postproc.path.bound import SHORT, axis_reference, curve_parameter, tip_reference
 from postproc.path.model import ARC
 from postproc.readback.comparison.actual_deviation_bound import CIRCLE, JOINTS, LINE, TIP, strays
+from postproc.readback.comparison.bound_search import BoundSearch, DeviationBound, PieceBounds, Pieces
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, coordinates, signed_sweep
 from postproc.reference.moves import Moves
@@ -32,32 +33,16 @@ from toolpaths.shapes import arrays
 TIGHT = 1.01  # bound over worst pose that is near enough
 HALVINGS = 26
 """at most, of one block"""
-GRAIN = 1e-7, 1e-9
-"""mm, rad: bounds below are not looked at more closely"""
 SAME = 1e-5
 """mm: what the law of a block and the reader may differ by in its middle"""
 CHUNK = 20_000
 _FEW, _AT_ONCE = 250, 8
 """few pieces cost what one does: so many parts of each instead of halves"""
-_NO_BOUND, _PATIENCE = 1e20, 10
-"""mm: above it nothing is known; after so many halvings a block without a bound is given up"""
+_PATIENCE = 10
+"""times that a block without a bound is divided before it is given up"""
 _STANDS = 1e-12
 _REACH = 0.9
 """of the tolerance: how far from the nearest point the axis may be compared"""
-
-
-@dataclass(frozen=True)
-@arrays(unbounded_rows="U")
-class DeviationBound:
-    """Upper bounds over all blocks: tip (mm), axis (rad), each with the block (row) that has it, -1 where there are none;
-    how many blocks have no bound, because kinematics or law give none (they are only checked at places), and which."""
-
-    tip: float
-    axis: float
-    tip_row: int
-    axis_row: int
-    unbounded: int
-    unbounded_rows: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True)
@@ -71,53 +56,6 @@ class _Ends:
     share: Floats
 
 
-@dataclass(frozen=True)
-@arrays(k="N", a="N", b="N")
-class _Pieces:
-    """Parts [a, b] of blocks: `k` (N,) numbers of `_Ends.rows`."""
-
-    k: Ints
-    a: Floats
-    b: Floats
-
-    def __len__(self) -> int:
-        return len(self.k)
-
-    def divided(self, parts: int) -> _Pieces:
-        """Each in so many equal parts."""
-        cuts = self.a[:, None] + np.linspace(0.0, 1.0, parts + 1) * (self.b - self.a)[:, None]
-        cuts[:, -1] = self.b
-        return _Pieces(np.repeat(self.k, parts), cuts[:, :-1].ravel(), cuts[:, 1:].ravel())
-
-    def take(self, index: Ints | Bools | slice) -> _Pieces:
-        """Some of them."""
-        return _Pieces(self.k[index], self.a[index], self.b[index])
-
-
-@dataclass(frozen=True)
-@arrays(seen_tip="N", seen_axis="N", tip="N", axis="N")
-class _Values:
-    """Of N pieces: worst deviation at places, and bound, of tip (mm) and axis (rad); inf where there is no bound."""
-
-    seen_tip: Floats
-    seen_axis: Floats
-    tip: Floats
-    axis: Floats
-
-    def take(self, index: Bools | Ints) -> _Values:
-        """Some of them."""
-        return _Values(self.seen_tip[index], self.seen_axis[index], self.tip[index], self.axis[index])
-
-    def replaced(self, index: Ints, other: _Values) -> _Values:
-        """With others in the place of some."""
-        changed = []
-        for name in ("seen_tip", "seen_axis", "tip", "axis"):
-            column = np.array(getattr(self, name))
-            column[index] = getattr(other, name)
-            changed.append(column)
-        return _Values(*changed)
-
-
 def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, owner: Ints, begin: Floats,
                     share: Floats, allowed: tuple[float, float]) -> DeviationBound:
     """Bounds of the blocks `rows` (K,) from the curves of their moves `owner` (K,).
@@ -126,7 +64,7 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
     (mm) and axis (rad). Rapids that are dog-legs are bounded piece by piece between their corners.
     """
     ends = _Ends(rows, owner, begin, share)
-    worst = _Worst(allowed)
+    worst = BoundSearch(allowed)
     for at in range(0, len(rows), CHUNK):
         for pieces in _whole(motion, executed, ends, np.arange(at, min(at + CHUNK, len(rows)))):
             worst.add(pieces, _values(motion, executed, moves, ends, pieces, allowed))
@@ -143,91 +81,21 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
     return worst.result(rows)
 
 
-class _Worst:
-    """The state of the search: worst poses seen, largest bounds of closed pieces, pieces that are still open.
-
-    Everything in pairs, of tip and axis.
-    """
-
-    def __init__(self, allowed: tuple[float, float]) -> None:
-        self.allowed = np.array(allowed)
-        self.seen, self.closed = np.zeros(2), np.zeros(2)
-        self.k = [-1, -1]
-        self.open: list[tuple[_Pieces, _Values]] = []
-        self.unbounded: set[int] = set()
-
-    def add(self, pieces: _Pieces, values: _Values) -> None:
-        """Take pieces in; those without a bound count by what was seen of them."""
-        self.seen = np.maximum(self.seen, [values.seen_tip.max(), values.seen_axis.max()])
-        bounded = np.isfinite(values.tip) & np.isfinite(values.axis)
-        if not bounded.all():
-            self.unbounded.update(np.unique(pieces.k[~bounded]).tolist())
-            pieces, values = pieces.take(bounded), values.take(bounded)
-        self.open.append((pieces, values))
-        self._sort_out()
-
-    def _limit(self) -> Floats:
-        """Bounds up to here are near enough: to the worst seen, and inside the tolerance where that is."""
-        near = np.maximum(TIGHT * self.seen, np.array(GRAIN))
-        return np.asarray(np.where(self.seen <= self.allowed, np.minimum(near, self.allowed), near))
-
-    def _sort_out(self) -> None:
-        """Close the pieces whose bounds are near enough to the worst seen."""
-        limit, still = self._limit(), []
-        for pieces, values in self.open:
-            above = (values.tip > limit[0]) | (values.axis > limit[1])
-            self._close(pieces.take(~above), values.take(~above))
-            if above.any():
-                still.append((pieces.take(above), values.take(above)))
-        self.open = still
-
-    def _close(self, pieces: _Pieces, values: _Values) -> None:
-        for i, bound in enumerate((values.tip, values.axis)):
-            if len(bound) and bound.max() > self.closed[i]:
-                self.closed[i], self.k[i] = bound.max(), int(pieces.k[bound.argmax()])
-
-    def give_up(self) -> None:
-        """Open pieces of which nothing is known have no bound."""
-        parts, self.open = self.open, []
-        for pieces, values in parts:
-            known = np.maximum(values.tip, values.axis) < _NO_BOUND
-            self.unbounded.update(np.unique(pieces.k[~known]).tolist())
-            self.open.append((pieces.take(known), values.take(known)))
-
-    def taken(self) -> _Pieces:
-        """The pieces that are open, which are so no more."""
-        self._sort_out()
-        pieces, self.open = [p for p, _ in self.open], []
-        if not pieces:
-            return _Pieces(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
-        return _Pieces(*(np.concatenate([getattr(p, name) for p in pieces]) for name in ("k", "a", "b")))
-
-    def result(self, rows: Ints) -> DeviationBound:
-        """What is known in the end."""
-        self.give_up()
-        for pieces, values in self.open:
-            self._close(pieces, values)
-        tip, axis = np.maximum(self.closed, self.seen).tolist()
-        tip_row, axis_row = (int(rows[k]) if k >= 0 else -1 for k in self.k)
-        without = rows[np.array(sorted(self.unbounded), dtype=np.int64)]
-        return DeviationBound(tip, axis, tip_row, axis_row, len(without), without)
-
-
-def _whole(motion: Motion, executed: BlockPoses, ends: _Ends, k: Ints) -> list[_Pieces]:
+def _whole(motion: Motion, executed: BlockPoses, ends: _Ends, k: Ints) -> list[Pieces]:
     """Whole blocks; dog-legs cut at their corners."""
     bent = executed.bent(motion, ends.rows[k])
-    pieces = [_Pieces(k[~bent], np.zeros(int((~bent).sum())), np.ones(int((~bent).sum())))]
+    pieces = [Pieces(k[~bent], np.zeros(int((~bent).sum())), np.ones(int((~bent).sum())))]
     legs = k[bent]
     if len(legs):
         cuts = np.sort(np.concatenate([np.zeros((len(legs), 1)), executed.corners(motion, ends.rows[legs]),
                                        np.ones((len(legs), 1))], axis=1), axis=1)
         a, b = cuts[:, :-1].ravel(), cuts[:, 1:].ravel()
-        pieces.append(_Pieces(np.repeat(legs, cuts.shape[1] - 1), a, b).take(b > a))
+        pieces.append(Pieces(np.repeat(legs, cuts.shape[1] - 1), a, b).take(b > a))
     return [p for p in pieces if len(p)]
 
 
-def _values(motion: Motion, executed: BlockPoses, moves: Moves, ends: _Ends, pieces: _Pieces,
-            allowed: tuple[float, float]) -> _Values:
+def _values(motion: Motion, executed: BlockPoses, moves: Moves, ends: _Ends, pieces: Pieces,
+            allowed: tuple[float, float]) -> PieceBounds:
     """Deviations and bounds of pieces: from the nearest points of the curves, where that is outside the tolerance from the
     places whose axis fits best among those whose tip is near enough, as `Curves.deviation` has it."""
     rows = ends.rows[pieces.k]
@@ -252,7 +120,7 @@ def _values(motion: Motion, executed: BlockPoses, moves: Moves, ends: _Ends, pie
     return found
 
 
-def _excess(values: _Values, allowed: tuple[float, float]) -> Floats:
+def _excess(values: PieceBounds, allowed: tuple[float, float]) -> Floats:
     """The larger bound over its tolerance."""
     return np.asarray(np.maximum(values.tip / allowed[0], values.axis / allowed[1]))
 
@@ -265,7 +133,7 @@ def _best_fit(curves: Curves, tip: Floats, axis: Floats, u: Floats, within: floa
 
 
 def _compared(curves: Curves, poses: list[tuple[Floats, Floats]], u: list[Floats], law: _PieceMotion, even: Bools,
-              even_parameter: Bools) -> _Values:
+              even_parameter: Bools) -> PieceBounds:
     """Deviations and bounds of N pieces from the poses of their curves at `u`, where they begin, in their middle, where they
     end; `even`: the difference of the tips is straight."""
     n = len(even)
@@ -278,7 +146,7 @@ def _compared(curves: Curves, poses: list[tuple[Floats, Floats]], u: list[Floats
     bend = [np.where(law.known, _bend(jet) + np.zeros(n), np.inf) for jet in differences]
     # A straight tip next to a straight line: with both parameters even the difference is straight, so largest at an end.
     bend[0] = np.where(even & law.known, 0.0, bend[0])
-    return _Values(_known(tip_off), _angle(_known(axis_off)), _known(tip_off + bend[0] / 32.0 + law.strays[0]),
+    return PieceBounds(_known(tip_off), _angle(_known(axis_off)), _known(tip_off + bend[0] / 32.0 + law.strays[0]),
                    _angle(_known(axis_off + bend[1] / 32.0 + law.strays[1])))
 
 
@@ -310,7 +178,7 @@ class _PieceMotion:
     strays: Floats
 
     @classmethod
-    def of(cls, motion: Motion, executed: BlockPoses, rows: Ints, pieces: _Pieces,
+    def of(cls, motion: Motion, executed: BlockPoses, rows: Ints, pieces: Pieces,
            places: tuple[Floats, Floats, Floats], poses: list[tuple[Floats, Floats]]) -> _PieceMotion:
         """By kind: arcs; tip straight and axis standing; straight in joints; tip straight and rotary joints even."""
         n = len(rows)
@@ -363,7 +231,7 @@ def _kinds(motion: Motion, executed: BlockPoses, rows: Ints) -> Ints:
     return np.where(motion.code[rows] == ARC, CIRCLE, kind)
 
 
-def _jets(kind: int, motion: Motion, executed: BlockPoses, rows: Ints, pieces: _Pieces, kin: Kinematics, q0: Floats,
+def _jets(kind: int, motion: Motion, executed: BlockPoses, rows: Ints, pieces: Pieces, kin: Kinematics, q0: Floats,
           q1: Floats, poses: list[tuple[Floats, Floats]]) -> tuple[TaylorVector, TaylorVector] | None:
     """(tip, axis) of pieces of one kind; None where the kinematics gives no bound."""
     (tip0, axis0), _, (tip1, _) = poses
@@ -377,7 +245,7 @@ def _jets(kind: int, motion: Motion, executed: BlockPoses, rows: Ints, pieces: _
     return (line, kin.jets(q0, q1)[1]) if kind == TIP else kin.jets(q0, q1)
 
 
-def _circle_jets(motion: Motion, executed: BlockPoses, rows: Ints, pieces: _Pieces, tip0: Floats,
+def _circle_jets(motion: Motion, executed: BlockPoses, rows: Ints, pieces: Pieces, tip0: Floats,
                  axis0: Floats) -> tuple[TaylorVector, TaylorVector] | None:
     """Arcs and helices: what the words say, seen from the table, where the slides keep lengths and angles."""
     begin, end = coordinates(motion, rows)

@@ -129,6 +129,6 @@ def _not_modulo(words: Words, line: Ints, axes: tuple[str, ...], rolls: dict[int
         bad = np.concatenate([bad, codes(words, "M", (126,))[0]])
     if not len(bad):
         return []
-    return [error("gcode.rollover", "the shorter path (M126, DC) or a direction (ACP, ACN) for an axis that counts its turns",
-                  file=file, lines=line[np.sort(bad)][:6].tolist(), count=len(bad),
+    return [error("gcode.rollover", "the shorter path (M126, DC) or a direction (ACP, ACN) for an axis that counts its "
+                  "turns", file=file, lines=line[np.sort(bad)][:6].tolist(), count=len(bad),
                   hint="modulo = true for the axis in the machine file, if it rolls over")]
