@@ -69,10 +69,16 @@ def progress_bar() -> Iterator[Any]:
         yield lambda stage, at, total: bar.update(task, description=stage, completed=at, total=total)
 
 
+def _plain(value: object) -> object:
+    """JSON of what is no JSON by itself: a number or truth of an array as what it is, all else (paths) in words."""
+    item = getattr(value, "item", None)
+    return item() if callable(item) and getattr(value, "ndim", None) == 0 else str(value)
+
+
 def print_json(values: object) -> None:
     import json
 
-    typer.echo(json.dumps(values, indent=2, allow_nan=False, default=str))
+    typer.echo(json.dumps(values, indent=2, allow_nan=False, default=_plain))
 
 
 def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, Any], text: str,
@@ -108,7 +114,7 @@ def _written(target: str, values: dict[str, Any], outputs: dict[Path, str | byte
     import json
 
     if target and target != "-":
-        figures = json.dumps(rounded(values), indent=2, allow_nan=False, default=str) + "\n"
+        figures = json.dumps(rounded(values), indent=2, allow_nan=False, default=_plain) + "\n"
         outputs = {Path(target): figures, **outputs}
     if not outputs:
         return [], False

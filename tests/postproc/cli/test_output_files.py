@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
 from postproc.cli.app import app
+from postproc.cli.console import print_json
 from postproc.setup.fingerprint import fingerprint
 from postproc.setup.model import load_setup
 from tests.postproc.kit import SAMPLES, TOOLS
@@ -176,3 +179,9 @@ def test_a_killed_run_is_reported_by_verify_and_put_right_by_convert(shop: Path,
     assert sorted(texts(out)) == ["O1001", "O1002", "O1003", "main.nc"]
     got = run(*verify)
     assert got.exit_code == 0 and "file.unfinished" not in got.stderr
+
+
+def test_values_of_arrays_are_json_of_their_own_kind(capsys: pytest.CaptureFixture[str]) -> None:
+    """A truth is no word "True", a number no text; a path is one."""
+    print_json({"above": np.True_, "count": np.int64(3), "file": Path("a.nc")})
+    assert json.loads(capsys.readouterr().out) == {"above": True, "count": 3, "file": "a.nc"}

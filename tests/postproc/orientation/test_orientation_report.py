@@ -244,6 +244,8 @@ def test_axes_that_cannot_be_run_are_reported() -> None:
     assert not math.isfinite(choice.tried[0].own.seconds) and sheet.most_gaining(choice) in ([0], [1])
     values = report.as_dict(choice)
     json.dumps(values, allow_nan=False)
+    reasons = {lost["kind"]: lost["reason"] for lost in values["passes"][0]["rejected"]}
+    assert reasons["travel"].startswith("travel: axis A at 1")
     assert values["passes"][0]["reference_time_s"] is None and values["passes"][0]["gain_percent"] is None
     assert values["plans"]["keep"]["time_s"] is None and values["plans"]["auto"]["time_s"] > 0.0
     noted = text.as_text(choice, "auto", [1])
