@@ -131,6 +131,29 @@ def test_a_machine_on_rods_reaches_its_bound(name: str) -> None:
     assert 0.3 < reached.max() <= 1.0 + 1e-6
 
 
+@pytest.mark.parametrize("name", ["h4a-c-table", "h4a-spindle-axis"])
+@pytest.mark.parametrize("constant", ["EB0S", "EA0S", "EX0S"])
+def test_rates_hold_at_every_place_within_reach(name: str, constant: str) -> None:
+    """Not only in the middle: far along a turn of the rotary axis a slide moves the tool's errors as the bound allows."""
+    kin = machines.load(name).kinematics.with_tool(87.0)
+    actual = ErrorModel(SerialErrors(constants={constant: 0.05 if constant != "EX0S" else 0.3})).on(kin)
+    q = joints(kin, 20, 4)
+    q[:, 4] = 1e-3
+    reach = np.array([1e-6] * 4 + [0.5])
+    rates = actual.error_rates(q, np.broadcast_to(reach, q.shape))
+    assert rates is not None
+    for turn in (-0.495, 0.495):
+        there = q + [0.0, 0.0, 0.0, 0.0, turn]
+        for j in range(4):
+            step = np.zeros(5)
+            step[j] = 1e-3
+            off = [[v - n for v, n in zip(actual.aim(actual.coordinates(x)), kin.forward(x), strict=True)]
+                   for x in (there - step, there + step)]
+            for k, rate in enumerate((rates.tip, rates.axis)):
+                slope = np.linalg.norm(off[1][k] - off[0][k], axis=1) / 2e-3
+                assert (slope <= rate[:, j] * (1.0 + 1e-6) + 2e-9).all(), (j, k, float((slope / rate[:, j]).max()))
+
+
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table", "nutating-head", "mill-3axis"])
 def test_no_error_of_a_map_changes_faster(name: str) -> None:
     kin = kinematics(name)
