@@ -30,7 +30,8 @@ _PLACES = (TableColumn("setup", "", "number of the set-up: 0, 1, ..."),
 _SIX = (*(TableColumn(f"d{x}", "length", f"displacement along {x} of what the axis moves, + along {x}") for x in "xyz"),
         *(TableColumn(f"e{x}", "angle", f"turn about {x} of what the axis moves, + as a right-hand screw") for x in "xyz"))
 COLUMNS: dict[str, tuple[TableColumn, ...]] = {
-    "reversal": (*_PLACES, TableColumn("reading", "angle", "actual less commanded angle, + in the direction the axis counts")),
+    "reversal": (*_PLACES,
+                 TableColumn("reading", "angle", "actual less commanded angle, + in the direction the axis counts")),
     "rotary": (*_PLACES, *_SIX),
     "poses": tuple(TableColumn(f"d{x}", "length", f"actual less nominal place of the tip along {x} of the table frame")
                    for x in "xyz"),
