@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -33,9 +34,9 @@ def figures(*arguments: object, code: int = 0) -> dict:
 
 def test_check_reports_what_a_model_holds_and_does() -> None:
     done = run("check", MIKRON, "-m", "mikron-ucp710", "--tool-length", 80)
-    for word in ("OK: errors of mikron-ucp710, 339 parameters", "EXX    linear table       30  -355 to 355", "3.00",
-                 "EC0Y 6 arcsec", "spindle: EA0S 5 arcsec", "independent parameters", "tool of 80 mm", "tip  worst"):
+    for word in ("OK: errors of mikron-ucp710, 339 parameters", "3.00", "EC0Y 6 arcsec", "spindle: EA0S 5 arcsec", "independent parameters", "tool of 80 mm", "tip  worst"):
         assert word in done.stdout
+    assert re.search(r"^EXX +linear table +30 +-355 to 355 ", done.stdout, re.MULTILINE)
     found = figures("check", SAMPLES / "h4a-c-table.toml", "-m", "h4a-c-table")
     assert found["components"] == {} and found["legs"]["rail"]["parameter"] == "X.rail.z" and found["diagnostics"] == []
     assert 50.0 < found["volume"]["tip_worst_um"] < 150.0 and found["volume"]["doubt_tip_um"] < 10.0
