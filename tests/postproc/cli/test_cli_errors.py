@@ -34,7 +34,8 @@ def figures(*arguments: object, code: int = 0) -> dict:
 
 def test_check_reports_what_a_model_holds_and_does() -> None:
     done = run("check", MIKRON, "-m", "mikron-ucp710", "--tool-length", 80)
-    for word in ("OK: errors of mikron-ucp710, 339 parameters", "3.00", "EC0Y 6 arcsec", "spindle: EA0S 5 arcsec", "independent parameters", "tool of 80 mm", "tip  worst"):
+    for word in ("OK: errors of mikron-ucp710, 339 parameters", "3.00", "EC0Y 6 arcsec", "spindle: EA0S 5 arcsec",
+                 "independent parameters", "tool of 80 mm", "tip  worst"):
         assert word in done.stdout
     assert re.search(r"^EXX +linear table +30 +-355 to 355 ", done.stdout, re.MULTILINE)
     found = figures("check", SAMPLES / "h4a-c-table.toml", "-m", "h4a-c-table")
