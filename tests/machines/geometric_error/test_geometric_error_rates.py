@@ -50,7 +50,8 @@ def test_sizes_and_slopes_of_curves_are_bounds_and_near(kind: str) -> None:
         assert np.abs(values).max() <= curve.most * (1.0 + 1e-12)
         assert slope <= curve.steepest * (1.0 + 1e-6)
     forward, backward = curve.at(x, 1.0), curve.at(x, -1.0)
-    assert np.abs(forward - backward).max() <= curve.apart * (1.0 + 1e-12) and (curve.apart > 0.0) == ("ways" in kind)
+    assert np.abs(forward - backward).max() <= curve.apart * (1.0 + 1e-12)
+    assert (curve.apart > 0.0) == ("two approach directions" in kind)
     assert curve.steepest <= 3.0 * max(np.abs(np.diff(curve.at(x, approach)) / np.diff(x)).max()
                                        for approach in (-1.0, 1.0)) + 1e-12
     if kind == "turned":
