@@ -144,7 +144,7 @@ def test_rates_hold_at_every_place_within_reach(name: str, constant: str) -> Non
     rates = actual.error_rates(q, np.broadcast_to(reach, q.shape))
     assert rates is not None
     for turn in (-0.495, 0.495):
-        there = q + [0.0, 0.0, 0.0, 0.0, turn]
+        there = q + np.array([0.0, 0.0, 0.0, 0.0, turn])
         for j in range(4):
             step = np.zeros(5)
             step[j] = 1e-3
