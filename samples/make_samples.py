@@ -6,10 +6,10 @@ import json
 import sys
 from pathlib import Path
 
-import gentle
 import orientation
 import prismatic
 import surfaces
+import tilting_platform
 
 SAMPLES = {
     "pocket.cls": prismatic.pocket,
@@ -21,8 +21,8 @@ SAMPLES = {
     "bicubic.cls": surfaces.bicubic,
     "test_part.cls": orientation.test_part,
     "tool_axis_tour.apt": surfaces.tour,
-    "h4a_dome.cls": gentle.h4a_dome,
-    "h4a_indexed.cls": gentle.h4a_indexed,
+    "h4a_dome.cls": tilting_platform.h4a_dome,
+    "h4a_indexed.cls": tilting_platform.h4a_indexed,
 }
 
 

@@ -7,6 +7,7 @@ path of the word's sign ("sign": RAB = 1; LinuxCNC WRAPPED_ROTARY), or as the wo
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
@@ -80,9 +81,9 @@ def rollovers(machine: Machine, controller: ControllerFile) -> tuple[dict[int, R
     return result, found
 
 
-def parked(machine: Machine, rolls: dict[int, Rollover], q: Floats) -> Floats:
+def parked(machine: Machine, rolls: Collection[int], q: Floats) -> Floats:
     """Home (J,) or (N, J) as axes stand there that come from joints q: at the nearest whole turn, but for those that are to
-    unwind all their turns."""
+    unwind all their turns; `rolls`: the modulo axes by joint."""
     home = np.broadcast_to(machine.home, q.shape).copy()
     for j in parking(machine, rolls):
         turn = TURN * DEG
@@ -90,7 +91,7 @@ def parked(machine: Machine, rolls: dict[int, Rollover], q: Floats) -> Floats:
     return home
 
 
-def parking(machine: Machine, rolls: dict[int, Rollover]) -> list[int]:
+def parking(machine: Machine, rolls: Collection[int]) -> list[int]:
     """The joints that park at whole turns."""
     return [j for j in endless(machine) if j in rolls or machine.turns[j].park == "turn"]
 

@@ -107,7 +107,7 @@ def _outside(q: Floats, over: Floats, machine: Machine) -> Refusal:
     """The joint that is worst outside its travel."""
     j = int(over.argmax())
     limits, unit = machine.limits, 1.0 / DEG if machine.rotary[j] else 1.0
-    above = float(q[:, j].max()) > limits.upper[j]
+    above = bool(q[:, j].max() > limits.upper[j])
     value = float(q[:, j].max() if above else q[:, j].min())
     low, high, beyond = (float(x) * unit for x in (limits.lower[j], limits.upper[j], over[j]))
     return Refusal("travel", machine.axis_names[j], value * unit, low, high, beyond,

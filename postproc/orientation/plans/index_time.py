@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.machine import Machine
+from postproc.control.rollover import parked
 from postproc.feedrate.rest_to_rest import PointToPointMode, rest_seconds
 from postproc.joints.joint_path import nearest_solution
 from postproc.joints.tracks import TRAVEL_SLACK
@@ -140,8 +141,8 @@ def between(before: list[PassEnds] | None, after: list[PassEnds] | None, work: P
 
 
 def unwinding(picked: list[PassEnds], work: PassContext, spun: bool) -> float:
-    """Seconds that the return home takes longer for joints of endless travel that have been wound up on the path: from pass
-    to pass they go the shortest path.
+    """Seconds that the return home takes longer for joints of endless travel that have been wound up on the path, where they
+    do not park at the nearest whole turn (`park = "home"`): from pass to pass they go the shortest path.
 
     Args:
         spun: False where nothing says the angle of a joint that the axis leaves free, so that it stays where it is
@@ -154,7 +155,8 @@ def unwinding(picked: list[PassEnds], work: PassContext, spun: bool) -> float:
         goes = endless & (spun | (joints != each.free))
         at = np.where(goes, at + _shortest(each.first - at, endless) + each.last - each.first, at)
     begin = _lifted(picked[-1:], machine)
-    wound, home = np.where(endless, at, begin), machine.home[None]
+    wound = np.where(endless, at, begin)
+    home = parked(machine, [j for j, turns in enumerate(machine.turns) if turns.modulo], wound)
     limits = joint_limits(machine.limits)
     return float(rest_seconds(wound, home, limits, PointToPointMode.STRAIGHT)[0] - _moved(begin, home, machine)[0, 0])
 

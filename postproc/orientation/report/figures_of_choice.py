@@ -95,7 +95,7 @@ def _pass(tried: PassSearch, made: Candidate, work: PassContext) -> dict[str, An
             "next_best": _short(runner_up(tried)),
             "reach": {name: _reach(it) for name, it in (("own", tried.own), ("paper", tried.aimed), ("chosen", made))
                       if it is not None},
-            "rejected": [{"orientation_deg": angles(other), "kind": kind, "reason": why}
+            "rejected": [{"orientation_deg": angles(other), "kind": kind, "reason": str(why)}
                          for other, why, kind in tried.rejected]}
 
 

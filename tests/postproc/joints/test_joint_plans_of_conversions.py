@@ -100,7 +100,7 @@ def test_choices_are_reported() -> None:
     """A within -30 to 120: the other side cannot hold 45 degrees."""
     result = run(cone(0.5, 5.0, 45.0), machine("mikron-ucp710"))
     (d,) = [d for d in result.diagnostics if d.code == "joints.chosen"]
-    assert "leave travel" in d.message
+    assert "exceed axis travel" in d.message
 
 
 NUTATED = """base = "{base}"

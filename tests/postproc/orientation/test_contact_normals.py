@@ -64,7 +64,7 @@ def test_long_moves_and_arcs_are_looked_at_between_their_ends() -> None:
     middle = np.array([[0.0, 5.0, start[0, 2]]])
     arc = Curves(start, start, Z[None], Z[None], np.array([True]), middle, Z[None], np.array([2.0 * np.pi]))
     at = sphere().contact(arc, np.array([1]), 8.0)
-    assert len(at) == 144 and np.ptp(np.arctan2(at.link[:, 1], at.link[:, 0])) > 6.0
+    assert len(at) == 144 and np.ptp(np.arctan2(at.travel[:, 1], at.travel[:, 0])) > 6.0
     assert np.abs(at.normal[:, 2] - 0.8).max() < 0.01
     plate = Surface(trimesh.creation.box(extents=(100.0, 100.0, 10.0)), Placement(np.eye(3), np.zeros(3)), 0.01)
     at = plate.contact(lines_of(np.array([[-20.0, 0.0, 5.0]]), np.array([[20.0, 0.0, 5.0]])), np.array([1]), 8.0)

@@ -85,7 +85,7 @@ def test_feed_has_its_direction_at_both_ends_of_an_arc() -> None:
     start, end, up = 10.0 * X[None], 10.0 * np.eye(3)[1:2], Z[None]
     arc = Curves(start, end, up, up, np.array([True]), np.zeros((1, 3)), up, np.array([np.pi / 2]))
     at = contact_of(arc, np.array([[Z, Z]]), np.array([[6, 7]]))
-    np.testing.assert_allclose(at.link, [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]], atol=1e-12)
+    np.testing.assert_allclose(at.travel, [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]], atol=1e-12)
     assert at.line.tolist() == [6, 7]
 
 
@@ -94,10 +94,10 @@ def test_the_feed_of_a_slope_lies_in_its_tangent_plane() -> None:
     none, both = np.zeros(1), np.array([[Z, Z]])
     line = Curves(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.2]]), Z[None], Z[None], none.astype(bool), np.zeros((1, 3)),
                   np.zeros((1, 3)), none)
-    np.testing.assert_allclose(contact_of(line, both, np.array([[1, 2]])).link, np.tile(X, (2, 1)), atol=1e-12)
+    np.testing.assert_allclose(contact_of(line, both, np.array([[1, 2]])).travel, np.tile(X, (2, 1)), atol=1e-12)
     down = Curves(np.zeros((1, 3)), -Z[None], Z[None], Z[None], none.astype(bool), np.zeros((1, 3)), np.zeros((1, 3)), none)
     at = contact_of(down, both, np.array([[1, 2]]))
-    assert len(at) == 2 and np.isnan(at.link).all()
+    assert len(at) == 2 and np.isnan(at.travel).all()
     limits = OrientationLimits(lead=(5.0, 10.0), off_centre=10.0)
     allowed = AllowedAxes(60.0 * DEG, None, limits)
     assert allowed.mask(only_pass(along_x()), leaning(7.0, 30.0)[None])[0]

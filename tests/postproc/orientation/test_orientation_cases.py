@@ -74,7 +74,7 @@ def test_travel_decides() -> None:
     assert free.best.rotary()["A"] == pytest.approx(45.0, abs=1.0)
     assert 20.0 < abs(narrow.best.rotary()["A"]) <= 30.0 + 1e-6 and narrow.aimed is None
     assert free.best.seconds < 0.999 * narrow.best.seconds < 0.95 * narrow.own.seconds
-    noted = [lost.why for lost in narrow.rejected if lost.kind == "travel"]
+    noted = [str(lost.why) for lost in narrow.rejected if lost.kind == "travel"]
     assert any(why.startswith("travel: axis A at 45.000 degrees, allowed -30.000 to 30.000") for why in noted)
 
 
@@ -111,7 +111,7 @@ def test_the_holder_decides() -> None:
     assert first.axis[1] > 0.3 and first.rotary()["A"] == pytest.approx(45.0, abs=1.0)
     other = behind(right)
     assert other.best.axis[1] < -0.3 and other.best.seconds == pytest.approx(first.seconds, rel=1e-3)
-    noted = [lost.why for lost in other.rejected if lost.kind == "touches"]
+    noted = [str(lost.why) for lost in other.rejected if lost.kind == "touches"]
     assert any(why.startswith("holder of T1 touches fixture wall at 60 by ") for why in noted)
     thin = behind(right, holder=14.0)
     assert not any(lost.kind == "touches" for lost in thin.rejected)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
 import toolpaths
 from postproc.base.options import Options
+from postproc.control.rollover import endless
 from postproc.orientation.plans.orient import orient
 from postproc.pipeline.convert import convert
 from postproc.placement.program import program_seconds
+from postproc.report.unwinding import unwinding
 from postproc.setup.model import load_setup
 from tests.postproc.kit import SAMPLES, machine
 from toolpaths.toolpath import Toolpath
@@ -37,20 +42,28 @@ def strips() -> Toolpath:
     return path
 
 
-@pytest.mark.parametrize("name", ["mikron-ucp710", pytest.param("head-table", marks=pytest.mark.slow)])
-def test_a_plan_takes_as_long_as_its_program(name: str) -> None:
-    """From home to home with the tool change: `keep` winds C up, which the travel home undoes. The program rounds
-    corners between rapids, the count stops there, so that it is above by some percent at most."""
+@pytest.mark.parametrize(("name", "counts"), [
+    ("mikron-ucp710", {"park": "turn"}), ("mikron-ucp710", {"park": "home"}),
+    ("mikron-ucp710", {"park": "home", "modulo": True}),
+    pytest.param("head-table", {"park": "home"}, marks=pytest.mark.slow)],
+    ids=["whole-turn", "home", "modulo", "head-table"])
+def test_a_plan_takes_as_long_as_its_program(name: str, counts: dict[str, Any]) -> None:
+    """From home to home with the tool change: `keep` winds C up, which the travel home undoes only where C parks at home
+    and counts its turns. The program rounds corners between rapids, the count stops there, so that it is above by some
+    percent at most."""
     m, (setup, _) = machine(name), load_setup(SAMPLES / "tools.setup.toml")
+    m = replace(m, turns=tuple(replace(turns, **counts) if j in endless(m) else turns for j, turns in enumerate(m.turns)))
     assert setup is not None
     choice, found = orient(strips(), m, setup, Options())
     assert choice is not None, found
-    counted, written = {}, {}
+    counted, written, wound = {}, {}, {}
     for plan in ("keep", "auto"):
-        counted[plan] = choice.plans[plan].seconds
-        written[plan] = program_seconds(convert(choice.toolpath(plan), m, setup=setup, options=Options(feed="planned")))
+        program = convert(choice.toolpath(plan), m, setup=setup, options=Options(feed="planned"))
+        counted[plan], written[plan] = choice.plans[plan].seconds, program_seconds(program)
+        wound[plan] = sum(one["in_program_s"] for one in unwinding(program).values())
         assert counted[plan] == pytest.approx(written[plan], rel=0.025), plan
     assert counted["keep"] - counted["auto"] == pytest.approx(written["keep"] - written["auto"], abs=0.3)
+    assert (wound["keep"] > 0.5) == (counts == {"park": "home"})
 
 
 def drilled(*cycles: str) -> Toolpath:

@@ -72,7 +72,7 @@ def test_a_way_that_touches_is_not_taken() -> None:
     assert before.seconds < auto.seconds < result.choice.plans["keep"].seconds
     assert [d.code for d in noted] == ["orient.passed_over"]
     assert f"{before.seconds:.3f} s, holder of T1 touches fixture post 0 by " in noted[0].message
-    assert "on the path to pass 0 (line 10)" in noted[0].message
+    assert "on the move to pass 0 (line 10)" in noted[0].message
 
 
 def test_what_is_barred_is_the_way_and_not_the_axis() -> None:

@@ -140,7 +140,7 @@ def test_the_sample_is_converted_verified_and_timed(tmp_path: Path) -> None:
 
 def test_inspect_reports_the_systems() -> None:
     text = CliRunner().invoke(app, ["inspect", str(FOLDER / "upside_down.cls")]).stdout
-    assert "system MSYS 1: origin (393, -297, 3) mm, turned by 180.00 degrees, its z by 180.00" in text
+    assert "system MSYS 1: origin (393, -297, 3) mm, rotation 180.00 degrees, Z tilted 180.00 degrees" in text
     text = CliRunner().invoke(app, ["inspect", str(SAMPLES / "pocket.cls")]).stdout
     assert "system MSYS 1: origin (0, 0, 0) mm\n" in text
 
