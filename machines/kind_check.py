@@ -112,7 +112,7 @@ def _rates(kin: Kinematics, q: Floats, axis: Floats) -> Iterator[KeyProblem]:
     expected = by_samples.rates(lambda some: kin.forward(some), q, kin.rotary)
     good = np.isfinite(expected).all(axis=(1, 2))
     size = max(1.0, float(np.abs(expected[good]).max(initial=0.0)))
-    if np.abs(rates - expected)[good].max(initial=0.0) > RATE * size:
+    if not np.abs(rates - expected)[good].max(initial=0.0) <= RATE * size:  # NaN is no rate either
         yield _problem("jacobian is not what forward changes by")
     standing = ~np.array(kin.turns_tool)
     if np.abs(expected[good][:, 3:, standing]).max(initial=0.0) > RATE:
@@ -140,6 +140,6 @@ def _bounds(kin: Kinematics, q: Floats, pose: Floats) -> Iterator[KeyProblem]:
             value, first, second = (np.stack([np.broadcast_to(c, n) for c in v], axis=1) for v in (
                 jet.value, jet.first, jet.second))
             off = np.linalg.norm(value + h * first + 0.5 * h * h * second - seen, axis=1)
-            if (off > jet.third * abs(h) ** 3 / 6.0 + 1e-9 * size).any():
+            if not (off <= jet.third * abs(h) ** 3 / 6.0 + 1e-9 * size).all():
                 yield _problem("jets_proved is True, and poses leave the bound that jets gives")
                 return

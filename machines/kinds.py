@@ -21,6 +21,7 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 from typing import get_args
+from zlib import crc32
 
 from machines.models import KinematicsModel
 
@@ -122,7 +123,7 @@ def _of_file(file: str) -> dict[str, type[KinematicsModel]]:
 
 
 def _run(file: Path) -> ModuleType:
-    name = f"postproc_kinds_{file.stem}"
+    name = f"postproc_kinds_{file.stem}_{crc32(str(file.resolve()).encode()):08x}"
     spec = spec_from_file_location(name, file)
     if spec is None or spec.loader is None:
         raise ImportError("not a Python file")

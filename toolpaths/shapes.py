@@ -38,7 +38,7 @@ def arrays(**shapes: str) -> Callable[[Owner], Owner]:
     """
 
     def marked(cls: Owner) -> Owner:
-        own: Callable[[Any], None] | None = cls.__dict__.get("__post_init__")
+        own: Callable[[Any], None] | None = getattr(cls, "__post_init__", None)
         table = {**getattr(cls, TABLE, {}), **shapes}
         check: list[Callable[[Any], None]] = []
 

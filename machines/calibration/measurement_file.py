@@ -30,15 +30,15 @@ _PLACES = (TableColumn("setup", "", "number of the set-up: 0, 1, ..."),
 _SIX = (*(TableColumn(f"d{x}", "length", f"displacement along {x} of what the axis moves, + along {x}") for x in "xyz"),
         *(TableColumn(f"e{x}", "angle", f"turn about {x} of what the axis moves, + as a right-hand screw") for x in "xyz"))
 COLUMNS: dict[str, tuple[TableColumn, ...]] = {
-    "reversal": (*_PLACES, TableColumn("reading", "angle",
-                                       "actual less commanded angle, + the approach direction the axis counts")),
+    "reversal": (*_PLACES,
+                 TableColumn("reading", "angle", "actual less commanded angle, + in the direction the axis counts")),
     "rotary": (*_PLACES, *_SIX),
     "poses": tuple(TableColumn(f"d{x}", "length", f"actual less nominal place of the tip along {x} of the table frame")
                    for x in "xyz"),
     "ball_bar": (TableColumn("distance", "length", "whole length from the ball on the table to the ball in the spindle"),),
     "laser": (TableColumn("reading", "length", "actual less nominal displacement of the tip, + along `toward`"),),
 }
-"""what was read, by kind of measurement; poses, ball_bar and laser have a column for each axis of the machine next to"""
+"""what was read, by kind of measurement; poses, ball_bar and laser have a column for each axis of the machine too"""
 JOINT = "commanded position of each axis of the machine, slides in a length, rotary axes in an angle"
 DIRECTION = ("may be left out: approach direction of X (so for any axis), 1 from lesser values, -1 from greater ones, "
              "0 not known")

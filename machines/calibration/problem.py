@@ -19,7 +19,7 @@ from toolpaths.shapes import arrays
 RANK = 1e-9
 """singular values (of the scaled, weighted Jacobian) below this part of the largest count as none"""
 PART = 1e-6
-"""least share of a parameter in what cannot be reported, to be named"""
+"""least share of a parameter in what cannot be determined, to be named"""
 HUBER = 1.345
 """standard deviations beyond which a residual counts linearly in a robust fit (Huber 1964: 95 % efficient)"""
 STEPS, ROBUST_STEPS = 30, 300

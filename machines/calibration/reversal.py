@@ -178,7 +178,7 @@ class Campaign:
 def plan(n: int, sigma: float, minutes_per_reading: float, minutes_per_setup: float, most: int | None = None,
          offsets: bool = True) -> list[Campaign]:
     """Campaigns of 2 set-ups and more: expected uncertainty against machine time; sigma is infinite where it cannot be
-    reported."""
+    determined."""
     found = []
     for m in range(2, (most or n) + 1):
         noted = identify(np.zeros((m, n)), sigma, offsets)

@@ -26,7 +26,7 @@ ENOUGH = 3
 SPAN = 1e-9
 """of the largest singular value"""
 NOTED = 1e-6
-"""of a column's length: where mounting and indexer leave less of it, it is not reported"""
+"""of a column's length: where mounting and indexer leave less of it, it is not determined"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class RotaryFit:
     """Series of the six errors, (6, 2, H): cosine and sine amplitudes of harmonics 1 .. H, mm and rad.
 
     Attributes:
-        amplitudes, sigma: (6, 2, H); where they are not reported amplitude 0 and sigma inf
+        amplitudes, sigma: (6, 2, H); where they are not determined amplitude 0 and sigma inf
         covariance: (12 H, 12 H) of the flattened amplitudes
         lost: names of the amplitudes that mounting or indexer can pretend as well
         result: of the fit; the smallest one where the readings leave it open
@@ -144,7 +144,7 @@ def _left(rows: Floats, count: int) -> Floats:
 
 def _noted(left: Floats) -> tuple[Bools, Floats]:
     """Of what mounting and indexer leave of the wanted columns (K, P): True (P,) for those that they or lost ones can make
-    up, and the singular values of what is reported."""
+    up, and the singular values of what is determined."""
     square, count = np.linalg.qr(left, mode="r"), left.shape[1]
     _, values, vt = np.linalg.svd(np.concatenate([square, np.zeros((count - len(square), count))]))
     return np.asarray(np.sum(vt[values <= NOTED] ** 2, axis=0) > 1e-6), values[values > NOTED]

@@ -136,4 +136,4 @@ class CalibrationRun:
 
 def approach_column(axis: str) -> str:
     """Name of the column that says from which direction an axis came."""
-    return f"{axis} approach direction"
+    return f"{axis} way"

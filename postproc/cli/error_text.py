@@ -24,7 +24,7 @@ def _components(found: dict[str, Any]) -> list[str]:
     rows = []
     for name, c in found["components"].items():
         span = "everywhere" if c["range"][0] is None else f"{c['range'][0]:g} to {c['range'][1]:g}"
-        lost = f"{c['lost_motion']:.2f}" if c["both_directions"] else ""
+        lost = f"{c['lost_motion']:.2f}" if c["both_ways"] else ""
         rows.append((name, c["kind"], c["values"], span, f"{c['largest']:.2f}", c["unit"], f"{c['at']:.2f}", lost))
     heads = ("error", "kind", "values", "range", "largest", "", "at", "lost motion")
     lines = table_text(rows, heads, "llrlrlrr") if rows else []

@@ -11,7 +11,7 @@ from postproc.compile.canned import holes_of
 from postproc.compile.commands import commands_of
 from postproc.compile.cycle_refusals import not_native
 from postproc.compile.feed import Feeds, PlannedTimes, plan_feeds
-from postproc.compile.long_turns import long_turns, without_standing
+from postproc.compile.long_turns import long_turns, standing_unsaid, without_standing
 from postproc.compile.program import Command, Commands, Hole, Program
 from postproc.compile.sections import sections_of, with_sections
 from postproc.compile.word_rows import WordRows, block_tools, joints_of, with_turns, word_rows
@@ -57,6 +57,8 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                       placed, kept_holes, places, sections, skip[keep], control.rolls,
                       control.machine.home * control.unit)
     found += long_turns(program, toolpath.file)
+    found += standing_unsaid(control.rolls, control.machine.axis_names, job.setup.output.apart, bool(skip.any()),
+                             toolpath.file)
     return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, toolpath.file),
                             *_mapped(feeds, moves, path, job),
                             *not_native(toolpath, moves, path, native, controller, skip)]

@@ -25,6 +25,19 @@ def without_standing(write: Bools, positions: Floats, rolls: dict[int, Rollover]
     return write
 
 
+def standing_unsaid(rolls: dict[int, Rollover], letters: tuple[str, ...], restart: bool, skipped: bool,
+                    file: str) -> list[Diagnostic]:
+    """An error where a block must not depend on what ran before it, but an axis that stands cannot be stated."""
+    axes = ", ".join(letters[axis] for axis, roll in rolls.items() if roll.rule == "sign")
+    why = "a restart at an operation" if restart else "a block behind OPSKIP" if skipped else ""
+    if not axes or not why:
+        return []
+    return [error("rollover.standing", f"{why} must state {axes}, and where the sign of a word is the direction a word that "
+                  "states where the axis stands may turn it by a whole turn", file=file,
+                  hint='leave restart = true out of the set-up and OPSKIP out of the CL file, or take rollover = "shortest" '
+                  'or "none" for the axis where the control can')]
+
+
 def long_turns(program: Program, file: str) -> list[Diagnostic]:
     """Blocks that turn a modulo axis by half a turn or more where the control takes the shorter path, else by a whole
     one."""

@@ -71,6 +71,10 @@ def rollovers(machine: Machine, controller: ControllerFile) -> tuple[dict[int, R
             found.append(error("machine.rollover", f"axis {name} of {machine.name}: this control takes the sign of a word "
                                "as its direction, so that words are 0 to 360 degrees", file=machine.file,
                                hint=f"modulo_range = [0, 360] under [axes.{name}]"))
+        elif rules.shortest and turns.low:
+            found.append(error("machine.rollover", f"axis {name} of {machine.name}: words of this control that state their "
+                               "path are 0 to 360 degrees", file=machine.file,
+                               hint=f"modulo_range = [0, 360] under [axes.{name}]"))
         else:
             result[j] = Rollover("sign" if rule == "sign" else "shortest", turns.low, bool(rules.shortest),
                                  rules.zero_negative == "-360")

@@ -130,8 +130,9 @@ class RolloverRules(UserModel):
     """how it says that the axis turns in its positive direction; used for half a turn and more"""
     negative: Worded = ""
     """the same for the negative one"""
-    zero_negative: Literal["-0", "-360"] = "-0"
-    """the word of 0 degrees that is reached in the negative direction, where the sign is the direction"""
+    zero_negative: Literal["-0", "-360"] = "-360"
+    """the word of 0 degrees that is reached in the negative direction, where the sign is the direction; "-0" only where the
+    control is known to heed the sign of zero"""
     on: tuple[str, ...] = ()
     """blocks of the safe start that put the shorter path in force, in programs for machines with modulo axes"""
     needs: dict[Literal["shortest", "sign"], Annotated[str, placeholders("axes")]] = Field(default_factory=dict)

@@ -47,7 +47,7 @@ def fitted_arcs(path: JointPath, nominal: JointPath, work: ErrorContext, start: 
 
 
 def _changes(work: ErrorContext, k: Ints) -> Ints:
-    """(N,) stretches of arcs k (N,) in which errors run one direction."""
+    """(N,) stretches of arcs k (N,) in which errors rise or fall."""
     places = [work.nominal(k, np.full(len(k), t)) for t in (0.0, *LOOKS, 1.0)]
     return changes(sum((np.abs(two - one) for one, two in pairwise(places)), np.zeros_like(places[0])), work.detail)
 

@@ -181,7 +181,7 @@ class _Written:
         return bend, last, begin
 
     def _turning(self, rows: Ints) -> Bools:
-        """(N,) blocks (N,) in which a joint may turn back: not where all stay near the straight approach direction."""
+        """(N,) blocks (N,) in which a joint may turn back: not where all stay near the straight path."""
         t, gap = self.work.bidirectional, self.gap[rows]
         q0, step = self.q[rows - 1][:, t], (self.q[rows] - self.q[rows - 1])[:, t]
         apart = np.max([np.abs(self._along(rows, share)[:, t] - q0 - share * step) for share in QUARTERS], axis=0)
@@ -240,7 +240,7 @@ class _Written:
 
 def _runs(pieces: Iterable[Floats]) -> tuple[Floats, Floats, Floats]:
     """(3, N, T), (N, T), (N, T) of motion in pieces (N, T), 2 being what a joint loses: shift, low and high of all but the
-    last run one direction, that run, and the approach direction of the first run, 0 where it is shorter than what the joint
+    last run in one direction, that run, and the direction of the first run, 0 where it is shorter than what the joint
     loses."""
     first, *rest = pieces
     whole, run, gone, most = PlaySteps(*_none(3, *first.shape)), first, first, np.abs(first)

@@ -273,7 +273,7 @@ def _approached(path: JointPath, work: ErrorContext, holes: _Holes, joints: Floa
 
 
 def _approach_off(path: JointPath, work: ErrorContext, q0: Floats, q1: Floats, row: Ints, share: Floats) -> Floats:
-    """(N,) mm, largest distance from the nominal motion on the approach direction from q0 to q1 (N, J), to holes (blocks
+    """(N,) mm, largest distance from the nominal motion on the path from q0 to q1 (N, J), to holes (blocks
     `row`), which get no points; 0 where the correction changes by no more than `share` (N,) mm over one stretch of the
     errors."""
     change = q1 - q0 - (work.path.q[row] - work.path.q[row - 1])

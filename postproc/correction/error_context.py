@@ -219,7 +219,7 @@ class ErrorContext:
         return self.model.detail(self.names)
 
     def changes(self, q0: Floats, q1: Floats) -> Ints:
-        """(N,) stretches of motion from q0 to q1 (N, J) in which errors run one direction."""
+        """(N,) stretches of motion from q0 to q1 (N, J) in which errors rise or fall."""
         return changes(q1 - q0, self.detail)
 
     def reached(self) -> tuple[Floats, Floats]:

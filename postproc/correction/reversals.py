@@ -20,7 +20,7 @@ LOOSE = 4.0
 """times the share of the correction for rapids of the CL file, and for arcs and the lines that replace them, which take no
 share of linearising; linking moves only have to come to their ends"""
 SHORTEST = 0.05
-"""mm of tip approach direction or degrees of a rotary axis: a block that short is not divided"""
+"""mm of the path of the tip or degrees of a rotary axis: a block that short is not divided"""
 
 
 def arcs_cut(path: JointPath, work: ErrorContext) -> Divided:
@@ -72,7 +72,7 @@ def starts_of(path: JointPath, nominal: JointPath, work: ErrorContext, allowed: 
 
 
 def stretches(path: JointPath) -> Bools:
-    """(K,) feed moves and rapids of the CL file, straight ones: their approach direction counts, not their ends alone."""
+    """(K,) feed moves and rapids of the CL file, straight ones: their path counts, not their ends alone."""
     straight = (path.code == FEED) | (path.code == TRAVERSE)
     return np.asarray(straight & np.isfinite(path.u) & ~path.home & (np.arange(len(path)) > 0))
 

@@ -57,10 +57,11 @@ def with_next_modes(result: PostResult, staged: StagedAgain) -> PostResult:
 
 
 def _depends(made: PostResult) -> bool:
-    """True where another output mode may do better."""
+    """True where another output mode may do better; not where the two readings of a program differ, a fault of ours."""
     if made.job is None or not _auto(made.job.modes):
         return False
-    return any(d.severity is Severity.ERROR and d.code not in SAME_IN_ALL for d in made.diagnostics)
+    errors = [d for d in made.diagnostics if d.severity is Severity.ERROR]
+    return not any(d.code.startswith("witness.") for d in errors) and any(d.code not in SAME_IN_ALL for d in errors)
 
 
 def _auto(modes: OutputModes) -> list[int]:

@@ -211,7 +211,8 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None) -
              f"rounding at most {shares['rounding']:.5f} mm"]
     if result.toolpath.records.total:
         lines.append(f"read: {result.toolpath.records}")
-    if any(laws != ["axes"] for laws in d["output_modes"].values()):
+    fallen_back = any(found.code == "output.next_mode" for found in result.diagnostics)
+    if fallen_back or any(laws != ["axes"] for laws in d["output_modes"].values()):
         lines.append("output: " + ", ".join(f"{name} {' and '.join(laws)}" for name, laws in d["output_modes"].items()))
     if d["orientation"] is not None:
         noted = d["orientation"]

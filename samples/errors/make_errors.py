@@ -68,12 +68,12 @@ def parallel(name: str, seed: int) -> ErrorModel:
 
 
 def with_uncertainty(model: ErrorModel) -> ErrorModel:
-    """The model with the standard deviations of Uncertainty."""
+    """The model with the standard deviations of UNCERTAINTY."""
     return replace(model, covariance=np.diag([UNCERTAINTY[angular(name)] ** 2 for name in model.names]))
 
 
 def runs(rng: np.random.Generator) -> str:
-    """Readings of X of mill-3axis as ISO 230-2 has them: five times there and back, each path its own column; any order."""
+    """Readings of X of mill-3axis as ISO 230-2 has them: five times there and back, a column each; any order."""
     x = np.linspace(-500.0, 500.0, 11)
     there = 0.012 * x / 500.0 + 0.004 * np.sin(x / 90.0)
     truth = np.stack([there, there - 0.003], axis=1)

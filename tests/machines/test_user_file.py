@@ -221,7 +221,7 @@ class Every(UserModel):
     ("some = [1.0, 2.5, 3.5]", "allowed: 2 elements or fewer", ""),
     ("table = 5", "table = 5: allowed: a table of keys and values", ""),
     ("axis = 5", "allowed: a table of keys and values", ""),
-    ('path = "left"', "path = \"left\": allowed: 'up' or 'down'", ""), ("sign = 2", "sign = 2: allowed: 1 or -1", ""),
+    ('course = "left"', "course = \"left\": allowed: 'up' or 'down'", ""), ("sign = 2", "sign = 2: allowed: 1 or -1", ""),
     ('code = "G60"', "allowed: text of the form", "register of the control: G54 to G59"),
     ("code = 54", "allowed: text in quotes", "in quotes"),
     ("system = 2", "system = 2: allowed: true or false, or text in quotes", ""),

@@ -81,13 +81,13 @@ class ActualRods(Actual):
                 platform_motion(self.frame, none, slides, (place, turned), reach))
 
     def _tool_rates(self, w: Floats, reach: Floats, tools: tuple[list[Columns], list[Columns]],
-                     arm_reach: Floats) -> ToolRates:
+                     arm_reach: Floats, axis_reach: Floats) -> ToolRates:
         """Of points and axes of the platform, with errors and without."""
         actual, nominal = self._motions(w, reach)
         nominal = nominal if self.turns else nominal.translating()
         arms, axes = zip(*([np.einsum("nij,nj->ni", motion.turned, columns.to_rows(v, len(w))) for v in tool[:2]]
                            for motion, tool in ((actual, tools[0]), (nominal, tools[1]))), strict=True)
-        return tool_rates(actual, nominal, arms, axes, reach, arm_reach)
+        return tool_rates(actual, nominal, arms, axes, reach, arm_reach, axis_reach)
 
     def _twist(self, w: Floats) -> tuple[Floats, Floats]:
         """(platform's place (N, 3), its motion per rod parameter (N, 6, P)), machine frame."""
@@ -139,7 +139,7 @@ class ActualDelta(ActualRods):
         length = self.kinematics.tool_length
         tools: list[list[Columns]] = [[columns.of_one(v) for v in actual_tool(UP, length, chain)]
                                       for chain in (self.chain, SerialErrors())]
-        tool = self._tool_rates(self.coordinates(q), reach, (tools[0], tools[1]), np.zeros(len(q)))
+        tool = self._tool_rates(self.coordinates(q), reach, (tools[0], tools[1]), np.zeros(len(q)), np.zeros(len(q)))
         none = np.zeros(q.shape)
         return ErrorRates(tool.tip, tool.axis, none, none)
 
@@ -240,8 +240,11 @@ class ActualH4(ActualRods):
         arm = self._arm(w, tools[1])
         at_spindle = self._at_spindle
         apart = size.shift_apart + size.turn_apart * arm
-        wide = (1.0 + 2.0 * LARGEST_TURN + size.turn_slope) * (arm + size.line_shift) + size.shift_slope
-        tool = self._tool_rates(w, reach[:, :4], tools, (wide * turn + apart) * at_spindle)
+        lean = 1.0 + 2.0 * LARGEST_TURN + size.turn_slope
+        own = size.line_shift + size.shift + spindle.line_shift + spindle.line_turn * abs(self.kinematics.tool_length)
+        wide = lean * (arm + own) + size.shift_slope
+        tool = self._tool_rates(w, reach[:, :4], tools, (wide * turn + apart) * at_spindle,
+                                (lean * turn + size.turn_apart) * at_spindle)
         arm = arm * (1.0 + turn) + (0.0 if at_spindle else (tool.nominal_tip * reach[:, :4]).sum(axis=1))
         return with_rotary(tool, size, spindle, arm, self.kinematics.tool_length, at_spindle)
 

@@ -147,17 +147,18 @@ class ToolRates:
 
 
 def tool_rates(actual: PlatformMotion, nominal: PlatformMotion, arms: tuple[Floats, Floats], axes: tuple[Floats, Floats],
-                reach: Floats, arm_reach: Floats) -> ToolRates:
+                reach: Floats, arm_reach: Floats, axis_reach: Floats) -> ToolRates:
     """Tools at `arms` (N, 3) from X with `axes` (N, 3), machine frame, with errors and without, while slides go by `reach`
-    (N, K) and the arms' ends move on the platform by up to `arm_reach` (N,) mm."""
+    (N, K), the arms' ends move on the platform by up to `arm_reach` (N,) mm and the axes turn on it by `axis_reach` (N,)."""
     rates, sizes = [], []
     for one, other in ((actual.of_point(arms[0]), nominal.of_point(arms[1])),
                        (actual.of_direction(axes[0]), nominal.of_direction(axes[1]))):
         rates.append(np.linalg.norm(one[0] - other[0], axis=1) + one[1] + other[1])
         sizes.append(np.linalg.norm(other[0], axis=1) + other[1])
     spins = [np.linalg.norm(m.turn, axis=1) + m.turn_change for m in (actual, nominal)]
-    rates[0] = rates[0] + (spins[0] + spins[1]) * arm_reach[:, None]
-    sizes[0] = sizes[0] + spins[1] * arm_reach[:, None]
+    for k, moved in enumerate((arm_reach, axis_reach)):
+        rates[k] = rates[k] + (spins[0] + spins[1]) * moved[:, None]
+        sizes[k] = sizes[k] + spins[1] * moved[:, None]
     turn_rate = np.linalg.norm(actual.turn - nominal.turn, axis=1) + actual.turn_change + nominal.turn_change
     tips = actual.place + arms[0] - nominal.place - arms[1]
     angle = np.linalg.norm(np.einsum("nji,njk->nik", nominal.turned, actual.turned) - np.eye(3), axis=(1, 2))
@@ -174,7 +175,7 @@ def with_rotary(tool: ToolRates, size: AxisSizes, spindle: AxisSizes, arm: Float
         return None
     before = np.where(at_spindle, tool.turned, 0.0)
     whole = own + spindle.line_turn + tool.turned
-    moved = spindle.line_shift + spindle.line_turn * length if at_spindle else tool.apart
+    moved = spindle.line_shift + spindle.line_turn * abs(length) if at_spindle else tool.apart
     moved = (moved + size.shift + own * arm + 2.0 * size.line_shift) / (1.0 - np.minimum(whole, 0.5))
     far = arm + moved
     turning = ((before + size.turn) * (far + size.line_shift) + size.line_turn * arm + moved + size.line_shift

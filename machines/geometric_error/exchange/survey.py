@@ -116,7 +116,7 @@ def _curve(curve: Curve, turn: bool, axis: str, model: ErrorModel, machine: Mach
     kind = "series" if isinstance(curve, Fourier) else "polynomial" if isinstance(curve, Polynomial) else \
         f"{curve.rule} table" if isinstance(curve, TableCurve) else ""
     apart = float(np.abs(np.diff(values, axis=0)).max(initial=0.0)) / unit
-    return {"kind": kind, "values": len(curve.values), "range": span, "both_directions": len(approaches) == 2,
+    return {"kind": kind, "values": len(curve.values), "range": span, "both_ways": len(approaches) == 2,
             "unit": "arcsec" if turn else "um", "largest": float(values[at]) / unit, "at": float(x[at[1]]) / position,
             "lost_motion": apart}
 

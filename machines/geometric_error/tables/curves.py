@@ -35,7 +35,7 @@ class Curve(ABC):
     @property
     @abstractmethod
     def detail(self) -> float:
-        """mm or rad over which the curve runs one direction at the most: what lies between looks as far apart is seen."""
+        """mm or rad over which the curve rises or falls at most: what lies between looks as far apart is seen."""
 
     @property
     @abstractmethod

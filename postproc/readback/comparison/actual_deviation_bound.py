@@ -57,7 +57,7 @@ def strays(motion: Motion, executed: BlockPoses, rows: Ints, times: tuple[Floats
     with np.errstate(invalid="ignore"):  # infinity times 0: a joint that has no error, known nowhere
         tip[mine] = 0.5 * (rates.tip * travel.half).sum(axis=1) + (rates.tip_reversal * turned).sum(axis=1)
         axis[mine] = 0.5 * (rates.axis * travel.half).sum(axis=1) + (rates.axis_reversal * turned).sum(axis=1)
-    return np.nan_to_num(tip, nan=np.inf), np.nan_to_num(axis, nan=np.inf)
+    return np.nan_to_num(tip, nan=np.inf, posinf=np.inf), np.nan_to_num(axis, nan=np.inf, posinf=np.inf)
 
 
 def _travel(motion: Motion, executed: BlockPoses, rows: Ints, length: Floats, kinds: Ints, q: list[Floats],

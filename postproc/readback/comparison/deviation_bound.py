@@ -236,6 +236,8 @@ def _jets(kind: int, motion: Motion, executed: BlockPoses, rows: Ints, pieces: P
     """(tip, axis) of pieces of one kind; None where the kinematics gives no bound."""
     (tip0, axis0), _, (tip1, _) = poses
     if kind == CIRCLE:
+        if not (kin.straight_slides or executed.control.base == "tcp"):
+            return None
         return _circle_jets(motion, executed, rows, pieces, tip0, axis0)
     line = straight(list(tip0.T), list(tip1.T))
     if kind == LINE or (kind == TIP and not any(kin.turns_tool)):

@@ -114,7 +114,7 @@ class ActualBlockPoses(BlockPoses):
                               for t in (0.0, 1.0)))
 
     def looks(self, motion: Motion, rows: Ints) -> Iterator[tuple[Ints, Floats]]:
-        """See `BlockPoses`: errors may change their course on the approach direction."""
+        """See `BlockPoses`: errors may change their course on the path."""
         step, before = np.zeros((len(rows), len(self.control.machine.axis_names))), self.joints(motion, rows, 0.0)
         for t in ARC_LOOKS:
             here = self.joints(motion, rows, t)
@@ -131,7 +131,7 @@ class ActualBlockPoses(BlockPoses):
 
     @cached_property
     def _curved(self) -> Bools:
-        """(E,) blocks whose joints may turn back on the approach direction: arcs, and those whose words are the tip while an
+        """(E,) blocks whose joints may turn back on the path: arcs, and those whose words are the tip while an
         axis turns."""
         motion, turning = self.motion, self.control.rotary
         by_tip = np.array([frame.law == "tcp" for frame in motion.frames])[motion.frame] | (self.control.base == "tcp")

@@ -15,6 +15,8 @@ from toolpaths.units import DEG
 
 LINEAR_STEP = 20.0
 """mm of a slide"""
+LONGEST = 1e6
+"""mm that no slide goes in one block"""
 ROTARY_STEP = 3.0 * DEG
 SAME = 1e-6
 """mm, and direction cosines: poses that are nearer are one"""
@@ -44,11 +46,12 @@ def walk(kin: Kinematics, q0: Floats, q1: Floats, pose: Floats) -> Floats:
     """Pose (N, 6) at joints q1 (N, J), reached straight in the joints from q0 where it is `pose` (N, 6).
 
     The rotary axes are outside the closed loops: no turn changes the mode, so that the steps are those of the slides.
-    Where a block leaves what the machine can reach, however far it goes, the walk ends, NaN.
+    Where a block leaves what the machine can reach the walk ends, NaN; so does one longer than any machine (LONGEST).
     """
     result, at = np.array(pose), np.array(q0)
     count = np.where(np.isfinite(result).all(axis=1), steps(kin, q0, q1, np.inf), 1)
-    i, rows = 0, np.arange(len(q0))
+    result[count > LONGEST / LINEAR_STEP] = np.nan
+    i, rows = 0, np.flatnonzero(count <= LONGEST / LINEAR_STEP)
     while len(rows):
         i += 1
         here = q0[rows] + (i / count[rows])[:, None] * (q1 - q0)[rows]
@@ -62,7 +65,7 @@ def steps(kin: Kinematics, q0: Floats, q1: Floats, turn: float = ROTARY_STEP) ->
     """(N,) steps of at most LINEAR_STEP mm and `turn` rad in which blocks are walked, 1 at least."""
     longest = np.where(kin.rotary, turn, LINEAR_STEP)
     size = np.nan_to_num((np.abs(q1 - q0) / longest).max(axis=1, initial=0.0))
-    return np.asarray(np.maximum(np.ceil(size), 1), dtype=np.int64)
+    return np.asarray(np.clip(np.ceil(size), 1, 1e15), dtype=np.int64)
 
 
 def _same(a: Floats, b: Floats) -> Bools:

@@ -154,14 +154,14 @@ def test_no_errors_at_all_are_a_warning(tmp_path: Path) -> None:
      "ECC is up to 0.6944 degrees; errors above 0.5 degrees are refused"),
     (TABLE, "mikron-ucp710", 1, "EXX is up to 2 mm"), (MAP, "mikron-ucp710", 2, "dy is up to 3 mm"),
     ('length_unit = "mm"\n[legs.X]\nrail = [16.0, 0.0, 0.0]\n', "uranesx", 2, "X.rail.x is up to 16 mm")])
-def test_a_unit_that_slipped_is_refused_unless_the_file_says_that_it_did_not(toml: str, machine: str, line: int, said: str,
-                                                                            tmp_path: Path) -> None:
+def test_a_wrong_unit_is_refused_unless_the_file_says_that_it_is_right(toml: str, machine: str, line: int, said: str,
+                                                                      tmp_path: Path) -> None:
     (tmp_path / "e.toml").write_text(toml)
     (tmp_path / "x.csv").write_text(CSV.replace("[um]", "[mm]") if toml == TABLE else
                                     "X [mm],dx [um],dy [mm],dz [um]\n0,1,2,3\n9,1,3,3\n")
     found, faults = load_checked(tmp_path / "e.toml", machines.load(machine))
     assert found is None and len(faults) == 1 and faults[0].code == "error-model.large" and faults[0].lines == (line,)
-    assert said in faults[0].message and "large = true" in faults[0].hint and "unit that slipped" in faults[0].hint
+    assert said in faults[0].message and "large = true" in faults[0].hint and "a wrong unit" in faults[0].hint
     (tmp_path / "e.toml").write_text("large = true\n" + toml)
     found, faults = load_checked(tmp_path / "e.toml", machines.load(machine))
     assert found is not None and [(d.code, d.severity) for d in faults] == [("error-model.large", Severity.WARNING)]

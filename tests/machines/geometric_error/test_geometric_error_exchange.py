@@ -332,7 +332,7 @@ SOURCES = [
     ("no unit", {"a.csv": AXIS.replace("X [mm]", "X", 1)}, "error-model.unit", "column 'X'"),
     ("half", {"a.csv": AXIS.replace("EYX", "EYX+")}, "error-model.column", "no column 'EYX-'"),
     ("both and one", {"a.csv": "X [mm],EXX+ [um],EXX- [um],EXX [um]\n0,1,2,3\n1,1,2,3\n"}, "error-model.column",
-     "beside"),
+     "next to"),
     ("twice", {"a.csv": AXIS, "b.csv": AXIS}, "error-import.twice", "is in"),
     ("map and tables", {"a.csv": AXIS, "b.csv": "X [mm],dx [um],dy [um],dz [um]\n0,1,2,3\n"}, "error-import.map", "alone"),
     ("location rows", {"a.csv": "EC0Y [arcsec]\n1\n2\n"}, "error-import.rows", "2 rows"),

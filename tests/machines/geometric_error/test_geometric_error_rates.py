@@ -50,7 +50,8 @@ def test_sizes_and_slopes_of_curves_are_bounds_and_near(kind: str) -> None:
         assert np.abs(values).max() <= curve.most * (1.0 + 1e-12)
         assert slope <= curve.steepest * (1.0 + 1e-6)
     forward, backward = curve.at(x, 1.0), curve.at(x, -1.0)
-    assert np.abs(forward - backward).max() <= curve.apart * (1.0 + 1e-12) and (curve.apart > 0.0) == ("ways" in kind)
+    assert np.abs(forward - backward).max() <= curve.apart * (1.0 + 1e-12)
+    assert (curve.apart > 0.0) == ("two approach directions" in kind)
     assert curve.steepest <= 3.0 * max(np.abs(np.diff(curve.at(x, approach)) / np.diff(x)).max()
                                        for approach in (-1.0, 1.0)) + 1e-12
     if kind == "turned":
@@ -129,6 +130,29 @@ def test_a_machine_on_rods_reaches_its_bound(name: str) -> None:
     assert np.abs(near).max() < 1e4
     reached = np.linalg.norm(off[1] - off[0], axis=1) / (rates.tip * np.abs(step)).sum(axis=1)
     assert 0.3 < reached.max() <= 1.0 + 1e-6
+
+
+@pytest.mark.parametrize("name", ["h4a-c-table", "h4a-spindle-axis"])
+@pytest.mark.parametrize("constant", ["EB0S", "EA0S", "EX0S"])
+def test_rates_hold_at_every_place_within_reach(name: str, constant: str) -> None:
+    """Not only in the middle: far along a turn of the rotary axis a slide moves the tool's errors as the bound allows."""
+    kin = machines.load(name).kinematics.with_tool(87.0)
+    actual = ErrorModel(SerialErrors(constants={constant: 0.05 if constant != "EX0S" else 0.3})).on(kin)
+    q = joints(kin, 20, 4)
+    q[:, 4] = 1e-3
+    reach = np.array([1e-6] * 4 + [0.5])
+    rates = actual.error_rates(q, np.broadcast_to(reach, q.shape))
+    assert rates is not None
+    for turn in (-0.495, 0.495):
+        there = q + np.array([0.0, 0.0, 0.0, 0.0, turn])
+        for j in range(4):
+            step = np.zeros(5)
+            step[j] = 1e-3
+            off = [[v - n for v, n in zip(actual.aim(actual.coordinates(x)), kin.forward(x), strict=True)]
+                   for x in (there - step, there + step)]
+            for k, rate in enumerate((rates.tip, rates.axis)):
+                slope = np.linalg.norm(off[1][k] - off[0][k], axis=1) / 2e-3
+                assert (slope <= rate[:, j] * (1.0 + 1e-6) + 2e-9).all(), (j, k, float((slope / rate[:, j]).max()))
 
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table", "nutating-head", "mill-3axis"])

@@ -68,7 +68,7 @@ def test_figures_of_a_model() -> None:
     machine = machines.load("mikron-ucp710")
     full = load(SAMPLES / "mikron-ucp710.toml", machine)
     found = survey(full, machine, 80.0)
-    assert found["components"]["EXX"]["lost_motion"] == pytest.approx(3.0) and found["components"]["EXX"]["both_directions"]
+    assert found["components"]["EXX"]["lost_motion"] == pytest.approx(3.0) and found["components"]["EXX"]["both_ways"]
     assert found["components"]["ECY"]["unit"] == "arcsec"
     peak = max(abs(float(x.split(",")[3])) for x in (SAMPLES / "mikron-ucp710-X.csv").read_text().splitlines()[2:])
     assert abs(found["components"]["EYX"]["largest"]) == pytest.approx(peak)

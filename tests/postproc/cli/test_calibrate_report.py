@@ -16,6 +16,7 @@ import machines
 from machines.calibration.calibrate import calibrate
 from machines.calibration.measurement_file import COLUMNS, DIRECTION, JOINT, MeasurementModel
 from machines.calibration.result_text import text
+from machines.calibration.run import approach_column
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
 from machines.geometric_error.exchange.write_model import save
@@ -77,6 +78,9 @@ def test_readme_and_schema_say_what_every_column_is() -> None:
             if kind in ("ball_bar", "laser", "reversal"):
                 assert column.meaning in README, column
     assert JOINT in README and DIRECTION in README
+    assert approach_column("X") == "X way" and "`X way`, ..." in README  # the name in users' tables
+    assert {"name": "X way, ...", "unit": "", "meaning": DIRECTION} in \
+        schema["$defs"]["LaserModel"]["properties"]["table"]["columns"]
     assert all(field.description for field in MeasurementModel.model_fields.values())
 
 
@@ -128,7 +132,7 @@ def test_values_of_a_table_say_where_they_are_and_by_which_way(folder: Path) -> 
     out, _ = noted(folder, "laser.toml")
     assert re.search(r"EXX\[0\]\+ +-7\.\d+ \+- 0\.212 um +at X -300 \+\n", out)
     assert re.search(r"EXX\[12\]- +4\.\d+ \+- 0\.212 um +at X 300 -$", out) and "zero" not in out
-    assert re.search(r"ECC\[1\] .* arcsec at C 30\n", noted(folder, "reversal.toml")[0])
+    assert re.search(r"ECC\[1\] .* arcsec +at C 30\n", noted(folder, "reversal.toml")[0])
     found = load(folder.parent / "calibration" / "screw-truth.toml", machines.load("mikron-ucp710"))
     fitted, _ = calibrate(folder / "laser.toml")
     assert fitted is not None and fitted.model is not None

@@ -111,7 +111,7 @@ SLIPS = {
     "two columns": ("laser.csv", text("Y [mm],Z [mm]", "V [mm],W [mm]"), "calibrate.column", "no column Y, Z; it has X"),
     "no bar": ("ball_bar.csv", text("\n150,0,0,", "\n0,0,0,"), "calibrate.row", "stands 0 mm from the centre"),
     "no number": ("laser.csv", text("-7.321", "1e300"), "calibrate.row", "reading is 1e+297 mm"),
-    "approach direction of nothing": ("laser.csv", text("X way", "x approach direction"), "calibrate.column", "write X way"),
+    "approach direction of nothing": ("laser.csv", text("X way", "x way"), "calibrate.column", "write X way"),
     "approach direction of 2": ("laser.csv", scaled(2.0, "X way"), "calibrate.row", "X way is 2"),
     "approach direction in mm": ("laser.csv", text("X way", "X way [mm]"), "calibrate.unit", "write X way alone"),
     "reversal in degrees": ("reversal.csv", text("[arcsec]", "[deg]"), "error-model.large", "ECC is up to 9.982 degrees"),

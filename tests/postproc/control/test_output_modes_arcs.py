@@ -274,7 +274,7 @@ def test_extents_know_the_quadrants_of_tilted_arcs(name: str, tmp_path: Path) ->
         low, high = extremes(path, result.job.moves, result.job.control, result.job.kinematics)
         t = np.linspace(0.0, 4.2, 4001)
         tips = 40.0 * (np.cos(t)[:, None] * frame[:, (third + 1) % 3] + np.sin(t)[:, None] * frame[:, (third + 2) % 3])
-        q = result.job.control.slides_for(kin, tips, np.tile(path.q[k], (len(t), 1)))
+        q = kin.at_tip(tips, np.tile(path.q[k], (len(t), 1)), np.arange(3))
         assert np.abs(low[k, :3] - q[:, :3].min(axis=0)).max() < 1e-3
         assert np.abs(high[k, :3] - q[:, :3].max(axis=0)).max() < 1e-3
 

@@ -15,6 +15,7 @@ import machines
 import postproc
 from machines.machine import Machine, Turns
 from postproc.base.options import Options
+from postproc.compile.long_turns import standing_unsaid
 from postproc.control.rollover import Rollover
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.conversion import estimate_of
@@ -92,7 +93,7 @@ def c_of(result: PostResult) -> np.ndarray:
 def test_words_stay_inside_one_turn_and_turn_as_planned(controller: str, rule: str, sense: float) -> None:
     result = converted(controller, rule, sense)
     assert result.ok, [str(d) for d in result.diagnostics]
-    words, whole = values(result.text), "-360." if controller == "fanuc-30i" and rule == "sign" else None
+    words, whole = values(result.text), "-360." if controller != "linuxcnc" and rule == "sign" else None
     assert (len(words) > 60 and np.abs(words).max() < 360.0) or whole
     assert np.abs(words).max() <= 360.0
     plain = counting(controller, sense)
@@ -320,3 +321,21 @@ def test_each_key_of_a_controller_file_counts(base: str, key: str, code: str, sh
     assert result.ok == (not code), [str(d) for d in result.diagnostics]
     assert not code or (any(e.startswith(code) for e in errors(result)) and result.text == "")
     assert shown in result.text
+
+
+def test_restart_blocks_are_refused_where_an_axis_that_stands_cannot_be_stated() -> None:
+    """A word that repeats where the axis stands may turn it on the rule of the sign; without it a restart is off."""
+    sign, shortest = {4: Rollover("sign")}, {4: Rollover("shortest")}
+    letters = ("X", "Y", "Z", "A", "C")
+    for restart, skipped in ((True, False), (False, True)):
+        [found] = standing_unsaid(sign, letters, restart, skipped, "a.cls")
+        assert found.code == "rollover.standing" and "C" in found.message and "restart" in found.hint
+        assert standing_unsaid(shortest, letters, restart, skipped, "a.cls") == []
+    assert standing_unsaid(sign, letters, False, False, "a.cls") == [] == standing_unsaid({}, letters, True, True, "a.cls")
+
+
+def test_stated_paths_are_of_0_to_360_degrees() -> None:
+    """DC of Siemens takes no negative word (alarm 16830)."""
+    result = converted("siemens-840d", "shortest", 1.0, "axes", -180.0)
+    assert not result.ok and [d.code for d in result.diagnostics if d.severity is Severity.ERROR] == ["machine.rollover"]
+    assert "modulo_range = [0, 360]" in next(d.hint for d in result.diagnostics if d.code == "machine.rollover")

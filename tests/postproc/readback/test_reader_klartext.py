@@ -167,7 +167,7 @@ def test_labels_behind_the_end_and_other_files() -> None:
     ("CYCL DEF 8.0 MIRROR", "gcode.cycle"), ("FN 0: Q1 = 5", "gcode.syntax"), ("L X+Q1", "gcode.syntax"), ("RND R5",
     "gcode.syntax"),
     ("CHF 2", "gcode.syntax"), ("APPR LT X+1 Y+1 LEN5", "gcode.syntax"), ("CT X+1 Y+1", "gcode.syntax"), ("L X+1 M126",
-    "gcode.unknown_code"),
+    "gcode.rollover"),
     ("L X+1 M92", "gcode.unknown_code"), ("L X+1 M136", "gcode.unknown_code"), ("L X+1 F AUTO", "gcode.syntax"),
     ("FL X+1", "gcode.syntax"),
     ("TOOL CALL 1 X", "gcode.tool"), ("TOOL CALL 1 Z DL+0.5", "gcode.tool"), ("C X+1 Y+1 DR+", "gcode.pole"),

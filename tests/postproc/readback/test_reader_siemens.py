@@ -121,7 +121,7 @@ def test_subprograms_of_one_archive_and_of_other_files() -> None:
 
 
 @pytest.mark.parametrize(("block", "code"), [
-    ("TRANS X5", "gcode.unknown_word"), ("ROT Z30", "gcode.unknown_word"), ("G0 C=DC(5)", "gcode.syntax"), ("R1=5",
+    ("TRANS X5", "gcode.unknown_word"), ("ROT Z30", "gcode.unknown_word"), ("G0 C=DC(5)", "gcode.rollover"), ("R1=5",
     "gcode.syntax"),
     ("IF R1==5 GOTOF A", "gcode.syntax"), ("G0 X=R1", "gcode.syntax"), ("CIP X1 Y1 I1=2", "gcode.syntax"), ("G33 Z1 K1",
     "gcode.unknown_code"),
