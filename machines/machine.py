@@ -62,6 +62,14 @@ class Turns:
 
 
 @dataclass(frozen=True)
+class ClampCodes:
+    """M codes, e.g. "M10", that clamp and release a rotary axis; "" where the machine does so by itself."""
+
+    clamp: str = ""
+    unclamp: str = ""
+
+
+@dataclass(frozen=True)
 class ControlKinematics:
     """A kinematics module that the control itself runs, so that programs hold tip coordinates in the part.
 
@@ -92,6 +100,7 @@ class Machine:
         stop: what a stop of the program switches off: "spindle and coolant", "spindle", "nothing", or "" where the machine
             file does not say
         turns: per joint, how it counts its turns; () as by `Turns()`
+        clamps: per joint, the codes that clamp and release it; () as by `ClampCodes()`
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
 
@@ -110,7 +119,14 @@ class Machine:
     stop: str = ""
     stated: Limits | None = None
     turns: tuple[Turns, ...] = ()
+    clamps: tuple[ClampCodes, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
+        object.__setattr__(self, "clamps", self.clamps or (ClampCodes(),) * len(self.axis_names))
         object.__setattr__(self, "home", frozen(self.home, np.float64, (len(self.axis_names),), "Machine.home"))
+
+    @property
+    def clamp_codes(self) -> dict[str, ClampCodes]:
+        """The codes of the axes that the program clamps, by letter."""
+        return {name: codes for name, codes in zip(self.axis_names, self.clamps, strict=True) if codes.clamp}

@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.compile.block_delete import after, skipped, with_skips
 from postproc.compile.canned import holes_of
+from postproc.compile.clamps import with_clamps
 from postproc.compile.commands import commands_of
 from postproc.compile.cycle_refusals import not_native
 from postproc.compile.feed import Feeds, PlannedTimes, plan_feeds
@@ -57,6 +58,7 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                       placed, kept_holes, places, sections, skip[keep], control.rolls,
                       control.machine.home * control.unit)
     found += long_turns(program, toolpath.file)
+    program = with_clamps(program, control.machine.clamp_codes, controller.plane_turns)
     found += standing_unsaid(control.rolls, control.machine.axis_names, job.setup.output.apart, bool(skip.any()),
                              toolpath.file)
     return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, toolpath.file),

@@ -9,6 +9,7 @@ from itertools import chain
 
 import numpy as np
 
+from postproc.compile.clamps import CLAMP, UNCLAMP
 from postproc.compile.program import PER_MINUTE, Command, Hole
 from postproc.control.rollover import HALF
 from postproc.controllers.model import Mode
@@ -263,6 +264,8 @@ class Writer(WriterState, ABC):
             yield from self.enter(section) if command.name == "ENTER_SECTION" else self.leave(section)
         elif command.name.startswith("START_SPINDLE"):
             yield from self.spindle(command)
+        elif command.name in (CLAMP, UNCLAMP):
+            yield str(command.args[0])
         elif command.name == "RESTATE":
             self.forget()
         elif command.name == "OPERATION_START":
