@@ -158,7 +158,7 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         timing=Timing(timing.tool_change, timing.clamp, timing.unclamp, frozenset(timing.assumed)),
         control_kinematics=model.control_kinematics(), file=file.file,
         stop=model.control.stop or "" if model.control is not None else "",
-        clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
+        hooks=model.hooks, clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
         turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats, frozen
 from toolpaths.shapes import arrays
@@ -101,6 +102,7 @@ class Machine:
             file does not say
         turns: per joint, how it counts its turns; () as by `Turns()`
         clamps: per joint, the codes that clamp and release it; () as by `ClampCodes()`
+        hooks: blocks of the shop at certain places of a program
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
 
@@ -120,6 +122,7 @@ class Machine:
     stated: Limits | None = None
     turns: tuple[Turns, ...] = ()
     clamps: tuple[ClampCodes, ...] = ()
+    hooks: HooksModel = field(default_factory=HooksModel)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
+from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from machines.machine import ControlKinematics
 from machines.stop import Stop
@@ -149,6 +150,8 @@ class MachineModel(UserModel):
     """linear axis that lifts the tool off the part at home"""
     timing: TimingModel
     control: ControlModel | None = None
+    hooks: HooksModel = HooksModel()
+    """blocks of the shop round tool calls, indexing moves, operations and stops"""
 
     def problems(self) -> Iterator[KeyProblem]:
         """Faults between tables; the geometry's first, for without it the rest means nothing."""

@@ -19,7 +19,7 @@ from toolpaths.arrays import Bools, Ints
 
 CLAMP, UNCLAMP = "CLAMP", "UNCLAMP"
 """commands; their argument is the code"""
-_FIRST = frozenset({"DWELL", "CUTTER_COMPENSATION_OFF"})
+FIRST = frozenset({"DWELL", "CUTTER_COMPENSATION_OFF"})
 """commands at the place of a clamp that belong to the block before it"""
 
 
@@ -108,7 +108,7 @@ def _put(group: list[Command], command: Command, early: bool) -> None:
     if early:
         after = [i + 1 for i, c in enumerate(group) if c.name in ("ENTER_SECTION", UNCLAMP)
                  or (c.name == "OPERATION_START" and len(c.args) > 1)]
-        at = max(after, default=next((i for i, name in enumerate(names) if name not in _FIRST), len(group)))
+        at = max(after, default=next((i for i, name in enumerate(names) if name not in FIRST), len(group)))
         while at < len(group) and names[at] == CLAMP:
             at += 1
     else:

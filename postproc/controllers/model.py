@@ -264,6 +264,13 @@ class ControllerFile(UserModel):
         """True where stating a tilted plane may turn rotary axes."""
         return self.modes.tilted is not None and self.modes.tilted.turns_axes
 
+    def with_passive(self, more: tuple[str, ...]) -> ControllerFile:
+        """The controller with more codes that move nothing: those of the shop's hooks."""
+        if not more:
+            return self
+        passive = tuple(dict.fromkeys((*self.program.passive, *more)))
+        return self.model_copy(update={"program": self.program.model_copy(update={"passive": passive})})
+
     def divided(self, files: bool) -> ControllerFile:
         """The controller that writes operations into files of their own, where that is asked for."""
         return self.model_copy(update={"subprograms": self.subprogram_files}) if files else self

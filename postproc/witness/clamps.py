@@ -19,7 +19,8 @@ def check_clamps(case: Case, executed: ExecutedBlocks, cut: Array) -> tuple[list
 
     `cut` (E,): blocks of cuts. A block is held against the last code in the lines before its own.
     """
-    if not case.clamps or (np.diff(executed.line) < 0).any():
+    last = int(executed.line.max(initial=0))
+    if not case.clamps or (np.diff(executed.line) < 0).any() or case.program.count(b"\n") < last:
         return [], 0
     lines = _REMARK.sub(b"", case.program.upper()).split(b"\n")
     found, count = list[Finding](), 0

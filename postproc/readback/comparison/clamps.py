@@ -25,9 +25,7 @@ def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults:
     machine, found = job.machine, list[Diagnostic]()
     if not machine.clamp_codes:
         return found
-    moves = job.moves.without_pecks()
-    inside = (owner >= 0) & (owner < len(moves))
-    cut = (motion.code > 0) & inside & ~moves.link[np.clip(owner, 0, len(moves) - 1)]
+    moves, cut = job.moves.without_pecks(), cutting_rows(motion, job, owner)
     for letter, one in machine.clamp_codes.items():
         state = _states(code, one)
         j = machine.axis_names.index(letter)
@@ -47,6 +45,19 @@ def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults:
                                       int(moves.line[owner[loose[0]]]), int(line[loose[0]]), len(loose),
                                       f"{one.clamp} before the cut"))
     return found
+
+
+def cutting_rows(motion: Motion, job: Job, owner: Ints) -> Bools:
+    """(E,) rows that cut: at feed, and serving a move that no link leads to."""
+    moves = job.moves.without_pecks()
+    inside = (owner >= 0) & (owner < len(moves))
+    return np.asarray((motion.code > 0) & inside & ~moves.link[np.clip(owner, 0, len(moves) - 1)])
+
+
+def stretches(which: Bools) -> Ints:
+    """(N, 2) first and one past the last of the stretches where `which` (E,) is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]).astype(np.int8)))
+    return np.asarray(edges.reshape(-1, 2))
 
 
 def _states(code: Canonical, one: ClampCodes) -> Floats:
@@ -72,6 +83,6 @@ def _planes(code: Canonical, state: Floats, letter: str, one: ClampCodes, job: J
 
 def _standing(cut: Bools, turns: Bools) -> Ints:
     """The last row of each stretch of cuts through which an axis stands."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], cut, [False]]).astype(np.int8))).reshape(-1, 2)
+    edges = stretches(cut)
     total = np.concatenate([[0], np.cumsum(turns)])
     return np.asarray(edges[total[edges[:, 1]] == total[edges[:, 0]], 1] - 1)
