@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Bools, Floats, frozen
 from toolpaths.shapes import arrays
 
 
@@ -114,3 +114,8 @@ class Machine:
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
         object.__setattr__(self, "home", frozen(self.home, np.float64, (len(self.axis_names),), "Machine.home"))
+
+    @property
+    def endless(self) -> Bools:
+        """(J,) rotary joints whose travel has no end."""
+        return np.asarray(np.array(self.rotary) & ~np.isfinite(self.limits.upper - self.limits.lower))
