@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 
 
@@ -27,11 +25,6 @@ class Limits:
     jerk: Floats
     assumed: frozenset[str] = frozenset()
     """e.g. "X.velocity" """
-
-    def __post_init__(self) -> None:
-        n = len(self.lower)
-        for name in ("lower", "upper", "velocity", "acceleration", "jerk"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n,), f"Limits.{name}"))
 
 
 @dataclass(frozen=True)
@@ -113,4 +106,3 @@ class Machine:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
-        object.__setattr__(self, "home", frozen(self.home, np.float64, (len(self.axis_names),), "Machine.home"))
