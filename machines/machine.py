@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
 
@@ -27,11 +27,6 @@ class Limits:
     jerk: Floats
     assumed: frozenset[str] = frozenset()
     """e.g. "X.velocity" """
-
-    def __post_init__(self) -> None:
-        n = len(self.lower)
-        for name in ("lower", "upper", "velocity", "acceleration", "jerk"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n,), f"Limits.{name}"))
 
 
 @dataclass(frozen=True)
@@ -113,7 +108,6 @@ class Machine:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
-        object.__setattr__(self, "home", frozen(self.home, np.float64, (len(self.axis_names),), "Machine.home"))
 
     @property
     def endless(self) -> Bools:

@@ -66,7 +66,7 @@ class Serial(Kinematics):
     jets_proved = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "tool_axis", unit_vector(self.tool_axis, "tool_axis"))
+        object.__setattr__(self, "tool_axis", unit_vector(self.tool_axis))
         kind = {joint.name: joint.rotary for joint in self.chain}
         object.__setattr__(self, "rotary", tuple(kind[name] for name in self.axis_names))
         object.__setattr__(self, "branches", 2 if len(self._turns) == 2 else 1)

@@ -26,7 +26,7 @@ _RADIUS_SLACK = 0.002
 
 
 @dataclass(frozen=True)
-@arrays(keep="N", plane="N", ccw="N", center="N 3", parts="N")
+@arrays(keep="N", plane="int8: N", ccw="N", center="N 3", parts="N")
 class WordArcs:
     """For N curves: `keep` (N,) True where the words describe the same arc; then `plane` (17, 18, 19), `ccw` as seen
     from the positive end of the third axis, `center` (N, 3) in the words X, Y, Z relative to the start point, and

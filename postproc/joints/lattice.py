@@ -44,8 +44,8 @@ class PoseRun:
 
 
 @dataclass(frozen=True)
-@arrays(values="B N J", family="B N", leads="B N-1", free="N-1", inside="B N", wound="W", least="B N W", most="B N W",
-        rotary="R", rest="N", away="N")
+@arrays(values="B N J", family="B N", leads="int8: B N-1", free="N-1", inside="B N", wound="W", least="int32: B N W",
+        most="int32: B N W", rotary="R", rest="N", away="N")
 class Lattice:
     """States of N poses on B branches; `wound` (W,) are the joints whose turns count, `limits` those of the machine.
 
