@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,6 +43,9 @@ class BlockPoses:
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
         return self._placed(motion, rows, motion.end[rows] if _whole(t) else self._approaches(motion, rows).at(t))
+
+    def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[Floats]) -> None:
+        """Said before the poses and joints of the same blocks at several fractions (K,) are asked for."""
 
     def at_coordinates(self, motion: Motion, rows: Ints, beginning: Floats, xyz: Floats) -> Floats:
         """Tips (K, 3) where X, Y, Z of the frames of blocks stand at `xyz` (K, 3), all else as in `beginning` (K, J)."""
