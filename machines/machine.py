@@ -9,7 +9,7 @@ import numpy as np
 
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
 
@@ -28,11 +28,6 @@ class Limits:
     jerk: Floats
     assumed: frozenset[str] = frozenset()
     """e.g. "X.velocity" """
-
-    def __post_init__(self) -> None:
-        n = len(self.lower)
-        for name in ("lower", "upper", "velocity", "acceleration", "jerk"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n,), f"Limits.{name}"))
 
 
 @dataclass(frozen=True)
@@ -131,9 +126,13 @@ class Machine:
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
         object.__setattr__(self, "clamps", self.clamps or (ClampCodes(),) * len(self.axis_names))
-        object.__setattr__(self, "home", frozen(self.home, np.float64, (len(self.axis_names),), "Machine.home"))
 
     @property
     def clamp_codes(self) -> dict[str, ClampCodes]:
         """The codes of the axes that the program clamps, by letter."""
         return {name: codes for name, codes in zip(self.axis_names, self.clamps, strict=True) if codes.clamp}
+
+    @property
+    def endless(self) -> Bools:
+        """(J,) rotary joints whose travel has no end."""
+        return np.asarray(np.array(self.rotary) & ~np.isfinite(self.limits.upper - self.limits.lower))

@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -32,10 +32,6 @@ class Plane:
 
     rotation: Floats
     origin: Floats
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", frozen(self.rotation, np.float64, (3, 3), "Plane.rotation"))
-        object.__setattr__(self, "origin", frozen(self.origin, np.float64, (3,), "Plane.origin"))
 
     @cached_property
     def key(self) -> tuple[float, ...]:

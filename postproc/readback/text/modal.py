@@ -30,8 +30,9 @@ _PART = 200_000
 
 
 @dataclass(frozen=True)
-@arrays(motion="B", plane="B", inverse="B", per_turn="B", inch="B", level="B", length_register="B", tool="B",
-        spindle="B", rpm="B", coolant="B", machine="B", compensation="B", offset="B", blend="B")
+@arrays(motion="int16: B", plane="int8: B", inverse="bool: B", per_turn="bool: B", inch="bool: B", level="int8: B",
+        length_register="B", tool="B", spindle="int8: B", rpm="B", coolant="int8: B", machine="bool: B",
+        compensation="int8: B", offset="B", blend="B")
 class Modal:
     """State at every block (index 0 is before block 1; B + 1 entries)."""
 
@@ -48,7 +49,7 @@ class Modal:
     spindle: Array
     """-1, 0, 1"""
     rpm: Floats
-    coolant: Ints
+    coolant: Array
     """bits of what flows (`postproc.reference.coolant`)"""
     machine: Array
     """G53 in this block"""
