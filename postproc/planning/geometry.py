@@ -82,10 +82,14 @@ class MachinePath:
         return SplinePath(self.fitted.t, self.fitted.c, DEGREE)
 
     @cached_property
+    def tool_spline(self) -> BSpline:
+        """of tip and axis (3 + 3), for limits at the tool; knots as of `fitted`"""
+        return make_interp_spline(self.s, self.values[:, self.joints:], k=DEGREE)
+
+    @cached_property
     def tool(self) -> SplinePath:
-        """of tip and axis, for limits at the tool"""
-        found = make_interp_spline(self.s, self.values[:, self.joints:], k=DEGREE)
-        return SplinePath(found.t, found.c, DEGREE)
+        """The same with its derivatives."""
+        return SplinePath(self.tool_spline.t, self.tool_spline.c, DEGREE)
 
     def derivatives(self, s: Floats) -> Derivatives:
         """Joints at s (N,)."""

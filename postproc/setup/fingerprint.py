@@ -13,6 +13,8 @@ from toolpaths.input_files import read_input
 DIGITS = 8
 _ASIDE = {"description", "placement"}
 """keys that change no word of a program: what `place` may choose from"""
+_STATED_ONLY = ("tip_acceleration", "tip_jerk", "axis_rate")
+"""keys of tools that count only where they are stated, so that programs older than the key keep their fingerprint"""
 
 
 def fingerprint(setup: SetupFile, file: str) -> str:
@@ -21,6 +23,10 @@ def fingerprint(setup: SetupFile, file: str) -> str:
     Meshes count by what they hold, not by their names. `file` is that of the set-up, whose folder meshes are named from.
     """
     values = setup.model_dump(mode="json", exclude=_ASIDE)
+    for tool in values["tools"].values():
+        for key in _STATED_ONLY:
+            if tool[key] is None:
+                del tool[key]
     for key in file_keys(values):
         try:
             data = read_input(Path(file).parent / str(value_at(values, key)))
