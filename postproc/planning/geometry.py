@@ -114,20 +114,9 @@ class PathStretch:
     near: JointsNearby
 
 
-def machine_path(path: Smooth, first: float, last: float, kin: Kinematics, near: JointsNearby) -> MachinePath:
-    """The joints' spline along `path` from s = first to last, without a stop between.
-
-    Raises:
-        ArithmeticError: where the machine has no solution, with the s of the first such place.
-    """
-    found, = machine_paths([PathStretch(path, first, last, near)], kin)
-    if isinstance(found, str):
-        raise ArithmeticError(found)
-    return found
-
-
 def machine_paths(stretches: list[PathStretch], kin: Kinematics) -> list[MachinePath | str]:
-    """`machine_path` of each; what is wrong where the machine has no solution. Many short ones are solved together."""
+    """The joints' spline of each, without a stop between its ends; what is wrong where the machine has no solution, with the
+    s of the first such place. Many short ones are solved together."""
     result: list[MachinePath | str] = [""] * len(stretches)
     at = {i: sites(one.path, one.first, one.last) for i, one in enumerate(stretches)}
     for turn in range(ROUNDS + 1):

@@ -24,9 +24,9 @@ def fingerprint(setup: SetupFile, file: str) -> str:
     """
     values = setup.model_dump(mode="json", exclude=_ASIDE)
     for tool in values["tools"].values():
-        for key in _STATED_ONLY:
-            if tool[key] is None:
-                del tool[key]
+        for name in _STATED_ONLY:
+            if tool[name] is None:
+                del tool[name]
     for key in file_keys(values):
         try:
             data = read_input(Path(file).parent / str(value_at(values, key)))

@@ -189,7 +189,6 @@ _NO_ANGLE = 1e-9
 """rad"""
 _AXES = {"AAXIS": 0, "BAXIS": 1, "CAXIS": 2, "A": 0, "B": 1, "C": 2, "XAXIS": 0, "YAXIS": 1, "ZAXIS": 2}
 _TURNED = frozenset({"creo", "solidworks-clt"})
-_NO_AXIS_WORDS = frozenset({"CLW", "CCLW", "INCR", "ATANGL", "TABLE", "HEAD", "NEXT", "ROTREF", "AXIS"})
 
 
 def rotate(b: ToolpathBuilder, s: Statement) -> None:

@@ -175,7 +175,7 @@ def test_limits_at_the_tool_hold_by_length() -> None:
 
 
 def test_second_order_limits_at_the_tool() -> None:
-    """On a circle: sqrt(A r) from acceleration, of which the octagon gives away up to 7.6 %; from the tilt rate / |da/ds|."""
+    """On a circle: sqrt(A r) from acceleration, less up to 7.6 % for the octagon; from the tilt rate / |da/ds|."""
     circle = Circle(20.0)
     for most, speed in ((ToolLimits(acceleration=500.0), 100.0), (ToolLimits(tilt_rate=0.3), 60.0),
                         (ToolLimits(jerk=20000.0), 200.0)):
