@@ -266,6 +266,7 @@ def tilted(v: Floats, tilt: Floats) -> Floats:
 
 
 def unit(v: Floats) -> Floats:
+    """Unit vectors (N, 3) along v (N, 3); NaN where v is 0."""
     norm = np.linalg.norm(v, axis=1, keepdims=True)
     result: Floats = v / np.where(norm > 0.0, norm, np.nan)
     return result
