@@ -96,8 +96,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
             feed: Annotated[str, typer.Option("--feed", metavar="{programmed,planned}",
-                                              help="programmed: the feeds of the CL file; planned: reduced where an axis "
-                                              "would exceed velocity, acceleration or jerk")] = "programmed",
+                                              help="programmed: the feeds of the CL file; planned: lower where an "
+                                              "axis or a tool would exceed its limits")] = "programmed",
             merge_feeds: Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="merge "
                                                        "neighbouring F words within this part")] = 0.0,
             smooth: Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the "

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
-Convention = Literal["ZXZ", "ZYX", "XYZ", "rotary"]
 _GIMBAL = 1e-9
 """sine or cosine of the middle angle below which the first and third turn are about one axis"""
 
