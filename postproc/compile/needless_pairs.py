@@ -26,27 +26,35 @@ def needless_pairs(groups: Mapping[int, list[Command]], end: int) -> dict[int, l
         for command in kept:
             if (kind := _kind(command)) is not None:
                 state[kind] = None if command.name in _OFF or command.skip else command
-            elif command.name not in _PASSES:
+            elif not _passes(command):
                 state = dict.fromkeys(state)
     return result
 
 
 def _without_pair(group: list[Command], what: str, running: Command | None) -> list[Command]:
     """Commands of one place without the one that switches `what` off and the one that starts it as it was `running`."""
-    if running is None:
-        return group
     off = next((k for k, c in enumerate(group) if _OFF.get(c.name) == what), -1)
-    if off < 0 or group[off].skip:
+    for command in group[:max(off, 0)]:
+        if _kind(command) == what:
+            running = None if command.skip else command
+        elif _kind(command) is None and not _passes(command):
+            running = None
+    if running is None or off < 0 or group[off].skip:
         return group
     for k in range(off + 1, len(group)):
         command = group[k]
         if _kind(command) == what:
             same = (command.name, command.args, command.skip) == (running.name, running.args, False)
             return [*group[:off], *group[off + 1:k], *group[k + 1:]] if same else group
-        restart = command.name == "OPERATION_START" and len(command.args) > 1
-        if restart or (_kind(command) is None and command.name not in _PASSES):
+        if _kind(command) is None and not _passes(command):
             return group
     return group
+
+
+def _passes(command: Command) -> bool:
+    """True where nothing that is switched needs to be stated again behind a command."""
+    restart = command.name == "OPERATION_START" and len(command.args) > 1
+    return command.name in _PASSES and not restart
 
 
 def _kind(command: Command) -> str | None:

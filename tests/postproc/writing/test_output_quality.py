@@ -90,6 +90,9 @@ def test_a_pair_is_kept_where_the_state_before_it_is_not_known() -> None:
     assert not needless_pairs({0: [Command("FLOOD_ON", skip=True)], 4: [off, on]}, 9)
     assert not needless_pairs({0: [Command("MIST_ON")], 4: [off, on]}, 9)
     assert not needless_pairs({0: [on], 4: [off, Command("OPERATION_START", ("A", 1.0)), on]}, 9)
+    assert not needless_pairs({0: [on], 4: [Command("PROGRAM_STOP"), off, on]}, 9)  # the stop may have switched it off
+    assert not needless_pairs({0: [on], 3: [Command("OPERATION_START", ("A", 1.0))], 4: [off, on]}, 9)
+    assert needless_pairs({4: [on, Command("COMMENT", ("A",)), off, on]}, 9) == {4: [on, Command("COMMENT", ("A",))]}
 
 
 # ---- stock -----------------------------------------------------------------------------------------------------------
