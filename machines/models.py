@@ -140,11 +140,11 @@ class ControlModel(UserModel):
 
 
     length_register: Register = "T"
-    """the length register H of a tool for which the CL file names none, by its number T: "T", or "T + 20"; of controls that
-    name registers"""
+    """the length register H of a tool for which the CL file names none or the tool's number T: "T", or "T + 20"; of controls
+    that name registers"""
     radius_register: Register | None = None
-    """the register D of a CUTCOM that names none, by the same rule, e.g. "T + 30"; default: that of the length where D is
-    modal, else the tool's own"""
+    """the register D of a CUTCOM that names none or the tool's number, by the same rule, e.g. "T + 30"; default: that
+    of the length where D is modal, else the tool's own"""
 
 
 class MachineModel(UserModel):

@@ -15,8 +15,9 @@ EDGES = range(1, 10)
 
 
 def by_rule(toolpath: Toolpath, controller: ControllerFile, length: int, radius: int | None) -> Toolpath:
-    """The path whose records name registers by the rules of the shop where the file names none: H = T + `length`, D = T +
-    `radius`; where the controller's codes have none, nothing is named."""
+    """The path whose records name registers by the rules of the shop, H = T + `length`, D = T + `radius`, where the file
+    names none, or the tool's number, as CAM systems do by themselves; where the controller's codes have none, nothing is
+    named."""
     codes = controller.codes
     cutcom = radius is not None and "{register}" in codes.compensation_left
     lengths = bool(length) and "{register}" in codes.length_offset
@@ -27,10 +28,12 @@ def by_rule(toolpath: Toolpath, controller: ControllerFile, length: int, radius:
         said = numbers(event)
         if event.word in TOOL_WORDS and said:
             tool = int(said[0])
-            if lengths and len(said) == 1:
-                event = replace(event, values=(*event.values, float(tool + length)))
-        elif event.word == "CUTCOM" and cutcom and compensation_side(event) in ("LEFT", "RIGHT") and not said and tool > 0:
-            event = replace(event, values=(*event.values, float(tool + (radius or 0))))
+            if lengths and (len(said) == 1 or said[1] == said[0]):
+                event = replace(event, values=(float(tool), float(tool + length)))
+        elif event.word == "CUTCOM" and cutcom and (
+                not said or said[0] == tool) and tool > 0 and compensation_side(event) in ("LEFT", "RIGHT"):
+            side = tuple(v for v in event.values if isinstance(v, str))
+            event = replace(event, values=(*side, float(tool + (radius or 0))))
         events.append(event)
     return replace(toolpath, events=tuple(events))
 

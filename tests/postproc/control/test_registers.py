@@ -89,11 +89,11 @@ def ruled(length: int, radius: int | None) -> Machine:
 
 @cache
 def contour() -> Toolpath:
-    """Two tools, the second with a register of its own in the file; each cuts under CUTCOM."""
+    """Two tools, the second with registers of its own in the file; each cuts under CUTCOM, the first twice."""
     def cut(named: str) -> list[str]:
         return ["RAPID", "GOTO/0,0,40", "FEDRAT/MMPM,500", "GOTO/0,0,30", f"CUTCOM/LEFT{named}", "GOTO/20,0,30",
                 "GOTO/40,0,30", "CUTCOM/OFF", "GOTO/50,10,30", "RAPID", "GOTO/50,10,40"]
-    return toolpath(*cut(""), "LOADTL/2,ADJUST,7", "SPINDL/RPM,2000,CLW", *cut(",9"))
+    return toolpath(*cut(""), *cut(",1"), "LOADTL/2,ADJUST,7", "SPINDL/RPM,2000,CLW", *cut(",9"))
 
 
 @cache
@@ -106,11 +106,20 @@ def test_registers_follow_the_rule_where_the_file_names_none(controller: str) ->
     result, plain = registered(controller), registered(controller, 0, None)
     assert result.ok and plain.ok, [str(d) for d in result.diagnostics]
     text = re.sub(r"\(.*?\)", "", result.text)
-    assert set(re.findall(r"H(\d+)", text)) == {"21", "7"} and re.findall(r"D(\d+)", text) == ["31", "9"]
+    assert set(re.findall(r"H(\d+)", text)) == {"21", "7"} and re.findall(r"D(\d+)", text) == ["31", "31", "9"]
     assert set(re.findall(r"H(\d+)", re.sub(r"\(.*?\)", "", plain.text))) == {"1", "7"}
     for right, wrong in (("H21", "H1"), ("H7", "H22"), ("D31", "D1")):
         assert verdict(result, result.text.replace(right, wrong)), wrong
     assert verdict(registered(controller, 0, None), result.text)  # a reader without the rule
+
+
+def test_a_file_that_names_the_tools_number_follows_the_rule_too() -> None:
+    """NX writes ADJUST,1 for T1 by itself."""
+    head = ["UNITS/MM", "LOADTL/1,ADJUST,1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600"]
+    path = toolpath("RAPID", "GOTO/0,0,40", "GOTO/0,0,30", head=head)
+    result = postproc.convert(path, ruled(20, None), "fanuc-30i", SETUP, Options())
+    assert result.ok and "H21" in result.text and not re.search(r"H1\b", result.text)
+    assert "verify.state" in verdict(result, result.text.replace("H21", "H1"))
 
 
 @pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640"])
