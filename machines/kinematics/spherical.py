@@ -8,10 +8,8 @@ import numpy as np
 
 from machines.kinematics import columns
 from machines.kinematics.columns import Columns
-from toolpaths.arrays import Floats, frozen
-from toolpaths.rotations import angle_between
-
-Vector = tuple[float, ...]
+from toolpaths.arrays import Floats, read_only
+from toolpaths.rotations import angle_between, wrap
 
 
 def meet(first: Floats, second: Floats, tool: Floats, from_pole: Floats) -> tuple[Floats, Floats]:
@@ -30,7 +28,7 @@ def meet(first: Floats, second: Floats, tool: Floats, from_pole: Floats) -> tupl
 
 
 @lru_cache(maxsize=256)
-def _triangle(first: Vector, second: Vector, tool: Vector) -> tuple[float, float, float]:
+def _triangle(first: tuple[float, ...], second: tuple[float, ...], tool: tuple[float, ...]) -> tuple[float, float, float]:
     """The sides a1, a2, and by how much `first` stands about `second` from `tool`: the same for all poses of a machine."""
     one, two, three = np.array(first), np.array(second), np.array(tool)
     return angle(one, two), angle(two, three), float(azimuth(two, columns.of_one(one)) - azimuth(two, columns.of_one(three)))
@@ -49,12 +47,12 @@ def basis(pole: Floats) -> tuple[Floats, Floats]:
 
 
 @lru_cache(maxsize=256)
-def _basis(direction: Vector) -> tuple[Floats, Floats]:
+def _basis(direction: tuple[float, ...]) -> tuple[Floats, Floats]:
     pole = np.array(direction)
     helper = np.eye(3)[(int(np.argmax(np.abs(pole))) + 1) % 3]
     e1 = perpendicular(pole, helper)
     e1 = e1 / np.linalg.norm(e1)
-    return frozen(e1, np.float64, (3,), "e1"), frozen(np.cross(pole, e1), np.float64, (3,), "e2")
+    return read_only(e1), read_only(np.cross(pole, e1))
 
 
 def perpendicular(pole: Floats, v: Floats) -> Floats:
@@ -66,9 +64,3 @@ def perpendicular(pole: Floats, v: Floats) -> Floats:
 def angle(a: Floats, b: Floats) -> float:
     """Angle between two unit vectors (3,), rad."""
     return float(angle_between(a, b))
-
-
-def wrap(angle: Floats) -> Floats:
-    """The same angles in (-pi, pi]."""
-    result: Floats = angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
-    return result

@@ -67,6 +67,8 @@ ControllerName = Annotated[str, typer.Option("-c", "--controller", help="control
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
                                      "corrected, and proved on the machine with them")]
+ToolTable = Annotated[str, typer.Option("--tool-table", metavar="FILE", help="the control's tool table: verify with the "
+                                        "lengths of tools at the machine")]
 OutputModeOption = Annotated[str, typer.Option("--output-mode", metavar="{auto,axes,tcp,tilted}", help=(
     "axes: machine coordinates, no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, TCPM, G234); tilted: tilted work "
     "plane, 3+2 (G68.2, CYCLE800, PLANE SPATIAL, G254)"))]
@@ -94,8 +96,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
             feed: Annotated[str, typer.Option("--feed", metavar="{programmed,planned}",
-                                              help="programmed: the feeds of the CL file; planned: reduced where an axis "
-                                              "would exceed velocity, acceleration or jerk")] = "programmed",
+                                              help="programmed: the feeds of the CL file; planned: lower where an "
+                                              "axis or a tool would exceed its limits")] = "programmed",
             merge_feeds: Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="merge "
                                                        "neighbouring F words within this part")] = 0.0,
             smooth: Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the "
@@ -155,14 +157,15 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            axis_tolerance: AxisToleranceOption = 0.05, units: UnitsOption = "", dialect: DialectOption = "",
            allow_unknown: Allow = None,
            error_model: Errors = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-           require_proof: RequireProof = False, proof: ProofOf = "", json: Json = "") -> None:
+           require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTable = "", json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     _choice("--orient", orient, ORIENTATIONS)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
                       error_model=error_model, orient=orient, max_tilt=max_tilt,  # type: ignore[arg-type]
                       require_proof=require_proof)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup,
-                                         "the error model": error_model, "the proof file": proof or f"{gcode}.proof.json",
+                                         "the error model": error_model, "the tool table": tool_table,
+                                         "the proof file": proof or f"{gcode}.proof.json",
                                          **own_files(machine, controller)})
     from postproc.pipeline.convert import verify as run
     from postproc.proof import command
@@ -171,7 +174,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
         path, found = _read(file, options, progress)
-        result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress)
+        result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress, tool_table=tool_table)
         kept, more = command.compared_with(result, machine, controller, proof)
     text = summary.verify_text(result) + (f"\n{kept.line()}" if kept else "")
     found = [*result.diagnostics, *more]

@@ -8,9 +8,11 @@ import numpy as np
 
 from postproc.compile.block_delete import after, skipped, with_skips
 from postproc.compile.canned import holes_of
+from postproc.compile.clamps import with_clamps
 from postproc.compile.commands import commands_of
 from postproc.compile.cycle_refusals import not_native
 from postproc.compile.feed import Feeds, PlannedTimes, plan_feeds
+from postproc.compile.hooks import with_hooks
 from postproc.compile.long_turns import long_turns, standing_unsaid, without_standing
 from postproc.compile.program import Command, Commands, Hole, Program
 from postproc.compile.sections import sections_of, with_sections
@@ -41,7 +43,7 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                        toolpath.pass_[moves.row[path.move]], native, job.options.feed_mode, controller.feed,
                        planned)
     commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.apart,
-                                        job.setup.output.tool_call)
+                                        job.setup.output.tool_call, job.setup.output.stop_between_tools)
     end = np.where(path.home[:, None], np.round(path.q * control.unit, int(places.max())), words.end)
     write = without_standing(words.write, end, control.rolls)
     keep = write.any(axis=1) | (path.code == ARC)
@@ -57,9 +59,11 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                       placed, kept_holes, places, sections, skip[keep], control.rolls,
                       control.machine.home * control.unit)
     found += long_turns(program, toolpath.file)
+    program = with_clamps(program, control.machine.clamp_codes, controller.plane_turns)
+    program = with_hooks(program, job.hooks, {tool.number: tool.name for tool in reversed(toolpath.tools)})
     found += standing_unsaid(control.rolls, control.machine.axis_names, job.setup.output.apart, bool(skip.any()),
                              toolpath.file)
-    return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, toolpath.file),
+    return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, job),
                             *_mapped(feeds, moves, path, job),
                             *not_native(toolpath, moves, path, native, controller, skip)]
 
@@ -110,12 +114,14 @@ def _mapped(feeds: Feeds, moves: Moves, path: JointPath, job: Job) -> list[Diagn
                  lines=np.unique(moves.line[path.move[rows]])[:6].tolist(), count=len(rows))]
 
 
-def _slowed(feeds: Feeds, moves: Moves, path: JointPath, planned: bool, file: str) -> list[Diagnostic]:
+def _slowed(feeds: Feeds, moves: Moves, path: JointPath, planned: bool, job: Job) -> list[Diagnostic]:
     rows = np.flatnonzero(feeds.slowed)
     if not len(rows):
         return []
     share = path.seconds[rows] / feeds.seconds[rows]
     excess = "exceed its velocity, acceleration or jerk" if planned else "be faster than its limit"
+    if planned and any(tool.limited for tool in job.setup.tools.values()):
+        excess += ", or the tool a limit of the set-up"
     return [info("feed.reduced", f"feed reduced, down to {100.0 * share.min():.1f} %, where an axis would "
-                 f"{excess}", file=file, lines=np.unique(moves.line[path.move[rows]])[:6].tolist(),
+                 f"{excess}", file=job.toolpath.file, lines=np.unique(moves.line[path.move[rows]])[:6].tolist(),
                  count=len(rows))]

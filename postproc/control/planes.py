@@ -12,15 +12,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
-Convention = Literal["ZXZ", "ZYX", "XYZ", "rotary"]
 _GIMBAL = 1e-9
 """sine or cosine of the middle angle below which the first and third turn are about one axis"""
 
@@ -32,10 +30,6 @@ class Plane:
 
     rotation: Floats
     origin: Floats
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", frozen(self.rotation, np.float64, (3, 3), "Plane.rotation"))
-        object.__setattr__(self, "origin", frozen(self.origin, np.float64, (3,), "Plane.origin"))
 
     @cached_property
     def key(self) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ from postproc.cycle_time.shape import NOTHING, shape
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import arc_sweeps, coordinates, positions
 from postproc.readback.text.canonical import LOADED, OFFSET, REGISTER, REST, SMOOTH, Canonical
+from postproc.readback.text.clamps import closing, opening
 from postproc.readback.text.modal import columns, fill_values, modal_state
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
@@ -50,7 +51,7 @@ class BlockOrigin:
 
 
 def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Control, origin: BlockOrigin | None = None,
-              own_path: bool = True, by_radius: bool = False) -> MotionBlocks:
+              own_path: bool = True, by_radius: bool = False, override: float = 1.0) -> MotionBlocks:
     """The blocks that move, with their pauses.
 
     Args:
@@ -59,6 +60,7 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
         own_path: True where a program without a path mode blends without a limit, and a feed keeps the units that held when
             it was stated (LinuxCNC), else both are the control's
         by_radius: inverse time of arcs counts radians
+        override: the operator's feed override, 1 for 100 %: of feeds alone, not of rapids and taps
     """
     origin = origin or BlockOrigin.by_tool(motion)
     block = _block_of(code, motion)
@@ -75,7 +77,8 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
                           pauses,
                           origin.cl_line, origin.move, _tip_lengths(motion, control))
     inch = _feed_inch(words, block, own_path)
-    blocks = replace(blocks, speed=_speeds(inch, motion, blocks, by_radius))
+    turned = np.where(np.isnan(motion.pitch), override, 1.0)
+    blocks = replace(blocks, speed=_speeds(inch, motion, blocks, by_radius) * turned)
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
     blocks = _unrolled(blocks, motion, control, unit) if (motion.frame > 0).any() else blocks.take(moving)
     return replace(blocks, pauses=_with_indexing(blocks, machine))
@@ -206,29 +209,38 @@ def _speeds(inch: Bools, motion: Motion, blocks: MotionBlocks, by_radius: bool) 
 def _pauses(words: Words, block: Ints, line: Ints, motion: Motion, machine: Machine) -> Pauses:
     """Rests by the codes of the program; dwells stand with the row that they follow, those of 0 s are stops."""
     at, codes = words.pick("M")
-    at, codes = at[np.isin(codes, RESTING_M)], codes[np.isin(codes, RESTING_M)]
+    clamps, unclamps = closing(machine.clamp_codes), opening(machine.clamp_codes)
+    resting = np.isin(codes, (*RESTING_M, *clamps, *unclamps))
+    at, codes = at[resting], codes[resting]
     changes, other = words.pick(LOADED)[0], np.concatenate([words.pick(sign)[0] for sign in (REGISTER, OFFSET, "S")])
     rests = np.flatnonzero(motion.dwell > 0.0)
     empty = words.pick(REST)[0][words.pick(REST)[1] == 0.0]
     where = np.concatenate([at, changes, other, empty, block[rests]])
     row = np.searchsorted(block, where) - 1
     row[len(where) - len(rests):] = rests
-    cause = np.concatenate([np.where(np.isin(codes, (3.0, 4.0)), Cause.SPINDLE, Cause.OTHER),
+    of_codes = np.where(np.isin(codes, (3.0, 4.0)), Cause.SPINDLE, Cause.OTHER)
+    of_codes[np.isin(codes, (*clamps, *unclamps))] = Cause.INDEXING
+    cause = np.concatenate([of_codes,
                             np.full(len(changes), Cause.TOOL_CHANGE), np.full(len(other), Cause.OTHER),
                             np.full(len(empty) + len(rests), Cause.DWELL)])
     seconds = np.where(cause == Cause.TOOL_CHANGE, machine.timing.tool_change, 0.0)
+    seconds[:len(at)] += np.where(np.isin(codes, clamps), machine.timing.clamp, 0.0)
+    seconds[:len(at)] += np.where(np.isin(codes, unclamps), machine.timing.unclamp, 0.0)
     seconds[len(where) - len(rests):] = motion.dwell[rests]
     order = np.lexsort((where, row))
     return Pauses(row[order], cause[order], seconds[order], line[where[order]])
 
 
 def _with_indexing(blocks: MotionBlocks, machine: Machine) -> Pauses:
-    """The pauses with clamp and unclamp: where a run of rapids turns axes that the cut behind it leaves at rest."""
+    """The pauses with clamp and unclamp: where a run of rapids turns axes that the cut behind it leaves at rest.
+
+    Of axes that the machine clamps by itself; codes of the program that do so are pauses of their own."""
     timing, pauses = machine.timing, blocks.pauses
+    own = blocks.axes.rotary & ~np.array([bool(codes.clamp) for codes in machine.clamps])
     seconds = timing.clamp + timing.unclamp
     if seconds <= 0.0 or not len(blocks):
         return pauses
-    turned = np.abs((blocks.end - blocks.start)[:, blocks.axes.rotary]).max(axis=1, initial=0.0) > NOTHING
+    turned = np.abs((blocks.end - blocks.start)[:, own]).max(axis=1, initial=0.0) > NOTHING
     cuts = np.flatnonzero(~blocks.rapid)
     following = np.searchsorted(cuts, np.arange(len(blocks)))
     moves_on = np.append(turned[cuts], True)[following]

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from machines.hooks import HooksModel
 from machines.user_file import UserModel, read_toml, validate
 from postproc.setup.bodies import BodiesModel, ToolBody
 from postproc.setup.files import seen_from_here
@@ -60,6 +61,17 @@ class ToolSetup(ToolBody):
     """where the CL file states no SPINDL for this tool, e.g. spindle = { rpm = 8000, direction = "clockwise" }"""
     coolant: CoolantKind | None = None
     """where the CL file states no COOLNT for this tool"""
+    tip_acceleration: float | None = Field(default=None, gt=0.0)
+    """largest acceleration of the tip along its path on the part, mm/s2; kept by --feed planned; default: no limit"""
+    tip_jerk: float | None = Field(default=None, gt=0.0)
+    """largest jerk of the tip along its path on the part, mm/s3; kept by --feed planned; default: no limit"""
+    axis_rate: float | None = Field(default=None, gt=0.0)
+    """largest rate at which the tool axis turns on the part, degrees/s; kept by --feed planned; default: no limit"""
+
+    @property
+    def limited(self) -> bool:
+        """True where the tool has a limit of its own."""
+        return (self.tip_acceleration, self.tip_jerk, self.axis_rate) != (None, None, None)
 
     @property
     def length(self) -> float:
@@ -96,6 +108,10 @@ class OutputSettings(UserModel):
     """false: the program calls no tool and no length: the one tool of the file stands in the spindle already and its length
     is measured into the work offset. [tools.N] gauge_length (N = 0 for a tool without a number) is then part of the work
     offset that the header names"""
+
+    stop_between_tools: bool = False
+    """an optional stop (M1) before every tool change but the first, spindle and coolant off; where the CL file stops there
+    itself, none besides"""
 
     @property
     def apart(self) -> bool:
@@ -168,6 +184,8 @@ class SetupFile(UserModel):
     """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""
     rewind: RewindSettings = RewindSettings()
     joints: Joints = Joints()
+    hooks: HooksModel = HooksModel()
+    """blocks of the shop for this job, as in the machine file: a key that is stated here takes the place of that there"""
     bodies: BodiesModel | None = None
     """part, table and fixtures that the tools must not touch"""
     orientation: OrientationLimits = OrientationLimits()

@@ -52,7 +52,7 @@ class ActualBlockPoses(BlockPoses):
         for kept, time, found in self._seen:
             if kept is rows and time is t:
                 return found
-        found = (np.concatenate(self.nominal(motion, rows, t), axis=1), super().joints(motion, rows, t),
+        found = (np.concatenate(super().poses(motion, rows, t), axis=1), super().joints(motion, rows, t),
                  self._approach(motion, rows, t))
         if len(rows) <= AT_ONCE:
             self._seen[:] = [*self._seen[1 - PLACES:], (rows, t, found)]
@@ -75,17 +75,8 @@ class ActualBlockPoses(BlockPoses):
         return []
 
     def nominal(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
-        """The same of the machine without errors."""
-        return super().poses(motion, rows, t)
-
-    def lawful(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
-        """See `BlockPoses`: the law is that of the machine without errors, as the control holds it."""
-        pose, q, _ = self._at(motion, rows, t)
-        for k, (number,) in alike(motion.frame[rows]) if self.control.own_kinematics is not None else ():
-            held = motion.frames[number].kinematics
-            if held is not None:
-                pose = np.array(pose)
-                pose[k] = np.concatenate(held.forward(q[k]), axis=1)
+        """See `BlockPoses`."""
+        pose = self._at(motion, rows, t)[0]
         return pose[:, :3], pose[:, 3:]
 
     def off_law(self, motion: Motion, rows: Ints) -> Bools:
@@ -96,7 +87,7 @@ class ActualBlockPoses(BlockPoses):
         """See `BlockPoses`: of the errors, and of other pivots of the control where it has some."""
         found = joined((k, self.actual(tool).error_rates(q[k], reach[k]) or unknown_rates(len(k), q.shape[1]))
                        for k, (tool,) in alike(motion.tool[rows]))
-        held = np.flatnonzero(super().off_law(motion, rows))
+        held = np.flatnonzero(self._other_pivots(motion, rows))
         if not len(held):
             return found
         tip = np.array(found.tip)

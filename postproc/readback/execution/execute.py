@@ -13,7 +13,7 @@ from postproc.readback.execution.frames import AXES, ExecutionFrame, FrameTable
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.execution.rows import INCH, BlockSection, MotionRows
 from postproc.readback.execution.sections import run_section
-from postproc.readback.text.canonical import CALL, LAW, REST, TURNS, Canonical, ProgramText, WordMeaning, in_files, placed
+from postproc.readback.text.canonical import CALL, LAW, REST, TURNS, Canonical, WordMeaning, in_files, placed
 from postproc.readback.text.modal import Modal, columns, fill, fill_values, modal_state, number_of
 from postproc.readback.text.words import Words
 from postproc.reference.coolant import FLOOD, MIST
@@ -23,9 +23,10 @@ from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
-@arrays(line="E", code="E", end="E J", start="J", plane="E", ccw="E", center="E 3", feed="E", inverse="E", tool="E",
-        register="E", spindle="E", rpm="E", coolant="E", hole="E", missing_feed="E", dwell="E", compensation="E",
-        offset="E", blend="E", frame="E", block="E", radius="E", pitch="E", floating="E", inch="E")
+@arrays(line="E", code="int8: E", end="E J", start="J", plane="int8: E", ccw="E", center="E 3", feed="E", inverse="E",
+        tool="E", register="E", spindle="int8: E", rpm="E", coolant="E", hole="E", missing_feed="E", dwell="E",
+        compensation="int8: E", offset="E", blend="E", frame="E", block="E", radius="E", pitch="E", floating="E",
+        inch="E")
 class Motion:
     """E executed blocks.
 
@@ -214,14 +215,3 @@ def _feeds(words: Words, modal: Modal, rows: MotionRows) -> tuple[Floats, Bools]
     if rows.hole.any():
         value = np.where(np.isfinite(rows.feed), rows.feed, value)
     return value, (rows.code > 0) & ~(value > 0.0)
-
-
-def execute(words: Words, letters: tuple[str, ...], offsets: Offsets, file: str = "") -> tuple[Motion, list[Diagnostic]]:
-    """The motion of a program in RS274/NGC words, without subprograms, that starts with the machine at home."""
-    from postproc.readback.dialects.iso import IsoReader
-
-    reader = IsoReader(letters)
-    found = reader.check(words, file)
-    canonical, more = reader.translated(ProgramText(words), np.arange(words.lines + 1), file)
-    motion, last = run(canonical, letters, offsets, file)
-    return motion, [*found, *more, *last]
