@@ -18,7 +18,13 @@ def tree(path: Path) -> ast.Module:
 @cache
 def nodes(path: Path) -> tuple[ast.AST, ...]:
     """All nodes of a file, in the order of `ast.walk`."""
-    return tuple(ast.walk(tree(path)))
+    return walked(tree(path))
+
+
+@cache
+def walked(top: ast.AST) -> tuple[ast.AST, ...]:
+    """All nodes at and below one, in the order of `ast.walk`, which nobody changes."""
+    return tuple(ast.walk(top))
 
 
 @cache

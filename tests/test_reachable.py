@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.source import ROOT, product, tree
+from tests.source import ROOT, product, tree, walked
 
 PRODUCT = product()
 SAMPLES = sorted((ROOT / "samples").rglob("*.py"))
@@ -45,7 +45,7 @@ def module(path: Path) -> str:
 def imports(found: ast.AST) -> Iterator[tuple[str, str]]:
     """(module, name) of each import, and of each attribute of an imported module."""
     alias = {}
-    for node in ast.walk(found):
+    for node in walked(found):
         if isinstance(node, ast.ImportFrom) and node.module:
             for one in node.names:
                 alias[one.asname or one.name] = f"{node.module}.{one.name}"
@@ -53,7 +53,7 @@ def imports(found: ast.AST) -> Iterator[tuple[str, str]]:
         elif isinstance(node, ast.Import):
             for one in node.names:
                 alias[one.asname or one.name.split(".")[0]] = one.name if one.asname else one.name.split(".")[0]
-    for node in ast.walk(found):
+    for node in walked(found):
         if isinstance(node, ast.Attribute):
             names, inner = [node.attr], node.value
             while isinstance(inner, ast.Attribute):
@@ -71,7 +71,7 @@ def examples(path: Path) -> list[ast.Module]:
 
 def words(found: ast.AST) -> Iterator[str]:
     """Attributes, and texts that may name one."""
-    for node in ast.walk(found):
+    for node in walked(found):
         if isinstance(node, ast.Attribute):
             yield node.attr
         elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isidentifier():

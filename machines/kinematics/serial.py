@@ -28,7 +28,7 @@ from machines.kinematics.frames import reference_x, spin_about
 from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats
-from toolpaths.rotations import angle_between, wrap
+from toolpaths.rotations import angle_between, cross, lengths, wrap
 from toolpaths.shapes import arrays
 
 ROUND_OFF = 1e-12
@@ -373,7 +373,7 @@ class Serial(Kinematics):
 
 def _along(direction: Floats, v: Floats) -> Bools:
     """True (N,) where v (N, 3) lies along +-direction."""
-    result: Bools = np.linalg.norm(np.cross(v, direction), axis=1) < ROUND_OFF
+    result: Bools = lengths(cross(v, direction)) < ROUND_OFF
     return result
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats
+from toolpaths.rotations import cross
 from toolpaths.shapes import arrays
 
 
@@ -151,12 +152,12 @@ def three_spheres(centres: Floats, radii: Floats) -> tuple[Floats, Floats]:
     """
     first = centres[:, 0]
     e1, e2 = centres[:, 1] - first, centres[:, 2] - first
-    normal = np.cross(e1, e2)
+    normal = cross(e1, e2)
     square = np.einsum("ni,ni->n", normal, normal)
     k1 = 0.5 * (np.einsum("ni,ni->n", e1, e1) + radii[0] ** 2 - radii[1] ** 2)
     k2 = 0.5 * (np.einsum("ni,ni->n", e2, e2) + radii[0] ** 2 - radii[2] ** 2)
     square = np.where(square > 0.0, square, np.nan)
-    foot = (k1[:, None] * np.cross(e2, normal) + k2[:, None] * np.cross(normal, e1)) / square[:, None]
+    foot = (k1[:, None] * cross(e2, normal) + k2[:, None] * cross(normal, e1)) / square[:, None]
     rest = radii[0] ** 2 - np.einsum("ni,ni->n", foot, foot)
     height = np.sqrt(np.where(rest >= 0.0, rest, np.nan) / square)
     return first + foot, height[:, None] * normal

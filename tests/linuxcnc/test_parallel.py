@@ -52,7 +52,7 @@ def converted(sample: str, machine: str, setup_name: str, controller: str | Path
 
 @pytest.mark.parametrize(("sample", "machine", "setup_name"), [
     ("h4a_dome.cls", "h4a-c-table", "h4a"), ("h4a_indexed.cls", "h4a-spindle-axis", "h4a"),
-    ("pocket.cls", "uranesx", "delta"), ("pocket.cls", DELTA, "tools")])
+    pytest.param("pocket.cls", "uranesx", "delta", marks=pytest.mark.slow), ("pocket.cls", DELTA, "tools")])
 def test_linuxcnc_reads_what_we_meant(interpret, sample: str, machine: str, setup_name: str) -> None:
     """Positions, feed modes and the time of each block, of programs whose words are joints (X, Y, Z, U and C or B)."""
     o = outputs.output(converted(sample, machine, setup_name), interpret)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from tests.mutants.plant import Fault
 
 FAULTS = (
-    Fault("G2 and G3 exchanged", "writer of linuxcnc", "IsoWriter.heads", "bool(p.ccw[first + row])",
-          "not p.ccw[first + row]"),
+    Fault("G2 and G3 exchanged", "writer of linuxcnc", "IsoWriter.heads", "p.ccw.item(first + row)",
+          "not p.ccw.item(first + row)"),
     Fault("feed word left out where it changes back", "writer of linuxcnc", "IsoWriter.feeds",
           "if needed[k] or text != self.feed:", "if needed[k] or float(text) > float(self.feed or 0):"),
     Fault("I and J exchanged", "writer of linuxcnc", "IsoWriter.arc_words", "{'IJK'[i]}", "{'JIK'[i]}"),
@@ -30,8 +30,8 @@ FAULTS = (
           "rows = np.flatnonzero(p.write[at:stop, j])",
           "rows = np.flatnonzero(p.write[at:stop, j])[::2] if letter == 'Z' else "
           "np.flatnonzero(p.write[at:stop, j])"),
-    Fault("length offset never on", "writer of fanuc", "IsoWriter.add_length", "heads[at] += self.space + code",
-          "pass"),
+    Fault("length offset never on", "writer of fanuc", "IsoWriter.add_length",
+          "heads[at - first] += self.space + code", "pass"),
     Fault("G54 for the set-up's work offset", "writer of fanuc", "Writer.start",
           'block.replace("{work_offset}", self.work_offset)', 'block.replace("{work_offset}", "G55")'),
     Fault("rigid tapping not announced", "writer of fanuc", "IsoWriter.hole", 'if hole.key.startswith("TAP") and',

@@ -179,6 +179,7 @@ def test_rates_are_derivatives_of_the_nominal_place(name: str) -> None:
         assert (up - down) / 2e-5 == pytest.approx(rates[:, :, k], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.numeric
 @pytest.mark.parametrize("name", NAMES)
 def test_the_compiled_closure_is_the_one_of_numpy(name: str, monkeypatch: pytest.MonkeyPatch) -> None:

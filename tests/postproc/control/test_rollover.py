@@ -88,6 +88,7 @@ def c_of(result: PostResult) -> np.ndarray:
     return result.comparison.executed[1].end[:, result.machine.axis_names.index("C")]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 @pytest.mark.parametrize(("controller", "rule"), RULES)
 def test_words_stay_inside_one_turn_and_turn_as_planned(controller: str, rule: str, sense: float) -> None:
@@ -106,6 +107,7 @@ def test_words_stay_inside_one_turn_and_turn_as_planned(controller: str, rule: s
     assert abs(last - 360.0 * round(last / 360.0)) < 1e-6  # parked at a whole turn, nothing unwound
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("controller", "rule"), [("fanuc-30i", "shortest"), ("siemens-840d", "shortest"),
                                                    ("heidenhain-tnc640", "shortest"), ("haas-ngc", "shortest")])
 @pytest.mark.parametrize("output", ["tcp", "auto"])

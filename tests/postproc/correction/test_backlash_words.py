@@ -69,14 +69,17 @@ def steps_of(ends: BlockEnds) -> Floats:
 
 
 @pytest.mark.numeric
-@pytest.mark.parametrize("lossy", [1, 2, 3])
-def test_the_walk_interpreted_and_compiled_is_the_one_of_numpy(lossy: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("lossy", "made"), [
+    *((lossy, False) for lossy in (1, 2, 3)), *(pytest.param(lossy, True, marks=pytest.mark.slow) for lossy in (1, 2, 3))])
+def test_the_walk_interpreted_and_compiled_is_the_one_of_numpy(lossy: int, made: bool,
+                                                               monkeypatch: pytest.MonkeyPatch) -> None:
     ends = random_ends(np.random.default_rng(lossy), 400, lossy, 8.7e-5)
     plain, approaches = walk_by_numpy.walk(ends)
     monkeypatch.setattr(walking, "chosen", lambda function, *_: function)
-    as_it_stands = walking.walk(ends)
-    monkeypatch.setattr(walking, "chosen", lambda function, *_: compiled(function))
-    fast = walking.walk(ends)
+    fast = as_it_stands = walking.walk(ends)
+    if made:
+        monkeypatch.setattr(walking, "chosen", lambda function, *_: compiled(function))
+        fast = walking.walk(ends)
     np.testing.assert_array_equal(fast[0], plain)
     np.testing.assert_array_equal(as_it_stands[0], plain)
     np.testing.assert_array_equal(as_it_stands[1], fast[1])

@@ -122,6 +122,7 @@ def leaning(lines: list[str], axis: np.ndarray) -> list[str]:
     return result
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("output", [{}, {"restart": True}, {"subprograms": True}], ids=["plain", "restart", "subprograms"])
 @pytest.mark.parametrize(("controller", "machine"), [
     *product(["linuxcnc", "generic-iso", "fanuc-30i", "siemens-840d", "heidenhain-tnc640"], ["mikron-ucp710"]),

@@ -132,6 +132,7 @@ def test_what_no_mode_converts_fails_once_with_what_to_do(monkeypatch: pytest.Mo
     assert "output.next_mode" not in {d.code for d in result.diagnostics}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["fanuc-30i", "heidenhain-tnc640"])
 @pytest.mark.parametrize("sample", ["five_faces.cls", "joints/singular_pass.cls"])
 def test_auto_converts_what_another_mode_converts(sample: str, controller: str) -> None:

@@ -48,6 +48,7 @@ def converted(name: str, controller: str) -> PostResult:
     return good(postproc.convert(path, own_machine(name), controller=controller, setup=setup))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", CONTROLS)
 @pytest.mark.parametrize("name", ["scissors", "polar", "tilting"])
 def test_a_kind_with_inverse_and_forward_alone_converts_checked_not_proved(name: str, controller: str) -> None:

@@ -14,6 +14,7 @@ from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.serial import Serial
 from postproc.readback.comparison import compare as compare_module
 from postproc.readback.comparison import deviation_bound as bound_module
+from postproc.readback.execution import actual as actual_module
 from postproc.verification.proof_text import statement
 from postproc.verification.read_back import _executed
 from tests.postproc.kit import SAMPLES, codes, convert, good, goto, setup_of, toolpath
@@ -90,6 +91,14 @@ def test_the_machine_with_its_errors_is_bounded(which):
     assert comparison.unbounded == 0 and comparison.bounded_cuts == comparison.cuts > 0
     assert tip <= comparison.tip_bound <= max(1.12 * tip, 1e-6)
     assert axis <= comparison.axis_bound <= max(1.05 * axis, 1e-7)
+
+
+def test_places_looked_at_together_are_those_looked_at_one_by_one(monkeypatch):
+    together = good(corrected(*ERRORS[1])).comparison
+    monkeypatch.setattr(actual_module, "AT_ONCE", 1)
+    alone = good(corrected.__wrapped__(*ERRORS[1])).comparison
+    assert (together.tip_bound, together.axis_bound) == pytest.approx((alone.tip_bound, alone.axis_bound), rel=1e-12)
+    assert (together.worst_tip, together.worst_axis) == pytest.approx((alone.worst_tip, alone.worst_axis), rel=1e-12)
 
 
 @pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640", "fanuc-30i"])

@@ -52,7 +52,7 @@ def deviation(result: PostResult, q: Floats, machine: str, length: float) -> Flo
 
 
 def test_the_field_is_that_of_the_machine_in_the_frame_of_the_part() -> None:
-    result, noted = field("pocket.cls", "uranesx", turned("delta"))
+    result, noted = field("inch_plate.apt", "uranesx", turned("delta"))
     lengths = {tool.gauge_length for tool in result.setup.tools.values()}
     off = np.min([np.abs(deviation(result, noted.q, "uranesx", float(x or 0.0)) - noted.before).max(axis=1)
                   for x in lengths], axis=0)
@@ -101,7 +101,7 @@ def test_without_a_field_nothing_is_written(tmp_path: Path) -> None:
     model = tmp_path / "control.toml"
     text = Path("samples/errors/uranesx.toml").read_text()
     model.write_text('corrected_by = "control"\n' + "\n".join(x for x in text.splitlines() if "corrected_by" not in x))
-    common = ["convert", "samples/pocket.cls", "-m", "uranesx", "-c", "linuxcnc", "--setup", "samples/delta.setup.toml",
+    common = ["convert", "samples/inch_plate.apt", "-m", "uranesx", "-c", "linuxcnc", "--setup", "samples/delta.setup.toml",
               "-o", str(tmp_path / "a.ngc")]
     run = CliRunner().invoke(app, [*common, "--error-model", str(model), "--residuals", str(tmp_path / "r.csv")])
     assert run.exit_code == 1 and "residuals.none" in run.output
@@ -126,7 +126,7 @@ def test_a_residual_file_replaces_no_other(tmp_path: Path) -> None:
 def test_an_ending_that_is_none() -> None:
     setup, _ = load_setup("samples/delta.setup.toml")
     assert setup is not None
-    result, noted = field("pocket.cls", "uranesx", setup)
+    result, noted = field("inch_plate.apt", "uranesx", setup)
     with pytest.raises(ValueError, match="figure format"):
         contents(result, [".pdf"])
     assert UM < noted.tip_bound * 10.0 < 10.0 * UM and noted.axis_bound > DEG / 3600.0

@@ -15,9 +15,13 @@ import postproc
 import toolpaths
 from postproc.base.options import Options
 from postproc.compile.program import Hole
+from postproc.controllers.model import load_controller
+from postproc.job.job import Job, prepare
 from postproc.pipeline.result import PostResult
+from postproc.setup.model import load_setup
 from postproc.verification.residual_errors import after_formatting
 from postproc.writing.polar_arc import REACH, polar_arc
+from tests.postproc.kit import machine
 from tests.postproc.program_kit import blocks, program, step
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
@@ -145,6 +149,16 @@ def converted(controller: str, model: str, sample: str = "pocket.cls") -> PostRe
     return postproc.convert(path, "mikron-ucp710", controller, options=options, diagnostics=found)
 
 
+def job_of(controller: str, model: str) -> Job:
+    """The first stage of that alone."""
+    path, _ = toolpaths.read(SAMPLES / "pocket.cls")
+    (spec, _), (setup, _) = load_controller(controller), load_setup(SAMPLES / "tools.setup.toml")
+    assert spec is not None and setup is not None
+    job, found = prepare(path, machine("mikron-ucp710"), spec, setup, Options(error_model=model, output="tcp"))
+    assert job is not None, found
+    return job
+
+
 MODEL = str(SAMPLES / "errors/mikron-ucp710.toml")
 
 
@@ -158,9 +172,8 @@ def test_corrected_arcs_end_inside_the_bound() -> None:
 def test_the_bound_counts_helices_where_there_are_some() -> None:
     """Half a last decimal in X, Y, Z; more where arcs climb or the correction may make them, on this control alone."""
     words = 0.5 * GRAIN * math.sqrt(3.0)
-    results = (converted("heidenhain-tnc640", MODEL), converted("heidenhain-tnc640", ""), converted("siemens-840d", MODEL))
-    corrected, plain, other = (result.job for result in results)
-    assert corrected is not None and plain is not None and other is not None
+    corrected, plain, other = (job_of(*each) for each in (("heidenhain-tnc640", MODEL), ("heidenhain-tnc640", ""),
+                                                          ("siemens-840d", MODEL)))
     assert other.rounding.tip == pytest.approx(words)
     moves = plain.moves
     arcs = np.flatnonzero((moves.arc >= 0) & ~moves.link)

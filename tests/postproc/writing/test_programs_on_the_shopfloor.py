@@ -78,6 +78,7 @@ def test_files_of_another_program_are_not_replaced_in_silence(tmp_path: Path) ->
     assert own.exit_code == 1 and "file.own_name" in own.output and (out / "O1001").read_bytes() == before
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("keys", "step"), [({}, 10), ({"subprograms": True}, 10), ({"subprograms": True}, 1001)])
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_no_block_number_stands_twice(controller: str, keys: dict[str, object], step: int, tmp_path: Path) -> None:
@@ -134,6 +135,7 @@ def test_positions_beyond_a_turn_name_the_setting_that_they_need(controller: str
     assert not any("NEEDS" in t.upper() for t in near)
 
 
+@pytest.mark.covering
 @pytest.mark.covering
 @pytest.mark.parametrize("level", [8, 20])
 @pytest.mark.parametrize("controller", [*CONTROLLERS, "linuxcnc"])
