@@ -104,7 +104,7 @@ def _plain(event: Event, spindle: Spindle, controller: ControllerFile, report: R
     if not bare:
         return [Event(event.index, "PPRINT", (text.strip("(); "),), event.line)] if text else []
     if not _BLOCK.fullmatch(bare):
-        report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]} is no block of G-code", event.line,
+        report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]} is not a block of G-code", event.line,
                "write text for people with PPRINT")
         return []
     said = [(letter, float(value)) for letter, value in _WORD.findall(bare)]
