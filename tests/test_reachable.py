@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from machines.kinds import BUILT_IN
+
 ROOT = Path(__file__).parents[1]
 PRODUCT = sorted(p for top in ("toolpaths", "machines", "postproc") for p in (ROOT / top).rglob("*.py"))
 SAMPLES = sorted((ROOT / "samples").rglob("*.py"))
@@ -28,7 +30,6 @@ LISTED = {
     "PlannedMotion.trajectories": "samples of what is planned, for users of the package (postproc/README.md)",
     "StretchSpeeds.lowest": "a result of `Plan.blocks`, in the example of feedrate/README.md",
     "StretchSpeeds.highest": "likewise", "__getattr__": "called by Python",
-    "LinearDeltaModel": "named by `machines/kinds.py`", "H4LinearModel": "likewise", "SerialModel": "likewise",
 }
 """name: why it stays"""
 BLOCK_ENDS = ("by_approach", "tip_rates", "later", "goes_on", "like")
@@ -110,6 +111,8 @@ def all_unused() -> dict[str, str]:
     for found in users():
         for owner, name in imports(found):
             imported.setdefault(owner, set()).add(name)
+    for owner, name in (entry.split(":") for entry in BUILT_IN.values()):
+        imported.setdefault(owner, set()).add(name)
     return {name: str(path.relative_to(ROOT)) for path in PRODUCT
             for name in unused(tree(path), imported.get(module(path), set()))}
 
