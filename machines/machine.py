@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
 
@@ -27,11 +28,6 @@ class Limits:
     jerk: Floats
     assumed: frozenset[str] = frozenset()
     """e.g. "X.velocity" """
-
-    def __post_init__(self) -> None:
-        n = len(self.lower)
-        for name in ("lower", "upper", "velocity", "acceleration", "jerk"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n,), f"Limits.{name}"))
 
 
 @dataclass(frozen=True)
@@ -59,6 +55,14 @@ class Turns:
     low: float = 0.0
     rollover: str = ""
     park: str = "turn"
+
+
+@dataclass(frozen=True)
+class ClampCodes:
+    """M codes, e.g. "M10", that clamp and release a rotary axis; "" where the machine does so by itself."""
+
+    clamp: str = ""
+    unclamp: str = ""
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,8 @@ class Machine:
         stop: what a stop of the program switches off: "spindle and coolant", "spindle", "nothing", or "" where the machine
             file does not say
         turns: per joint, how it counts its turns; () as by `Turns()`
+        clamps: per joint, the codes that clamp and release it; () as by `ClampCodes()`
+        hooks: blocks of the shop at certain places of a program
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
 
@@ -110,7 +116,19 @@ class Machine:
     stop: str = ""
     stated: Limits | None = None
     turns: tuple[Turns, ...] = ()
+    clamps: tuple[ClampCodes, ...] = ()
+    hooks: HooksModel = field(default_factory=HooksModel)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
-        object.__setattr__(self, "home", frozen(self.home, np.float64, (len(self.axis_names),), "Machine.home"))
+        object.__setattr__(self, "clamps", self.clamps or (ClampCodes(),) * len(self.axis_names))
+
+    @property
+    def clamp_codes(self) -> dict[str, ClampCodes]:
+        """The codes of the axes that the program clamps, by letter."""
+        return {name: codes for name, codes in zip(self.axis_names, self.clamps, strict=True) if codes.clamp}
+
+    @property
+    def endless(self) -> Bools:
+        """(J,) rotary joints whose travel has no end."""
+        return np.asarray(np.array(self.rotary) & ~np.isfinite(self.limits.upper - self.limits.lower))

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from machines.kinds import BUILT_IN
+from tests.source import ROOT, product, tree
 
-ROOT = Path(__file__).parents[1]
-PRODUCT = sorted(p for top in ("toolpaths", "machines", "postproc") for p in (ROOT / top).rglob("*.py"))
+PRODUCT = product()
 SAMPLES = sorted((ROOT / "samples").rglob("*.py"))
 PAGES = [p for p in sorted(ROOT.glob("*.md")) + sorted(p for top in ("toolpaths", "machines", "postproc") for p in
                                                        (ROOT / top).rglob("*.md")) if "```python" in p.read_text("utf-8")]
@@ -30,6 +30,7 @@ LISTED = {
     "PlannedMotion.trajectories": "samples of what is planned, for users of the package (postproc/README.md)",
     "StretchSpeeds.lowest": "a result of `Plan.blocks`, in the example of feedrate/README.md",
     "StretchSpeeds.highest": "likewise", "__getattr__": "called by Python",
+    "declared": "what a class declares of its arrays: tests/toolpaths/test_shapes.py looks at every dataclass",
 }
 """name: why it stays"""
 BLOCK_ENDS = ("by_approach", "tip_rates", "later", "goes_on", "like")
@@ -39,11 +40,6 @@ BLOCK_ENDS = ("by_approach", "tip_rates", "later", "goes_on", "like")
 def module(path: Path) -> str:
     parts = path.relative_to(ROOT).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-@cache
-def tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text("utf-8"))
 
 
 def imports(found: ast.AST) -> Iterator[tuple[str, str]]:
@@ -99,10 +95,11 @@ def defined(node: ast.stmt) -> list[str]:
 
 def unused(file: ast.Module, imported: set[str]) -> Iterator[str]:
     """Names of a file that nobody imports, and that no other statement of the file uses."""
-    for node in file.body:
-        others = [n for other in file.body if other is not node for n in ast.walk(other)]
-        inside = {n.id if isinstance(n, ast.Name) else n.value for n in others if isinstance(n, ast.Name | ast.Constant)}
-        yield from (name for name in defined(node) if name not in inside and name not in imported)
+    inside = [{n.id if isinstance(n, ast.Name) else n.value for n in ast.walk(node)
+               if isinstance(n, ast.Name | ast.Constant)} for node in file.body]
+    uses = Counter(name for names in inside for name in names)
+    for node, own in zip(file.body, inside, strict=True):
+        yield from (name for name in defined(node) if uses[name] == (name in own) and name not in imported)
 
 
 def all_unused() -> dict[str, str]:

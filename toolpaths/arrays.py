@@ -58,18 +58,8 @@ def as_slice(index: Ints) -> Ints | slice:
     return slice(int(index[0]), int(index[-1]) + 1)
 
 
-def frozen(values: npt.ArrayLike, dtype: npt.DTypeLike, shape: tuple[int, ...], name: str) -> Array:
-    """`values` as a read-only array of `dtype`; -1 in `shape` allows any length.
-
-    A writable array that already fits is not copied: a read-only view of it is returned.
-
-    Raises:
-        ValueError: where the shape does not fit.
-    """
-    array = np.asarray(values, dtype=dtype)
-    if array.ndim != len(shape) or any(want not in (-1, got) for want, got in zip(shape, array.shape, strict=True)):
-        wanted = "(" + ", ".join("any" if n < 0 else str(n) for n in shape) + ")"
-        raise ValueError(f"{name} has shape {array.shape}, expected {wanted}")
-    view = array.view()
+def read_only(values: npt.ArrayLike) -> Floats:
+    """A read-only view of an array, or what is none as one."""
+    view: Floats = np.asarray(values, dtype=np.float64).view()
     view.flags.writeable = False
     return view

@@ -1,40 +1,70 @@
-"""Read-only arrays of checked shapes in every frozen value: `@arrays` below `@dataclass`.
+"""Read-only arrays of checked shapes and types in every frozen value: `@arrays` below `@dataclass`.
 
     @dataclass(frozen=True)
-    @arrays(tip="N 3", axis="N 3", line="N", ends="N+1")
+    @arrays(tip="N 3", axis="N 3", line="N", ends="N+1", kind="int8: N")
     class Targets:
         tip: Floats
         axis: Floats
         line: Ints
         ends: Floats
+        kind: Array
 
-Letters are lengths that the fields share, numbers are lengths, `N+1` counts from a letter that another field gives,
-`#names` is `len(self.names)`, `_` any length and `...` any shape. Fields that are None are passed over; a tuple of arrays is
-`*` and the shape of each.
+Letters are lengths that the fields share, numbers are lengths, `N+1` counts from a letter that another field always gives,
+`#names` is `len(self.names)`, `##nodes` the length of each item of `nodes`, `_` any length and `...` any shape. Fields that
+are None are passed over; a tuple of arrays is `*` and the shape of each. Where some are None, the others still share their
+letters, and so do the arrays of a tuple.
+The type is that of the annotation (`Floats`, `Ints`, `Bools`), or stands before a colon.
 The check is compiled once for each class, when its first value is made.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 
+from toolpaths.arrays import Array
+
 Owner = TypeVar("Owner", bound=type)
 TABLE = "__arrays__"
 _LETTER = re.compile(r"[A-Za-z]\w*")
+_ANNOTATED = re.compile(r"\b(?:(Floats|Ints|Bools)|NDArray\[np\.(\w+)\])")
+_HELD = re.compile(r"(#+)([\w.]+)")
+_NAMED = {"Floats": "float64", "Ints": "int64", "Bools": "bool"}
+
+
+@dataclass(frozen=True)
+class _Field:
+    """What one field holds: parts of its shape (None: any), type ("": any), whether it may be None, is a tuple of arrays."""
+
+    name: str
+    parts: tuple[str, ...] | None
+    kind: str
+    optional: bool
+    several: bool
+
+    @property
+    def letters(self) -> set[str]:
+        return {part for part in self.parts or () if _LETTER.fullmatch(part)}
+
+    @property
+    def counted(self) -> set[str]:
+        """Letters that this field counts from."""
+        return {letter for part in self.parts or () if not _LETTER.fullmatch(part) and part != "_"
+                for letter in _LETTER.findall(_HELD.sub("", part))}
 
 
 def arrays(**shapes: str) -> Callable[[Owner], Owner]:
-    """Make the named fields read-only and check their shapes against each other whenever a value of the class is made.
+    """Make the named fields read-only and check their shapes against each other, and their types, whenever a value is made.
 
-    A writable array is not copied: the field becomes a read-only view of it. What is no array becomes one.
-    A `__post_init__` of the class runs before.
+    A writable array is not copied: the field becomes a read-only view of it. What is no array becomes one; numbers of a
+    type that loses nothing become those of the field's type. A `__post_init__` of the class runs before.
 
     Raises (when a value is made):
-        ValueError: naming class, field, the shape found and the one expected.
+        ValueError: naming class, field, the shape or type found and the one expected.
     """
 
     def marked(cls: Owner) -> Owner:
@@ -46,140 +76,152 @@ def arrays(**shapes: str) -> Callable[[Owner], Owner]:
             if own is not None:
                 own(self)
             if not check:
-                check.append(_compiled(_in_order(table, _optional(type(self)))))
+                check.append(_compiled(_in_order(table, type(self))))
             check[0](self)
 
         setattr(cls, TABLE, table)
-        cls.__post_init__ = __post_init__  # type: ignore[attr-defined]
+        cls.__post_init__ = __post_init__  # type: ignore[attr-defined]  # any class may be given one
         return cls
 
     return marked
 
 
-def _optional(cls: type) -> set[str]:
-    """Fields that may be None."""
-    kinds = [item for base in cls.__mro__ for item in vars(base).get("__annotations__", {}).items()]
-    return {name for name, kind in kinds if "None" in str(kind)}
+def declared(cls: type) -> dict[str, tuple[str, str]]:
+    """Shape and type ("" where none is stated) of each field that `@arrays` names."""
+    return {f.name: (" ".join(f.parts or ("...",)), f.kind) for f in _in_order(getattr(cls, TABLE), cls)}
 
 
-def _compiled(table: Sequence[tuple[str, str, bool]]) -> Callable[[Any], None]:
-    """One function of all checks of a class: as many comparisons of tuples as it has arrays."""
-    lines, known = ["def check(self):"], set[str]()
-    for name, shape, optional in table:
-        put = f"put(self, {name!r}, a)"
-        lines += [f" a = self.{name}", " if a is not None:"]
-        if shape.startswith("*"):
-            lines += [f"  {put.replace(', a)', ', each(self, a, ' + repr(name) + ', ' + repr(shape[1:].strip()) + '))')}"]
-            continue
-        lines += ["  if a.__class__ is not ndarray:", "   a = asarray(a)", f"   {put}"]
-        lines += _comparison(shape, set(known) if optional else known)
-        lines += ["  if a.flags.writeable:", "   a = a.view()", "   a.flags.writeable = False", f"   {put}"]
+def _in_order(table: Mapping[str, str], cls: type) -> list[_Field]:
+    """Fields that always give letters, those that count from them, tuples and those that may be None.
 
-    def fail(self: Any) -> None:
-        raise ValueError(_fault(self, table))
+    Raises:
+        TypeError: where nothing always gives a letter that is counted from.
+    """
+    kinds = {name: str(kind) for base in reversed(cls.__mro__)
+             for name, kind in vars(base).get("__annotations__", {}).items()}
+    fields = [_field(name, text, kinds.get(name, "")) for name, text in table.items()]
+    given = {letter for f in fields if not (f.optional or f.several) for letter in f.letters}
+    if missing := {letter for f in fields for letter in f.counted} - given:
+        raise TypeError(f"no field gives the length {', '.join(sorted(missing))}: {dict(table)}")
+    return sorted(fields, key=lambda f: (f.optional or f.several, bool(f.counted)))
 
-    def each(self: Any, values: Any, name: str, shape: str) -> tuple[Any, ...]:
-        wanted = [(i, np.asarray(value), _wanted(self, shape, {})) for i, value in enumerate(values)]
-        for i, value, expected in wanted:
-            if expected is not None and not _fits(value.shape, expected):
-                raise ValueError(f"{_noted(self, f'{name}[{i}]', value.shape, expected)}")
-        return tuple(_read_only(value) for _, value, _ in wanted)
 
-    names: dict[str, Any] = {"ndarray": np.ndarray, "asarray": np.asarray, "put": object.__setattr__, "fail": fail,
-                             "each": each}
+def _field(name: str, text: str, annotation: str) -> _Field:
+    kind, _, shape = text.rpartition(": ")
+    found = _ANNOTATED.search(annotation)
+    if not kind and found is not None:
+        kind = _NAMED.get(found[1] or "", found[2] or "").rstrip("_")
+    parts = tuple(shape.removeprefix("*").split())
+    return _Field(name, None if parts == ("...",) else parts, kind, "None" in annotation, shape.startswith("*"))
+
+
+def _compiled(fields: list[_Field]) -> Callable[[Any], None]:
+    """One function of all checks of a class: as many comparisons of types and of tuples as it has arrays."""
+    always = {letter for f in fields if not (f.optional or f.several) for letter in f.letters}
+    sometimes = sorted({letter for f in fields for letter in f.letters} - always)
+    lines, known = ["def check(self):", *(f" {letter} = None" for letter in sometimes)], set[str]()
+    names: dict[str, Any] = {"ndarray": np.ndarray, "put": object.__setattr__, "as_type": _as_type, "fail": _fail,
+                             "fields": fields}
+    for k, f in enumerate(fields):
+        names[f"kind{k}"] = np.dtype(f.kind) if f.kind else None
+        put = [] if f.several else [f" put(self, {f.name!r}, a)"]
+        body = [f"if a.__class__ is not ndarray{f' or a.dtype is not kind{k}' if f.kind else ''}:",
+                f" a = as_type(a, kind{k}, self, {f.name!r})", *put, *_comparison(f.parts, known, sometimes),
+                "if a.flags.writeable:", " a = a.view()", " a.flags.writeable = False", *put]
+        if f.several:
+            lines += [f" if self.{f.name} is not None:", "  made = []", f"  for a in self.{f.name}:",
+                      *(f"   {line}" for line in body), "   made.append(a)", f"  put(self, {f.name!r}, tuple(made))"]
+        else:
+            lines += [f" a = self.{f.name}", " if a is not None:", *(f"  {line}" for line in body)]
     exec("\n".join(lines), names)
     made: Callable[[Any], None] = names["check"]
     return made
 
 
-def _in_order(table: Mapping[str, str], optional: Set[str]) -> list[tuple[str, str, bool]]:
-    """Name, shape, whether it may be None: fields that give letters, those that count from them, those that may be None.
-
-    Raises:
-        TypeError: where nothing gives a letter that is counted from.
-    """
-    given = {part for name, shape in table.items() if not shape.startswith("*") and name not in optional
-             for part in shape.split() if _LETTER.fullmatch(part)}
-    counted = {letter: shape for shape in table.values() for part in shape.replace("*", "").split()
-               if not _LETTER.fullmatch(part) and part != "..." for letter in _LETTER.findall(re.sub(r"#\w+", "", part))}
-    if missing := set(counted) - given - {"_"}:
-        raise TypeError(f"no field gives the length {', '.join(sorted(missing))}: {dict(table)}")
-
-    def place(name: str) -> tuple[bool, bool]:
-        return name in optional, any(not _LETTER.fullmatch(part) and not part.isdigit() and part != "_"
-                                     for part in table[name].split())
-
-    return [(name, table[name], name in optional) for name in sorted(table, key=place)]
-
-
-def _comparison(shape: str, known: set[str]) -> list[str]:
-    """Lines that bind the letters of a shape that are not `known`, and compare the rest."""
-    if shape == "...":
+def _comparison(parts: tuple[str, ...] | None, known: set[str], sometimes: list[str]) -> list[str]:
+    """Lines that bind letters of a shape and compare the rest; `known` are bound, `sometimes` may be by one before."""
+    if parts is None:
         return []
-    parts = [_expression(part) for part in shape.split()]
-    fresh = [part for part in shape.split() if _LETTER.fullmatch(part) and part not in known]
-    if not fresh and "_" not in parts:
-        return [f"  if a.shape != ({''.join(f'{part}, ' for part in parts)}):", "   fail(self)"]
-    lines, bound = [f"  if a.ndim != {len(parts)}:", "   fail(self)"], set[str]()
+    if any("##" in part for part in parts) or all(part != "_" and part not in sometimes and (
+            part in known or not _LETTER.fullmatch(part)) for part in parts):
+        return [f"if a.shape != ({''.join(f'{_expression(part)}, ' for part in parts)}):", " fail(self, fields)"]
+    lines, tests = [f"if a.ndim != {len(parts)}:", " fail(self, fields)"], list[str]()
     for k, part in enumerate(parts):
-        if part in fresh and part not in bound:
-            lines.append(f"  {part} = a.shape[{k}]")
-            bound.add(part)
-    tests = [f"a.shape[{k}] != {part}" for k, part in enumerate(parts) if part != "_" and (
-        part not in fresh or part in parts[:k])]
-    known |= bound
-    return lines + ([f"  if {' or '.join(tests)}:", "   fail(self)"] if tests else [])
+        if part in sometimes:
+            lines += [f"if {part} is None:", f" {part} = a.shape[{k}]"]
+        elif _LETTER.fullmatch(part) and part not in known:
+            lines.append(f"{part} = a.shape[{k}]")
+            known.add(part)
+            continue
+        if part != "_":
+            tests.append(f"a.shape[{k}] != {_expression(part)}")
+    return [*lines, f"if {' or '.join(tests)}:", " fail(self, fields)"] if tests else lines
 
 
 def _expression(part: str) -> str:
-    return re.sub(r"#(\w+)", r"len(self.\1)", part)
+    return _HELD.sub(lambda found: f"*map(len, self.{found[2]})" if found[1] == "##" else f"len(self.{found[2]})", part)
 
 
-def _wanted(self: Any, shape: str, lengths: Mapping[str, int]) -> tuple[int | str, ...] | None:
-    """The lengths of a shape as far as they are known; None for any shape."""
-    if shape == "...":
-        return None
+def _as_type(values: Any, kind: np.dtype[Any] | None, self: Any, name: str) -> Array:
+    """An array of that type.
 
-    def length(part: str) -> int | str:
-        if part == "_" or set(_LETTER.findall(re.sub(r"#\w+", "", part))) - set(lengths):
-            return part
-        return int(eval(_expression(part), {"self": self, **lengths}))
+    Raises:
+        ValueError: where numbers would be lost: texts or fractions for counts, counts out of the range of a narrow type.
+    """
+    a = np.asarray(values)
+    if kind is None or a.dtype == kind:
+        return a
+    if a.size and not np.can_cast(a.dtype, kind, "same_kind"):
+        raise ValueError(f"{type(self).__name__}.{name} holds {a.dtype}, expected {kind}")
+    rows = a[:1] if a.ndim and len(a) and a.strides[0] == 0 else a
+    made = rows.astype(kind)
+    if kind.kind in "iu" and kind.itemsize < a.dtype.itemsize and (made != rows).any():
+        raise ValueError(f"{type(self).__name__}.{name} holds {rows[made != rows][0]}, out of the range of {kind}")
+    return made if rows is a else np.broadcast_to(made[0], a.shape)
 
-    return tuple(length(part) for part in shape.split())
 
+def _fail(self: Any, fields: list[_Field]) -> None:
+    """Name the first field that does not fit, in the order of the check.
 
-def _fits(found: tuple[int, ...], expected: tuple[int | str, ...]) -> bool:
-    return len(found) == len(expected) and all(
-        isinstance(want, str) or got == want for got, want in zip(found, expected, strict=True))
-
-
-def _fault(self: Any, table: Sequence[tuple[str, str, bool]]) -> str:
-    """The first field that does not fit, in the order of the check."""
+    Raises:
+        ValueError: always.
+    """
     lengths: dict[str, int] = {}
-    for name, shape, _ in table:
-        value = getattr(self, name)
-        if value is None or shape.startswith("*"):
-            continue
-        found = np.shape(value)
-        expected = _wanted(self, shape, lengths)
-        if expected is not None:
-            if not _fits(found, expected):
-                return _noted(self, name, found, expected)
-            for part, got in zip(shape.split(), found, strict=True):
-                if _LETTER.fullmatch(part) and lengths.setdefault(part, got) != got:
-                    return _noted(self, name, found, _wanted(self, shape, lengths) or ())
-    return f"{type(self).__name__}: shapes do not fit"
+    for f in fields:
+        for name, value in _each(self, f):
+            expected = _wanted(self, f.parts, lengths)
+            if f.parts is None or expected is None:
+                continue
+            found = np.shape(value)
+            fits = len(found) == len(expected) and all(isinstance(want, str) or got == want
+                                                       for got, want in zip(found, expected, strict=True))
+            for part, got in zip(f.parts, found, strict=False) if fits and "##" not in "".join(f.parts) else ():
+                fits = fits and (not _LETTER.fullmatch(part) or lengths.setdefault(part, got) == got)
+            if not fits:
+                raise ValueError(f"{type(self).__name__}.{name} has shape {_words(found)}, expected "
+                                 f"{_words(_wanted(self, f.parts, lengths) if len(found) == len(expected) else expected)}")
+    raise ValueError(f"{type(self).__name__}: shapes do not fit")
 
 
-def _noted(self: Any, name: str, found: tuple[int, ...], expected: tuple[int | str, ...]) -> str:
-    return f"{type(self).__name__}.{name} has shape {_words(found)}, expected {_words(expected)}"
+def _each(self: Any, f: _Field) -> Iterator[tuple[str, Any]]:
+    """Name and array of a field, or of each item of a tuple."""
+    value = getattr(self, f.name)
+    if value is not None:
+        yield from ((f"{f.name}[{i}]", one) for i, one in enumerate(value)) if f.several else [(f.name, value)]
+
+
+def _wanted(self: Any, parts: tuple[str, ...] | None, lengths: Mapping[str, int]) -> tuple[int | str, ...]:
+    """The lengths of a shape as far as they are known."""
+    found: list[int | str] = []
+    for part in parts or ():
+        if "##" in part:
+            found += [len(one) for one in getattr(self, part.strip("#"))]
+        elif part == "_" or set(_LETTER.findall(_HELD.sub("", part))) - set(lengths):
+            found.append(part)
+        else:
+            found.append(int(eval(_expression(part), {"self": self, **lengths})))
+    return tuple(found)
 
 
 def _words(shape: tuple[int | str, ...]) -> str:
     return f"({', '.join('any' if part == '_' else str(part) for part in shape)}{',' if len(shape) == 1 else ''})"
-
-
-def _read_only(values: Any) -> Any:
-    view = values.view()
-    view.flags.writeable = False
-    return view

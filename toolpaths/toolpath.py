@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from toolpaths.arrays import Array, Floats, frozen, shared
+from toolpaths.arrays import Array, Floats, shared
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays
 
@@ -152,11 +152,6 @@ class Arcs:
     radius: Floats
     sweep: Floats
 
-    def __post_init__(self) -> None:
-        n = len(self.radius)
-        for name, shape in (("center", (n, 3)), ("normal", (n, 3)), ("radius", (n,)), ("sweep", (n,))):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, shape, f"Arcs.{name}"))
-
     def __len__(self) -> int:
         return len(self.radius)
 
@@ -166,20 +161,8 @@ class Arcs:
         return Arcs(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
 
 
-_COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
-    "tip": (np.float64, (3,)),
-    "axis": (np.float64, (3,)),
-    "feed": (np.float64, ()),
-    "feed_mode": (np.int8, ()),
-    "kind": (np.int8, ()),
-    "role": (np.int8, ()),
-    "arc": (np.int32, ()),
-    "cycle": (np.int32, ()),
-    "tool": (np.int32, ()),
-    "operation": (np.int32, ()),
-    "pass_": (np.int32, ()),
-    "line": (np.int64, ()),
-}
+_SHARED = ("tip", "axis", "feed", "feed_mode", "kind", "role", "arc", "cycle", "tool", "operation", "pass_", "line")
+"""columns that are kept once where all rows are the same"""
 
 
 @dataclass(frozen=True)
@@ -192,8 +175,9 @@ class ClSource:
 
 
 @dataclass(frozen=True)
-@arrays(tip="N 3", axis="N 3", feed="N", feed_mode="N", kind="N", role="N", arc="N", cycle="N", tool="N", operation="N",
-        pass_="N", line="N", normal="N 3", contact="N 3", spin="N")
+@arrays(tip="N 3", axis="N 3", feed="N", feed_mode="int8: N", kind="int8: N", role="int8: N", arc="int32: N",
+        cycle="int32: N", tool="int32: N", operation="int32: N", pass_="int32: N", line="int64: N", normal="N 3",
+        contact="N 3", spin="N")
 class Toolpath:
     """The path of the cutter in the part frame (the absolute frame of the CL file), one row per commanded position.
 
@@ -250,17 +234,12 @@ class Toolpath:
     """where the path is exactly what reading a file gave: a path that is made otherwise, or changed, has none"""
 
     def __post_init__(self) -> None:
-        n = len(self.tip)
-        for name, (dtype, tail) in _COLUMNS.items():
-            object.__setattr__(self, name, shared(frozen(getattr(self, name), dtype, (n, *tail), f"Toolpath.{name}")))
-        for name, tail in (("normal", (3,)), ("contact", (3,)), ("spin", ())):
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, frozen(value, np.float64, (n, *tail), f"Toolpath.{name}"))
+        for name in _SHARED:
+            object.__setattr__(self, name, shared(np.asarray(getattr(self, name))))
         for name, count in (("arc", len(self.arcs)), ("cycle", len(self.cycles)), ("tool", len(self.tools)),
                             ("operation", len(self.operations))):
             column = getattr(self, name)
-            if n and int(column.max()) >= count:
+            if len(column) and int(column.max()) >= count:
                 raise ValueError(f"Toolpath.{name} holds {int(column.max())}, only {count} exist")
 
     def __len__(self) -> int:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.calibration.noise import Noise, noise_of
-from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
 RANK = 1e-9
@@ -29,7 +29,7 @@ STOPS = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(guess="P", free="P", observed="R", sigma="R")
+@arrays(guess="#names", free="#names", observed="R", sigma="R")
 class CalibrationProblem:
     """P parameters, R readings.
 
@@ -50,12 +50,6 @@ class CalibrationProblem:
     sigma: Floats
     predict: Callable[[Floats], Floats]
     jacobian: Callable[[Floats], Floats]
-
-    def __post_init__(self) -> None:
-        p, r = len(self.names), len(self.observed)
-        object.__setattr__(self, "guess", frozen(self.guess, np.float64, (p,), "CalibrationProblem.guess"))
-        object.__setattr__(self, "free", frozen(self.free, np.bool_, (p,), "CalibrationProblem.free"))
-        object.__setattr__(self, "sigma", frozen(self.sigma, np.float64, (r,), "CalibrationProblem.sigma"))
 
 
 @dataclass(frozen=True, eq=False)

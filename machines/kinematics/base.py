@@ -24,10 +24,10 @@ from machines.kinematics.clearance_geometry import ClearanceGeometry
 from machines.kinematics.rod_platform import RodPlatform
 from machines.kinematics.taylor import TaylorVector, straight
 from machines.kinematics.workspace import Workspace
-from toolpaths.arrays import Bools, Floats, Ints, frozen
+from toolpaths.arrays import Bools, Floats, Ints, read_only
 
 ErrorForm = TypeVar("ErrorForm", covariant=True)
-UP = frozen(np.array([0.0, 0.0, 1.0]), np.float64, (3,), "UP")
+UP = read_only([0.0, 0.0, 1.0])
 
 
 class ErrorForms(Protocol[ErrorForm]):

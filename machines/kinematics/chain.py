@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Floats, read_only
 from toolpaths.shapes import arrays
 
 
@@ -21,11 +22,10 @@ class Joint:
     point: Floats = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", unit_vector(self.direction, "direction"))
-        object.__setattr__(self, "point", frozen(self.point, np.float64, (3,), "point"))
+        object.__setattr__(self, "direction", unit_vector(self.direction))
 
 
-def unit_vector(v: Floats, name: str) -> Floats:
-    """`v` (3,) with length 1, read-only; `name` for the error of a wrong shape."""
+def unit_vector(v: npt.ArrayLike) -> Floats:
+    """`v` (3,) with length 1, read-only."""
     vector = np.asarray(v, dtype=np.float64)
-    return frozen(vector / np.linalg.norm(vector), np.float64, (3,), name)
+    return read_only(vector / np.linalg.norm(vector))

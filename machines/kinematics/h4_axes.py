@@ -11,9 +11,10 @@ import numpy as np
 
 from machines.kinematics.base import as_points
 from machines.kinematics.columns import of_one
-from machines.kinematics.h4_linear import ROUND_OFF, H4Linear, Pair, tilted, unit, wrap
+from machines.kinematics.h4_linear import ROUND_OFF, H4Linear, Pair, tilted, unit
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
-from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.arrays import Bools, Floats
+from toolpaths.rotations import wrap
 from toolpaths.shapes import arrays
 
 X, UP = (1.0, 0.0, 0.0), [0.0, 0.0, 1.0]
@@ -98,9 +99,6 @@ class H4SpindleAxis(H4Linear):
     at_spindle = True
     pivot: Floats = field(default_factory=lambda: np.zeros(3))
     """(3,) mm in the platform; the gauge point is `gauge` below it"""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "pivot", frozen(self.pivot, np.float64, (3,), "H4SpindleAxis.pivot"))
 
     def axis_line(self, letter: str) -> tuple[Floats, Floats]:
         """See the base class; in the level platform."""

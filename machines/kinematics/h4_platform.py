@@ -16,7 +16,7 @@ from machines.kinematics.columns import blocks
 from machines.kinematics.h4_modes import candidates
 from machines.kinematics.sliders import Legs, determinant, platform_rates, solved
 from machines.kinematics.workspace import Workspace
-from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
 STEPS = 30
@@ -47,7 +47,6 @@ class H4Platform:
     side: float = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "joints", frozen(self.joints, np.float64, (4, 3), "H4Platform.joints"))
         home = self.home[None]
         jx = self.jx(home, self.legs.inverse(self.ends(home)))
         object.__setattr__(self, "side", float(np.sign(determinant(jx)[0])))

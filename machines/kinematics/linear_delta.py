@@ -19,7 +19,7 @@ from machines.kinematics.rod_loops import RodLoop
 from machines.kinematics.sliders import Legs, determinant, three_spheres
 from machines.kinematics.taylor import TaylorVector
 from machines.kinematics.workspace import Workspace
-from toolpaths.arrays import Bools, Floats, Ints, frozen
+from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shapes import arrays
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -53,7 +53,6 @@ class LinearDelta(OnSlides):
     gauge_below = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "platform", frozen(self.platform, np.float64, (3, 3), "LinearDelta.platform"))
         home = self.workspace.middle[None] + self._gauge_to_tip()
         rods = self.rods(self.legs.inverse(self._joints(home)), home)
         object.__setattr__(self, "side", float(np.sign(determinant(rods)[0])))

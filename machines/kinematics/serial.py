@@ -25,10 +25,10 @@ from machines.kinematics.base import ErrorForm, ErrorForms, Kinematics, as_point
 from machines.kinematics.chain import Joint, unit_vector
 from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x, spin_about
-from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular, wrap
+from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, wrap
 from toolpaths.shapes import arrays
 
 ROUND_OFF = 1e-12
@@ -66,7 +66,7 @@ class Serial(Kinematics):
     jets_proved = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "tool_axis", unit_vector(self.tool_axis, "tool_axis"))
+        object.__setattr__(self, "tool_axis", unit_vector(self.tool_axis))
         kind = {joint.name: joint.rotary for joint in self.chain}
         object.__setattr__(self, "rotary", tuple(kind[name] for name in self.axis_names))
         object.__setattr__(self, "branches", 2 if len(self._turns) == 2 else 1)

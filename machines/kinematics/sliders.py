@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
 
@@ -35,13 +35,8 @@ class Legs:
     roots: Floats
 
     def __post_init__(self) -> None:
-        k = len(self.points)
         unit = np.asarray(self.directions, dtype=np.float64)
-        unit = unit / np.linalg.norm(unit, axis=-1, keepdims=True)
-        object.__setattr__(self, "points", frozen(self.points, np.float64, (k, 3), "Legs.points"))
-        object.__setattr__(self, "directions", frozen(unit, np.float64, (k, 3), "Legs.directions"))
-        object.__setattr__(self, "lengths", frozen(self.lengths, np.float64, (k,), "Legs.lengths"))
-        object.__setattr__(self, "roots", frozen(self.roots, np.float64, (k,), "Legs.roots"))
+        object.__setattr__(self, "directions", unit / np.linalg.norm(unit, axis=-1, keepdims=True))
 
     def solve(self, joints: Floats) -> tuple[Floats, Floats]:
         """(middle, half), each (N, K) mm: q = middle + root * half for platform joints (N, K, 3).

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 
 
@@ -18,10 +18,6 @@ class Workspace:
     lower: Floats
     upper: Floats
     tilt: tuple[float, float] = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "lower", frozen(self.lower, np.float64, (3,), "Workspace.lower"))
-        object.__setattr__(self, "upper", frozen(self.upper, np.float64, (3,), "Workspace.upper"))
 
     @property
     def middle(self) -> Floats:

@@ -17,7 +17,7 @@ from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
-@arrays(feed="K", mode="K", seconds="K", slowed="K")
+@arrays(feed="K", mode="int8: K", seconds="K", slowed="K")
 class Feeds:
     """Feed words (K,) with their mode (K,), the time of each block (K,) s, and the blocks slowed for an axis (K,)."""
 

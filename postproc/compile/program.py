@@ -76,8 +76,8 @@ class Hole:
 
 
 @dataclass(frozen=True)
-@arrays(begins="_", words="K J", write="K J", code="K", feed="K", mode="K", plane="K", ccw="K", center="K 3", home="K",
-        link="K", row="K", line="K", decimals="J", skip="K")
+@arrays(begins="_", words="K J", write="K J", code="int8: K", feed="K", mode="int8: K", plane="int8: K", ccw="K",
+        center="K 3", home="K", link="K", row="K", line="K", decimals="J", skip="K")
 class Program:
     """K blocks with the commands before them.
 

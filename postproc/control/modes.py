@@ -37,7 +37,7 @@ class WordFrame:
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(asked="O", decimals="J")
+@arrays(asked="int8: O", decimals="J")
 class OutputModes:
     """What controller and machine can do, and what is asked for each operation.
 

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -30,10 +30,6 @@ class Plane:
 
     rotation: Floats
     origin: Floats
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "rotation", frozen(self.rotation, np.float64, (3, 3), "Plane.rotation"))
-        object.__setattr__(self, "origin", frozen(self.origin, np.float64, (3,), "Plane.origin"))
 
     @cached_property
     def key(self) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from machines.machine import Machine
-from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, frozen, shared, taken
+from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, shared, taken
 from toolpaths.shapes import arrays
 
 
@@ -67,7 +67,7 @@ class Axes:
 
 
 @dataclass(frozen=True)
-@arrays(block="P", cause="P", seconds="P", line="P")
+@arrays(block="P", cause="int8: P", seconds="P", line="P")
 class Pauses:
     """P times at rest, in order.
 
@@ -81,11 +81,6 @@ class Pauses:
     seconds: Floats
     line: Ints
 
-    def __post_init__(self) -> None:
-        n = len(self.block)
-        for name, kind in (("block", np.int64), ("cause", np.int8), ("seconds", np.float64), ("line", np.int64)):
-            object.__setattr__(self, name, frozen(getattr(self, name), kind, (n,), f"Pauses.{name}"))
-
     @staticmethod
     def none() -> Pauses:
         """No pause at all."""
@@ -96,16 +91,14 @@ class Pauses:
         return len(self.block)
 
 
-_COLUMNS: dict[str, tuple[type, tuple[int, ...]]] = {
-    "line": (np.int64, ()), "rapid": (np.bool_, ()), "arc": (np.bool_, ()), "center": (np.float64, (3,)),
-    "normal": (np.float64, (3,)), "sweep": (np.float64, ()), "speed": (np.float64, ()), "path": (np.int8, ()),
-    "tolerance": (np.float64, ()), "chain": (np.float64, ()), "operation": (np.int64, ()),
-}
+_SHARED = ("line", "rapid", "arc", "center", "normal", "sweep", "speed", "path", "tolerance", "chain", "operation")
+"""columns that are kept once where all rows are the same"""
 
 
 @dataclass(frozen=True)
-@arrays(start="E A", end="E A", line="E", rapid="E", arc="E", center="E 3", normal="E 3", sweep="E", speed="E", path="E",
-        tolerance="E", chain="E", operation="E", cl_line="E", move="E", given="E", pieces="E")
+@arrays(start="E #axes.letters", end="E #axes.letters", line="E", rapid="E", arc="E", center="E 3", normal="E 3",
+        sweep="E", speed="E", path="int8: E", tolerance="E", chain="E", operation="E", cl_line="E", move="E", given="E",
+        pieces="E")
 class MotionBlocks:
     """E blocks that move, in mm, rad and s.
 
@@ -150,11 +143,8 @@ class MotionBlocks:
     pieces: Ints | None = None
 
     def __post_init__(self) -> None:
-        n, a = len(self.line), len(self.axes.letters)
-        for name in ("start", "end"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n, a), f"Blocks.{name}"))
-        for name, (kind, tail) in _COLUMNS.items():
-            object.__setattr__(self, name, shared(frozen(getattr(self, name), kind, (n, *tail), f"Blocks.{name}")))
+        for name in _SHARED:
+            object.__setattr__(self, name, shared(np.asarray(getattr(self, name))))
 
     def __len__(self) -> int:
         return len(self.line)

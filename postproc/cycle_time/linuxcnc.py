@@ -72,7 +72,7 @@ class Row:
     asked: Floats
     most: Floats
     rate: Floats
-    ends: Array
+    ends: Ints
     kink: Floats
     fresh: Bools
     traverse: Bools

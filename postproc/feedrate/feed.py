@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 
 
@@ -21,12 +21,10 @@ class StepFeed:
     values: Floats
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "edges", frozen(self.edges, np.float64, (-1,), "StepFeed.edges"))
-        object.__setattr__(self, "values", frozen(self.values, np.float64, (len(self.edges) - 1,), "StepFeed.values"))
         if not np.all(np.diff(self.edges) > 0.0):
             raise ValueError("edges of feeds must rise strictly")
-        if not np.all(self.values > 0.0):
-            raise ValueError(f"feeds must be positive, found {self.values.min()}")
+        if not np.all(np.asarray(self.values) > 0.0):
+            raise ValueError(f"feeds must be positive, found {np.min(self.values)}")
 
     @property
     def breaks(self) -> Floats:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 
 
@@ -34,12 +34,10 @@ class JointLimits:
     tool: ToolLimits | None = None
 
     def __post_init__(self) -> None:
-        joints = len(np.atleast_1d(self.velocity))
         for name in ("velocity", "acceleration", "jerk"):
-            values = frozen(getattr(self, name), np.float64, (joints,), f"JointLimits.{name}")
+            values = np.asarray(getattr(self, name))
             if not np.all(values > 0.0):
                 raise ValueError(f"JointLimits.{name} must be positive, found {values.min()}")
-            object.__setattr__(self, name, values)
 
 
 def squared_speed(dq: Floats, velocity: Floats) -> Floats:

@@ -13,7 +13,7 @@ import numpy as np
 
 from postproc.feedrate.interior import Multipliers
 from postproc.feedrate.problem import SpeedProblem
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 
 
@@ -27,9 +27,6 @@ class LimitShares:
 
     feed: float
     limits: Floats
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "limits", frozen(self.limits, np.float64, (3, -1), "Shares.limits"))
 
     @property
     def seconds(self) -> float:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.feedrate.limits import JointLimits, ToolLimits
-from toolpaths.arrays import Floats, Ints, frozen
+from toolpaths.arrays import Floats, Ints
 from toolpaths.shapes import arrays
 
 REST_PAD = 3
@@ -79,13 +79,8 @@ class JointTrajectory:
     tool: Floats | None = None
 
     def __post_init__(self) -> None:
-        n, joints = np.shape(self.q)
-        tool = np.zeros((n, 3)) if self.tool is None else self.tool
-        object.__setattr__(self, "tool", frozen(tool, np.float64, (n, 3), "JointTrajectory.tool"))
-        for name in ("t", "s", "sd", "feed"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n,), f"JointTrajectory.{name}"))
-        for name in ("q", "qd", "qdd", "qddd"):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, (n, joints), f"JointTrajectory.{name}"))
+        if self.tool is None:
+            object.__setattr__(self, "tool", np.zeros((len(self.q), 3)))
 
     @property
     def step(self) -> float:

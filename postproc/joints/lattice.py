@@ -14,8 +14,9 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits
-from postproc.joints.tracks import TRAVEL_SLACK, TWO_PI, branches_of, following, wrap
+from postproc.joints.tracks import TRAVEL_SLACK, branches_of, following
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.rotations import TWO_PI, wrap
 from toolpaths.shapes import arrays
 
 _MANY = 1 << 30
@@ -43,8 +44,8 @@ class PoseRun:
 
 
 @dataclass(frozen=True)
-@arrays(values="B N J", family="B N", leads="B N-1", free="N-1", inside="B N", wound="W", least="B N W", most="B N W",
-        rotary="R", rest="N", away="N")
+@arrays(values="B N J", family="B N", leads="int8: B N-1", free="N-1", inside="B N", wound="W", least="int32: B N W",
+        most="int32: B N W", rotary="R", rest="N", away="N")
 class Lattice:
     """States of N poses on B branches; `wound` (W,) are the joints whose turns count, `limits` those of the machine.
 

@@ -29,7 +29,7 @@ _MOST_SKEW = 0.25
 
 
 @dataclass(frozen=True)
-@arrays(u0="N", u1="N", q0="N J", q1="N J", start="* _ 3", end="* _ 3")
+@arrays(u0="N", u1="N", q0="N J", q1="N J", start="* N 3", end="* N 3")
 class CurveBlocks:
     """N blocks and what they follow: joints q0 -> q1 (N, J), curves[u0..u1], poses at both ends (tip, axis), (N, 3)."""
 

@@ -16,8 +16,8 @@ TRAVERSE, FEED, ARC = 0, 1, 2
 
 
 @dataclass(frozen=True)
-@arrays(q="K J", move="K", u="K", code="K", home="K", seconds="K", plane="K", ccw="K", center="K 3", state="K J",
-        frame="K", begin="M+1", singular="M", turns="T", rewinds="W")
+@arrays(q="K J", move="K", u="K", code="int8: K", home="K", seconds="K", plane="int8: K", ccw="K", center="K 3",
+        state="K J", frame="K", begin="M+1", singular="M", turns="T", rewinds="W")
 class JointPath:
     """Blocks in joints, K of them, and where the rows of Moves begin among them.
 

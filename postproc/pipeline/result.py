@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from postproc.correction.compensation import ErrorCorrection
     from postproc.correction.written_deviation import AfterFormatting
     from postproc.orientation.plans.choice import OrientationChoice
+    from postproc.verification.tool_table import MeasuredLength
     from postproc.witness.evidence import Testimony
 
 
@@ -94,6 +95,8 @@ class VerifyResult:
     cl_file: str = ""
     sha256: str = ""
     """of the bytes of the program"""
+    measured: tuple[MeasuredLength, ...] = ()
+    """lengths at the machine, where a tool table was given: the program is verified with them"""
 
     @property
     def ok(self) -> bool:

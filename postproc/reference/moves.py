@@ -29,8 +29,8 @@ _PART = 50_000
 
 
 @dataclass(frozen=True)
-@arrays(tip="M 3", axis="M 3", kind="M", feed="M", seconds="M", arc="M", row="M", hole="M", phase="M", cycle="M",
-        link="M", tool="M", line="M", spin="M")
+@arrays(tip="M 3", axis="M 3", kind="int8: M", feed="M", seconds="M", arc="int32: M", row="M", hole="M",
+        phase="int8: M", cycle="int32: M", link="M", tool="int32: M", line="M", spin="M")
 class Moves:
     """Elementary moves, one row each; the start of a row is the end of the row before.
 

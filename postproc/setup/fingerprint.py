@@ -13,8 +13,10 @@ from toolpaths.input_files import read_input
 DIGITS = 8
 _ASIDE = {"description", "placement"}
 """keys that change no word of a program: what `place` may choose from"""
-_STATED_ONLY = ("tip_acceleration", "tip_jerk", "axis_rate")
-"""keys of tools that count only where they are stated, so that programs older than the key keep their fingerprint"""
+_LATER: tuple[tuple[str, ...], ...] = (("hooks",), ("output", "stop_between_tools"))
+"""keys that set-ups have not always had: at their defaults they are left out, so that programs keep their fingerprint"""
+_LATER_OF_TOOLS = ("tip_acceleration", "tip_jerk", "axis_rate")
+"""likewise, of each tool"""
 
 
 def fingerprint(setup: SetupFile, file: str) -> str:
@@ -23,8 +25,12 @@ def fingerprint(setup: SetupFile, file: str) -> str:
     Meshes count by what they hold, not by their names. `file` is that of the set-up, whose folder meshes are named from.
     """
     values = setup.model_dump(mode="json", exclude=_ASIDE)
+    default = SetupFile().model_dump(mode="json")
+    for path in _LATER:
+        if value_at(values, path) == value_at(default, path):
+            del value_at(values, path[:-1])[path[-1]]
     for tool in values["tools"].values():
-        for name in _STATED_ONLY:
+        for name in _LATER_OF_TOOLS:
             if tool[name] is None:
                 del tool[name]
     for key in file_keys(values):

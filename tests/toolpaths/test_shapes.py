@@ -1,4 +1,4 @@
-"""Values that hold arrays: read-only, shapes checked against each other; every frozen dataclass of the project is one."""
+"""Values that hold arrays: read-only, shapes checked against each other, types too; so is every frozen dataclass."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import dataclasses
 import importlib
 import pkgutil
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
-from toolpaths.arrays import Array, Floats
-from toolpaths.shapes import TABLE, arrays
+from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.shapes import TABLE, arrays, declared
 
 WITNESS = "postproc.witness."
 """shares no code with the rest"""
@@ -62,6 +62,12 @@ def test_every_value_with_arrays_is_checked() -> None:
                                                                      if hasattr(every[name], TABLE)}
 
 
+def test_every_checked_array_states_its_type() -> None:
+    """By its annotation (`Floats`, `Ints`, `Bools`), an `Array` in the table."""
+    assert {f"{name}.{field}" for name, cls in dataclasses_of_the_project().items() if hasattr(cls, TABLE)
+            for field, (_, kind) in declared(cls).items() if not kind} == set()
+
+
 def test_a_value_without_the_check_is_noticed() -> None:
     @dataclass(frozen=True)
     class Bare:
@@ -73,10 +79,11 @@ def test_a_value_without_the_check_is_noticed() -> None:
 
 
 @dataclass(frozen=True)
-@arrays(tip="N 3", line="N", ends="N+1", more="M", pairs="M 2", home="#letters", parts="* _ 3", free="...", loose="N _")
+@arrays(tip="N 3", line="N", ends="N+1", more="M", pairs="M 2", home="#letters", parts="* P 3", free="...", loose="N _",
+        kind="int8: K", grid="##parts 2", some="K")
 class Value:
     tip: Floats
-    line: Array
+    line: Ints
     ends: Floats
     letters: str = "XY"
     home: Any = (0.0, 0.0)
@@ -85,6 +92,9 @@ class Value:
     parts: tuple[Floats, ...] = ()
     free: Any = 0.0
     loose: Floats | None = None
+    kind: Array = field(default_factory=lambda: np.array([7]))
+    grid: Floats | None = None
+    some: Bools | None = None
 
 
 def value(**changed: Any) -> Value:
@@ -102,7 +112,7 @@ def test_arrays_become_read_only_and_are_not_copied() -> None:
 
 
 @pytest.mark.parametrize(("changed", "said"), [
-    ({"line": np.zeros(3)}, "Value.line has shape (3,), expected (4,)"),
+    ({"line": np.zeros(3, int)}, "Value.line has shape (3,), expected (4,)"),
     ({"tip": np.zeros((4, 2))}, "Value.tip has shape (4, 2), expected (N, 3)"),
     ({"tip": np.zeros(3)}, "Value.tip has shape (3,), expected (N, 3)"),
     ({"ends": np.zeros(4)}, "Value.ends has shape (4,), expected (5,)"),
@@ -110,12 +120,33 @@ def test_arrays_become_read_only_and_are_not_copied() -> None:
     ({"home": 5.0}, "Value.home has shape (), expected (2,)"),
     ({"loose": np.zeros((3, 7))}, "Value.loose has shape (3, 7), expected (4, any)"),
     ({"pairs": np.zeros((6, 3))}, "Value.pairs has shape (6, 3), expected (M, 2)"),
-    ({"parts": (np.zeros((2, 3)), np.zeros((2, 2)))}, "Value.parts[1] has shape (2, 2), expected (any, 3)"),
+    ({"parts": (np.zeros((2, 3)), np.zeros((2, 2)))}, "Value.parts[1] has shape (2, 2), expected (2, 3)"),
+    ({"parts": (np.zeros((2, 3)), np.zeros((4, 3)))}, "Value.parts[1] has shape (4, 3), expected (2, 3)"),
+    ({"more": np.zeros(6), "pairs": np.zeros((5, 2))}, "Value.pairs has shape (5, 2), expected (6, 2)"),
+    ({"loose": np.zeros(4)}, "Value.loose has shape (4,), expected (4, any)"),
+    ({"some": np.zeros(2, bool)}, "Value.some has shape (2,), expected (1,)"),
+    ({"parts": (np.zeros((5, 3)),) * 2, "grid": np.zeros((5, 4, 2))}, "Value.grid has shape (5, 4, 2), expected (5, 5, 2)"),
+    ({"line": np.zeros(4)}, "Value.line holds float64, expected int64"),
+    ({"line": [1.5, 2, 3, 4]}, "Value.line holds float64, expected int64"),
+    ({"tip": [["a", "b", "c"]] * 4}, "Value.tip holds <U1, expected float64"),
+    ({"some": np.array([1])}, "Value.some holds int64, expected bool"),
+    ({"kind": np.array([1, 300])}, "Value.kind holds 300, out of the range of int8"),
+    ({"parts": (np.full((2, 3), "x"),)}, "Value.parts holds <U1, expected float64"),
 ])
-def test_a_shape_that_does_not_fit_names_class_and_field(changed: dict[str, Any], said: str) -> None:
+def test_a_shape_or_type_that_does_not_fit_names_class_and_field(changed: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError) as fault:
         replace(value(), **changed)
     assert str(fault.value) == said
+
+
+def test_numbers_that_lose_nothing_become_the_type_of_the_field() -> None:
+    made = value(tip=[[1, 2, 3]] * 4, line=np.arange(4, dtype=np.int32), kind=np.array([1, -3]), more=[], some=[True, False],
+                 parts=(np.ones((2, 3), np.float32),))
+    kinds = (made.tip.dtype, made.line.dtype, made.kind.dtype, made.parts[0].dtype)
+    assert kinds == (np.float64, np.int64, np.int8, np.float64) and made.more is not None and made.more.dtype == np.float64
+    same = np.broadcast_to(np.array([7]), (9,))
+    kept = value(kind=same).kind
+    assert kept.strides == (0,) and kept.dtype == np.int8 and kept.tolist() == [7] * 9
 
 
 def test_a_letter_that_no_field_gives_is_a_mistake_of_the_table() -> None:
@@ -123,6 +154,17 @@ def test_a_letter_that_no_field_gives_is_a_mistake_of_the_table() -> None:
     @arrays(ends="N+1")
     class Wrong:
         ends: Floats
+
+    with pytest.raises(TypeError, match="no field gives the length N"):
+        Wrong(np.zeros(3))
+
+
+def test_counting_from_a_field_that_may_be_missing_is_a_mistake_of_the_table() -> None:
+    @dataclass(frozen=True)
+    @arrays(tip="N", ends="N+1")
+    class Wrong:
+        ends: Floats
+        tip: Floats | None = None
 
     with pytest.raises(TypeError, match="no field gives the length N"):
         Wrong(np.zeros(3))

@@ -20,7 +20,7 @@ from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.rod_platform import RodPlatform
 from machines.kinematics.serial import Serial
-from toolpaths.arrays import Floats, frozen
+from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 
 CorrectedBy = Literal["post", "control"]
@@ -29,7 +29,7 @@ BLOCK = 2048
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(covariance="P P")
+@arrays(covariance="#names #names")
 class ErrorModel:
     """Errors of one machine. Zero parameters give exactly the nominal machine.
 
@@ -51,11 +51,6 @@ class ErrorModel:
     name: str = ""
     machine: str = ""
     large: bool = False
-
-    def __post_init__(self) -> None:
-        if self.covariance is not None:
-            p = len(self.names)
-            object.__setattr__(self, "covariance", frozen(self.covariance, np.float64, (p, p), "ErrorModel.covariance"))
 
     @property
     def names(self) -> list[str]:

@@ -20,7 +20,7 @@ import numpy as np
 from machines.geometric_error.actual.rods_loop import COMPILE_FROM, close_all
 from machines.geometric_error.actual.transforms import turns
 from machines.kinematics.rod_platform import RodPlatform
-from toolpaths.arrays import Floats, Ints, frozen
+from toolpaths.arrays import Floats, Ints
 from toolpaths.compiled import compiled, wanted
 from toolpaths.shapes import arrays
 
@@ -34,7 +34,7 @@ LEAST_GAIN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(rail="K 3", guide="K 3", carriage="6 3", platform="6 3", length="6")
+@arrays(rail="#legs 3", guide="#legs 3", carriage="6 3", platform="6 3", length="6")
 class RodErrors:
     """Errors of K legs and six rods, mm and rad; the order of the parameters is that of E-14.
 
@@ -56,12 +56,6 @@ class RodErrors:
     legs: tuple[str, ...]
     rods: tuple[str, ...]
     pairs: tuple[float, ...] = ()
-
-    def __post_init__(self) -> None:
-        k = len(self.legs)
-        for name, shape in (("rail", (k, 3)), ("guide", (k, 3)), ("carriage", (RODS, 3)), ("platform", (RODS, 3)),
-                            ("length", (RODS,))):
-            object.__setattr__(self, name, frozen(getattr(self, name), np.float64, shape, f"RodErrors.{name}"))
 
     @classmethod
     def none(cls, legs: tuple[str, ...], rods: tuple[str, ...], pairs: tuple[float, ...] = ()) -> Self:
@@ -135,7 +129,8 @@ class RodFrame:
         if wanted(len(q), COMPILE_FROM, close_all):
             place, turned = np.array(place), np.array(turned)
             lengths = (self.length + errors.length) ** 2
-            worst = compiled(close_all)(np.ascontiguousarray(q), self.leg, *self.carriage_lines(errors),
+            lines = (np.ascontiguousarray(part) for part in self.carriage_lines(errors))
+            worst = compiled(close_all)(np.ascontiguousarray(q), self.leg, *lines,
                                         self.joint + errors.platform, lengths, place, turned, STEPS, CLOSED, LEAST_GAIN)
             return _where_closed(place, turned, worst)
         with np.errstate(over="ignore", invalid="ignore"):  # what does not close grows out of bounds

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats, frozen
+from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:
@@ -72,7 +72,9 @@ class Curve(ABC):
 
     def with_values(self, values: Floats) -> Self:
         """The same curve with other parameters (P,)."""
-        return replace(self, values=frozen(values, np.float64, self.values.shape, "Curve.values"))  # type: ignore[type-var]
+        if np.shape(values) != self.values.shape:
+            raise ValueError(f"{type(self).__name__}.values has shape {np.shape(values)}, expected {self.values.shape}")
+        return replace(self, values=values)  # type: ignore[type-var]  # every curve is a dataclass with `values`
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +97,8 @@ class TableCurve(Curve):
     range: tuple[float, float] = field(init=False)
 
     def __post_init__(self) -> None:
-        n = len(self.x)
-        object.__setattr__(self, "x", frozen(self.x, np.float64, (n,), "Table.x"))
-        object.__setattr__(self, "values", frozen(self.values, np.float64, (2 * n if self.both else n,), "Table.values"))
+        if len(self.values) != (count := len(self.x) * (2 if self.both else 1)):
+            raise ValueError(f"TableCurve.values has {len(self.values)} entries, expected {count}")
         object.__setattr__(self, "range", EVERYWHERE if self.period else (float(self.x[0]), float(self.x[-1])))
 
     @property
@@ -212,7 +213,6 @@ class Fourier(Curve):
     range: tuple[float, float] = EVERYWHERE
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen(self.values, np.float64, (-1,), "Fourier.values"))
         if len(self.values) % 2 == 0:
             raise ValueError(f"Fourier.values has {len(self.values)} entries, expected 1 + 2 K")
 
@@ -269,9 +269,6 @@ class Polynomial(Curve):
     range: tuple[float, float]
     origin: float = 0.0
     scale: float = 1.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen(self.values, np.float64, (-1,), "Polynomial.values"))
 
     @property
     def detail(self) -> float:

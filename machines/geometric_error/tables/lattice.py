@@ -15,7 +15,7 @@ from typing import Self
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats, Ints, frozen
+from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -25,7 +25,7 @@ ROTARY = "ABC"
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(nodes="* _", table="...")
+@arrays(nodes="* _", table="##nodes 6")
 class ErrorMap:
     """Values on a full lattice.
 
@@ -48,10 +48,7 @@ class ErrorMap:
     bed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        nodes = tuple(frozen(x, np.float64, (-1,), "ErrorMap.nodes") for x in self.nodes)
-        object.__setattr__(self, "nodes", nodes)
-        object.__setattr__(self, "table", frozen(self.table, np.float64, (*map(len, nodes), 6), "ErrorMap.table"))
-        object.__setattr__(self, "periods", self.periods or (0.0,) * len(nodes))
+        object.__setattr__(self, "periods", self.periods or (0.0,) * len(self.nodes))
 
     @property
     def names(self) -> list[str]:

@@ -23,9 +23,10 @@ from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True)
-@arrays(line="E", code="E", end="E J", start="J", plane="E", ccw="E", center="E 3", feed="E", inverse="E", tool="E",
-        register="E", spindle="E", rpm="E", coolant="E", hole="E", missing_feed="E", dwell="E", compensation="E",
-        offset="E", blend="E", frame="E", block="E", radius="E", pitch="E", floating="E", inch="E")
+@arrays(line="E", code="int8: E", end="E J", start="J", plane="int8: E", ccw="E", center="E 3", feed="E", inverse="E",
+        tool="E", register="E", spindle="int8: E", rpm="E", coolant="E", hole="E", missing_feed="E", dwell="E",
+        compensation="int8: E", offset="E", blend="E", frame="E", block="E", radius="E", pitch="E", floating="E",
+        inch="E")
 class Motion:
     """E executed blocks.
 

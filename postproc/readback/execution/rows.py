@@ -18,8 +18,8 @@ INCH = 25.4
 
 
 @dataclass(frozen=True)
-@arrays(motion="N", plane="N", machine="N", level="N", inch="N", columns="N J", steps="N J", rest="N", length="N",
-        relative="N 3", absolute="N 3", extra="N 7", deep="N 3", repeats="N", call="N")
+@arrays(motion="int16: N", plane="int8: N", machine="N", level="int8: N", inch="N", columns="N J", steps="N J",
+        rest="N", length="N", relative="N 3", absolute="N 3", extra="N 7", deep="N 3", repeats="N", call="N")
 class BlockSection:
     """Blocks `first` and on (N), as their words and modal state have them.
 
@@ -69,7 +69,7 @@ class BlockSection:
 
 
 @dataclass(frozen=True)
-@arrays(block="R", code="R", end="R J", center="R 3", frame="R", hole="R", feed="R", dwell="R")
+@arrays(block="R", code="int8: R", end="R J", center="R 3", frame="R", hole="R", feed="R", dwell="R")
 class MotionRows:
     """R rows of motion: block, code, end (R, J) in machine coordinates, centre (R, 3) in those of the frame, number of the
     frame; hole, feed (NaN: the F word in force), rest of cycles."""

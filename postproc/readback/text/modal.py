@@ -22,13 +22,17 @@ GROUPS: Groups = {
     "compensation": (40, 41, 42), "path": (61, 61.1, 64), "once": (4, 53), "arc_distance": (90.1, 91.1),
 }
 """of NIST RS274/NGC and LinuxCNC; a dialect adds its own"""
+MACROS = ("G65", "G66")
+"""calls of a macro, whose arguments may be any words"""
+_ARGUMENTS = [ord(a) for a in "PQRLHDE"]
 _PART = 200_000
 """words that are looked at together"""
 
 
 @dataclass(frozen=True)
-@arrays(motion="B", plane="B", inverse="B", per_turn="B", inch="B", level="B", length_register="B", tool="B",
-        spindle="B", rpm="B", coolant="B", machine="B", compensation="B", offset="B", blend="B")
+@arrays(motion="int16: B", plane="int8: B", inverse="bool: B", per_turn="bool: B", inch="bool: B", level="int8: B",
+        length_register="B", tool="B", spindle="int8: B", rpm="B", coolant="int8: B", machine="bool: B",
+        compensation="int8: B", offset="B", blend="B")
 class Modal:
     """State at every block (index 0 is before block 1; B + 1 entries)."""
 
@@ -45,7 +49,7 @@ class Modal:
     spindle: Array
     """-1, 0, 1"""
     rpm: Floats
-    coolant: Ints
+    coolant: Array
     """bits of what flows (`postproc.reference.coolant`)"""
     machine: Array
     """G53 in this block"""
@@ -129,11 +133,20 @@ def modal_state(words: Words) -> Modal:
 
 
 def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
-    """Words without the blocks that hold a code the controller file calls passive."""
+    """Words without codes that the controller file calls passive, and what stands behind them in their blocks: all words of
+    a macro call, up to the next G or M code those of other G codes, of M codes those that are no axis, feed or speed."""
     drop = np.zeros(len(words.letter), dtype=bool)
+    ends = (words.letter == ord("G")) | (words.letter == ord("M"))
     for code in passive:
-        lines = words.line[(words.letter == ord(code[0])) & (words.value == float(code[1:]))]
-        drop |= np.isin(words.line, lines)
+        if not code[1:2].isdigit():
+            continue
+        value = float(code[1:])
+        for k in np.flatnonzero((words.letter == ord(code[0])) & (words.value == value)).tolist():
+            stop = int(np.searchsorted(words.line, words.line[k], side="right"))
+            if code not in MACROS:
+                stop = next((i for i in range(k + 1, stop) if ends[i]), stop)
+            drop[k] = True
+            drop[k + 1:stop] = True if code[0] == "G" else np.isin(words.letter[k + 1:stop], _ARGUMENTS)
     return words.take(~drop)
 
 

@@ -26,7 +26,7 @@ _NUMBER[list(b"0123456789.+- \t\n")] = True
 
 
 @dataclass(frozen=True)
-@arrays(letter="W", value="W", line="W", point="W")
+@arrays(letter="uint8: W", value="W", line="W", point="W")
 class Words:
     """W words in file order.
 
