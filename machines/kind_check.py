@@ -55,7 +55,7 @@ def _letters(kin: Kinematics) -> Iterator[KeyProblem]:
     for letter, rotary in zip(kin.axis_names, kin.rotary, strict=True):
         allowed = "ABC" if rotary else "XYZUVWPQR"
         if len(letter) != 1 or letter not in allowed:
-            yield _problem(f"{letter!r} is no letter of a {'rotary' if rotary else 'linear'} axis, allowed: "
+            yield _problem(f"{letter!r} is not a letter of a {'rotary' if rotary else 'linear'} axis, allowed: "
                            f"{' '.join(allowed)}")
 
 
@@ -79,7 +79,7 @@ def _poses(kin: Kinematics, q: Floats) -> Iterator[KeyProblem]:
         yield _problem("forward gives no pose at home")
         return
     if np.abs(np.linalg.norm(axis, axis=1) - 1.0).max() > NEAR:
-        yield _problem("forward gives tool axes that are no unit vectors")
+        yield _problem("forward gives tool axes that are not unit vectors")
         return
     for length, what in ((0.0, "inverse"), (TOOL, f"inverse with a tool of {TOOL:g} mm")):
         yield from _round_trip(kin.with_tool(length), q, (tip - length * axis, axis), what)

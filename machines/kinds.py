@@ -97,7 +97,7 @@ def _loaded(point: EntryPoint) -> type[KinematicsModel]:
         raise KindFault(f"kind {point.name!r} ({point.value}) is not imported: {type(fault).__name__}: {fault}",
                         "correct or reinstall the package that registers it") from fault
     if not (isinstance(model, type) and issubclass(model, KinematicsModel)):
-        raise KindFault(f"kind {point.name!r} ({point.value}) is no KinematicsModel (machines/models.py)",
+        raise KindFault(f"kind {point.name!r} ({point.value}) is not a KinematicsModel (machines/models.py)",
                         "register the model of the [kinematics] table")
     return model
 

@@ -30,7 +30,7 @@ def _upward(travel: Any) -> Any:
 
 def _whole_turn(turn: tuple[float, float]) -> tuple[float, float]:
     if not (turn[1] - turn[0] == 360.0 and turn[0] <= 0.0 < turn[1]):
-        raise ValueError(f"{list(turn)} is no turn with 0 in it; write [0, 360] or [-180, 180]")
+        raise ValueError(f"{list(turn)} is not one whole turn with 0 in it; write [0, 360] or [-180, 180]")
     return turn
 
 
@@ -174,7 +174,7 @@ class MachineModel(UserModel):
         if self.retract_axis is not None and rotary.get(self.retract_axis, True):
             linear = ", ".join(name for name, turns in rotary.items() if not turns)
             yield KeyProblem("machine.retract-axis", ("retract_axis",),
-                             f"retract_axis = {self.retract_axis!r} is no linear axis of this machine",
+                             f"retract_axis = {self.retract_axis!r} is not a linear axis of this machine",
                              f"choose from {linear}")
         if self.control is not None:
             try:

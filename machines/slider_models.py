@@ -138,7 +138,7 @@ class SliderModel(KinematicsModel):
                 yield KeyProblem("machine.geometry", ("legs", name, "direction"),
                                  f"{list(leg.direction)} has length {length:.6g}, not 1", "write a unit vector")
             if len(name) != 1 or name not in "XYZUVWPQR":
-                yield KeyProblem("machine.axis-letter", ("legs", name), f"{name!r} is no letter of a linear axis",
+                yield KeyProblem("machine.axis-letter", ("legs", name), f"{name!r} is not a letter of a linear axis",
                                  "choose from X Y Z U V W P Q R")
             if len(leg.rods) > 2:
                 yield KeyProblem("machine.geometry", ("legs", name, "rods"), f"{len(leg.rods)} rods; a leg has one or two")

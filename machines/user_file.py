@@ -211,7 +211,7 @@ def _syntax(fault: tomllib.TOMLDecodeError, file: str, text: str) -> Diagnostic:
     line = int(place.split()[1].rstrip(",")) if place.startswith("line ") else text.count("\n") + 1
     number = decimal_comma(next(iter(text.splitlines()[line - 1:line]), ""))
     if number:
-        return error("file.syntax", f"{number} is no number", file=file, lines=[line],
+        return error("file.syntax", f"{number} is not a number", file=file, lines=[line],
                      hint=f"{POINT}: {number.replace(',', '.')}")
     return error("file.syntax", f"not valid TOML: {what}", file=file, lines=[line], hint=_HOW)
 

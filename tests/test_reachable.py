@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from machines.kinds import BUILT_IN
 from tests.source import ROOT, product, tree, walked
 
 PRODUCT = product()
@@ -30,7 +31,6 @@ LISTED = {
     "StretchSpeeds.lowest": "a result of `Plan.blocks`, in the example of feedrate/README.md",
     "StretchSpeeds.highest": "likewise", "__getattr__": "called by Python",
     "declared": "what a class declares of its arrays: tests/toolpaths/test_shapes.py looks at every dataclass",
-    "LinearDeltaModel": "named by `machines/kinds.py`", "H4LinearModel": "likewise", "SerialModel": "likewise",
 }
 """name: why it stays"""
 BLOCK_ENDS = ("by_approach", "tip_rates", "later", "goes_on", "like")
@@ -108,6 +108,8 @@ def all_unused() -> dict[str, str]:
     for found in users():
         for owner, name in imports(found):
             imported.setdefault(owner, set()).add(name)
+    for owner, name in (entry.split(":") for entry in BUILT_IN.values()):
+        imported.setdefault(owner, set()).add(name)
     return {name: str(path.relative_to(ROOT)) for path in PRODUCT
             for name in unused(tree(path), imported.get(module(path), set()))}
 

@@ -103,7 +103,7 @@ def _output(path: Path, run: str) -> _Output:
     except FileNotFoundError:
         old = None
     if old is not None and not stat.S_ISREG(old.st_mode):
-        raise OSError(errno.EINVAL, "it is no regular file")
+        raise OSError(errno.EINVAL, "it is not a regular file")
     if old is not None and not (old.st_mode & 0o222 and os.access(target, os.W_OK)):
         raise OSError(errno.EACCES, READ_ONLY)
     return _Output(path, target, leftovers.temporary(target, run, leftovers.NEW), old)

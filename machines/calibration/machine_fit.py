@@ -63,7 +63,7 @@ def problem_of(model: ErrorModel, kinematics: Kinematics, measured: Measurements
     chosen = [name for name in model.names if not parameters or name.startswith(tuple(parameters))]
     for prefix in parameters:
         if not any(name.startswith(prefix) for name in model.names):
-            raise ValueError(f"{prefix!r} is no parameter of the error model; {near(prefix, model.names)}")
+            raise ValueError(f"{prefix!r} is not a parameter of the error model; {near(prefix, model.names)}")
     setup = SETUP[measured.kind]
     names = (*model.names, *setup)
     free = np.array([*(name in set(chosen) for name in model.names), *(measured.zeroed for _ in setup)])

@@ -92,7 +92,7 @@ class CalibrationRun:
         bad = (setup != np.round(setup)) | (setup < 0) | (step != np.round(step)) | (step < 0) | (step >= steps)
         twice = np.ones(len(setup), dtype=np.bool_)
         twice[np.unique(setup * steps + step, return_index=True)[1]] = False
-        for where, what in ((bad, f"is no set-up 0, 1, ... and step 0 .. {steps - 1}"), (twice, "was measured before")):
+        for where, what in ((bad, f"is not a set-up 0, 1, ... and a step 0 .. {steps - 1}"), (twice, "was measured before")):
             if where.any():
                 row = int(np.argmax(where))
                 self.row(table, row, f"set-up {setup[row]:g}, step {step[row]:g} {what}")

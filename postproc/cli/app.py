@@ -30,6 +30,7 @@ from postproc.cli.options import (
     AxisToleranceOption,
     Beyond,
     ClFile,
+    ControllerName,
     DialectOption,
     MachineName,
     ProofOf,
@@ -63,12 +64,13 @@ app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc
 app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog=PLACES)(place)
 
-ControllerName = Annotated[str, typer.Option("-c", "--controller", help="controller: a name from the list, or a TOML file")]
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
                                      "corrected, and proved on the machine with them")]
 ToolTable = Annotated[str, typer.Option("--tool-table", metavar="FILE", help="the control's tool table: verify with the "
                                         "lengths of tools at the machine")]
+ErrorsOfProgram = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric "
+                                              "errors that the program corrects")]
 OutputModeOption = Annotated[str, typer.Option("--output-mode", metavar="{auto,axes,tcp,tilted}", help=(
     "axes: machine coordinates, no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, TCPM, G234); tilted: tilted work "
     "plane, 3+2 (G68.2, CYCLE800, PLANE SPATIAL, G254)"))]
@@ -92,22 +94,22 @@ def options_of_all(version: Annotated[bool, typer.Option("--version", is_eager=T
 def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="G-code file to write")],
             feed_mode: Annotated[str, typer.Option("--feed-mode", metavar="{auto,per-minute,inverse-time}",
-                                                   help="unit of F words")] = "auto",
+                                                   help="F in mm/min (G94), or one over the time of the "
+                                                   "block (G93)")] = "auto",
             output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
             feed: Annotated[str, typer.Option("--feed", metavar="{programmed,planned}",
                                               help="programmed: the feeds of the CL file; planned: lower where an "
                                               "axis or a tool would exceed its limits")] = "programmed",
             merge_feeds: Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="merge "
-                                                       "neighbouring F words within this part")] = 0.0,
+                                                       "neighbouring F words that differ by up to PERCENT")] = 0.0,
             smooth: Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the "
                                                  "tolerance")] = False,
             setup: Setup = "", tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
             units: UnitsOption = "",
             dialect: DialectOption = "", allow_unknown: Allow = None, error_model: Errors = "", beyond: Beyond = False,
-            residuals: Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="what errors do at "
-                                 "each CL point, before and after correction: .csv, or drawn: .png, .svg; again for "
-                                 "more")] = None,
+            residuals: Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="errors at each CL "
+                                 "point before and after correction: .csv, or drawn: .png, .svg; may be repeated")] = None,
             require_proof: RequireProof = False, proof: ProofOption = False, json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     _choice("--orient", orient, ORIENTATIONS)
@@ -156,7 +158,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: ToleranceOption = 0.01,
            axis_tolerance: AxisToleranceOption = 0.05, units: UnitsOption = "", dialect: DialectOption = "",
            allow_unknown: Allow = None,
-           error_model: Errors = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
+           error_model: ErrorsOfProgram = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
            require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTable = "", json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     _choice("--orient", orient, ORIENTATIONS)
@@ -242,7 +244,7 @@ def _residual_files(files: list[Path], error_model: str) -> list[Path]:
     from postproc.report.residual_files import ENDINGS
 
     if not error_model:
-        raise typer.BadParameter("there are none without --error-model", param_hint="--residuals")
+        raise typer.BadParameter("residuals need --error-model", param_hint="--residuals")
     for name in files:
         if name.suffix.lower() not in ENDINGS:
             raise typer.BadParameter(f"{name.name} ends neither in .csv nor in .png or .svg", param_hint="--residuals")

@@ -21,12 +21,12 @@ def _schema(wanted: bool) -> None:
 
 def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", help="what was measured, and how")],
               output: Annotated[Path, typer.Option("-o", "--output", metavar="ERROR_MODEL.toml",
-                                                   help="error model to write; its tables are put next to it")],
+                                                   help="error model to write; its tables are written next to it")],
               figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of signatures, "
                                                           "residuals and condition number, .png or .svg")] = None,
-              accept_residual: Annotated[bool, typer.Option("--accept-residual", help="take a fit that leaves more of the "
-                                                            "readings than their stated noise; its covariance is scaled by "
-                                                            "what is left")] = False,
+              accept_residual: Annotated[bool, typer.Option("--accept-residual", help="accept a fit whose residuals are "
+                                                            "larger than the stated noise; its covariance is scaled up "
+                                                            "accordingly")] = False,
               schema: Annotated[bool, typer.Option("--schema", is_eager=True, callback=_schema, help="print the JSON schema "
                                                    "of a measurement file, with the columns of its table")] = False,
               json: Json = "") -> None:

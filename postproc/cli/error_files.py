@@ -118,7 +118,8 @@ def merged_into(model: ErrorModel, into: Path, machine: Machine) -> tuple[ErrorM
 
     old, _ = loaded(into, machine)
     if old.map is not None or model.map is not None:
-        raise DiagnosticError([error("error-import.map", "a map stands alone", file=str(into), hint="leave --into out")])
+        raise DiagnosticError([error("error-import.map", "a map cannot be combined with other sources", file=str(into),
+                                      hint="leave --into out")])
     lost = replaced(old, model) if old.covariance is not None and model.covariance is None else set()
     names = sorted({name.split("[")[0].split(".")[0] for name in lost})
     noted = [f"uncertainty unknown of {', '.join(names)}: give --covariance, or sigma in the model"] if names else []

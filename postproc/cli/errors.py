@@ -24,7 +24,7 @@ FigureOption = Annotated[Path | None, typer.Option("--figure", metavar="FILE",
                                                    help="drawing of the errors, and of the tip over "
                                                    "the work volume, .png or .svg")]
 ToolLength = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0,
-                                           help="gauge length of the tool that is looked at")]
+                                           help="gauge length of the tool at whose tip errors are given")]
 Step = Annotated[list[str] | None, typer.Option("--step", metavar="AXIS=STEP", help="mm or degrees between rows or nodes, "
                                                 "e.g. X=50; may be repeated")]
 Loss = Annotated[float, typer.Option("--loss", metavar="UM", min=1e-4, max=1e4,
@@ -34,20 +34,20 @@ AngleLoss = Annotated[float, typer.Option("--angle-loss", metavar="ARCSEC", min=
 Rest = Annotated[Path | None, typer.Option("--rest", metavar="REST.toml",
                                            help="model of what LinuxCNC does not correct, for --error-model")]
 MapFile = Annotated[Path, typer.Option("-o", "--output", metavar="MAP.toml",
-                                       help="model to write; its lattice is put next to it")]
+                                       help="model to write; its lattice is written next to it")]
 Over = Annotated[str, typer.Option("--over", metavar="LETTERS", help="coordinates: axes, e.g. XYZ or XYZAC, or x y z of the "
                                    "point in the table frame; default the slides, xyz of parallel-kinematic machines")]
 MapLossOption = Annotated[float | None, typer.Option("--loss", metavar="UM", min=1e-3, max=1e4,
-                                                     help="divide cells until the map "
-                                                     "loses no more inside its lattice, um")]
-At = Annotated[list[str] | None, typer.Option("--at", metavar="AXIS=POSITION", help="where an axis stands that is no "
-                                              "coordinate, mm or degrees")]
+                                                     help="refine the lattice until the "
+                                                     "interpolation error inside it is below UM")]
+At = Annotated[list[str] | None, typer.Option("--at", metavar="AXIS=POSITION", help="position of an axis that is "
+                                              "not a coordinate of the map, mm or degrees")]
 MapToolLengthOption = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0,
                                                     help="displacements are those "
                                                     "of the tip of this tool; 0: of the gauge point")]
-MapDirectionsOption = Annotated[str, typer.Option("--directions",
-                                                  help="of the map's values: machine, or table (turns with the "
-                                                  "rotary axes under the part)")]
+MapDirectionsOption = Annotated[str, typer.Option("--directions", metavar="{machine,table}",
+                                                  help="axes along which the map gives its values; those of the "
+                                                  "table turn with the rotary axes under the part")]
 
 
 @errors_app.command("check", epilog="Example: postproc errors check errors.toml -m mikron-ucp710 --tool-length 120")
@@ -98,7 +98,7 @@ def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step 
 @errors_app.command("to-linuxcnc", epilog="Example: postproc errors to-linuxcnc e.toml -m mill-3axis -o comp --rest r.toml")
 def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Rest = None, step: Step = None,
                 loss: Loss = 0.1, angle_loss: AngleLoss = 0.1, tool_length: ToolLength = 100.0, json: Json = "") -> None:
-    """Write positioning errors as LinuxCNC's screw compensation, one file per joint, and say what they leave."""
+    """Write positioning errors as LinuxCNC's screw compensation, one file per joint, and report what remains."""
     refuse_overwriting({"--rest": str(rest or ""), "--json": json}, {"the error model": str(file), **own_files(machine)})
     from machines.geometric_error.exchange import exports
     from machines.geometric_error.tables.csv_table import UNITS
@@ -125,7 +125,7 @@ def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = 
            loss: MapLossOption = None,
            at: At = None, tool_length: MapToolLengthOption = 0.0, directions: MapDirectionsOption = "machine",
            json: Json = "") -> None:
-    """Write an error map of a model, as controls hold it, and say what it loses."""
+    """Write an error map of a model, as controls hold it, and report its interpolation error."""
     refuse_overwriting({"-o": str(output), "--json": json}, {"the error model": str(file), **own_files(machine)})
     if directions not in ("machine", "table"):
         raise typer.BadParameter(f"{directions!r} is not available; choose from machine, table", param_hint="--directions")

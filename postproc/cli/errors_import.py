@@ -16,18 +16,20 @@ Sources = Annotated[list[str], typer.Argument(metavar="SOURCE...", help="tables 
                                               "targets and runs of one error (EXX=laser.csv), a lattice (map.csv), "
                                               "LinuxCNC's files (X=x.comp)")]
 OutputOption = Annotated[Path, typer.Option("-o", "--output", metavar="MODEL.toml",
-                                            help="model to write; its tables are put "
+                                            help="model to write; its tables are written "
                                             "next to it")]
-Into = Annotated[Path | None, typer.Option("--into", metavar="MODEL.toml", help="model whose other errors stay, with their "
-                                           "covariance")]
+Into = Annotated[Path | None, typer.Option("--into", metavar="MODEL.toml", help="add to this model: its other errors stay, "
+                                           "with their covariance")]
 Covariance = Annotated[Path | None, typer.Option("--covariance", metavar="C.csv", help="square table of what is imported, "
                                                  "um and arcsec")]
 Interpolation = Annotated[str, typer.Option("--interpolation", metavar="{linear,spline}",
                                             help="between rows: linear or spline")]
 Repeats = Annotated[list[str] | None, typer.Option("--repeats", metavar="AXIS=PERIOD", help="degrees or mm after which a "
                                                    "table or map repeats, e.g. C=360")]
-Sign = Annotated[int, typer.Option("--sign", help="-1 where the numbers say how the part moves relative to the tool")]
-ScrewFileTypeOption = Annotated[int, typer.Option("--type", min=0, max=1, help="COMP_FILE_TYPE of LinuxCNC's files")]
+Sign = Annotated[int, typer.Option("--sign", metavar="{1,-1}",
+                                     help="-1 where the numbers say how the part moves relative to the tool")]
+ScrewFileTypeOption = Annotated[int, typer.Option("--type", metavar="{0,1}", min=0, max=1,
+                                                    help="COMP_FILE_TYPE of LinuxCNC's files")]
 ToolLengthOption = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0,
                                                  help="of the tool whose tip a "
                                                  "map displaces; 0: the gauge point")]
@@ -36,10 +38,11 @@ Zero = Annotated[list[str] | None, typer.Option("--zero", metavar="AXIS=POSITION
 Average = Annotated[bool, typer.Option("--average", help="rows at the same place, columns of runs (EXX+1, EXX-1, EXX+2 ...) "
                                        "and files of runs are readings: the mean counts, the scatter is the uncertainty")]
 NearOption = Annotated[list[str] | None, typer.Option("--near", metavar="AXIS=AMOUNT",
-                                                      help="with --average: readings no farther "
-                                                      "apart are of one place, given to that amount, mm or degrees")]
+                                                      help="with --average: readings within this "
+                                                      "amount of each other belong to one place, mm or degrees")]
 Large = Annotated[bool, typer.Option("--large", help="accept errors above 1 mm or 0.5 degrees")]
-DirectionsOption = Annotated[str, typer.Option("--directions", help="of a map's values: machine or table")]
+DirectionsOption = Annotated[str, typer.Option("--directions", metavar="{machine,table}",
+                                                  help="axes along which a map gives its values")]
 
 
 def import_(sources: Sources, machine: MachineName, output: OutputOption, into: Into = None, covariance: Covariance = None,
@@ -47,7 +50,7 @@ def import_(sources: Sources, machine: MachineName, output: OutputOption, into: 
             tool_length: ToolLengthOption = 0.0, directions: DirectionsOption = "table", zero: Zero = None,
             average: Average = False,
             near: NearOption = None, large: Large = False, json: Json = "") -> None:
-    """Make an error model of tables that others wrote."""
+    """Import tables of errors as an error model."""
     for option, value, allowed in (("--interpolation", interpolation, ("linear", "spline")),
                                    ("--sign", str(sign), ("1", "-1")), ("--directions", directions, ("machine", "table"))):
         if value not in allowed:

@@ -53,10 +53,11 @@ MOST = 6
 
 def orient(file: ClFile,
            machine: MachineName,
-           controller: Annotated[str, typer.Option("-c", "--controller", help="for which the plan is proved")] = "linuxcnc",
+           controller: Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER",
+                                                   help="controller for which the plan is proved")] = "linuxcnc",
            max_tilt: MaxTilt = 60.0,
-           plan: Annotated[str, typer.Option("--orient", help="plan whose passes are shown: keep, per-pass, whole-part, "
-                                             "auto")] = "auto",
+           plan: Annotated[str, typer.Option("--orient", metavar="{keep,per-pass,whole-part,auto}",
+                                             help="plan whose passes are shown")] = "auto",
            passes: Annotated[list[int] | None, typer.Option("--pass", metavar="N", min=0, help="show this pass in full "
                                                             "(number of the table; may be repeated)")] = None,
            figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of plans, passes and, of "
@@ -65,7 +66,7 @@ def orient(file: ClFile,
            tolerance: ToleranceOption = 0.01,
            axis_tolerance: AxisToleranceOption = 0.05,
            error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's "
-                                                    "geometric errors: checked; it changes no choice")] = "",
+                                                    "geometric errors: checked, not used for the choice")] = "",
            units: UnitsOption = "",
            dialect: DialectOption = "",
            allow_unknown: Allow = None,

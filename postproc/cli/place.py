@@ -45,8 +45,10 @@ def place(file: ClFile,
           machine: MachineName,
           setup: Annotated[Path, typer.Option("--setup", metavar="S.toml", help="set-up file; [placement] says where the "
                                               "part may stand")],
-          output: Annotated[Path, typer.Option("-o", "--output", metavar="S2.toml", help="the same with [part] replaced")],
-          controller: Annotated[str, typer.Option("-c", "--controller", help="for which the place is proved")] = "linuxcnc",
+          output: Annotated[Path, typer.Option("-o", "--output", metavar="S2.toml", help="set-up file to write: the same "
+                                               "with [part] replaced")],
+          controller: Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER",
+                                                   help="controller for which the place is proved")] = "linuxcnc",
           orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
           tolerance: ToleranceOption = 0.01,
           axis_tolerance: AxisToleranceOption = 0.05,
@@ -103,7 +105,7 @@ def _check(orient: str, units: str, dialect: str, setup: Path, figure: Path | No
             raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(known)}", param_hint=option)
     figure_ending(figure)
     if there_is(setup) and not is_regular(setup):
-        raise typer.BadParameter(f"{setup} is no regular file: its text is read twice", param_hint="--setup")
+        raise typer.BadParameter(f"{setup} is not a regular file: its text is read twice", param_hint="--setup")
 
 
 def _chosen(file: Path, machine: Machine, controller: str, options: Options,

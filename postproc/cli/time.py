@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from postproc.cli.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
-from postproc.cli.options import AxisToleranceOption, Beyond, MachineName, ToleranceOption, UnitsOption, only_with_errors
+from postproc.cli.options import (
+    AxisToleranceOption,
+    Beyond,
+    ControllerName,
+    DialectOption,
+    MachineName,
+    ToleranceOption,
+    UnitsOption,
+    only_with_errors,
+)
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -26,12 +35,12 @@ UNKNOWN: dict[str, Any] = {"cycle_time_s": None, "lower_bound_s": None, "band_s"
 
 def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or G-code file of the controller")],
          machine: MachineName,
-         controller: Annotated[str, typer.Option("-c", "--controller", help="controller: name or TOML file")] = "linuxcnc",
-         model: Annotated[str, typer.Option("--model", help="model of the control: ideal, lookahead, linuxcnc, or a TOML "
-                                            "file; default: the controller's")] = "",
+         controller: ControllerName = "linuxcnc",
+         model: Annotated[str, typer.Option("--model", metavar="{ideal,lookahead,linuxcnc,FILE}",
+                                            help="model of the control, or a TOML file; default: the controller's")] = "",
          calibrate: Annotated[str, typer.Option("--calibrate", metavar="LOG.csv", help="fit the model to a measured run of "
                                                 "FILE: columns nc_line, time_s")] = "",
-         output: Annotated[str, typer.Option("-o", "--output", metavar="MODEL.toml", help="write the fitted model")] = "",
+         output: Annotated[str, typer.Option("-o", "--output", metavar="MODEL.toml", help="file for the fitted model")] = "",
          override: Annotated[float, typer.Option("--override", metavar="PERCENT", min=1.0, max=300.0, help="feed override: "
                                                  "feeds at PERCENT of what is programmed, rapids and taps as they are; "
                                                  "with --calibrate, at which the run was measured")] = 100.0,
@@ -39,9 +48,9 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
          tolerance: ToleranceOption = 0.01,
          axis_tolerance: AxisToleranceOption = 0.05,
          units: UnitsOption = "",
-         dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect")] = "",
-         error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="a CL file is timed as it is "
-                                                  "written with these geometric errors corrected")] = "",
+         dialect: DialectOption = "",
+         error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="time a CL file with these "
+                                                  "geometric errors of the machine corrected")] = "",
          beyond: Beyond = False,
          json: Json = "") -> None:
     """Estimate how long a program takes, with a band, and where the time goes."""
@@ -79,7 +88,7 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
 
 def _check(output: str, calibrate: str, units: str, dialect: str) -> None:
     if output and not calibrate:
-        raise typer.BadParameter("there is no calibrated model without --calibrate", param_hint="-o")
+        raise typer.BadParameter("it writes the model that --calibrate fits: give --calibrate too", param_hint="-o")
     if units and units not in ("mm", "inch"):
         raise typer.BadParameter(f"{units!r} is not available; choose from mm, inch", param_hint="--units")
     if dialect:

@@ -100,12 +100,12 @@ def _unformed(number: int, cutter: Cutter) -> list[Diagnostic]:
         found.append(warning("collision.corner", f"T{number}: a corner radius of {cutter.corner or 0.0:g} mm does not fit "
                              f"a diameter of {cutter.diameter:g} mm with a taper of {cutter.taper / DEG:g} degrees: the "
                              "cutter is not checked against the part, and counts as a cylinder or cone elsewhere",
-                             hint=f"add diameter, corner_radius and taper of a form that is round it {key}"))
+                             hint=f"add diameter, corner_radius and taper of a cutter form that encloses it {key}"))
     if cutter.corner is None:
         found.append(warning("collision.corner", f"T{number}: its corner radius is not known, it is checked as sharp",
                              hint=f"add corner_radius = ... {key}"))
     if cutter.flattened:
-        found.append(info("collision.point", f"T{number}: its point counts as flat, which is more than there is",
+        found.append(info("collision.point", f"T{number}: its point is taken as flat, which is larger than it is",
                           hint=f"add tip_angle = ... {key}"))
     return found
 

@@ -88,7 +88,7 @@ def _broken(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
         return (error("mesh.empty", "holds no triangle", file=path, hint="export the solid as a triangle mesh"),)
     bad = np.flatnonzero(~np.isfinite(mesh.vertices).all(axis=1))
     if len(bad):
-        return (error("mesh.number", f"{len(bad)} of {len(mesh.vertices)} vertices are no finite numbers", file=path,
+        return (error("mesh.number", f"{len(bad)} of {len(mesh.vertices)} vertices are not finite numbers", file=path,
                       hint="export it again"),)
     return ()
 
@@ -97,7 +97,7 @@ def _no_solid(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
     """Holes, and faces that do not agree which side is out."""
     open_edges, one_sided = _edge_faults(mesh)
     if open_edges:
-        return (error("mesh.open_surface", f"is no closed solid: {open_edges} edges are not shared by two "
+        return (error("mesh.open_surface", f"is not a closed solid: {open_edges} edges are not shared by two "
                       "triangles", file=path, hint="close the holes, or export the body as a solid"),)
     with np.errstate(all="ignore"):
         flat = mesh.volume == 0.0

@@ -63,8 +63,8 @@ class OutputModes:
         if control.base == "tcp":
             own = "the control runs the kinematics of this machine for the whole program"
             return {"axes": own, "tcp": "", "tilted": own}
-        machine = "" if control.has_tip_modes else f"{name} is no serial machine with slides X, Y, Z along its axes and a " \
-            "rotary axis"
+        machine = "" if control.has_tip_modes else f"{name} is not a serial machine with slides X, Y, Z along its " \
+            "axes and a rotary axis"
         machine = machine or ("" if self.tool_call else "it needs the tool's length in a register, and the set-up has "
                               "[output] tool_call = false")
         tables = modes.tilted is not None and modes.tilted.tables_only and not control.has_rotary_tables_only
@@ -167,7 +167,7 @@ def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
         why = modes.lacking.get(ASKED[asked], "")  # type: ignore[call-overload]
         if why:
             lines = [op.line for op, a in zip(toolpath.operations, modes.asked, strict=True) if a == asked and op.line]
-            result.append(error("output.mode", f"output mode {ASKED[asked]} cannot be had: {why}", file=toolpath.file,
+            result.append(error("output.mode", f"output mode {ASKED[asked]} is not possible: {why}", file=toolpath.file,
                                 lines=lines[:6], count=max(len(lines), 1), hint=f"this controller and machine have: {can}"))
     return result
 
@@ -184,7 +184,7 @@ def _no_subprograms(controller: ControllerFile, setup: SetupFile, options: Optio
 def _unknown_operations(setup: SetupFile, options: Options, toolpath: Toolpath) -> list[Diagnostic]:
     names = {op.name for op in toolpath.operations}
     known = ", ".join(sorted(n for n in names if n)) or "no named operation"
-    return [error("setup.operation", f"[output.operations] names {name!r}, which is no operation of the CL file",
+    return [error("setup.operation", f"[output.operations] names {name!r}, which is not an operation of the CL file",
                   file=options.setup, hint=f"it has: {known}")
             for name in setup.output.operations if name not in names]
 

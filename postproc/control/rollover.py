@@ -70,7 +70,7 @@ def rollovers(machine: Machine, controller: ControllerFile) -> tuple[dict[int, R
         if rule not in rules.rules:
             had = ", ".join(f'"{r}"' for r in rules.rules)
             found.append(error("machine.rollover", f'axis {name} of {machine.name} has rollover = "{rule}", which this '
-                               "control has not", file=machine.file,
+                               "control does not have", file=machine.file,
                                hint=f'allowed are {had} under [axes.{name}]; left out it is "{rules.default}"'))
         elif turns.low and (rule == "sign" or rules.shortest):
             why = "this control takes the sign of a word as its direction, so that words" if rule == "sign" else \

@@ -47,7 +47,7 @@ def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[RunLog | None,
     try:
         rows = list(csv.reader(io.StringIO(text)))
     except csv.Error as fault:
-        return None, [error("log.columns", f"is no CSV file: {fault}", file=str(file),
+        return None, [error("log.columns", f"is not a CSV file: {fault}", file=str(file),
                             hint="a log has the columns nc_line and time_s, a comma between them")]
     names = [name.strip() for name in rows[0]] if rows else []
     allowed = ("nc_line", "time_s", *letters)
@@ -93,7 +93,7 @@ def _faults(line: Floats, time: Floats, row: Ints, file: str) -> list[Diagnostic
                       hint="log every change of the line number")]
     odd = np.flatnonzero((line != np.round(line)) | (line < 1.0) | (line > MOST_LINES))
     if len(odd):
-        return [error("log.line", f"nc_line {line[odd[0]]:g} is no line number", file=file, lines=row[odd][:6].tolist(),
+        return [error("log.line", f"nc_line {line[odd[0]]:g} is not a line number", file=file, lines=row[odd][:6].tolist(),
                       count=len(odd), hint="lines of the file are whole numbers from 1")]
     back = np.flatnonzero(np.diff(time) < 0.0) + 1
     if len(back):

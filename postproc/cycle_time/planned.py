@@ -46,7 +46,7 @@ def _unsolved(motion: PlannedMotion, moves: Moves, file: str) -> list[Diagnostic
     lines = [int(moves.line[one.move[0]]) for one, made in zip(motion.passes, motion.plans, strict=True) if not made.solved]
     if not lines:
         return []
-    return [warning("time.unsolved", "the least time of these passes was not found; they are given longer than need be, "
+    return [warning("time.unsolved", "the least time of these passes was not found; their times are longer than necessary, "
                     "within all limits", file=file, lines=lines[:6], count=len(lines), hint="--model lookahead")]
 
 

@@ -74,7 +74,7 @@ def spun(kin: Kinematics, moves: Moves, rows: Ints, axis: Floats, q: Floats, tol
     bad = np.flatnonzero(off > tolerance)
     if not len(bad):
         return []
-    return [error("axis.spin", f"the tool is to be held about its own axis, which no rotary axis can do here: it stands "
+    return [error("axis.spin", f"the tool is to be turned about its own axis, which no rotary axis can do here: it is "
                   f"{off[bad].max() / DEG:.4f} degrees off", file=file, lines=moves.line[rows[bad]][:6].tolist(),
                   count=len(bad), hint="leave Toolpath.spin out where the tool is not along a rotary axis all the pass")]
 

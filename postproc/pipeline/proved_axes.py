@@ -161,7 +161,7 @@ def _noted(passed: list[tuple[OrientationPlan, str]], choice: OrientationChoice,
     reasons = [f"{one.seconds:.3f} s, {why}" for one, why in passed]
     more = f"; and {len(reasons) - _NOTED} more" if len(reasons) > _NOTED else ""
     taken = choice.plans[plan].seconds
-    return [info("orient.passed_over", f"passed over for the {taken:.3f} s of {plan}, as their programs are refused: "
+    return [info("orient.passed_over", f"not taken for the {taken:.3f} s of {plan}, as their programs are refused: "
                  f"{'; '.join(reasons[:_NOTED])}{more}", file=choice.work.toolpath.file)]
 
 
@@ -170,4 +170,4 @@ def _unproved(made: Proved, plan: Orientation, passed: list[tuple[OrientationPla
     tried = f", nor are those of {len(passed) - 1} other plans" if len(passed) > 1 else ""
     return warning("orient.unproved", f"the program of {plan} for {made.program.controller_name} is refused{tried}: "
                    f"{passed[0][1]}", file=made.choice.work.toolpath.file,
-                   hint="convert says all that stands against it; --orient keep leaves the axes of the CL file")
+                   hint="convert reports every reason; --orient keep leaves the axes of the CL file")

@@ -98,10 +98,10 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
         return None, [*found, error("place.plan", f"no motion could be planned: {fault}", file=toolpath.file)]
     if timer.unsolved:
         found.append(warning("place.unsolved", "the least time of these passes was not found at every place; the times "
-                             "compared are longer than need be, within all limits", file=toolpath.file,
+                             "compared are longer than necessary, within all limits", file=toolpath.file,
                              lines=sorted(timer.unsolved)[:6], count=len(timer.unsolved)))
     if result.now.refused:
-        found.append(warning("place.now", f"where [part] has it the part cannot stand: {result.now.refused}",
+        found.append(warning("place.now", f"the part cannot stand where [part] places it: {result.now.refused}",
                              file=options.setup))
     if result.best is None:
         return None, [*found, _nowhere(result, timer, options)]
@@ -151,7 +151,7 @@ def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     safe = safe_space(work.moves, setup, work.placement)
     space = space_of(setup.placement, now, (safe.corners.min(axis=0), safe.corners.max(axis=0)))
     if not space.free:
-        return None, None, [error("place.limits", "[placement] of the set-up leaves the part no other place",
+        return None, None, [error("place.limits", "[placement] of the set-up allows no other place for the part",
                                   file=options.setup, hint=LIMITS)]
     return work, space, found
 
@@ -179,7 +179,7 @@ def _nowhere(result: FoundPlaces, timer: Timer, options: Options) -> Diagnostic:
     else:
         reasons = [why for _, _, why in result.lacks] + [one.refused for one in timer.known() if one is not result.now]
         why = Counter(reasons or [result.now.refused]).most_common(1)[0][0]
-    return error("place.none", f"nowhere inside [placement] can the part stand: {why}", file=options.setup,
+    return error("place.none", f"no place inside [placement] is possible: {why}", file=options.setup,
                  hint="wider limits, another tool length, a lower clearance.margin or a machine with more travel")
 
 

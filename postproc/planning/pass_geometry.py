@@ -95,7 +95,7 @@ def pass_geometry(path: JointPath, moves: Moves, kinematics: Callable[[int], Kin
         own = list(islice(paths, len(one.stretches)))
         faults = [fault for fault in own if isinstance(fault, str)]
         if faults:
-            diagnostics.append(error("plan.reach", f"the smoothed path leaves what the machine can reach: {faults[0]}",
+            diagnostics.append(error("plan.reach", f"the smoothed path leaves the reach of the machine: {faults[0]}",
                                      file=file, lines=moves.line[one.written.move[[0, -1]]].tolist(),
                                      hint="--feed programmed, a smaller --tolerance, or move the part"))
             continue

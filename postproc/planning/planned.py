@@ -104,7 +104,7 @@ class PlannedMotion:
         """The passes with their corners blended; made when they are first asked for.
 
         Raises:
-            DiagnosticError: where the smoothed path leaves what the machine can reach.
+            DiagnosticError: where the smoothed path leaves the reach of the machine.
         """
         found, diagnostics = self.source.geometry()
         require(diagnostics)
@@ -126,7 +126,7 @@ class PlannedMotion:
         except (ValueError, ArithmeticError) as fault:
             lines = self.source.moves.line[one.move[[0, -1]]].tolist()
             raise DiagnosticError([error("plan.failed", f"no motion could be planned: {fault}", file=self.source.file,
-                                         lines=lines, hint="--feed programmed does without a plan")]) from fault
+                                         lines=lines, hint="--feed programmed needs no plan")]) from fault
 
     @property
     def seconds(self) -> float:

@@ -31,7 +31,7 @@ def kept(result: PostResult, machine: str, controller: str, wanted: bool, known:
     """
     place = proof_place(output)
     if not wanted:
-        return {}, [warning("proof.older", "the proof file of an older program stands there and is not of this one",
+        return {}, [warning("proof.older", "the proof file there is of an older program",
                             file=str(place), hint="convert with --proof to write it again, or remove it")
                     ] if is_regular(place) else []
     try:

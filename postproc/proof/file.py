@@ -171,7 +171,7 @@ def read_proof(file: str | Path) -> tuple[ProofFile | None, list[Diagnostic]]:
     try:
         values = json.loads(data, object_pairs_hook=_once)
     except (ValueError, RecursionError) as fault:
-        return None, [_damaged(file, f"it is no JSON ({str(fault).splitlines()[0]})", getattr(fault, "lineno", 0))]
+        return None, [_damaged(file, f"it is not JSON ({str(fault).splitlines()[0]})", getattr(fault, "lineno", 0))]
     try:
         proof = ProofFile.model_validate(values)
     except ValidationError as fault:

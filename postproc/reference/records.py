@@ -106,7 +106,7 @@ def _plain(event: Event, spindle: Spindle, controller: ControllerFile, report: R
     if any(name[1:2].isalpha() and bare.startswith(name) for name in controller.program.passive):
         return [Event(event.index, "INSERT", (bare,), event.line)]
     if not _BLOCK.fullmatch(bare):
-        report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]} is no block of G-code", event.line,
+        report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]} is not a block of G-code", event.line,
                "write text for people with PPRINT")
         return []
     said = [(letter, float(value)) for letter, value in _WORD.findall(bare)]

@@ -22,7 +22,7 @@ def cut_operations(toolpath: Toolpath, longest: int) -> tuple[Toolpath, list[Dia
         return toolpath, []
     begins, too_long = _begins(_run_starts(toolpath), np.flatnonzero(_may_cut(toolpath)), len(toolpath), longest)
     found = [] if not too_long else [warning(
-        "output.longest", f"a part of the program holds more than {longest} points: there is no rapid to cut it at",
+        "output.longest", f"a part of the program has more than {longest} points: there is no rapid to cut it at",
         file=toolpath.file, lines=toolpath.line[too_long][:6].tolist(), count=len(too_long),
         hint="[output] longest of the set-up, or retracts between the passes in the CAM system")]
     if not begins:

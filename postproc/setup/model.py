@@ -278,7 +278,7 @@ def system_of(name: str, toolpath: Toolpath, file: str, key: str,
         if frame.name.lower() == name.lower():
             return frame, []
     names = ", ".join(f.name for f in toolpath.frames)
-    return None, [error(f"setup.{path[-1]}", f"{key} = {name!r} is no system of the CL file", file=file or toolpath.file,
+    return None, [error(f"setup.{path[-1]}", f"{key} = {name!r} is not a system of the CL file", file=file or toolpath.file,
                         lines=_line(file, path), hint=f"it has: {names}")]
 
 

@@ -1,4 +1,5 @@
-"""Laws of reading and writing CL text: nothing raises, writing loses nothing, fast and slow paths agree."""
+"""Laws of reading and writing CL text: whatever the text, what is read is whole, written text reads back, fast and slow
+paths agree."""
 
 from __future__ import annotations
 
@@ -10,11 +11,11 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from toolpaths import write
-from toolpaths.cl.read import read_bytes
+from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.scan import scan
 from toolpaths.cl.text.source import normalise
-from toolpaths.diagnostics import has_errors
+from toolpaths.diagnostics import Severity, has_errors
 from toolpaths.toolpath import FeedMode, Toolpath
 
 SLOW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -65,6 +66,23 @@ def assert_writes_back(toolpath: Toolpath) -> None:
     assert again.toolpath.equals(toolpath)
 
 
+def assert_whole(result: ReadResult) -> None:
+    """What holds of any text: rows and arcs fit together, each row and each diagnostic names a line of the file, directions
+    are unit vectors, an error says what to do; without one nothing is infinite, and the text that we write reads back."""
+    path, found = result.toolpath, result.diagnostics
+    assert path.axis.shape == path.tip.shape == (len(path), 3) and len(path.line) == len(path.feed) == len(path)
+    assert ((path.line >= 1) & (path.line <= result.lines)).all()
+    length = np.linalg.norm(path.axis, axis=1)
+    assert np.allclose(length[np.isfinite(length)], 1.0, rtol=0.0, atol=1e-9)
+    for d in found:
+        assert d.code.startswith("cl.") and d.message and d.count >= 1
+        assert all(1 <= line <= result.lines for line in d.lines), (d, result.lines)
+    assert all(d.hint for d in found if d.severity is Severity.ERROR), [str(d) for d in found]
+    if not has_errors(found):
+        assert np.isfinite(path.tip).all() and np.isfinite(path.axis).all()
+        assert_writes_back(path)
+
+
 @SLOW
 @given(heads, program, st.sampled_from(["\n", "\r\n", "\r"]))
 def test_written_text_reads_back(head: str, lines: list[str], end: str) -> None:
@@ -78,15 +96,15 @@ def test_written_text_reads_back(head: str, lines: list[str], end: str) -> None:
                  .map("\n".join)))
 @example("MSYS/1e200,0,0,1,0,0,0,1,0\nGOTO/1,2,3")
 @example("GOTO/1e308,2,3\nUNITS/INCH\nGODLTA/1e308,0,0")
-def test_no_text_raises(text: str) -> None:
-    read_bytes(text)
+def test_any_text_is_read_whole(text: str) -> None:
+    assert_whole(read_bytes(text))
 
 
 @SLOW
 @given(st.binary(max_size=300))
-def test_no_bytes_raise(data: bytes) -> None:
-    read_bytes(data)
-    read_bytes(b"GOTO/1,2,3\n" + data + b"\nGOTO/4,5,6\n")
+def test_any_bytes_are_read_whole(data: bytes) -> None:
+    assert_whole(read_bytes(data))
+    assert_whole(read_bytes(b"GOTO/1,2,3\n" + data + b"\nGOTO/4,5,6\n"))
 
 
 MUTATIONS = ["", " ", ",", "$", "/", "\n", "9", "-", ".", "E", "GOTO/", "(", "$$", "\x00", "\t", "'", "NaN"]
@@ -94,12 +112,12 @@ MUTATIONS = ["", " ", ",", "$", "/", "\n", "9", "-", ".", "E", "GOTO/", "(", "$$
 
 @SLOW
 @given(program, st.lists(st.tuples(st.integers(0, 2000), st.sampled_from(MUTATIONS)), max_size=8))
-def test_no_broken_program_raises(lines: list[str], changes: list[tuple[int, str]]) -> None:
+def test_a_broken_program_is_read_whole(lines: list[str], changes: list[tuple[int, str]]) -> None:
     text = "\n".join(lines)
     for at, what in changes:
         at %= len(text) + 1
         text = text[:at] + what + text[at + 1:]
-    read_bytes(text)
+    assert_whole(read_bytes(text))
 
 
 @SLOW

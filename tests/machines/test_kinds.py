@@ -72,7 +72,7 @@ def test_a_package_registers_a_kind_by_its_metadata(tmp_path, monkeypatch) -> No
     assert kinds.code_file("scissors") == package / "shop_machine.py" and kinds.code_file("serial") is None
     (info / "entry_points.txt").write_text(f"[{kinds.GROUP}]\nscissors = shop_machine:Scissors\nserial = no_module:X\n")
     fault = only(tmp_path)
-    assert "is no KinematicsModel" in fault.message and "register the model" in fault.hint
+    assert "is not a KinematicsModel" in fault.message and "register the model" in fault.hint
     assert machines.load("mill-3axis").kinematics.straight_slides  # a built-in kind stays what it is
     (info / "entry_points.txt").write_text(f"[{kinds.GROUP}]\nscissors = gone_module:Model\n")
     fault = only(tmp_path)
@@ -179,7 +179,7 @@ def test_the_contract_is_held_against_a_file_that_is_loaded(tmp_path, monkeypatc
     ("return Scissors(self.arm, self.rail)", "return 7", "build gives a int, expected a Kinematics"),
     ("return Scissors(self.arm, self.rail)", "raise OSError('no')", "builds no kinematics: OSError: no"),
     ("def forward(", "def forwards(", "builds no kinematics: TypeError: Can't instantiate abstract class"),
-    ('axis_names = ("X", "Y", "Z")', 'axis_names = ("X", "Y", "C")', "'C' is no letter of a linear axis"),
+    ('axis_names = ("X", "Y", "Z")', 'axis_names = ("X", "Y", "C")', "'C' is not a letter of a linear axis"),
     ('    axis_names = ("X", "Y", "Z")', "    names = ()", "has no attribute 'axis_names'")])
 def test_a_model_that_gives_no_kinematics_is_refused(tmp_path, monkeypatch, old: str, new: str, words: str) -> None:
     wrong = tmp_path / "wrong.py"

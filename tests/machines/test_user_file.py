@@ -238,7 +238,7 @@ def test_values_are_reported_with_what_is_allowed(text, said, hint, tmp_path):
     ("velocity = 6,5", "6,5"), ("velocity = -6,5   # fast", "-6,5"), ("velocity = 0,05\nreach = 3", "0,05")])
 def test_a_decimal_comma_is_reported_with_its_line(text, number, tmp_path):
     d = only(tmp_path, GOOD.replace("velocity = 500", text))
-    assert (d.code, d.lines, d.message) == ("file.syntax", (5,), f"{number} is no number")
+    assert (d.code, d.lines, d.message) == ("file.syntax", (5,), f"{number} is not a number")
     assert d.hint == f"write a decimal point: {number.replace(',', '.')}"
     assert "no number" not in only(tmp_path, GOOD + "velocity 3\n").message
 

@@ -173,7 +173,7 @@ def _normals(b: ToolpathBuilder, rows: PointRows) -> tuple[Floats | None, Floats
     if not is_contact.any():
         return normal, None
     untold = np.setdiff1d(np.flatnonzero(is_contact), b.contacts)
-    b.log.many(Severity.WARNING, "cl.contact", "numbers 7 to 9 of GOTO are no unit vector, read as the contact point",
+    b.log.many(Severity.WARNING, "cl.contact", "numbers 7 to 9 of GOTO are not a unit vector; read as the contact point",
                rows.line[untold])
     return normal, np.where(is_contact[:, None], rows.third * b.scale, np.nan)
 

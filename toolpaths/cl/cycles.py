@@ -44,7 +44,7 @@ def cycle(b: ToolpathBuilder, s: Statement) -> None:
         _arm(b, values(CycleValues(kind, s.words), rest))
     else:
         b.cycle_records += 1
-        b.log.error("cl.cycle", f"CYCLE/{s.body[:60]}: {first or 'nothing'} is no kind of cycle", b.line,
+        b.log.error("cl.cycle", f"CYCLE/{s.body[:60]}: {first or 'nothing'} is not a known cycle", b.line,
                     "known kinds: " + ", ".join(sorted(KINDS)))
 
 
@@ -65,12 +65,12 @@ def _variant(b: ToolpathBuilder, kind: str, words: tuple[Word, ...], rest: tuple
     the cycle of its kind, a bore from below and a tap in steps, is refused."""
     steps = [str(w) for w in words[:len(words) - len(rest)] if w in _IN_STEPS]
     if kind == "TAP" and steps:
-        b.log.error("cl.cycle", f"CYCLE/TAP,{steps[0]}: tapping in steps is not supported", b.line,
+        b.log.error("cl.cycle", f"CYCLE/TAP,{steps[0]}: peck tapping is not supported", b.line,
                     "tap in one go, or have the CAM system write out the moves")
     if kind != "BORE" or not rest:
         return rest
     if rest[0] == "BACK":
-        b.log.error("cl.cycle", "CYCLE/BORE,BACK: boring from below is not supported", b.line,
+        b.log.error("cl.cycle", "CYCLE/BORE,BACK: back boring is not supported", b.line,
                     "have the CAM system write out the moves")
     elif rest[0] in _BORES:
         b.log.warning("cl.cycle-option", f"CYCLE/BORE,{rest[0]}: bored in and out at the feed instead", b.line,
@@ -171,10 +171,10 @@ def _cycle_feed(b: ToolpathBuilder, v: CycleValues) -> tuple[float, FeedMode, fl
         return pitch, FeedMode.PER_REVOLUTION, pitch
     feed, mode = b.feed.now
     if math.isnan(feed) and v.kind == "TAP":
-        b.log.error("cl.cycle-value", "CYCLE/TAP states neither pitch nor feed, and no feed holds", b.line,
+        b.log.error("cl.cycle-value", "CYCLE/TAP states neither pitch nor feed, and no feed is in force", b.line,
                     "write it with PITCH, or a feed per revolution")
     elif math.isnan(feed):
-        b.log.warning("cl.no-feed", f"CYCLE/{v.kind} states no feed and none holds", b.line)
+        b.log.warning("cl.no-feed", f"CYCLE/{v.kind} states no feed and none is in force", b.line)
     else:
         b.log.info("cl.cycle-feed", f"CYCLE/{v.kind} states no feed, the one in force is taken", b.line)
     return feed, mode, pitch

@@ -131,8 +131,8 @@ def check_forms(program: StatementList, log: DiagnosticLog, allowed: Iterable[st
         if fault:
             name = statement.major.removeprefix(DATA_COMMENT)
             between = "/" if statement.body and statement.slash else " " if statement.body else ""
-            log.error("cl.form", f"{name}{between}{statement.body[:60]}: {fault}", line, "compare the record with the CAM "
-                      f"system; where it is right, --allow-unknown {shlex.quote(statement.major)} takes it as it stands",
+            log.error("cl.form", f"{name}{between}{statement.body[:60]}: {fault}", line, "check the record in the CAM "
+                      f"system; if it is right, --allow-unknown {shlex.quote(statement.major)} takes it as it stands",
                       key=f"{name} {fault}")
 
 
@@ -198,7 +198,7 @@ def _words_fault(s: Statement, form: RecordForm, allow: frozenset[str]) -> str:
     if "/" in s.body:
         return "a second slash"
     if not s.body.isascii():
-        return f"{next(c for c in s.body if ord(c) > 127)!r} is no character of a record"
+        return f"{next(c for c in s.body if ord(c) > 127)!r} is not a character of a record"
     split = _split_word(s, form)
     if split:
         return split
@@ -238,7 +238,7 @@ def _word_fault(word: str, form: RecordForm) -> str:
         return f"{word[:30]} is not a number"
     meant = nearest(word, sorted(form.words))
     if meant:
-        return f"{word[:30]} is no word of it: {meant}?"
+        return f"{word[:30]} is not a word of it: {meant}?"
     for known in form.words:
         rest = word.removeprefix(known)
         if rest != word and (rest[0] in _STARTS_NUMBER or not rest[0].isalnum() or rest in form.words
@@ -248,7 +248,7 @@ def _word_fault(word: str, form: RecordForm) -> str:
     if ends:
         return f"{ends} stands within it: the end of a line is missing"
     if not form.open or len(word) == 1:
-        return f"{word[:30]} is no word of it"
+        return f"{word[:30]} is not a word of it"
     return "" if re.fullmatch(r"[A-Z0-9_.-]+", word) else f"{word[:30]} is no word"
 
 

@@ -81,7 +81,7 @@ def calsub(b: ToolpathBuilder, s: Statement) -> None:
     known, name = _subprograms(b), called(s)
     found = known.place(name, b.index) if name != "" else None
     if found is None and known.elsewhere(name):
-        b.log.warning("cl.subprogram", f"CALSUB/{s.body}: no subprogram of the file, left out", b.line,
+        b.log.warning("cl.subprogram", f"CALSUB/{s.body}: not defined in the file; left out", b.line,
                       "moves of a program that the machine keeps are not checked", key="named")
         return
     if found is None or len(b.calls) >= _DEEPEST or found in b.calls or b.row > _MOST_ROWS:
@@ -148,7 +148,7 @@ def _remark(b: ToolpathBuilder, s: Statement) -> None:
     joined = word.replace(" ", "")
     meant = meant or (joined if joined in _SAYING else "") or _bodied(f"{word} {s.body}".strip())
     if meant:
-        b.log.error("cl.data-comment", f"$$-> {word[:40]}: no remark that is known, {meant}?", b.line,
+        b.log.error("cl.data-comment", f"$$-> {word[:40]}: not a known remark; did you mean {meant}?", b.line,
                     "correct the word, or write $$ without -> before a comment", key=meant)
 
 

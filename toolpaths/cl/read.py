@@ -92,7 +92,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, d
         _cut_off(data, parts.lines, log)
     counts = report_others(b)
     if b.row == 0:
-        log.error("cl.empty", "the file holds no point", hint="a CL file has GOTO records")
+        log.error("cl.empty", "the file has no points", hint="a CL file has GOTO records")
     toolpath = assemble(b)
     _check_rapids(b, toolpath)
     check_forms(program, log, b.allow_unknown, found)

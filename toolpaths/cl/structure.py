@@ -29,7 +29,7 @@ def begin_operation(b: ToolpathBuilder, name: str, tool_name: str = "") -> None:
 def end_cycle(b: ToolpathBuilder) -> None:
     """Disarm a cycle that the file has not ended."""
     if b.cycle.now >= 0:
-        b.log.warning("cl.cycle-open", "the operation ends with a cycle still armed; it is ended here", b.line)
+        b.log.warning("cl.cycle-open", "the operation ends with a cycle still active; it is cancelled here", b.line)
         b.cycle.set(b.row, -1)
 
 

@@ -69,7 +69,7 @@ def _register(b: ToolpathBuilder, register: float | None) -> float | None:
         b.log.warning("cl.length-register", "length register 0 holds no length: that of the tool's number is taken", b.line,
                       "state ADJUST with the register of the tool, or none")
     else:
-        b.log.error("cl.length-register", f"{register:g} is no length register", b.line,
+        b.log.error("cl.length-register", f"{register:g} is not a length register", b.line,
                     "registers are whole numbers from 1 on")
     return None
 
@@ -77,7 +77,7 @@ def _register(b: ToolpathBuilder, register: float | None) -> float | None:
 def change(b: ToolpathBuilder, number: float, register: float | None, more: tuple[float, ...] = ()) -> None:
     """Load tool `number`; the event LOADTL and the tool index follow."""
     if number != math.floor(number) or not 0 <= number < _MAX_NUMBER:
-        b.log.error("cl.tool-number", f"{number:g} is no tool number", b.line,
+        b.log.error("cl.tool-number", f"{number:g} is not a tool number", b.line,
                     "tool numbers are whole numbers from 1 on")
         return
     register = _register(b, register)

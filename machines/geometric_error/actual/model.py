@@ -102,7 +102,7 @@ class ErrorModel:
             return nominal
         unknown = [x for x in self.map.letters if x not in (*kinematics.axis_names, "x", "y", "z")]
         if unknown:
-            raise ValueError(f"the map's coordinate {unknown[0]!r} is no axis of this machine; it has "
+            raise ValueError(f"the map's coordinate {unknown[0]!r} is not an axis of this machine; it has "
                              f"{', '.join(kinematics.axis_names)}, and x y z of the point that is displaced")
         return ActualByMap(nominal, self.map)
 

@@ -93,7 +93,7 @@ def read_sources(sources: Sequence[str], machine: Machine, how: ImportOptions) -
         found += _twice(part, places, source)
         model = replace(part, machine=machine.name) if part.map is not None else merged(model, part)
         if part.map is not None and len(parts) > 1:
-            found.append(error("error-import.map", "a map stands alone", file=source,
+            found.append(error("error-import.map", "a map cannot be combined with other sources", file=source,
                                hint=f"import it without the other {len(parts) - 1} sources"))
     if not has_errors(found):
         found += [*fits(model, machine), *_unused(how, model), *_large(model, sources, how)]
@@ -183,7 +183,7 @@ def _read(source: str, how: ImportOptions) -> tuple[CsvTable | None, list[Diagno
     named = _NAMED.match(source)
     name = parse(named[1]) if named else None
     if named and name is None:
-        return None, [error("error-import.name", f"{named[1]!r} is no component error", hint="write e.g. EXX=x.csv")]
+        return None, [error("error-import.name", f"{named[1]!r} is not a component error", hint="write e.g. EXX=x.csv")]
     table, found = read_csv(Path(named[2] if named else source), gaps=how.average)
     made = None if table is None else by_iso_names(table, name)
     fault = made if isinstance(made, Fault) else None if made is None else _gap(made)
@@ -313,7 +313,7 @@ def _names(table: CsvTable, letter: str) -> tuple[list[ErrorName], list[Diagnost
             continue
         if name is None or name.location or name.axis != letter:
             known = [f"E{d}{letter}" for d in DIRECTIONS]
-            found.append(error("error-model.column", f"column {column[:40]!r} is no component error of {letter}",
+            found.append(error("error-model.column", f"column {column[:40]!r} is not a component error of {letter}",
                                file=table.file, lines=[table.head], hint=nearest(column, known)))
             continue
         names[str(name)] = name

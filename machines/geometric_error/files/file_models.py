@@ -166,4 +166,4 @@ def _named(name: str, table: str, location: bool) -> None:
     if parts is None or parts.location != location or (parts.axis == "S" and not location):
         wanted = "E + direction X Y Z A B C + 0 + axis or S, e.g. EC0Y" if location else \
             "E + direction X Y Z A B C + axis, e.g. EXX"
-        raise ValueError(f"[{table}] {name!r} is no ISO 230-1 name; write {wanted}")
+        raise ValueError(f"[{table}] {name!r} is not an ISO 230-1 name; write {wanted}")

@@ -83,7 +83,7 @@ def _places(table: CsvTable, name: str, near: float) -> Floats | Fault:
     if (last - levels > near).any():
         k = int(np.argmax(last - levels))
         return Fault("error-import.near", f"positions of {name} from {levels[k] / unit:g} to {last[k] / unit:g} follow each "
-                     f"other within {near / unit:g}: they are no one place", "take less with --near")
+                     f"other within {near / unit:g}: they are not one place", "take less with --near")
     return np.asarray((np.round(0.5 * (levels + last) / near) * near)[index])
 
 

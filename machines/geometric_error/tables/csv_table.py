@@ -104,7 +104,7 @@ def read_text(path: Path, cited: tuple[str, int] = ("", 0)) -> tuple[str | None,
         return fault("error-table.unreadable", f"cannot read {path.name[:60]!r}: {reason(bad)}",
                      advice(bad, "name a CSV file"))
     if text is None:
-        return fault("error-table.unreadable", f"{path.name} is no text", "save it as CSV, UTF-8")
+        return fault("error-table.unreadable", f"{path.name} is not text", "save it as CSV, UTF-8")
     return text, []
 
 
@@ -183,7 +183,7 @@ def _head_faults(file: str, line: int, cells: Sequence[str], found: Sequence[re.
     for cell, match in zip(cells, found, strict=True):
         if match is None or not match["name"]:
             hint = "write NAME [unit]" if cell else "name the column, or take it out"
-            result.append(error("error-table.header", f"{cell[:40]!r} is no column", file=file, lines=[line], hint=hint))
+            result.append(error("error-table.header", f"{cell[:40]!r} is not a column", file=file, lines=[line], hint=hint))
         elif match["unit"] is not None and unit_of(match["unit"]) not in UNITS:
             result.append(error("error-table.unit", f"unit {match['unit'][:20]!r} of column {match['name'][:40]} is not "
                                 "known", file=file, lines=[line], hint="known: " + ", ".join(UNITS)))

@@ -34,8 +34,8 @@ def map_from_csv(table: CsvTable, periods: Mapping[str, float] | None = None) ->
     nodes, index = zip(*(levels_of(column) for column in places.T), strict=True)
     shape = tuple(map(len, nodes))
     if math.prod(shape) > CROWDED * len(table):
-        return None, [error("error-map.scattered", "the rows are no lattice: " + _levels_of(letters, shape) + " levels need "
-                            f"{math.prod(shape)} rows, there are {len(table)}", file=table.file,
+        return None, [error("error-map.scattered", "the rows are not a lattice: " + _levels_of(letters, shape) +
+                            f" levels need {math.prod(shape)} rows, there are {len(table)}", file=table.file,
                             hint="write the commanded positions, the same levels of each coordinate in every row")]
     flat = np.ravel_multi_index(index, shape)
     values = np.zeros((math.prod(shape), 6))
@@ -73,7 +73,7 @@ def round_about(lattice: ErrorMap, periods: Mapping[str, float], file: str) -> t
     nodes, table, found = list(lattice.nodes), lattice.table, []
     for letter, period in periods.items():
         if letter not in lattice.letters:
-            found.append(error("error-map.period", f"{letter} is no coordinate of the map", file=file,
+            found.append(error("error-map.period", f"{letter} is not a coordinate of the map", file=file,
                                hint="its coordinates are " + ", ".join(lattice.letters)))
             continue
         k = lattice.letters.index(letter)

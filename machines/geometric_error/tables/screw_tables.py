@@ -30,9 +30,9 @@ def to_linuxcnc(name: ErrorName, table: TableCurve, sense: float = 1.0) -> str:
         ValueError: where LinuxCNC cannot hold it.
     """
     if not name.positioning:
-        raise ValueError(f"{name} is no positioning error; LinuxCNC's screw compensation holds EXX, EYY, ... ECC")
+        raise ValueError(f"{name} is not a positioning error; LinuxCNC's screw compensation holds EXX, EYY, ... ECC")
     if table.rule != "linear" or table.period:
-        raise ValueError(f"{name} is no plain linear table; take `sampled` at the positions that you want")
+        raise ValueError(f"{name} is not a plain linear table; take `sampled` at the positions that you want")
     if len(table.x) > LINUXCNC_ROWS:
         raise ValueError(f"{name} has {len(table.x)} rows, LinuxCNC holds {LINUXCNC_ROWS}; take `sampled` at fewer")
     unit = DEG if name.axis in ROTARY else 1.0
@@ -59,7 +59,7 @@ def from_linuxcnc(text: str, name: ErrorName, sense: float = 1.0, kind: int = 0,
         except ValueError:
             row = []
         if len(row) != 3 or not np.isfinite(row).all() or (rows and row[0] <= rows[-1][0]):
-            return None, [error("error-table.row", f"{line.strip()[:60]!r} is no row of a screw compensation file",
+            return None, [error("error-table.row", f"{line.strip()[:60]!r} is not a row of a screw compensation file",
                                 file=file, lines=[n], hint="write nominal, forward and reverse, nominal ascending; a "
                                 "CSV table is imported by its name alone, or as EXX=x.csv")]
         rows.append(row)

@@ -29,7 +29,7 @@ def limit_faults(work: PassContext, file: str = "", tilt: float = np.pi) -> list
 
 def _unknown_operations(work: PassContext, limits: OrientationLimits, file: str) -> list[Diagnostic]:
     known = [op.name for op in work.toolpath.operations if op.name]
-    return [error("orient.operation", f"fixed_operations names {name!r}, which is no operation of the CL file",
+    return [error("orient.operation", f"fixed_operations names {name!r}, which is not an operation of the CL file",
                   file=file or work.toolpath.file, lines=_line(file, "fixed_operations"), hint=nearest(name, known))
             for name in limits.fixed_operations if name not in known]
 

@@ -279,7 +279,7 @@ def _by_cutter(radius: float | None) -> str:
     """Why the axis of a pass is fixed by its cutter; "" where it may be turned."""
     if radius is None:
         return UNKNOWN
-    return "the cutter is no ball: turned, it would touch elsewhere" if radius == 0.0 else ""
+    return "the cutter is not a ball: turned, it would touch elsewhere" if radius == 0.0 else ""
 
 
 UNKNOWN = "the form of the cutter is not known"

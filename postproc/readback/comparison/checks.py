@@ -256,7 +256,7 @@ def check_links(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints,
         return []
     k = int(np.flatnonzero(bad)[0])
     line = int(moves.line[m[k]]) if m[k] < len(moves) else 0
-    return [faults.error("verify.link", "a linking move comes too near to the part", line, int(motion.line[rows[k]]),
+    return [faults.error("verify.link", "a linking move comes too close to the part", line, int(motion.line[rows[k]]),
                          int(bad.sum()))]
 
 

@@ -96,5 +96,5 @@ def check_rewinds(motion: Motion, executed: BlockPoses, number: Ints, tip: Float
     if not bad.any():
         return []
     k = int(np.flatnonzero(bad)[0])
-    return [faults.error("verify.rewind", "an axis unwinds while the tool is too near to the part", 0,
+    return [faults.error("verify.rewind", "an axis unwinds while the tool is too close to the part", 0,
                          int(motion.line[rows[k]]), int(bad.sum()))]

@@ -44,7 +44,7 @@ def planned_feeds(data: bytes, others: Mapping[str, bytes], gcode: str) -> tuple
         return True, []
     found = f"its header names {head.feeds}, the F words are {now}" if head.feeds else \
         "its header names no fingerprint of them"
-    return True, [error("verify.slow", f"feeds that were planned are not as they were written: {found}", file=gcode,
+    return True, [error("verify.slow", f"the planned feeds were changed after the program was written: {found}", file=gcode,
                         hint="convert again; where feeds were lowered by hand, no plan explains them")]
 
 

@@ -81,4 +81,4 @@ def check_end(motion: Motion, job: Job, home: Floats, faults: Faults) -> list[Di
                              int(motion.line[-1]), 1, "the retract to home before the end is missing")]
     rest = ", ".join(names[j] for j in bad)
     return [faults.warning("verify.end", f"the program ends with {rest} away from home", 0, int(motion.line[-1]), 1,
-                           "nothing, if it is meant so")] if rest else []
+                           "ignore this if it is intended")] if rest else []

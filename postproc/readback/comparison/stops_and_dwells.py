@@ -35,19 +35,19 @@ def check_stops(code: Canonical, motion: Motion, job: Job, faults: Faults) -> li
             where = in_files(code.line[blocks], code.files)
             result.append(faults.warning("verify.stop", f"the program holds M{number:g} {stated} times, the CL file {word} "
                                          f"{len(lines)} times: a stop within a cut marks the part", 0, int(where[0]),
-                                         stated - len(lines), "take out what is not meant"))
+                                         stated - len(lines), "remove the stops that are not intended"))
         if stated < len(lines):
             result.append(faults.error("verify.stop", f"the program holds M{number:g} {stated} times, the CL file {word} "
                                        f"{len(lines)} times", lines[stated], int(motion.line[-1]), len(lines) - stated))
     rests = [*_delays(job), *_at_bottoms(job)]
     asked, found = sum(seconds for seconds, _ in rests), float(motion.dwell.sum())
     if found < asked - _ROUNDING * len(rests) - 1e-9:
-        result.append(faults.error("verify.dwell", f"the program rests for {found:.3f} s, the CL file for {asked:.3f} s",
+        result.append(faults.error("verify.dwell", f"the program dwells for {found:.3f} s, the CL file for {asked:.3f} s",
                                    rests[0][1], int(motion.line[-1])))
     elif found > asked + max(0.01 * asked, _ROUNDING * (len(rests) + 1)):
         rest = int(motion.line[int(motion.dwell.argmax())])
-        result.append(faults.warning("verify.rest", f"the program rests for {found:.3f} s, the CL file for {asked:.3f} s", 0,
-                                     rest, hint="take out the rest that is not meant"))
+        result.append(faults.warning("verify.rest", f"the program dwells for {found:.3f} s, the CL file for {asked:.3f} s",
+                                     0, rest, hint="remove the dwell that is not intended"))
     return result
 
 

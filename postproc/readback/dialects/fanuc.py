@@ -75,8 +75,8 @@ class FanucReader(IsoReader):
         own = file == self.main_file
         if not len(starts) and not own:
             spans = {PurePath(file).stem.upper(): main}
-        found = [error("gcode.subprogram", "M99 in the main program begins it again", file=file, lines=[int(b)],
-                       hint="M30") for b in back if own and main[0] <= b <= main[1] and not self.local(words, int(b))]
+        found = [error("gcode.subprogram", "M99 in the main program starts it again", file=file, lines=[int(b)],
+                       hint="write M30") for b in back if own and main[0] <= b <= main[1] and not self.local(words, int(b))]
         subprograms = {name: _returns(span, back) for name, span in spans.items() if not own or span[1] > main[1]}
         return Structure(main, {k: v for k, v in subprograms.items() if v[1]}, self.calls(words)), found
 
@@ -120,7 +120,7 @@ class FanucReader(IsoReader):
             return []
         letter = chr(words.letter[int(np.flatnonzero(bad)[0])])
         return [error("gcode.decimal_point", f"{letter} with a decimal point: the control stops there", file=file,
-                      lines=line[blocks][:6].tolist(), count=len(blocks), hint="whole numbers")]
+                      lines=line[blocks][:6].tolist(), count=len(blocks), hint="write a whole number")]
 
     def _bare(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
         assert words.point is not None
@@ -132,7 +132,7 @@ class FanucReader(IsoReader):
         k = int(np.flatnonzero(bare)[0])
         return [error("gcode.decimal_point", f"{chr(words.letter[k]).upper()}{words.value[k]:g} has no decimal point: "
                       f"{words.value[k]:g} or {words.value[k] * MILLISECONDS:g}, as a parameter of the control has it",
-                      file=file, lines=line[blocks][:6].tolist(), count=len(blocks), hint="write the point")]
+                      file=file, lines=line[blocks][:6].tolist(), count=len(blocks), hint="write the decimal point")]
 
     def arcs(self, words: Words, new: New, drop: Bools) -> Words:
         """Centres from the start; P and K of canned cycles as RS274/NGC has them."""
@@ -186,7 +186,8 @@ class FanucReader(IsoReader):
         """G5.1 Q1, with R1 to R10 where the control has that, or Q0."""
         if stated.get("Q") not in (0.0, 1.0) or stated.get("R", 1.0) not in range(1, 11):
             said = " ".join(f"{a}{v:g}" for a, v in stated.items()) or "nothing"
-            found.append(error("gcode.smoothing", f"G05.1 with {said}", file=file, lines=[line], hint="G05.1 Q1, or Q0"))
+            found.append(error("gcode.smoothing", f"G05.1 with {said}", file=file, lines=[line],
+                               hint="write G05.1 Q1, or G05.1 Q0"))
 
     def taps(self, words: Words, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """G74 and G84 tap rigidly only behind M29 (B-63944EN-2, rigid tapping), which ends with the next code of motion."""
@@ -212,7 +213,7 @@ class FanucReader(IsoReader):
             wrong = self.wrong(float(c), state, length)
             if wrong:
                 found.append(error("gcode.mode", f"{code} {wrong}", file=file, lines=[int(line[here])],
-                                   hint="leave the mode that is on first"))
+                                   hint="cancel the mode that is on first"))
                 continue
             if c in (43, self.tcp_code):
                 length = float(np.nan_to_num(register[here], nan=-1.0))
@@ -255,7 +256,7 @@ class FanucReader(IsoReader):
         stated = take(words, drop, b, "XYZIJKPQR")
         if set(stated) & set("PQR"):
             found.append(error("gcode.mode", "G68.2 by other than Euler angles is not executed by this reader", file=file,
-                               lines=[int(line[b])], hint="G68.2 X Y Z I J K"))
+                               lines=[int(line[b])], hint="write G68.2 X Y Z I J K"))
         shift = np.array([stated.get(a, 0.0) for a in "XYZ"])
         return WordMeaning("tilted", "G68.2", turned("ZXZ", [stated.get(a, 0.0) for a in "IJK"]), shift)
 
@@ -266,7 +267,7 @@ class FanucReader(IsoReader):
         if bad.any():
             found.append(error("gcode.mode", "motion or a choice of solution between G68.2 and G53.1 is not executed by "
                                "this reader", file=file, lines=[int(line[words.line[low:high][bad][0]])],
-                               hint="G53.1 alone, right behind G68.2"))
+                               hint="write G53.1 alone, right behind G68.2"))
 
     def reference(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """G91 G28 Z0.: rapidly to the reference position, which is the machine's home; through a point is refused."""
@@ -277,7 +278,7 @@ class FanucReader(IsoReader):
             stated = take(words, drop, b, "".join(self.axes))
             if at < 0 or mode[at] != 91 or any(stated.values()) or self.home is None:
                 found.append(error("gcode.reference", "G28 through a point", file=file, lines=[int(line[b])],
-                                   hint="G91 G28 Z0."))
+                                   hint="write G91 G28 Z0."))
                 continue
             new += [(b, "G", 53.0), (b, "G", 0.0)]
             new += [(b, a, float(self.home[self.axes.index(a)])) for a in stated]
@@ -292,7 +293,7 @@ class FanucReader(IsoReader):
         bad = blocks[motion[blocks] != 0]
         if len(bad):
             found.append(error("gcode.machine_position", "G53 while G0 is not in force", file=file,
-                               lines=line[bad][:6].tolist(), count=len(bad), hint="G53 G0, in this order"))
+                               lines=line[bad][:6].tolist(), count=len(bad), hint="write G53 G0, in this order"))
 
 
 def block(words: Words, b: int) -> dict[str, float]:

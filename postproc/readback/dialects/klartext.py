@@ -138,7 +138,8 @@ class KlartextReader(Reader):
             elif s.name in ("CALL LBL", "CALL PGM"):
                 calls[b] = Call(b, f"{s.name[5:]} {name}")
             elif s.name == "BEGIN PGM" and s.args[1] == "INCH":
-                found.append(error("gcode.units", "a program in inches", file=file, lines=[b], hint="BEGIN PGM ... MM"))
+                found.append(error("gcode.units", "a program in inches", file=file, lines=[b],
+                                   hint="write the program in mm: BEGIN PGM ... MM"))
         if not any(s.name == "BEGIN PGM" and s.args[1] for _, s in here):
             found.append(self.unstated(file, 1))
         names = {str(s.args[0]) for _, s in here if s.name == "BEGIN PGM"} | {PurePath(file).stem.upper()}
@@ -178,7 +179,7 @@ def _frame(here: list[tuple[int, DialectStatement]], file: str, lines: int) -> l
     if len(names) == 2 and names[0] == names[1]:
         return []
     return [warning("gcode.frame", "the program has no BEGIN PGM and END PGM of one name", file=file, lines=[lines],
-                    hint="0 BEGIN PGM NAME MM ... END PGM NAME MM")]
+                    hint="write 0 BEGIN PGM NAME MM ... END PGM NAME MM")]
 
 
 def _in_file(words: Words, rows: Ints) -> Words:

@@ -48,11 +48,11 @@ def test_tables_as_programs_save_them(tmp_path: Path, text: bytes) -> None:
 
 
 BAD = [
-    ("UTF-16 without a mark", TABLE, CSV.encode("utf-16-le"), "error-table.unreadable", "e.toml", 2, "x.csv is no text"),
-    ("binary", TABLE, bytes(range(256)), "error-table.unreadable", "e.toml", 2, "no text"),
-    ("zeros", TABLE, bytes(9), "error-table.unreadable", "e.toml", 2, "no text"),
-    ("half a letter", TABLE, b"\xff\xfeX", "error-table.unreadable", "e.toml", 2, "no text"),
-    ("no letter", TABLE, b"X [mm],EXX [\x81m]\n0,1\n", "error-table.unreadable", "e.toml", 2, "no text"),
+    ("UTF-16 without a mark", TABLE, CSV.encode("utf-16-le"), "error-table.unreadable", "e.toml", 2, "x.csv is not text"),
+    ("binary", TABLE, bytes(range(256)), "error-table.unreadable", "e.toml", 2, "not text"),
+    ("zeros", TABLE, bytes(9), "error-table.unreadable", "e.toml", 2, "not text"),
+    ("half a letter", TABLE, b"\xff\xfeX", "error-table.unreadable", "e.toml", 2, "not text"),
+    ("no letter", TABLE, b"X [mm],EXX [\x81m]\n0,1\n", "error-table.unreadable", "e.toml", 2, "not text"),
     ("empty", TABLE, b"", "error-table.empty", "x.csv", 0, "nothing"),
     ("header alone", TABLE, b"X [mm],EXX [um]\n\n", "error-table.empty", "x.csv", 1, "header alone"),
     ("no header", TABLE, b"-300,0\n300,2\n", "error-table.header", "x.csv", 1, "holds numbers"),
@@ -63,7 +63,7 @@ BAD = [
      "one column"),
     ("a file of LinuxCNC", TABLE, b"0 0.001 0\n9 9.001 9\n", "error-table.header", "x.csv", 1, "without commas"),
     ("words in a column", TABLE, b"X [mm],EXX [um],note\n0,1,ok\n9,1,warm\n", "error-table.row", "x.csv", 2, "'ok'"),
-    ("column without a name", TABLE, b"X [mm];;EXX [um]\n0;1;2\n", "error-table.header", "x.csv", 1, "'' is no column"),
+    ("column without a name", TABLE, b"X [mm];;EXX [um]\n0;1;2\n", "error-table.header", "x.csv", 1, "'' is not a column"),
     ("value without a name", TABLE, b"X [mm];EXX [um];\n0;1;2\n", "error-table.row", "x.csv", 2, "3 values, 2 columns"),
     ("units alone", TABLE, b"X;EXX\nmm;um\n", "error-table.row", "x.csv", 2, "'mm'"),
     ("commas between and within", TABLE, b"X [mm],EXX [um]\n-300,5,0,2\n300,0,1,0\n", "error-table.row", "x.csv", 2,

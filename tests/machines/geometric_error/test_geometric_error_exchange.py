@@ -322,7 +322,7 @@ AXIS = "X [mm],EXX [um],EYX [um]\n0,1,2\n100,3,4\n"
 SOURCES = [
     ("another axis", {"a.csv": "B [deg],EXB [um]\n0,1\n9,2\n"}, "error-model.axis", "no axis 'B'"),
     ("two axes", {"a.csv": "X [mm],Y [mm],EXX [um]\n0,0,1\n1,1,2\n"}, "error-import.axis", "X and Y"),
-    ("error of another axis", {"a.csv": AXIS.replace("EYX", "EYY")}, "error-model.column", "'EYY' is no component error"),
+    ("error of another axis", {"a.csv": AXIS.replace("EYX", "EYY")}, "error-model.column", "'EYY' is not a component error"),
     ("misspelt", {"a.csv": AXIS.replace("EYX", "EQX")}, "error-model.column", "'EQX'"),
     ("no errors", {"a.csv": "X [mm]\n0\n1\n"}, "error-model.column", "no errors of X"),
     ("order", {"a.csv": AXIS + "50,3,4\n"}, "error-model.order", "50 after 100"),

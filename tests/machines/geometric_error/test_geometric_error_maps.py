@@ -80,7 +80,7 @@ def test_a_map_goes_round_a_rotary_axis(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("old", "new", "keys", "code", "word"), [
     ("360,1,", "360,1.5,", "repeats = { C = 360 }", "error-map.period", "differ by up to 0.5 um"),
     ("360,1,", "370,1,", "repeats = { C = 360 }", "error-map.period", "span 370"),
-    ("", "", "repeats = { A = 360 }", "error-map.period", "A is no coordinate"),
+    ("", "", "repeats = { A = 360 }", "error-map.period", "A is not a coordinate"),
     ("", "", "repeats = { C = -360 }", "file.range", "repeats.C"),
     ("", "", "zero = { X = 1.0 }", "error-map.zero", "the map has C"),
     ("", "", "zero = { C = 400.0 }", "error-map.zero", "outside"),

@@ -7,14 +7,17 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 from typer.testing import CliRunner, Result
 
 from postproc.cli.app import app, main
 from tests.postproc.kit import HEAD, SAMPLES, TOOLS
+from toolpaths.cl.text.dialects import DIALECTS
 
 MILL = ["-m", "mill-3axis", "-c", "linuxcnc"]
 POCKET = str(SAMPLES / "pocket.cls")
@@ -213,6 +216,30 @@ def test_help_is_instant_and_lists_the_commands() -> None:
                          text=True, check=True, timeout=30)
     assert all(word in got.stdout for word in ("convert", "verify", "inspect", "trace", "machine", "controller"))
     assert not re.search(r"\| +(numpy|numba|pydantic)\s*$", got.stderr, re.MULTILINE)
+
+
+def commands(group: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            yield from commands(command, (*words, name))
+        else:
+            yield (*words, name), command
+
+
+PAGES = dict(commands(typer.main.get_command(app)))
+
+
+@pytest.mark.parametrize("words", PAGES, ids=" ".join)
+def test_help_says_what_each_option_takes(words: tuple[str, ...]) -> None:
+    """No option or argument is only a type; each has its help; the dialects are all named."""
+    for one in PAGES[words].params:
+        if one.name != "help":
+            assert getattr(one, "help", None), one.name
+        if one.param_type_name == "option" and not one.is_flag:
+            assert one.metavar, one.name
+    page = " ".join(run(*words, "--help").stdout.split())
+    if "--dialect" in page:
+        assert re.search(f"instead of the recognised one: {', '.join(DIALECTS)}", page)
 
 
 def test_same_input_same_output(tmp_path: Path) -> None:

@@ -139,7 +139,7 @@ def test_a_table_turned_under_a_standing_tool_gains_what_the_square_gives() -> N
     m = jerk_only(machine("mikron-ucp710"))
     found = on("mikron-ucp710", strips([20.0], "16,1"), m).tried[0]
     angle = (20.0 - found.best.held / DEG) % 90.0
-    assert found.own.one.fixed.startswith("the cutter is no ball") and angle == pytest.approx(45.0, abs=0.3)
+    assert found.own.one.fixed.startswith("the cutter is not a ball") and angle == pytest.approx(45.0, abs=0.3)
     level = turned(found.own.one, found.own.axis, m, held=20.0 * DEG)
     assert found.best.seconds / level.seconds == pytest.approx(2.0 ** (-1.0 / 6.0), rel=1e-3)
     assert found.best.axis.tolist() == found.own.axis.tolist()

@@ -83,7 +83,7 @@ def test_auto_is_never_worse() -> None:
 
 
 def test_whole_part_pays_where_passes_are_many() -> None:
-    """The paper's finding: turning between passes costs more than it gives, one orientation for all gains."""
+    """The paper's finding: turning between passes costs more time than it gains, one orientation for all gains."""
     few, many = flat(), chosen(passes(16), machine("mikron-ucp710"))
     assert many.plans["whole-part"].seconds < 0.97 * many.plans["keep"].seconds
     assert many.plans["auto"].seconds <= many.plans["whole-part"].seconds

@@ -226,7 +226,7 @@ def test_held_angles_are_reported_and_drawn() -> None:
     assert free_rotary.is_held(tried) and not free_rotary.is_held(ball)
     assert free_rotary.is_held(replace(ball, best=replace(ball.best, held=0.3)))
     noted = text.as_text(choice, "per-pass", [0])
-    assert noted.count("axis kept: the cutter is no ball") == 3 and "bound; axis kept" in noted
+    assert noted.count("axis kept: the cutter is not a ball") == 3 and "bound; axis kept" in noted
     one = report.as_dict(choice, "per-pass")["passes"][0]
     assert abs(abs(one["held_deg"]) % 90.0 - 45.0) < 0.5 and one["turned_deg"] == 0.0
     angle = np.array([0.3, tried.best.held])
@@ -289,7 +289,7 @@ def test_command_refuses_what_it_cannot_show(tmp_path: Path) -> None:
     file.write_text(written(2))
     wrong = run(file, "--pass", 7, "--figure", tmp_path / "p.svg", code=1).output
     assert "there is no pass 7" in wrong and "numbered 0 to 1" in wrong and not (tmp_path / "p.svg").exists()
-    assert "no .png or .svg" in run(file, "--figure", tmp_path / "p.pdf", code=2).output
+    assert "not a .png or .svg" in run(file, "--figure", tmp_path / "p.pdf", code=2).output
     assert "at most 6" in run(file, *(word for k in range(7) for word in ("--pass", k)), code=2).output
     assert "choose from" in run(file, "--orient", "best", code=2).output
     both = tmp_path / "p.svg"

@@ -58,7 +58,7 @@ def refused(name: str, text: str) -> set[str]:
 
 
 def test_the_pocket_without_the_line_that_ends_an_arc() -> None:
-    """Then X alone stands under G3: an arc without a centre, once a figure that is no number."""
+    """Then X alone stands under G3: an arc without a centre, once a figure that is not a number."""
     text = sample("pocket.cls", "mill-3axis", "fanuc-30i").text
     lines = text.splitlines()
     assert "gcode.arc" in refused("fanuc-30i", "\n".join(n for n in lines if n != "G1 Y-4. F900.") + "\n")
