@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
+from machines.choices import Park, RolloverRule, Stop
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
@@ -50,8 +52,8 @@ class Turns:
 
     modulo: bool = False
     low: float = 0.0
-    rollover: str = ""
-    park: str = "turn"
+    rollover: RolloverRule | Literal[""] = ""
+    park: Park = "turn"
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ class Machine:
     timing: Timing = field(default_factory=Timing)
     control_kinematics: ControlKinematics | None = None
     file: str = ""
-    stop: str = ""
+    stop: Stop | Literal[""] = ""
     stated: Limits | None = None
     turns: tuple[Turns, ...] = ()
 

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from postproc.cli.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
-from postproc.cli.options import AxisToleranceOption, Beyond, MachineName, ToleranceOption, UnitsOption, only_with_errors
+from postproc.cli.options import (
+    AxisToleranceOption,
+    Beyond,
+    DialectOption,
+    MachineName,
+    ToleranceOption,
+    UnitsOption,
+    only_with_errors,
+)
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -36,13 +44,13 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
          tolerance: ToleranceOption = 0.01,
          axis_tolerance: AxisToleranceOption = 0.05,
          units: UnitsOption = "",
-         dialect: Annotated[str, typer.Option("--dialect", help="read the CL file as this dialect")] = "",
+         dialect: DialectOption = "",
          error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="a CL file is timed as it is "
                                                   "written with these geometric errors corrected")] = "",
          beyond: Beyond = False,
          json: Json = "") -> None:
     """Estimate how long a program takes, with a band, and where the time goes."""
-    _check(output, calibrate, units, dialect)
+    _check(output, calibrate)
     only_with_errors(beyond, error_model)
     refuse_overwriting({"-o": output, "--json": json}, {"the file": str(file), "the set-up": setup, "the log": calibrate,
                                                         "the error model": error_model, **own_files(machine, controller),
@@ -72,17 +80,9 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
-def _check(output: str, calibrate: str, units: str, dialect: str) -> None:
+def _check(output: str, calibrate: str) -> None:
     if output and not calibrate:
         raise typer.BadParameter("there is no calibrated model without --calibrate", param_hint="-o")
-    if units and units not in ("mm", "inch"):
-        raise typer.BadParameter(f"{units!r} is not available; choose from mm, inch", param_hint="--units")
-    if dialect:
-        from toolpaths.cl.text.dialects import DIALECTS
-
-        if dialect not in DIALECTS:
-            raise typer.BadParameter(f"{dialect!r} is not available; choose from {', '.join(DIALECTS)}",
-                                     param_hint="--dialect")
 
 
 def _blocks(file: Path, machine: Machine, controller: str, model: str, options: Options,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from machines.machine import Machine
 from postproc.base.options import Options
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from postproc.correction.written_deviation import AfterFormatting
     from postproc.orientation.plans.choice import OrientationChoice
     from postproc.witness.evidence import Testimony
+
+StageName = Literal["prepare", "share", "place", "solve", "correct", "check", "plan", "compile", "write", "verify", "state"]
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class PostResult:
     """what is left of geometric errors at the CL points; None where none are corrected"""
     refused: Refused = frozenset()
     """(operation, mode) that "auto" has passed over"""
-    reached: str = ""
+    reached: StageName | Literal[""] = ""
     """name of the last stage that ran, "" where none did"""
 
     @property

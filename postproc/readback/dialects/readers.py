@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
+from machines.choices import Stop
 from postproc.control.rollover import Rollover
 from postproc.controllers.model import ControllerFile
 from postproc.readback.dialects.base import Reader
@@ -9,7 +12,7 @@ from toolpaths.arrays import Floats
 
 
 def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Floats | None = None,
-               stop: str = "", rolls: dict[int, Rollover] | None = None) -> Reader:
+               stop: Stop | Literal[""] = "", rolls: dict[int, Rollover] | None = None) -> Reader:
     """The reader of the dialect that the controller file's writer writes; `home` (J,): machine coordinates, mm, degrees;
     `stop`: what stops switch off where the machine file says it; `rolls`: modulo axes by joint."""
     from postproc.readback.dialects.fanuc import FanucReader
