@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from machines.choices import Park, RolloverRule, Stop
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
 
@@ -108,3 +110,8 @@ class Machine:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
+
+    @property
+    def endless(self) -> Bools:
+        """(J,) rotary joints whose travel has no end."""
+        return np.asarray(np.array(self.rotary) & ~np.isfinite(self.limits.upper - self.limits.lower))

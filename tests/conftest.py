@@ -8,7 +8,7 @@ from functools import cache
 
 import pytest
 
-from tests import compile_once, cover, environment
+from tests import compile_once, cover, environment, rewrite_once
 from tests.linuxcnc import interpreter, simulator
 from tests.processor_time import (
     pytest_addoption,
@@ -21,6 +21,10 @@ from tests.tiers import QUICK
 
 __all__ = ["environment", "pytest_addoption", "pytest_runtest_protocol", "pytest_sessionfinish", "pytest_terminal_summary",
            "pytest_testnodedown"]
+
+# Files that are imported make no garbage worth looking for.
+gc.disable()
+rewrite_once.install()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -36,9 +40,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_collection_finish() -> None:
     """What stays until the end is not looked through by each collection of garbage, and there are fewer of them."""
-    gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 20)
+    gc.enable()
     compile_once.install()
 
 

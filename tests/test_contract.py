@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
 
 from machines.kinds import BUILT_IN
-from tests.test_imports import ROAD, ROOT
+from tests.source import ROOT, nodes, product
 
 OWN_FILES = "machines/kinematics/"
 """where the kinds are; their models in machine files are chosen by `machines/kinds.py`"""
@@ -19,23 +19,15 @@ WITNESS = "postproc/witness/"
 
 
 @cache
-def trees() -> list[tuple[str, ast.Module]]:
-    return [(path.relative_to(ROOT).as_posix(), ast.parse(path.read_text()))
-            for top in ROAD for path in sorted((ROOT / top).rglob("*.py"))]
-
-
 def concrete_kinds() -> set[str]:
     """Names of all classes that derive from Kinematics, however far."""
     bases = {node.name: {ast.unparse(base).rpartition(".")[2] for base in node.bases}
-             for _, tree in trees() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
+             for path in product() for node in nodes(path) if isinstance(node, ast.ClassDef)}
     kinds, before = {"Kinematics"}, 0
     while len(kinds) > before:
         before = len(kinds)
         kinds |= {name for name, above in bases.items() if above & kinds}
     return kinds - {"Kinematics"}
-
-
-KINDS = concrete_kinds()
 
 
 def names_in(nodes: list[ast.expr]) -> set[str]:
@@ -48,15 +40,15 @@ def of_kinematics(call: ast.Call) -> bool:
     return any("kin" in name.lower() for name in names_in(call.args[:1]))
 
 
-def asks(tree: ast.AST) -> Iterator[str]:
+def asks(found: Iterable[ast.AST]) -> Iterator[str]:
     """Places that ask for a concrete kind: by its class, by what attributes it has, by the word of its machine file."""
-    for node in ast.walk(tree):
+    for node in found:
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            if node.func.id in ("isinstance", "issubclass") and names_in(node.args[1:]) & KINDS:
+            if node.func.id in ("isinstance", "issubclass") and names_in(node.args[1:]) & concrete_kinds():
                 yield ast.unparse(node)
             if node.func.id in ("hasattr", "getattr") and of_kinematics(node):
                 yield ast.unparse(node)
-        elif isinstance(node, ast.MatchClass) and names_in([node.cls]) & KINDS:
+        elif isinstance(node, ast.MatchClass) and names_in([node.cls]) & concrete_kinds():
             yield ast.unparse(node)
         elif isinstance(node, ast.Compare):
             sides = (node.left, *node.comparators)
@@ -69,19 +61,21 @@ def asks(tree: ast.AST) -> Iterator[str]:
 
 
 def test_nothing_asks_for_a_concrete_kind() -> None:
-    assert [f"{file}: {text}" for file, tree in trees() if not file.startswith((OWN_FILES, WITNESS))
-            for text in asks(tree)] == []
+    files = {path.relative_to(ROOT).as_posix(): path for path in product()}
+    assert [f"{file}: {text}" for file, path in files.items() if not file.startswith((OWN_FILES, WITNESS))
+            for text in asks(nodes(path))] == []
 
 
 def test_the_kinds_are_known() -> None:
-    assert {"Serial", "LinearDelta", "H4Linear", "H4TableAxis", "H4SpindleAxis", "OnSlides", "ActualKinematics"} == KINDS
+    assert {"Serial", "LinearDelta", "H4Linear", "H4TableAxis", "H4SpindleAxis", "OnSlides", "ActualKinematics"} == (
+        concrete_kinds())
 
 
 @pytest.mark.parametrize("text", [
     "isinstance(kin, Serial)", "isinstance(machine.kinematics, LinearDelta | h4.H4Linear)", "hasattr(kinematics, 'rig')",
     "type(machine.kinematics) is Serial", "getattr(kin, 'sense', 1.0)", "model.kind == 'serial'", "kin.slides_affine"])
 def test_an_asking_is_noticed(text: str) -> None:
-    assert list(asks(ast.parse(text)))
+    assert list(asks(ast.walk(ast.parse(text))))
 
 
 def test_the_sample_has_no_more_lines_than_it_is_said_to_have() -> None:

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests.source import ROOT, nodes
+
 ROAD = ("toolpaths", "machines", "postproc")
 """Each package may import itself and those before it."""
 HEAVY = {"numpy", "numba", "scipy", "rich"}
@@ -37,10 +38,10 @@ class Text:
     """lines by name"""
 
 
-def looked_at(source: str, package: str) -> Text:
-    """A file of a package, from which relative imports count."""
+def looked_at(source: str, package: str, path: Path | None = None) -> Text:
+    """A file of a package, from which relative imports count; its path where it stands on disk."""
     imports, functions = set[str](), dict[str, int]()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(ast.parse(source)) if path is None else nodes(path):
         if isinstance(node, ast.Import):
             imports |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -60,7 +61,8 @@ def texts() -> Mapping[str, Text]:
         for path in sorted((ROOT / package).rglob("*.py")):
             parts = path.relative_to(ROOT).with_suffix("").parts
             folder = ".".join(parts[:-1])
-            found[folder if parts[-1] == "__init__" else ".".join(parts)] = looked_at(path.read_text("utf-8"), folder)
+            found[folder if parts[-1] == "__init__" else ".".join(parts)] = looked_at(
+                path.read_text("utf-8"), folder, path)
     return found
 
 

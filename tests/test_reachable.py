@@ -7,8 +7,9 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
-PRODUCT = sorted(p for top in ("toolpaths", "machines", "postproc") for p in (ROOT / top).rglob("*.py"))
+from tests.source import ROOT, nodes, product, tree
+
+PRODUCT = product()
 OTHERS = sorted((ROOT / "samples").rglob("*.py"))
 LISTED = {
     "machine_path": "one stretch alone: the plain form of `machine_paths`, which a test compares with it",
@@ -19,13 +20,13 @@ LISTED = {
 
 def public(path: Path) -> list[str]:
     """Functions at the top of a file, without decorators that register them."""
-    return [node.name for node in ast.parse(path.read_text("utf-8")).body
+    return [node.name for node in tree(path).body
             if isinstance(node, ast.FunctionDef) and not node.name.startswith("_") and not node.decorator_list]
 
 
 def used(path: Path) -> Iterator[str]:
     """Names that a file uses, imports not counted; texts too, as packages look names up by `__getattr__`."""
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.Name):
             yield node.id
         elif isinstance(node, ast.Attribute):

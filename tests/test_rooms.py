@@ -7,7 +7,8 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from tests.test_imports import ROAD, ROOT, circle, graph, texts
+from tests.source import ROOT
+from tests.test_imports import ROAD, circle, graph, texts
 
 FLOORS = (
     ("toolpaths", "arrays, units, diagnostics, files, the Toolpath"),

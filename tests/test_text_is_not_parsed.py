@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterable
 
-from tests.test_imports import ROOT, texts
+from tests.source import ROOT, nodes
+from tests.test_imports import texts
 
 READERS = {
     "toolpaths.cl": "CL files", "toolpaths.cl.text": "CL files", "machines.geometric_error.tables": "CSV tables",
@@ -33,9 +35,9 @@ OF_OTHERS = {("machines.user_file", "partition"), ("machines.user_file", "remove
 """messages of the libraries that read TOML and check models"""
 
 
-def parsed(tree: ast.Module) -> set[str]:
+def parsed(found: Iterable[ast.AST]) -> set[str]:
     """Methods by which a file takes sentences apart that it has from a value (`x.why.startswith(...)`)."""
-    return {node.func.attr for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
+    return {node.func.attr for node in found if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
             and node.func.attr in TAKEN_APART and isinstance(node.func.value, ast.Attribute | ast.Name)
             and (node.func.value.attr if isinstance(node.func.value, ast.Attribute) else node.func.value.id) in
             SENTENCES - {"text"}}
@@ -53,10 +55,11 @@ def test_no_sentence_is_taken_apart() -> None:
     for name in texts():
         path = ROOT / (name.replace(".", "/") + ".py")
         if path.exists() and name.rpartition(".")[0] not in READERS:
-            found |= {(name, method) for method in parsed(ast.parse(path.read_text("utf-8")))}
+            found |= {(name, method) for method in parsed(nodes(path))}
     assert found <= OF_OTHERS, found - OF_OTHERS
 
 
 def test_a_sentence_taken_apart_is_noticed() -> None:
-    assert parsed(ast.parse('a = own.refused.startswith("travel")\nb = why.removeprefix("x")\nc = name.split()')) == {
+    code = 'a = own.refused.startswith("travel")\nb = why.removeprefix("x")\nc = name.split()'
+    assert parsed(ast.walk(ast.parse(code))) == {
         "startswith", "removeprefix"}

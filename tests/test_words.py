@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from postproc.orientation.report.text import KINDS
+from tests.source import ROOT, nodes, product, tree
 
-ROOT = Path(__file__).parents[1]
 PAGES = sorted(path for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *(
     p for top in ("toolpaths", "machines", "postproc", "samples") for p in (ROOT / top).rglob("*.md")))
     if path.name != "CHANGELOG.md")
-CODE = sorted(p for top in ("toolpaths", "machines", "postproc") for p in (ROOT / top).rglob("*.py"))
+CODE = product()
 INSTEAD = {
     "told": "reported, warned, printed", "tell": "say, report, determine", "tells": "says, reports", "telling": "saying",
     "doubt": "uncertainty", "doubts": "uncertainties", "doubtful": "uncertain",
@@ -49,7 +49,7 @@ NAMES = {"ways_at_mean": "key of JSON", "doubts_s": "key of JSON"}
 
 def texts(path: Path) -> Iterator[tuple[int, str]]:
     """(line, text) of every string of a file, docstrings too."""
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             for k, line in enumerate(node.value.split("\n")):
                 yield node.lineno + k, line
@@ -82,7 +82,7 @@ def test_texts_of_the_code() -> None:
 def test_names_of_the_code() -> None:
     wrong = set()
     for path in CODE:
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        for node in nodes(path):
             for key in ("id", "attr", "arg", "name"):
                 name = getattr(node, key, None)
                 if isinstance(name, str) and NAME.search(name) and name not in NAMES:
@@ -107,7 +107,7 @@ def test_one_name_one_meaning() -> None:
     """A public type has one definition."""
     where: dict[str, list[str]] = {}
     for path in CODE:
-        for node in ast.parse(path.read_text("utf-8")).body:
+        for node in tree(path).body:
             target = node.targets[0] if isinstance(node, ast.Assign) else None
             name = node.name if isinstance(node, ast.ClassDef) else target.id if isinstance(target, ast.Name) else ""
             if name[:1].isupper() and not name.isupper():

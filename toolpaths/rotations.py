@@ -6,6 +6,9 @@ import numpy as np
 
 from toolpaths.arrays import Floats
 
+TWO_PI = 2.0 * np.pi
+"""rad"""
+
 
 def rotation(direction: Floats, angle: Floats) -> Floats:
     """Matrices (N, 3, 3) of the rotation by `angle` (N,) rad about the unit `direction` (3,) (Rodrigues)."""
@@ -16,6 +19,17 @@ def rotation(direction: Floats, angle: Floats) -> Floats:
     s = np.sin(angle)[:, None, None]
     result: Floats = c * np.eye(3) + s * cross + (1.0 - c) * outer
     return result
+
+
+def wrap(angle: Floats) -> Floats:
+    """The same angles in (-pi, pi]."""
+    result: Floats = angle - TWO_PI * np.ceil((angle - np.pi) / TWO_PI)
+    return result
+
+
+def whole_turns(angle: Floats, turn: float = TWO_PI) -> Floats:
+    """The whole turns nearest to angles, in their unit."""
+    return np.asarray(turn * np.round(angle / turn))
 
 
 def lengths(v: Floats) -> Floats:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints, taken
-from toolpaths.rotations import angle_between, cross, lengths, slerp
+from toolpaths.rotations import angle_between, cross, lengths, slerp, whole_turns
 from toolpaths.shapes import arrays
 
 _EPS = 1e-12
@@ -120,7 +120,7 @@ class Curves:
         across = cross(normal, radial)
         offset = tip - center
         angle = np.arctan2(np.einsum("ni,ni->n", offset, across), np.einsum("ni,ni->n", offset, radial))
-        angle = angle + 2.0 * np.pi * np.round((guess * sweep - angle) / (2.0 * np.pi))
+        angle = angle + whole_turns(guess * sweep - angle)
         result: Floats = angle / sweep
         return result
 

@@ -77,14 +77,14 @@ def _derivatives(forward: Forward, q0: Floats, q1: Floats) -> tuple[Floats, Floa
 
 
 def differences(seen: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """The same of poses (INTERVALS + 1, N, 6) evenly along the moves."""
+    """The same of poses (INTERVALS + 1, N, 6), or of any vectors (INTERVALS + 1, N, 3 G), evenly along the moves."""
     h, k = 1.0 / INTERVALS, INTERVALS // 2
     near, far = seen[k + 1] - seen[k - 1], seen[k + 2] - seen[k - 2]
     first = (8.0 * near - far) / (12.0 * h)
     near, far = seen[k + 1] + seen[k - 1] - 2.0 * seen[k], seen[k + 2] + seen[k - 2] - 2.0 * seen[k]
     second = (16.0 * near - far) / (12.0 * h * h)
     step = np.diff(seen, n=3, axis=0) / h**3
-    sizes = np.stack([np.linalg.norm(step[:, :, part], axis=2).max(axis=0) for part in (slice(0, 3), slice(3, 6))], axis=1)
+    sizes = np.linalg.norm(step.reshape(*step.shape[:2], -1, 3), axis=3).max(axis=0)
     return seen[k], first, second, SAFETY * sizes
 
 
@@ -125,5 +125,5 @@ def axis_jet(followed: Followed, q0: Floats, q1: Floats, tip0: Floats, tip1: Flo
     """
     shares = np.linspace(0.0, 1.0, INTERVALS + 1)
     seen = np.stack([followed(tip0 + t * (tip1 - tip0), q0 + t * (q1 - q0), solved) for t in shares])
-    value, first, second, third = differences(np.concatenate([seen, seen], axis=2))
-    return TaylorVector(list(value[:, 3:].T), list(first[:, 3:].T), list(second[:, 3:].T), third[:, 1])
+    value, first, second, third = differences(seen)
+    return TaylorVector(list(value.T), list(first.T), list(second.T), third[:, 0])

@@ -274,9 +274,3 @@ def unit(v: Floats) -> Floats:
     norm = np.linalg.norm(v, axis=1, keepdims=True)
     result: Floats = v / np.where(norm > 0.0, norm, np.nan)
     return result
-
-
-def wrap(angle: Floats) -> Floats:
-    """The same angles in (-pi, pi]."""
-    result: Floats = angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
-    return result

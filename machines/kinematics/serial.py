@@ -25,10 +25,10 @@ from machines.kinematics.base import ErrorForm, ErrorForms, Kinematics, as_point
 from machines.kinematics.chain import Joint, unit_vector
 from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x, spin_about
-from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular, wrap
+from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, wrap
 from toolpaths.shapes import arrays
 
 ROUND_OFF = 1e-12

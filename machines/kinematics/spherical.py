@@ -7,7 +7,7 @@ import numpy as np
 from machines.kinematics import columns
 from machines.kinematics.columns import Columns
 from toolpaths.arrays import Floats
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, wrap
 
 
 def meet(first: Floats, second: Floats, tool: Floats, from_pole: Floats) -> tuple[Floats, Floats]:
@@ -50,9 +50,3 @@ def perpendicular(pole: Floats, v: Floats) -> Floats:
 def angle(a: Floats, b: Floats) -> float:
     """Angle between two unit vectors (3,), rad."""
     return float(angle_between(a, b))
-
-
-def wrap(angle: Floats) -> Floats:
-    """The same angles in (-pi, pi]."""
-    result: Floats = angle - 2.0 * np.pi * np.ceil((angle - np.pi) / (2.0 * np.pi))
-    return result

@@ -20,6 +20,8 @@ FEEDS = "fingerprint of the planned feeds"
 """before the eight hex digits of the F words"""
 PENDING = "proof pending"
 """the line that says what is proved, while the program is written (`verification/proof_text.py`)"""
+LENGTHS_PENDING = "length at the machine pending"
+"""ends the line of each tool that says by how much its length may differ, while the program is written"""
 UNKNOWN = "--------"
 """in their place while the program is written"""
 HEADER = 4000

@@ -73,6 +73,8 @@ ControllerName = Annotated[str, typer.Option("-c", "--controller", help="control
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
                                      "corrected, and proved on the machine with them")]
+ToolTable = Annotated[str, typer.Option("--tool-table", metavar="FILE", help="the control's tool table: verify with the "
+                                        "lengths of tools at the machine")]
 OutputModeOption = Annotated[OutputMode, word_option("--output-mode", OutputMode, (
     "axes: machine coordinates, no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, TCPM, G234); tilted: tilted work "
     "plane, 3+2 (G68.2, CYCLE800, PLANE SPATIAL, G254)"))]
@@ -157,13 +159,14 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            axis_tolerance: AxisToleranceOption = 0.05, units: UnitsOption = "", dialect: DialectOption = "",
            allow_unknown: Allow = None,
            error_model: Errors = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-           require_proof: RequireProof = False, proof: ProofOf = "", json: Json = "") -> None:
+           require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTable = "", json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
                       error_model=error_model, orient=orient, max_tilt=max_tilt,
                       require_proof=require_proof)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup,
-                                         "the error model": error_model, "the proof file": proof or f"{gcode}.proof.json",
+                                         "the error model": error_model, "the tool table": tool_table,
+                                         "the proof file": proof or f"{gcode}.proof.json",
                                          **own_files(machine, controller)})
     from postproc.pipeline.convert import verify as run
     from postproc.proof import command
@@ -172,7 +175,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
         path, found = _read(file, options, progress)
-        result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress)
+        result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress, tool_table=tool_table)
         kept, more = command.compared_with(result, machine, controller, proof)
     text = summary.verify_text(result) + (f"\n{kept.line()}" if kept else "")
     found = [*result.diagnostics, *more]

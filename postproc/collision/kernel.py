@@ -192,7 +192,8 @@ def search(piece: Any, high: Any, size: Any, body: Any, corners: Any, normals: A
     pairs, bounds = np.empty((_DEPTH, 2), dtype=np.int64), np.empty(_DEPTH)
     cells, inner = np.empty((_DEPTH, 21)), np.empty(_DEPTH)
     body_first, path_first = (len(body) + 1) // 2 - 1, (len(travel) + 1) // 2 - 1
-    pairs[0, 0], pairs[0, 1], bounds[0] = 0, 0, _bound(high, size, body, travel, 0, 0)
+    pairs[0, 0], pairs[0, 1] = 0, 0
+    bounds[0] = _bound(high, size, body, travel, pairs[0, 0], pairs[0, 1])  # a plain 0 is another type to the compiler
     top = 0
     while top >= 0:
         k, m, bound = pairs[top, 0], pairs[top, 1], bounds[top]

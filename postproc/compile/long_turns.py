@@ -43,7 +43,7 @@ def long_turns(program: Program, file: str) -> list[Diagnostic]:
     one."""
     found = []
     for axis, roll in program.rolls.items():
-        most = TURN / 2.0 if roll.rule == "shortest" and not roll.stated else TURN
+        most = TURN / 2.0 if roll.undirected else TURN
         step = np.abs(program.words[:, axis] - program.before(axis))
         bad = np.flatnonzero(program.write[:, axis] & (step > most - LEAST))
         if len(bad):

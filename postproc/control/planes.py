@@ -20,9 +20,9 @@ from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
-Turns = Literal["ZXZ", "ZYX", "XYZ"]
+TurnOrder = Literal["ZXZ", "ZYX", "XYZ"]
 """about which axes the three angles turn, each about the axes turned so far"""
-Convention = Literal[Turns, "rotary"]
+Convention = Literal[TurnOrder, "rotary"]
 """how a plane's angles are written: those turns, or the words of the rotary axes"""
 _GIMBAL = 1e-9
 """sine or cosine of the middle angle below which the first and third turn are about one axis"""
@@ -66,14 +66,14 @@ def turn(letter: str, degrees: float) -> Floats:
     return result
 
 
-def rotation_of(convention: Turns, angles: tuple[float, ...]) -> Floats:
+def rotation_of(convention: TurnOrder, angles: tuple[float, ...]) -> Floats:
     """(3, 3) of three angles (degrees) under a convention of turns."""
     a, b, c = (turn(letter, angle) for letter, angle in zip(convention, angles, strict=True))
     result: Floats = a @ b @ c
     return result
 
 
-def angles_of(convention: Turns, rotation: Floats) -> tuple[float, float, float]:
+def angles_of(convention: TurnOrder, rotation: Floats) -> tuple[float, float, float]:
     """The three angles (degrees) of a rotation (3, 3) under a convention of turns; the inverse of `rotation_of`.
 
     Middle angles are in 0..180 (ZXZ) or -90..90 (the others). Where first and third turn are about one axis, the third

@@ -17,7 +17,7 @@ from machines.machine import Machine
 from postproc.controllers.model import ControllerFile
 from toolpaths.arrays import Bools, Floats
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.units import DEG
+from toolpaths.rotations import whole_turns
 
 TURN = 360.0
 HALF = 179.9
@@ -40,9 +40,14 @@ class Rollover:
     whole: bool = False
 
     @property
+    def undirected(self) -> bool:
+        """True where words do not say which path they turn: the control takes the shorter one."""
+        return self.rule == "shortest" and not self.stated
+
+    @property
     def most(self) -> float:
         """Degrees that one block may turn."""
-        return HALF if self.rule == "shortest" and not self.stated else WHOLE
+        return HALF if self.undirected else WHOLE
 
     def words(self, degrees: Floats, before: Floats) -> tuple[Floats, Bools]:
         """(words (N,) in one turn, under "sign" negative where the axis turns that path; (N,) True where it does) of
@@ -67,14 +72,11 @@ def rollovers(machine: Machine, controller: ControllerFile) -> tuple[dict[int, R
             found.append(error("machine.rollover", f'axis {name} of {machine.name} has rollover = "{rule}", which this '
                                "control has not", file=machine.file,
                                hint=f'allowed are {had} under [axes.{name}]; left out it is "{rules.default}"'))
-        elif rule == "sign" and turns.low:
-            found.append(error("machine.rollover", f"axis {name} of {machine.name}: this control takes the sign of a word "
-                               "as its direction, so that words are 0 to 360 degrees", file=machine.file,
-                               hint=f"modulo_range = [0, 360] under [axes.{name}]"))
-        elif rules.shortest and turns.low:
-            found.append(error("machine.rollover", f"axis {name} of {machine.name}: words of this control that state their "
-                               "path are 0 to 360 degrees", file=machine.file,
-                               hint=f"modulo_range = [0, 360] under [axes.{name}]"))
+        elif turns.low and (rule == "sign" or rules.shortest):
+            why = "this control takes the sign of a word as its direction, so that words" if rule == "sign" else \
+                "words of this control that state their path"
+            found.append(error("machine.rollover", f"axis {name} of {machine.name}: {why} are 0 to 360 degrees",
+                               file=machine.file, hint=f"modulo_range = [0, 360] under [axes.{name}]"))
         else:
             result[j] = Rollover("sign" if rule == "sign" else "shortest", turns.low, bool(rules.shortest),
                                  rules.zero_negative == "-360")
@@ -86,25 +88,18 @@ def parked(machine: Machine, rolls: Collection[int], q: Floats) -> Floats:
     unwind all their turns; `rolls`: the modulo axes by joint."""
     home = np.broadcast_to(machine.home, q.shape).copy()
     for j in parking(machine, rolls):
-        turn = TURN * DEG
-        home[..., j] += turn * np.round((q[..., j] - home[..., j]) / turn)
+        home[..., j] += whole_turns(q[..., j] - home[..., j])
     return home
 
 
 def parking(machine: Machine, rolls: Collection[int]) -> list[int]:
     """The joints that park at whole turns."""
-    return [j for j in endless(machine) if j in rolls or machine.turns[j].park == "turn"]
-
-
-def endless(machine: Machine) -> list[int]:
-    """The rotary joints whose travel has no end."""
-    return [j for j, rotary in enumerate(machine.rotary)
-            if rotary and not np.isfinite(machine.limits.upper[j] - machine.limits.lower[j])]
+    return [j for j in np.flatnonzero(machine.endless).tolist() if j in rolls or machine.turns[j].park == "turn"]
 
 
 def off_home(machine: Machine, rolls: dict[int, Rollover], place: Floats, home: Floats) -> Floats:
     """mm and degrees by which places (..., J) are off home (J,), whole turns of axes that park at them aside."""
     away = np.abs(place - home)
     for j in parking(machine, rolls):
-        away[..., j] = np.abs(away[..., j] - TURN * np.round(away[..., j] / TURN))
+        away[..., j] = np.abs(away[..., j] - whole_turns(away[..., j], TURN))
     return np.asarray(away)

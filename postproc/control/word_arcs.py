@@ -9,6 +9,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from postproc.control.control import Control
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
+from toolpaths.rotations import whole_turns
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 
@@ -84,6 +85,6 @@ def _well_shaped(arc: Curves) -> Bools:
     first, last = radial(arc.start), radial(arc.end)
     r0, r1 = np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1)
     gap = np.linalg.norm(last - first, axis=1)
-    whole = np.abs(arc.sweep - 2.0 * np.pi * np.round(arc.sweep / (2.0 * np.pi))) < 1e-9
+    whole = np.abs(arc.sweep - whole_turns(arc.sweep)) < 1e-9
     ends = np.where(whole, gap < 1e-6, gap > _SHORTEST)
     return np.asarray((np.abs(r0 - r1) < _RADIUS_SLACK) & (r0 > _SHORTEST) & ends)

@@ -44,7 +44,7 @@ def chain_ends(xyz: Any, joins: Any, tolerance: Any) -> Any:
     return ends
 
 
-@loop
+@loop(takes=(("float64", 1),) * 4 + (("bool_", 1),) + (("float64", 1),) * 2)
 def speeds(length: Any, target: Any, most: Any, rate: Any, through: Any, kink: Any, ahead: Any) -> Any:
     """(2, N) speed at begin and end of each segment.
 
@@ -72,7 +72,7 @@ def speeds(length: Any, target: Any, most: Any, rate: Any, through: Any, kink: A
     return result
 
 
-@loop
+@loop(takes=(("float64", 1),) * 3 + (("bool_", 1),))
 def timeline(seconds: Any, overlap: Any, rest: Any, fresh: Any) -> Any:
     """(2, N) times at which each segment begins and ends.
 

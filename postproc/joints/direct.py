@@ -33,7 +33,12 @@ def direct(runs: Sequence[PoseRun], limits: Limits) -> list[Floats] | None:
 
 def _joints(kin: Kinematics, runs: Sequence[PoseRun], limits: Limits) -> Floats | None:
     """Joints (N, J) of runs one behind the other; None where one is outside, or where a direction is singular."""
-    poses = [np.concatenate(x) if len(x) > 1 else x[0] for x in ([run.tip for run in runs], [run.axis for run in runs])]
-    q: Floats = kin.inverse(*poses)[0]
+    tip, axis = (np.concatenate(x) if len(x) > 1 else x[0] for x in ([run.tip for run in runs], [run.axis for run in runs]))
+    return joints_inside(kin, tip, axis, limits)
+
+
+def joints_inside(kin: Kinematics, tip: Floats, axis: Floats, limits: Limits) -> Floats | None:
+    """Joints (N, J) of poses (N, 3) on a machine whose inverse has one branch; None where one is outside or singular."""
+    q: Floats = kin.inverse(tip, axis)[0]
     inside = (q >= limits.lower - TRAVEL_SLACK) & (q <= limits.upper + TRAVEL_SLACK)
     return q if bool(inside.all()) and not bool(kin.singular(q).any()) else None

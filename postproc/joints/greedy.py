@@ -8,8 +8,8 @@ import numpy as np
 
 from postproc.joints.lattice import Lattice
 from postproc.joints.states import BAD, SECONDS, Segment, leading, rough_segments
-from postproc.joints.tracks import wrap
 from toolpaths.arrays import Floats
+from toolpaths.rotations import wrap
 
 
 @dataclass(frozen=True)

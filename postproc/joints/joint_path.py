@@ -8,9 +8,9 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Limits
 from postproc.joints.lattice import PoseRun
 from postproc.joints.plan import RunSolution, plan_runs
-from postproc.joints.tracks import TRAVEL_SLACK, distance, wrap
+from postproc.joints.tracks import TRAVEL_SLACK, distance
 from toolpaths.arrays import Floats, Ints, repeated
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, wrap
 
 __all__ = ["TRAVEL_SLACK", "RunSolution", "branch_of", "nearest_solution", "reachable_axes", "solve", "wrap"]
 

@@ -14,8 +14,9 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits
-from postproc.joints.tracks import TRAVEL_SLACK, TWO_PI, branches_of, following, wrap
+from postproc.joints.tracks import TRAVEL_SLACK, branches_of, following
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.rotations import TWO_PI, wrap
 from toolpaths.shapes import arrays
 
 _MANY = 1 << 30

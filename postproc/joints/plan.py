@@ -17,8 +17,9 @@ from postproc.joints.greedy import greedy
 from postproc.joints.lattice import Lattice, PoseRun, lattice_of
 from postproc.joints.search import RunPiece, SegmentChoice, cheapest, pieces, wrong_side
 from postproc.joints.states import BAD, NEVER, SECONDS, Segment, least_of, rough_segments, tidy_segments
-from postproc.joints.tracks import TRAVEL_SLACK, TWO_PI, wrap
+from postproc.joints.tracks import TRAVEL_SLACK
 from toolpaths.arrays import Bools, Floats
+from toolpaths.rotations import TWO_PI, whole_turns, wrap
 from toolpaths.shapes import arrays
 
 
@@ -235,7 +236,7 @@ def _offsets(lattice: Lattice, taken: list[RunPiece], at: Floats) -> list[Floats
     result, before = [], at
     for piece in taken:
         begin = _rows(lattice, RunPiece(piece.first, piece.first, piece.state, False), piece.first)[0]
-        turned = np.where(lattice.endless, np.rint(np.nan_to_num(before - begin) / TWO_PI) * TWO_PI, 0.0)
+        turned = np.where(lattice.endless, whole_turns(np.nan_to_num(before - begin)), 0.0)
         result.append(turned)
         before = _rows(lattice, piece, piece.last)[0] + turned
     return result

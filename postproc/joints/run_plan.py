@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.base.group_rows import groups
+from postproc.joints.direct import joints_inside
 from postproc.joints.joint_path import reachable_axes
 from postproc.joints.lattice import PoseRun
 from postproc.joints.plan import JointPreferences, RunSolution, plan_runs
@@ -17,7 +18,7 @@ from postproc.joints.refined_moves import Refined, cut, with_rewinds
 from postproc.joints.singular_detours import Led, SingularPassage, lead_past, whole
 from postproc.joints.spin import held_joints
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints, shared
+from toolpaths.arrays import Bools, Floats, Ints, repeated, shared, taken
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
@@ -103,6 +104,8 @@ def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves:
     starts, parts = np.flatnonzero(moves.link), []
     tools = {k: kinematics(k) for k in np.unique(moves.tool[starts]).tolist()}
     given = _reached(tools, moves, starts, AXIS_SHARE * run_options.tolerance)
+    if (plan := _without_choice(machine, tools, moves, starts, given, run_options.tolerance)) is not None:
+        return plan
     for first, last in zip(starts.tolist(), [*starts[1:].tolist(), len(moves)], strict=True):
         parts.append(_part(machine, tools[int(moves.tool[first])], moves, first, last, given, run_options))
     runs = [_run(part, moves, run_options, machine.home) for part in parts]
@@ -112,6 +115,29 @@ def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves:
         runs = [_run(part, moves, run_options, machine.home) for part in parts]
         found = plan_runs(runs, machine.limits, machine.home, run_options.preferences, run_options.may_rewind, progress)
     return _together(moves, parts, found, run_options)
+
+
+def _without_choice(machine: Machine, tools: dict[int, Kinematics], moves: Moves, starts: Ints,
+                    given: tuple[Floats, Floats], tolerance: float) -> RunPlan | None:
+    """The same where `direct` has all runs, so that there may be a great many of them: of each tool at once."""
+    if not len(starts) or starts[0] or any(any(kin.rotary) or kin.branches != 1 for kin in tools.values()):
+        return None
+    axis, moved = given
+    lengths = np.diff(np.append(starts, len(moves)))
+    of_tool: Iterable[slice | Ints] = (slice(None),) if len(tools) == 1 else groups(np.repeat(moves.tool[starts], lengths))
+    q = np.empty((len(moves), len(machine.home)))
+    for rows in of_tool:
+        kin = tools[int(moves.tool[starts[0] if isinstance(rows, slice) else rows[0]])]
+        found = joints_inside(kin, moves.tip[rows], taken(axis, rows), machine.limits)
+        if found is None:
+            return None
+        q[rows] = found
+    n, singular = len(moves), np.zeros(len(moves), dtype=np.bool_)
+    refined = cut(moves, np.arange(n), repeated(0.0, n), repeated(1.0, n), moves.tip,
+                  shared(axis) if moved.any() else moves.axis)
+    left = np.repeat(tolerance - np.maximum.reduceat(moved, starts), lengths)
+    return RunPlan(refined, q, singular, shared(moved), shared(left), (),
+                   (RunSolution(q[:0], singular[:0]),) * len(starts))
 
 
 def _reached(tools: dict[int, Kinematics], moves: Moves, starts: Ints, tolerance: float) -> tuple[Floats, Floats]:

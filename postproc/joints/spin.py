@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.joints.tracks import wrap
 from toolpaths.arrays import Floats
+from toolpaths.rotations import wrap
 
 
 def free_joint(kin: Kinematics, tip: Floats, axis: Floats, home: Floats) -> int:

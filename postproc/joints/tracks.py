@@ -6,21 +6,14 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Array, Bools, Floats
-from toolpaths.rotations import slerp
+from toolpaths.rotations import slerp, wrap
 
-TWO_PI = 2.0 * np.pi
 TRAVEL_SLACK = 1e-9
 """mm or rad: round-off that is no excess of travel"""
 _SMALL_STEP = 0.35
 """rad of rotary path that a branch is followed without a look between"""
 _CROSSING = 1e-3
 _LEAST_STEP = 1e-10
-
-
-def wrap(angle: Floats) -> Floats:
-    """Angles into (-pi, pi]."""
-    result: Floats = -(np.mod(-angle + np.pi, TWO_PI) - np.pi)
-    return result
 
 
 def branches_of(kin: Kinematics, tip: Floats, axis: Floats, near: Floats) -> tuple[Floats, Bools]:

@@ -55,11 +55,15 @@ class SafeSpace:
 
     def clear(self, tip: Floats, axis: Floats, margin: float) -> Bools:
         """(N,) True where the tool, a half line from its tip along its axis, stays `margin` mm off the path's extent."""
+        return np.asarray(self.room(tip, axis) >= margin)
+
+    def room(self, tip: Floats, axis: Floats) -> Floats:
+        """(N,) mm that the tool is off the path's extent; negative inside."""
         offset = tip - self.centre
         height = np.einsum("ni,ni->n", offset, axis)
-        above = height >= ((self.corners - self.centre) @ axis.T).max(axis=0) + margin
+        above = height - ((self.corners - self.centre) @ axis.T).max(axis=0)
         nearest = np.sqrt(np.maximum((offset**2).sum(axis=1) - np.minimum(height, 0.0) ** 2, 0.0))
-        return np.asarray(above | (nearest >= self.radius + margin))
+        return np.asarray(np.maximum(above, nearest - self.radius))
 
 
 def safe_space(moves: Moves, setup: SetupFile, placement: Placement) -> SafeSpace:

@@ -21,6 +21,7 @@ from postproc.control.modes import table_axes
 from postproc.path.links import Link, SafeSpace, stays_clear
 from toolpaths.arrays import Bools, Floats
 from toolpaths.diagnostics import Diagnostic, info
+from toolpaths.rotations import whole_turns
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -59,8 +60,7 @@ def _at_zero(control: Control, q: Floats) -> Floats:
     """Joints (J,) with the rotary tables at zero: modulo axes at the nearest whole turn."""
     result = q.copy()
     for j in table_axes(control).tolist():
-        turn = 2.0 * np.pi
-        result[j] = turn * np.round(q[j] / turn) if j in control.rolls else 0.0
+        result[j] = whole_turns(q[j]) if j in control.rolls else 0.0
     return result
 
 

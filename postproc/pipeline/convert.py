@@ -21,6 +21,7 @@ from postproc.setup.system import standing
 from postproc.verification.neighbour_files import NeighbourFiles, unfinished
 from postproc.verification.read_back import other_axes, other_setup, read_back
 from postproc.verification.second_witness import second_witness
+from postproc.verification.tool_table import measured_lengths, read_tool_table, with_measured
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors, require
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import Toolpath
@@ -113,11 +114,15 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
 def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FilePath,
            controller: str | FilePath = "linuxcnc", setup: SetupFile | str | FilePath | None = None,
            options: Options | None = None, diagnostics: list[Diagnostic] | None = None,
-           progress: Progress | None = None) -> VerifyResult:
+           progress: Progress | None = None, tool_table: str | FilePath = "") -> VerifyResult:
     """A G-code file against a Toolpath on a machine; the arguments that `convert` has too are as there.
 
+    Args:
+        tool_table: file of the control's tool table: the program is verified with these lengths of tools
+
     Raises:
-        DiagnosticError: where machine, controller or set-up cannot be loaded, or the G-code file not be opened.
+        DiagnosticError: where machine, controller, set-up or tool table cannot be loaded, or the G-code file not be
+            opened.
     """
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     try:
@@ -136,10 +141,17 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     found += more
     if job is None or has_errors(found):
         return replace(begun, diagnostics=tuple(found))
+    asked = start.asked or start.setup
+    if tool_table:
+        measured, more = measured_lengths(read_tool_table(tool_table, spec), job, str(tool_table))
+        begun, found, asked = replace(begun, measured=tuple(measured)), [*found, *more], with_measured(asked, measured)
+        if has_errors(more):
+            return replace(begun, diagnostics=tuple(found))
+        job = replace(job, setup=with_measured(job.setup, measured))
     comparison, more = read_back(data, job, path.file, progress, str(gcode), NeighbourFiles(gcode))
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more]
     said = None
     if comparison is not None and not has_errors(found):
-        said, more = second_witness(start.source, start.asked or start.setup, options, job, comparison, data)
+        said, more = second_witness(start.source, asked, options, job, comparison, data)
         found += more
     return replace(begun, comparison=comparison, diagnostics=tuple(found), witness=said)

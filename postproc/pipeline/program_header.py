@@ -6,12 +6,13 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from postproc.base.header_words import PENDING, corrected_by_control, corrected_here, feeds_line, model_mark
+from postproc.base.header_words import LENGTHS_PENDING, PENDING, corrected_by_control, corrected_here, feeds_line, model_mark
 from postproc.base.version import VERSION
 from postproc.compile.program import Program
 from postproc.control.modes import table_axes
 from postproc.job.job import Job
 from postproc.pipeline.stage_values import CompiledStage
+from postproc.readback.comparison.length_margins import length_matters
 
 
 def header_lines(made: CompiledStage) -> list[str]:
@@ -75,7 +76,8 @@ def _tools(job: Job) -> list[str]:
                  *([f"diameter {tool.diameter:.4g} mm"] if tool and tool.diameter else []),
                  f"gauge length {length:.4f} mm" if length else "gauge length not stated"]
         found[number] = ", ".join(parts)
-    return list(found.values())
+    margins = [f"T{number}: {LENGTHS_PENDING}" for number in sorted(found)] if length_matters(job) else []
+    return [*found.values(), *margins]
 
 
 def _orientations(made: CompiledStage) -> list[str]:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from postproc.correction.compensation import ErrorCorrection
     from postproc.correction.written_deviation import AfterFormatting
     from postproc.orientation.plans.choice import OrientationChoice
+    from postproc.verification.tool_table import MeasuredLength
     from postproc.witness.evidence import Testimony
 
 StageName = Literal["prepare", "share", "place", "solve", "correct", "check", "plan", "compile", "write", "verify", "state"]
@@ -96,6 +97,8 @@ class VerifyResult:
     cl_file: str = ""
     sha256: str = ""
     """of the bytes of the program"""
+    measured: tuple[MeasuredLength, ...] = ()
+    """lengths at the machine, where a tool table was given: the program is verified with them"""
 
     @property
     def ok(self) -> bool:

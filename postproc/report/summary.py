@@ -175,9 +175,18 @@ def tools_of(result: PostResult) -> list[dict[str, Any]]:
         speeds = np.unique((direction * rpm)[cuts & (path.tool == k)])
         tool = found.setdefault(number, {
             "number": number, "name": path.tools[k].name if k >= 0 else "", "gauge_length_mm": job.gauge_length(k) or None,
-            "spindle_rpm": [], "of_setup": [what for n, what in job.stated if n == number]})
+            "spindle_rpm": [], "of_setup": [what for n, what in job.stated if n == number],
+            "length_margin_mm": _length_margin(result, number)})
         tool["spindle_rpm"] = sorted({*tool["spindle_rpm"], *speeds[np.isfinite(speeds)].tolist()})
     return list(found.values())
+
+
+def _length_margin(result: PostResult, number: int) -> dict[str, Any] | None:
+    """By how much a tool may differ from its gauge length, and what ends that; None where its register takes it up."""
+    one = next((one for one in (result.comparison.lengths if result.comparison else ()) if one.number == number), None)
+    return None if one is None else {
+        "shorter": _number(one.shorter), "ends_shorter": one.ends_shorter,
+        "longer": _number(one.longer), "ends_longer": one.ends_longer}
 
 
 def tool_lines(result: PostResult) -> list[str]:
@@ -187,7 +196,8 @@ def tool_lines(result: PostResult) -> list[str]:
         length = result.job.control.measured
         lines.append("no tool call: for the tool in the spindle, measured into the work offset, which "
                      + (f"holds its gauge length {length:.4f} mm" if length else "must hold its length besides"))
-    return lines + [f"T{number}: {what}, of the set-up" for number, what in (result.job.stated if result.job else ())]
+    lines += [f"T{number}: {what}, of the set-up" for number, what in (result.job.stated if result.job else ())]
+    return lines + [one.line() for one in (result.comparison.lengths if result.comparison else ())]
 
 
 def points_added(result: PostResult) -> int:
@@ -256,6 +266,8 @@ def verify_dict(result: VerifyResult) -> dict[str, Any]:
         "worst_tip_lines": list(c.worst_tip_line) if c else None,
         "worst_axis_lines": list(c.worst_axis_line) if c else None,
         "witness": witness_dict(result.witness),
+        "tool_table": [{"number": one.number, "register": one.register, "gauge_length_mm": one.gauge,
+                        "measured_mm": one.measured} for one in result.measured],
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
 
@@ -263,11 +275,13 @@ def verify_dict(result: VerifyResult) -> dict[str, Any]:
 def verify_text(result: VerifyResult) -> str:
     """The verdict for people."""
     c = result.comparison
+    measured = "".join(f"\n{one.line()}" for one in result.measured)
     if c is None:
-        return "not proved"
+        return f"not proved{measured}"
     if not result.ok:
         errors = sum(d.severity is Severity.ERROR for d in result.diagnostics)
-        return f"NOT proved: {len(c.owner)} blocks, {errors} error{'s' * (errors > 1)}; the first may cause the rest"
-    said = "".join(f"\n{line}" for line in witness_lines(result.witness))
+        return (f"NOT proved: {len(c.owner)} blocks, {errors} error{'s' * (errors > 1)}; the first may cause the rest"
+                f"{measured}")
+    said = "".join(f"\n{line}" for line in witness_lines(result.witness)) + measured
     return (f"{statement(c, result.witness)} ({len(c.owner)} blocks; worst at CL line {c.worst_tip_line[0]}, block line "
             f"{c.worst_tip_line[1]}, the axis at CL line {c.worst_axis_line[0]}, block line {c.worst_axis_line[1]}){said}")

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from postproc.control.rollover import endless
 from postproc.pipeline.result import PostResult
+from toolpaths.rotations import TWO_PI, whole_turns
 
 
 def unwinding(result: PostResult) -> dict[str, dict[str, Any]]:
@@ -16,17 +16,17 @@ def unwinding(result: PostResult) -> dict[str, dict[str, Any]]:
     path, job = result.path, result.job
     if path is None or job is None or not len(path):
         return {}
-    found, machine, turn = dict[str, dict[str, Any]](), job.machine, 2.0 * np.pi
+    found, machine = dict[str, dict[str, Any]](), job.machine
     steps = np.diff(np.concatenate([machine.home[None], path.q]), axis=0)
     link = np.isnan(path.u)
-    for j in endless(machine):
+    for j in np.flatnonzero(machine.endless).tolist():
         if j in job.control.rolls:
             continue
         velocity, step = float(machine.limits.velocity[j]), np.abs(steps[link, j])
-        seconds = float((step - np.abs(step - turn * np.round(step / turn))).sum()) / velocity
-        turns = round(float(path.q[-1, j] - machine.home[j]) / turn)
+        seconds = float((step - np.abs(step - whole_turns(step))).sum()) / velocity
+        turns = round(float(path.q[-1, j] - machine.home[j]) / TWO_PI)
         found[machine.axis_names[j]] = {"in_program_s": seconds, "turns_left": turns,
-                                        "next_start_s": abs(turns) * turn / velocity}
+                                        "next_start_s": abs(turns) * TWO_PI / velocity}
     return found
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from postproc.base.header_words import HEADER, PENDING
+from postproc.base.header_words import HEADER, LENGTHS_PENDING, PENDING
 from postproc.controllers.model import ControllerFile
 from postproc.readback.comparison.compare import Comparison
 from postproc.readback.text.words import plain
@@ -82,13 +82,23 @@ def with_statement(text: str, controller: ControllerFile, comparison: Comparison
     Args:
         file: the CL file, for messages
     """
+    lines = {PENDING: head_line(comparison, witness, comment_room(controller))}
+    lines |= {f"T{one.number}: {LENGTHS_PENDING}": one.line() for one in comparison.lengths}
+    found: list[Diagnostic] = []
+    for pending, line in lines.items():
+        text, faults = _in_place_of(text, controller, pending, line, file)
+        found += faults
+    return text, found
+
+
+def _in_place_of(text: str, controller: ControllerFile, pending: str, line: str, file: str) -> tuple[str, list[Diagnostic]]:
+    """The text with another comment in the head in the place of one that was read back."""
     style = controller.comment
-    capitals = f"{style.open}{_cleaned(controller, PENDING, True)}{style.close}" in text[:HEADER]
-    mark = f"{style.open}{_cleaned(controller, PENDING, capitals)}{style.close}"
+    capitals = f"{style.open}{_cleaned(controller, pending, True)}{style.close}" in text[:HEADER]
+    mark = f"{style.open}{_cleaned(controller, pending, capitals)}{style.close}"
     at = text.find(mark, 0, HEADER)
     if at < 0:
         return text, []
-    line = head_line(comparison, witness, comment_room(controller))
     line = f"{style.open}{_cleaned(controller, line, capitals)}{style.close}"
     begin, end = text.rfind("\n", 0, at) + 1, at + len(mark)
     if plain(text[begin:end].encode()) != plain((text[begin:at] + line).encode()):

@@ -14,6 +14,7 @@ from postproc.base.options import Options
 from postproc.job.job import Job
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
+from postproc.readback.comparison.length_margins import LengthMargin, length_margins, longer_run
 from postproc.readback.comparison.slow_moves import planned_feeds
 from postproc.readback.comparison.starts import check_end, check_start
 from postproc.readback.comparison.states import check_lengths
@@ -91,7 +92,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     motion, found = run(code, machine.axis_names, offsets, gcode)
     give_back()
     faults = Faults(job.toolpath.file, gcode)
-    unseen = check_start(code, job, faults)
+    unseen, longer = check_start(code, job, faults), longer_run(code, offsets, job)
     code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))
     diagnostics += [_located(d, job.toolpath.file, of_cl) for d in found]
     if has_errors(diagnostics):
@@ -114,7 +115,18 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
         noted = [*(_of_model(head, job, gcode, has_errors(noted)) if head.corrected is not None else
                    _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
-    return replace(comparison, executed=(code, motion), poses=executed, planned=planned), [*diagnostics, *noted]
+    return replace(comparison, executed=(code, motion), poses=executed, planned=planned,
+                   lengths=_margins(motion, executed, longer, job, comparison)), [*diagnostics, *noted]
+
+
+def _margins(motion: Motion, executed: BlockPoses, longer: tuple[Motion, Job, dict[int, float]] | None, job: Job,
+             c: Comparison) -> tuple[LengthMargin, ...]:
+    """How much tools may differ from their gauge lengths; () where registers take that up, or where the program fails."""
+    if longer is None or has_errors([*c.diagnostics]):
+        return ()
+    again, other, held = longer
+    left = job.options.tolerance - c.tip_bound, job.axis_tolerance - c.axis_bound
+    return length_margins(motion, executed, again, _executed(other, again, held), job, c.owner, left)
 
 
 def _unmeasured(motion: Motion, executed: BlockPoses, job: Job, faults: Faults) -> list[Diagnostic]:

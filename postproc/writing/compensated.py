@@ -46,8 +46,7 @@ def _leading(program: Program) -> dict[int, Command]:
     """The last command of compensation before the first move in the plane behind it, by the block of that move."""
     moving, result = _planar(program), dict[int, Command]()
     for block, command in program.ordered():
-        at = int(np.searchsorted(moving, block))
-        if command.name.startswith(CODE) and at < len(moving):
+        if command.name.startswith(CODE) and (at := int(moving.searchsorted(block))) < len(moving):
             result[int(moving[at])] = command
     return result
 

@@ -36,11 +36,11 @@ class IsoWriter(Writer):
         p, codes = self.program, self.controller.codes
         names = (codes.traverse, codes.feed, codes.arc_cw, codes.arc_ccw)
         result = [""] * (last - first)
-        changes = self.changes[slice(*np.searchsorted(self.changes, (first + 1, last)))]
+        changes = self.changes[self.changes.searchsorted(first + 1):self.changes.searchsorted(last)]
         for row in (0, *(changes - first).tolist()) if last > first else ():
-            code, home, words = int(p.code[first + row]), bool(p.home[first + row]), []
-            code += code == 2 and bool(p.ccw[first + row])
-            plane, mode = int(p.plane[first + row]), int(p.mode[first + row])
+            code, home, words = p.code.item(first + row), p.home.item(first + row), []
+            code += code == 2 and p.ccw.item(first + row)
+            plane, mode = p.plane.item(first + row), p.mode.item(first + row)
             if code and mode != self.mode:
                 words.append(codes.inverse_time if mode == INVERSE else codes.per_minute)
                 self.mode = mode
@@ -62,19 +62,15 @@ class IsoWriter(Writer):
         p, codes = self.program, self.controller.codes
         if "Z" not in p.letters:
             return
-        homes = np.flatnonzero(p.home[first:last] & self.controller.tools.home_without_length)
-        heights = np.flatnonzero(p.write[first:last, p.letters.index("Z")] & ~p.home[first:last])
-        at = 0
-        while True:
-            if self.length_off and not self.length_waits:
+        at = first
+        while not self.length_off or self.length_waits:
+            rows = self.heights if self.length_off else self.homes
+            found = rows.searchsorted(at)
+            if found == len(rows) or rows[found] >= last:
                 return
-            rows = heights if self.length_off else homes
-            found = int(np.searchsorted(rows, at))
-            if found == len(rows):
-                return
-            at = int(rows[found])
+            at = rows.item(found)
             code = codes.length_offset.format(register=self.register) if self.length_off else codes.length_cancel
-            heads[at] += self.space + code
+            heads[at - first] += self.space + code
             self.length_off = not self.length_off
 
     def feed_texts(self, values: Floats) -> list[str]:
@@ -91,6 +87,16 @@ class IsoWriter(Writer):
         return self.feed_texts(np.array([value]))[0]
 
     @cached_property
+    def homes(self) -> Ints:
+        """Blocks in machine coordinates before which the length goes off."""
+        return np.flatnonzero(self.program.home & self.controller.tools.home_without_length)
+
+    @cached_property
+    def heights(self) -> Ints:
+        """Blocks that state Z, not in machine coordinates."""
+        return np.flatnonzero(self.program.write[:, self.program.letters.index("Z")] & ~self.program.home)
+
+    @cached_property
     def changes(self) -> Ints:
         """Blocks, in order, with a motion, plane or feed mode that the block before has not, or in machine coordinates."""
         p = self.program
@@ -101,8 +107,8 @@ class IsoWriter(Writer):
         """Feed words, '' where the feed stands already (each block of inverse time states it)."""
         result = [""] * (last - first)
         cutting, stated, needed = self.fed
-        begin, end = np.searchsorted(cutting, (first, last)).tolist()
-        rows = stated[slice(*np.searchsorted(stated, (begin, end)))]
+        begin, end = int(cutting.searchsorted(first)), int(cutting.searchsorted(last))
+        rows = stated[stated.searchsorted(begin):stated.searchsorted(end)]
         if end > begin and (not len(rows) or rows[0] != begin):
             rows = np.append(begin, rows)
         for k, text in zip(rows.tolist(), self.feed_texts(self.program.feed[cutting[rows]]), strict=True):
@@ -136,11 +142,18 @@ class IsoWriter(Writer):
         p = self.program
         result = [""] * (last - first)
         places = self.controller.format.linear_decimals
+        if not self.has_arcs:
+            return result
         for k in np.flatnonzero(p.code[first:last] == 2).tolist():
             third = PLANE_AXIS[int(p.plane[first + k])]
             texts = self.number_text(p.center[first + k], places)
             result[k] = "".join(f"{self.space}{'IJK'[i]}{texts[i]}" for i in range(3) if i != third)
         return result
+
+    @cached_property
+    def has_arcs(self) -> bool:
+        """True where a block is an arc."""
+        return bool((self.program.code == 2).any())
 
     def hole(self, hole: Hole) -> Iterator[str]:
         """A canned cycle: in full where anything but the place of the hole changes, else the place alone."""

@@ -12,6 +12,7 @@ from tests.mutants.battery import Case
 
 FEED, REST = 0.005, 2e-3
 """share of the time of a move, and s, from which on a feed or a rest counts as another one"""
+NEXT = "output.next_mode"
 SAME = ("tool", "spindle", "rpm", "coolant", "register", "plane", "compensation", "radius", "offset", "pitch", "blend")
 
 
@@ -129,8 +130,16 @@ def effect_of(job: Any, comparison: Any) -> Effect:
     return Effect(spent, feeds, rests, turns, states, (comparison.worst_tip, float(np.degrees(comparison.worst_axis))))
 
 
-def change(before: Effect, after: Effect) -> str:
-    """What differs between two programs for one CL file that are both inside the tolerance: "" for nothing that counts."""
+def passed_on(base: Made, got: Made) -> bool:
+    """True where a conversion's own proof refused the mode that `base` is written in, and the next one was taken."""
+    return any(NEXT in said for said in got.said) and not any(NEXT in said for said in base.said)
+
+
+def change(before: Effect, after: Effect, other_mode: bool = False) -> str:
+    """What differs between two programs for one CL file that are both inside the tolerance: "" for nothing that counts.
+
+    In another output mode linking moves may be fed that were rapid, so that only moves fed in both are compared.
+    """
     if len(before.seconds) != len(after.seconds):
         return "the moves of the CL file are others"
     for name, values in before.states.items():
@@ -145,6 +154,8 @@ def change(before: Effect, after: Effect) -> str:
     off = np.abs(after.seconds - before.seconds)
     slow = off > np.maximum(FEED * np.maximum(before.seconds, after.seconds), REST)
     same = (np.abs(after.feeds - before.feeds) <= FEED * before.feeds).all(axis=1)
+    if other_mode:
+        slow &= (before.seconds > 0.0) & (after.seconds > 0.0)
     slow &= ~same  # the F words are the same: the path is longer or shorter, inside the tolerance
     if slow.any():
         k = int((off / np.maximum(before.seconds, 1e-9)).argmax())

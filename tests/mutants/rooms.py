@@ -66,7 +66,8 @@ TESTS: dict[str, tuple[str, ...]] = {
                   "postproc/verification/test_verify_edits.py", "postproc/readback/test_reader_laws.py",
                       "postproc/readback/test_readback.py",
                   "postproc/readback/test_program_mutation.py"),
-    "proof": ("postproc/readback/test_readback.py", "postproc/readback/test_program_mutation.py"),
+    "proof": ("postproc/readback/test_readback.py", "postproc/readback/test_program_mutation.py",
+              "postproc/readback/test_pecks_dwells_ends.py"),
 }
 FILES = {"fanuc": "fanuc", "siemens": "siemens", "heidenhain": "heidenhain", "haas": "haas"}
 READERS = {"fanuc": "fanuc", "siemens": "siemens", "heidenhain": "klartext", "haas": "fanuc", "linuxcnc": "twins",

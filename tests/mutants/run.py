@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any
 
 from tests.mutants.battery import CASES
-from tests.mutants.judge import Made, blind, body, change, converted, edits_of, made, short, verified
+from tests.mutants.judge import Made, blind, body, change, converted, edits_of, made, passed_on, short, verified
 from tests.mutants.plant import Fault, NotPlanted, functions, planted
 from tests.mutants.rooms import cases_of, files_asked, proves
 
@@ -150,7 +150,10 @@ def _of_case(base: Made, got: Made, checked: Made | None) -> str:
             return f"verify: {checked.errors[0] if checked.errors else 'refused'}"
         if base.effect is None or checked.effect is None:
             return "survives: a program where none should be"
-        differs = change(base.effect, checked.effect)
+        other = passed_on(base, got)
+        differs = change(base.effect, checked.effect, other)
+        if other and not differs:
+            return "conversion: its mode refused, the next one taken, which is right"
         return f"survives: {differs}" if differs else "harmless: inside the tolerance, times and states the same"
     if got.proof != base.proof:
         return "another proof: the program is the same"

@@ -6,18 +6,18 @@ import ast
 import math
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.source import ROOT, nodes, product
 from toolpaths import compiled as module
 from toolpaths.compiled import chosen, compiled, loaded, loop, wanted
 
-ROOT = Path(__file__).parents[2]
-FILES = {path.relative_to(ROOT).as_posix(): ast.parse(path.read_text("utf-8"))
-         for top in ("toolpaths", "machines", "postproc") for path in sorted((ROOT / top).rglob("*.py"))}
+FILES = {path.relative_to(ROOT).as_posix(): path for path in product()}
 JIT = "toolpaths/compiled.py"
 WITNESS = "postproc/witness/assign_blocks.py"
 """shares no code with the rest, not even this"""
@@ -54,9 +54,9 @@ def above(rows: Any, limit: Any) -> Any:
     return found
 
 
-def imported(tree: ast.Module) -> set[str]:
+def imported(found: Iterable[ast.AST]) -> set[str]:
     names = set[str]()
-    for node in ast.walk(tree):
+    for node in found:
         if isinstance(node, ast.Import):
             names |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
@@ -64,18 +64,18 @@ def imported(tree: ast.Module) -> set[str]:
     return names
 
 
-def calls(tree: ast.Module, name: str) -> bool:
+def calls(path: Path, name: str) -> bool:
     return any(isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == name
-               for node in ast.walk(tree))
+               for node in nodes(path))
 
 
 def test_one_file_imports_the_compiler() -> None:
-    assert {file for file, tree in FILES.items() if "numba" in imported(tree)} == {JIT, WITNESS}
-    assert "numba" in imported(ast.parse("def f():\n    from numba.core import types"))
+    assert {file for file, path in FILES.items() if "numba" in imported(nodes(path))} == {JIT, WITNESS}
+    assert "numba" in imported(ast.walk(ast.parse("def f():\n    from numba.core import types")))
 
 
 def test_loops_are_interpreted_or_compiled_but_for_a_list() -> None:
-    users = {file for file, tree in FILES.items() if "toolpaths.compiled" in ast.unparse(tree)}
+    users = {file for file, path in FILES.items() if "toolpaths.compiled" in path.read_text("utf-8")}
     one_form = {file for file in users if calls(FILES[file], "chosen")}
     two_forms = {file for file in users if calls(FILES[file], "compiled")}
     assert len(one_form) >= 6 and one_form & two_forms == set()

@@ -51,16 +51,14 @@ class PlatformMotion:
 
     def of_point(self, arm: Floats) -> tuple[Floats, Floats]:
         """(mm per mm (N, 3, K), its largest change (N, K)) of the point at `arm` (N, 3) from X, machine frame."""
-        size = np.linalg.norm(arm, axis=1)[:, None]
-        turn = np.linalg.norm(self.turn, axis=1)
-        return (self.shift + np.cross(self.turn, arm[:, :, None], axis=1),
-                self.shift_change + size * self.turn_change + (turn + self.turn_change) * size * self.swing[:, None])
+        rate, change = self.of_vector(arm)
+        return self.shift + rate, self.shift_change + change
 
-    def of_direction(self, unit: Floats) -> tuple[Floats, Floats]:
-        """The same of a direction (N, 3) of the platform, rad per mm."""
-        turn = np.linalg.norm(self.turn, axis=1)
-        return (np.cross(self.turn, unit[:, :, None], axis=1),
-                self.turn_change + (turn + self.turn_change) * self.swing[:, None])
+    def of_vector(self, vector: Floats) -> tuple[Floats, Floats]:
+        """The same of a vector (N, 3) of the platform, which its shift does not move; rad per mm of a direction."""
+        size, turn = np.linalg.norm(vector, axis=1)[:, None], np.linalg.norm(self.turn, axis=1)
+        return (np.cross(self.turn, vector[:, :, None], axis=1),
+                size * (self.turn_change + (turn + self.turn_change) * self.swing[:, None]))
 
     def translating(self) -> PlatformMotion:
         """Of a platform that does not turn, whatever six rods could do."""
@@ -152,7 +150,7 @@ def tool_rates(actual: PlatformMotion, nominal: PlatformMotion, arms: tuple[Floa
     (N, K), the arms' ends move on the platform by up to `arm_reach` (N,) mm and the axes turn on it by `axis_reach` (N,)."""
     rates, sizes = [], []
     for one, other in ((actual.of_point(arms[0]), nominal.of_point(arms[1])),
-                       (actual.of_direction(axes[0]), nominal.of_direction(axes[1]))):
+                       (actual.of_vector(axes[0]), nominal.of_vector(axes[1]))):
         rates.append(np.linalg.norm(one[0] - other[0], axis=1) + one[1] + other[1])
         sizes.append(np.linalg.norm(other[0], axis=1) + other[1])
     spins = [np.linalg.norm(m.turn, axis=1) + m.turn_change for m in (actual, nominal)]

@@ -129,7 +129,8 @@ class RodFrame:
         if wanted(len(q), COMPILE_FROM, close_all):
             place, turned = np.array(place), np.array(turned)
             lengths = (self.length + errors.length) ** 2
-            worst = compiled(close_all)(np.ascontiguousarray(q), self.leg, *self.carriage_lines(errors),
+            lines = (np.ascontiguousarray(part) for part in self.carriage_lines(errors))
+            worst = compiled(close_all)(np.ascontiguousarray(q), self.leg, *lines,
                                         self.joint + errors.platform, lengths, place, turned, STEPS, CLOSED, LEAST_GAIN)
             return _where_closed(place, turned, worst)
         with np.errstate(over="ignore", invalid="ignore"):  # what does not close grows out of bounds

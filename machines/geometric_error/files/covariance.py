@@ -43,8 +43,10 @@ def units(names: list[str], model: ErrorFileModel) -> Floats:
 def covariance_of(model: ErrorModel, file: UserFile, checked: ErrorFileModel) -> tuple[ErrorModel, list[Diagnostic]]:
     """The model with the covariance that its file gives; without it, reported, where it has more parameters than MOST."""
     given = "covariance" if checked.covariance is not None else "sigma"
+    if checked.covariance is None and not checked.sigma:
+        return model, []
     names, found = model.names, list[Diagnostic]()
-    if len(names) > MOST and (checked.sigma or checked.covariance is not None):
+    if len(names) > MOST:
         noted = file.problem(f"error-model.{given}", (given,),
                              f"the uncertainty of {len(names)} parameters is not reported, at most "
                              f"that of {MOST} is",
@@ -56,8 +58,6 @@ def covariance_of(model: ErrorModel, file: UserFile, checked: ErrorFileModel) ->
         scale = units(names, checked)
         matrix, found = read_covariance(path, names, (origin.file, origin.line))
         return (model if matrix is None else replace(model, covariance=matrix * np.outer(scale, scale))), found
-    if not checked.sigma:
-        return model, []
     sigma = np.zeros(len(names))
     for prefix in sorted(checked.sigma, key=len):
         mine = [k for k, name in enumerate(names) if name.startswith(prefix)]

@@ -7,6 +7,7 @@ mark, or Windows-1252, as spreadsheets save them. Inside mm and rad.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -202,6 +203,10 @@ def _numbers(body: Sequence[tuple[int, str]], mark: str, names: Sequence[str],
     values, faults = np.empty((len(body), len(names))), []
     comma = mark != "," and not any("." in text for _, text in body)
     for k, (line, text) in enumerate(body):
+        plain = None if comma else _plain(text.split(mark), len(names))
+        if plain is not None:
+            values[k] = plain
+            continue
         fault = _fill(values[k], text.split(mark), names, comma, gaps)
         if fault:
             faults.append((line, *fault))
@@ -214,6 +219,15 @@ def _numbers(body: Sequence[tuple[int, str]], mark: str, names: Sequence[str],
 def _thousands(body: Sequence[tuple[int, str]], mark: str) -> bool:
     """True where every comma may be one between thousands."""
     return all(_THOUSANDS.match(cell.strip()) for _, text in body for cell in text.split(mark) if "," in cell)
+
+
+def _plain(cells: list[str], count: int) -> list[float] | None:
+    """The numbers of a line where there are `count` and nothing else, as most lines are; None where `_fill` has to look."""
+    try:
+        row = list(map(float, cells))
+    except ValueError:
+        return None
+    return row if len(row) == count and math.isfinite(sum(row)) and not any("_" in cell for cell in cells) else None
 
 
 def _fill(row: Floats, cells: list[str], names: Sequence[str], comma: bool, gaps: bool) -> tuple[str, str] | None:

@@ -148,7 +148,7 @@ _LOST: dict[RejectionKind, str] = {"limits": "are outside the allowed angles", "
 
 @dataclass(frozen=True)
 class Unaimed:
-    """Why no vertex is aimed along the mean direction of a pass; `lost`: how many axes that would lost by what."""
+    """Why no vertex is aimed along the mean direction of a pass; `lost`: how many axes that would were rejected, by kind."""
 
     why: Literal["no direction", "own axis", "no vertex", "lost"]
     lost: tuple[tuple[RejectionKind, int], ...] = ()

@@ -22,7 +22,7 @@ from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.planning.planned import joint_limits
 from postproc.reference.events import tool_changes
 from toolpaths.arrays import Bools, Floats
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, whole_turns
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -148,7 +148,7 @@ def unwinding(picked: list[PassEnds], work: PassContext, spun: bool) -> float:
         spun: False where nothing says the angle of a joint that the axis leaves free, so that it stays where it is
     """
     machine, at = work.machine, work.machine.home
-    endless, joints = _endless(machine), np.arange(len(machine.home))
+    endless, joints = machine.endless, np.arange(len(machine.home))
     if not endless.any() or not all(np.isfinite(each.above_last).all() for each in picked):
         return 0.0
     for each in picked:
@@ -229,7 +229,7 @@ def _differ(a: Floats, b: Floats) -> Bools:
 
 def _indexed(q0: Floats, q1: Floats, machine: Machine) -> Floats:
     """As `_moved`, with unclamping and clamping where rotary joints turn."""
-    link = _shortest(q1[None] - q0[:, None], _endless(machine))
+    link = _shortest(q1[None] - q0[:, None], machine.endless)
     turns = (np.abs(link[..., np.array(machine.rotary)]) > SAME).any(axis=-1)
     return np.asarray(_moved(q0, q1, machine) + np.where(turns, machine.timing.clamp + machine.timing.unclamp, 0.0))
 
@@ -243,7 +243,7 @@ def _moved(q0: Floats, q1: Floats, machine: Machine) -> Floats:
 
 def _each(q0: Floats, q1: Floats, machine: Machine) -> Floats:
     """Seconds (K,) as `_moved`, from each of q0 (K, J) to that of q1 (K, J)."""
-    link = _shortest(q1 - q0, _endless(machine))
+    link = _shortest(q1 - q0, machine.endless)
     good, seconds = np.isfinite(link).all(axis=1), np.full(len(link), np.inf)
     if good.any():
         seconds[good] = rest_seconds(np.zeros_like(link[good]), link[good], joint_limits(machine.limits),
@@ -251,11 +251,6 @@ def _each(q0: Floats, q1: Floats, machine: Machine) -> Floats:
     return seconds
 
 
-def _endless(machine: Machine) -> Bools:
-    """(J,) rotary joints without an end of travel."""
-    return np.asarray(np.array(machine.rotary) & ~np.isfinite(machine.limits.upper - machine.limits.lower))
-
-
 def _shortest(link: Floats, endless: Bools) -> Floats:
     """Paths (..., J), those of endless joints less whole turns."""
-    return np.asarray(np.where(endless, link - 2.0 * np.pi * np.round(link / (2.0 * np.pi)), link))
+    return np.asarray(np.where(endless, link - whole_turns(link), link))

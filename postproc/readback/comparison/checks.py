@@ -248,9 +248,9 @@ def check_links(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints,
     for t in executed.times(motion, rows):
         tip, axis = executed.poses(motion, rows, t)
         low = ~space.clear(tip, axis, -tolerance)
-        approach = (_off_line(tip, moves.tip[to], moves.axis[to]) <= near) & ~ends
+        approach = (off_line(tip, moves.tip[to], moves.axis[to]) <= near) & ~ends
         before = np.maximum(m - 1, 0)
-        retract = (_off_line(tip, moves.tip[before], moves.axis[before]) <= near) & (m > 0)
+        retract = (off_line(tip, moves.tip[before], moves.axis[before]) <= near) & (m > 0)
         bad |= low & ~approach & ~retract
     if not bad.any():
         return []
@@ -260,7 +260,7 @@ def check_links(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints,
                          int(bad.sum()))]
 
 
-def _off_line(tip: Floats, end: Floats, axis: Floats) -> Floats:
+def off_line(tip: Floats, end: Floats, axis: Floats) -> Floats:
     """Distance (K,) of tips from the half lines that leave `end` along `axis`."""
     offset = tip - end
     along = np.maximum(np.einsum("ni,ni->n", offset, axis), 0.0)

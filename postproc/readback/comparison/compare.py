@@ -25,6 +25,7 @@ from postproc.readback.comparison.compensated import check_compensated
 from postproc.readback.comparison.deviation_bound import deviation_bound
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.free_rotary import check_spins
+from postproc.readback.comparison.length_margins import LengthMargin
 from postproc.readback.comparison.reach_bounds import check_reach_bounds
 from postproc.readback.comparison.rewinds import check_rewinds, rewinds
 from postproc.readback.comparison.slow_moves import check_fed_rapids, check_slow
@@ -75,6 +76,8 @@ class Comparison:
     poses: BlockPoses | None = None
     planned: bool = False
     """the feeds of the program were planned"""
+    lengths: tuple[LengthMargin, ...] = ()
+    """how much tools may differ from their gauge lengths, where that is not taken up by a register alone"""
 
 
 def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "", planned: bool = False) -> Comparison:

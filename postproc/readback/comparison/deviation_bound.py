@@ -101,6 +101,7 @@ def _values(motion: Motion, executed: BlockPoses, moves: Moves, ends: _Ends, pie
     rows = ends.rows[pieces.k]
     curves = moves.curves(ends.owner[pieces.k])
     places = pieces.a, 0.5 * (pieces.a + pieces.b), pieces.b
+    executed.look_ahead(motion, rows, places)
     poses = [executed.poses(motion, rows, t) for t in places]
     guess = [np.minimum(ends.begin[pieces.k] + t * ends.share[pieces.k], 1.0) for t in places]
     nearest = [curves.project(np.nan_to_num(tip), g) for (tip, _), g in zip(poses, guess, strict=True)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -52,11 +52,18 @@ class ActualBlockPoses(BlockPoses):
         for kept, time, found in self._seen:
             if kept is rows and time is t:
                 return found
-        found = (np.concatenate(self.nominal(motion, rows, t), axis=1), super().joints(motion, rows, t),
+        found = (np.concatenate(super().poses(motion, rows, t), axis=1), super().joints(motion, rows, t),
                  self._approach(motion, rows, t))
         if len(rows) <= AT_ONCE:
             self._seen[:] = [*self._seen[1 - PLACES:], (rows, t, found)]
         return found
+
+    def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[Floats]) -> None:
+        """See `BlockPoses`."""
+        if len(times) <= PLACES and len(rows) * len(times) <= AT_ONCE:
+            found = self._at(motion, np.tile(rows, len(times)), np.concatenate(times))
+            pose, q, approach = (part.reshape(len(times), len(rows), -1) for part in found)
+            self._seen[:] = [(rows, t, (pose[k], q[k], approach[k])) for k, t in enumerate(times)]
 
     def joints(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """See `BlockPoses`."""
@@ -68,17 +75,8 @@ class ActualBlockPoses(BlockPoses):
         return []
 
     def nominal(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
-        """The same of the machine without errors."""
-        return super().poses(motion, rows, t)
-
-    def lawful(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
-        """See `BlockPoses`: the law is that of the machine without errors, as the control holds it."""
-        pose, q, _ = self._at(motion, rows, t)
-        for k, (number,) in alike(motion.frame[rows]) if self.control.own_kinematics is not None else ():
-            held = motion.frames[number].kinematics
-            if held is not None:
-                pose = np.array(pose)
-                pose[k] = np.concatenate(held.forward(q[k]), axis=1)
+        """See `BlockPoses`."""
+        pose = self._at(motion, rows, t)[0]
         return pose[:, :3], pose[:, 3:]
 
     def off_law(self, motion: Motion, rows: Ints) -> Bools:
@@ -89,7 +87,7 @@ class ActualBlockPoses(BlockPoses):
         """See `BlockPoses`: of the errors, and of other pivots of the control where it has some."""
         found = joined((k, self.actual(tool).error_rates(q[k], reach[k]) or unknown_rates(len(k), q.shape[1]))
                        for k, (tool,) in alike(motion.tool[rows]))
-        held = np.flatnonzero(super().off_law(motion, rows))
+        held = np.flatnonzero(self._other_pivots(motion, rows))
         if not len(held):
             return found
         tip = np.array(found.tip)
@@ -157,15 +155,16 @@ class ActualBlockPoses(BlockPoses):
     def _steps(self, motion: Motion, rows: Ints, t: float | Floats) -> PlaySteps:
         """What the motion of blocks up to fraction t does to the approach directions (K, T)."""
         share = np.broadcast_to(np.asarray(t, dtype=np.float64), len(rows))
-        even = self._between(motion, rows, np.zeros(len(rows)), share)
+        even = self._of(*self._joints_at(motion, rows, (np.zeros(len(rows)), share)))
         result = {name: getattr(even, name).copy() for name in ("shift", "low", "high")}
         bent = np.flatnonzero(self._curved[rows])
         for at in range(0, len(bent), AT_ONCE):
             k = bent[at:at + AT_ONCE]
-            looks = self._looked_at(motion, rows[k])
+            some, of_some = np.unique(rows[k], return_inverse=True)  # parts of one block stand next to each other
+            looks = self._looked_at(motion, some)
             last = np.minimum((share[k] * LOOKS).astype(np.int64), LOOKS - 1)
-            gone = PlaySteps(*(steps[last, np.arange(len(k))] for steps in looks))
-            before, middle, q = (self.joints(motion, rows[k], t) for t in (
+            gone = PlaySteps(*(steps[last, of_some] for steps in looks))
+            before, middle, q = self._joints_at(motion, rows[k], (
                 last / LOOKS, 0.5 * (last / LOOKS + share[k]), share[k]))
             turn = _turning(before, middle, q)
             whole = gone.then(self._of(before, turn)).then(self._of(turn, q))
@@ -177,12 +176,12 @@ class ActualBlockPoses(BlockPoses):
         """Shift, low and high, each (LOOKS, K, T), from the beginning of blocks to each look; kept for the next time."""
         known = self._kept.get("rows")
         if known is None or not np.array_equal(known[0], rows):
-            q = self.joints(motion, rows, np.zeros(len(rows)))
+            looked = self._joints_at(motion, rows, [np.full(len(rows), 0.5 * k / LOOKS) for k in range(2 * LOOKS - 1)])
+            q = next(looked)
             whole = self._of(q, q)
             stages = [whole]
-            for k in range(1, LOOKS):
-                before, middle, q = q, *(self.joints(motion, rows, np.full(len(rows), t)) for t in ((k - 0.5) / LOOKS,
-                                                                                                     k / LOOKS))
+            for _ in range(1, LOOKS):
+                before, middle, q = q, next(looked), next(looked)
                 turn = _turning(before, middle, q)
                 whole = whole.then(self._of(before, turn)).then(self._of(turn, q))
                 stages.append(whole)
@@ -194,8 +193,12 @@ class ActualBlockPoses(BlockPoses):
     def _kept(self) -> dict[str, tuple[Ints, Floats, Floats, Floats]]:
         return {}
 
-    def _between(self, motion: Motion, rows: Ints, one: Floats, two: Floats) -> PlaySteps:
-        return self._of(self.joints(motion, rows, one), self.joints(motion, rows, two))
+    def _joints_at(self, motion: Motion, rows: Ints, times: Sequence[Floats]) -> Iterator[Floats]:
+        """Joints (K, J) of blocks at fractions (K,), of one fraction after the other; of few blocks all are made at once."""
+        if len(rows) * len(times) > AT_ONCE:
+            return (self.joints(motion, rows, t) for t in times)
+        every = self.joints(motion, np.tile(rows, len(times)), np.concatenate(times))
+        return iter(every.reshape(len(times), len(rows), -1))
 
     def _of(self, before: Floats, q: Floats) -> PlaySteps:
         step = np.nan_to_num((q - before)[:, self._bidirectional])

@@ -18,7 +18,7 @@ from postproc.control.modes import table_axes
 from postproc.readback.text.canonical import WordMeaning
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, whole_turns
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -206,7 +206,7 @@ def _picked(law: WordMeaning, control: Control, kin: Kinematics, q: Floats) -> F
     branches = kin.inverse(tip, law.rotation[:, 2][None, :], near=q[None, :])[:, 0][:, control.rotary] / DEG
     branches = branches[np.isfinite(branches).all(axis=1)]
     here = q[control.rotary] / DEG
-    branches = branches + _TURN * np.round((here - branches) / _TURN)
+    branches = branches + whole_turns(here - branches, _TURN)
     lower = control.machine.limits.lower[control.rotary] / DEG - ANGLE_SLACK
     upper = control.machine.limits.upper[control.rotary] / DEG + ANGLE_SLACK
     branches = branches + _TURN * ((branches < lower) & (branches + _TURN <= upper))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -44,6 +44,9 @@ class BlockPoses:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
         return self._placed(motion, rows, motion.end[rows] if _whole(t) else self._approaches(motion, rows).at(t))
 
+    def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[Floats]) -> None:
+        """Said before the poses and joints of the same blocks at several fractions (K,) are asked for."""
+
     def at_coordinates(self, motion: Motion, rows: Ints, beginning: Floats, xyz: Floats) -> Floats:
         """Tips (K, 3) where X, Y, Z of the frames of blocks stand at `xyz` (K, 3), all else as in `beginning` (K, J)."""
         position = np.array(beginning)
@@ -75,17 +78,28 @@ class BlockPoses:
         return q
 
     def lawful(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
-        """(tip, axis) (K, 3) where the law of the blocks has the tool: on the machine as the control holds it."""
-        tip, axis = self.poses(motion, rows, t)
-        numbers = motion.frame[rows]
-        for number in np.unique(numbers[self.off_law(motion, rows)]).tolist():
+        """(tip, axis) (K, 3) where the law of the blocks has the tool: on the machine without errors, as the control holds
+        it."""
+        tip, axis = self.nominal(motion, rows, t)
+        numbers, other = motion.frame[rows], self._other_pivots(motion, rows)
+        if other.any():
+            tip, axis, q = np.array(tip), np.array(axis), self.joints(motion, rows, t)
+        for number in np.unique(numbers[other]).tolist():
             k, kin = np.flatnonzero(numbers == number), motion.frames[number].kinematics
             assert kin is not None
-            tip[k], axis[k] = kin.forward(self.joints(motion, rows, t)[k])
+            tip[k], axis[k] = kin.forward(q[k])
         return tip, axis
 
+    def nominal(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
+        """As `poses`, of the machine without errors."""
+        return self.poses(motion, rows, t)
+
     def off_law(self, motion: Motion, rows: Ints) -> Bools:
-        """(K,) blocks in which the machine is not that of the law: the control holds other pivots."""
+        """(K,) blocks in which the machine is not that of the law."""
+        return self._other_pivots(motion, rows)
+
+    def _other_pivots(self, motion: Motion, rows: Ints) -> Bools:
+        """(K,) blocks in which the control holds other pivots than the machine has."""
         other = np.array([self.control.own_kinematics is not None and frame.kinematics is not None
                           for frame in motion.frames])
         return np.asarray(other[motion.frame[rows]])

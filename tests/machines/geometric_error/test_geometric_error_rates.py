@@ -24,6 +24,7 @@ from toolpaths.arrays import Floats
 
 RNG = np.random.default_rng(5)
 STEPS = 40
+BOUND = 1.0 + 1e-9
 REACH = {False: (-900.0, 900.0), True: (-2.5, 2.5)}
 """mm; rad"""
 CURVES: dict[str, Curve] = {
@@ -75,33 +76,34 @@ def with_two_directions(kin: Kinematics, letters: Sequence[str] = ()) -> SerialE
     return SerialErrors(tuple(found))
 
 
-def held(kin: Kinematics, model: ErrorModel, sizes: Sequence[float] = (1e-3, 1.0, 30.0)) -> None:
-    """Along straight steps of random length from random poses, with approach directions that change: no difference above the
-    bound."""
-    actual, q = model.on(kin), joints(kin, STEPS, 7)
+def worst_share(kin: Kinematics, model: ErrorModel, sizes: Sequence[float] = (1e-3, 1.0, 30.0)) -> float:
+    """The largest difference by its bound, along straight steps of random length from random poses, with approach directions
+    that change; infinite where there is no bound."""
+    actual, q, worst = model.on(kin), joints(kin, STEPS, 7), 0.0
     rng, rotary = np.random.default_rng(9), np.array(kin.rotary)
     for size in sizes:
         step = rng.normal(size=q.shape) * np.where(rotary, 0.01, 1.0) * size
         step *= rng.random(q.shape) < 0.5  # also single axes
         approach, turned = rng.uniform(-1.0, 1.0, q.shape), rng.uniform(-1.0, 1.0, q.shape)
         rates = actual.error_rates(q, np.abs(step))
-        assert rates is not None
-        assert (rates.tip < 1e3).all()
+        if rates is None or (rates.tip >= 1e3).any():
+            return float("inf")
         here, there = ([v - n for v, n in zip(actual.aim(actual.coordinates(x), w), kin.forward(x), strict=True)]
                        for x, w in ((q, approach), (q + step, turned)))
         for k, (rate, by_approach) in enumerate(((rates.tip, rates.tip_reversal), (rates.axis, rates.axis_reversal))):
             moved = np.linalg.norm(there[k] - here[k], axis=1)
             allowed = (rate * np.abs(step)).sum(axis=1) + (by_approach * np.abs(turned - approach)).sum(axis=1)
-            assert (moved <= allowed * (1.0 + 1e-9) + 1e-12).all(), (size, float((moved / allowed).max()))
+            worst = float(np.maximum(worst, (moved / (allowed + 1e-12)).max()))
+    return worst
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_no_error_of_a_serial_machine_changes_faster(name: str) -> None:
     kin = kinematics(name)
-    held(kin, ErrorModel(serial_errors(kin, 3)))
-    held(kin, ErrorModel(with_two_directions(kin)))
+    assert worst_share(kin, ErrorModel(serial_errors(kin, 3))) <= BOUND
+    assert worst_share(kin, ErrorModel(with_two_directions(kin))) <= BOUND
     moving = dict.fromkeys("ABC", "moving")
-    held(kin, ErrorModel(replace(serial_errors(kin, 4), frame=moving)))  # type: ignore[arg-type]
+    assert worst_share(kin, ErrorModel(replace(serial_errors(kin, 4), frame=moving))) <= BOUND  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["uranesx", "h4a-c-table", "h4a-spindle-axis"])
@@ -109,12 +111,12 @@ def test_no_error_of_a_machine_on_rods_changes_faster(name: str) -> None:
     """Every dimension wrong, the rotary axis and the spindle too; two approach directions in the rotary axis's tables."""
     kin = machines.load(name).kinematics.with_tool(87.0)
     both = model(kin, 3)
-    held(kin, both, (1e-3, 0.1, 0.7))
-    held(kin, replace(both, axes=SerialErrors()), (1e-3, 0.7))
+    assert worst_share(kin, both, (1e-3, 0.1, 0.7)) <= BOUND
+    assert worst_share(kin, replace(both, axes=SerialErrors()), (1e-3, 0.7)) <= BOUND
     if any(kin.rotary):
-        held(kin, replace(both, axes=with_two_directions(kin, kin.axis_names[4:])), (1e-3, 0.3))
-        held(kin, replace(both, axes=replace(both.axes, frame=dict.fromkeys("ABC", "moving"))),
-             (0.3,))  # type: ignore[arg-type]
+        assert worst_share(kin, replace(both, axes=with_two_directions(kin, kin.axis_names[4:])), (1e-3, 0.3)) <= BOUND
+        moving = replace(both.axes, frame=dict.fromkeys("ABC", "moving"))  # type: ignore[arg-type]
+        assert worst_share(kin, replace(both, axes=moving), (0.3,)) <= BOUND
 
 
 @pytest.mark.parametrize("name", ["uranesx", "h4a-c-table", "h4a-spindle-axis"])
@@ -164,7 +166,7 @@ def test_no_error_of_a_map_changes_faster(name: str) -> None:
                                 (("X", *bed), (slide, np.linspace(0.0, 5.0, 6))[: 1 + len(bed)],
                                  {"periods": (0.0, 2.0 * np.pi)[: 1 + len(bed)]})):
         table = rng.normal(size=(*map(len, nodes), 6)) * [0.03, 0.03, 0.03, 3e-5, 3e-5, 3e-5]
-        held(kin, ErrorModel(map=ErrorMap(letters, nodes, table, **how)))  # type: ignore[arg-type]
+        assert worst_share(kin, ErrorModel(map=ErrorMap(letters, nodes, table, **how))) <= BOUND  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("text", "letter", "turning"), [("EXX", "X", False), ("EBX", "X", True), ("EAC", "C", True)])

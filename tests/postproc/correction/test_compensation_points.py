@@ -20,7 +20,9 @@ from postproc.correction.compensation import unstated
 from postproc.pipeline.convert import verify
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import load_setup
+from postproc.verification.proof_text import statement
 from postproc.verification.residual_errors import after_formatting, beyond_bound
+from tests.postproc.readback.test_deviation_bound import NEAR, dense
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Severity
 from toolpaths.units import DEG
@@ -68,6 +70,17 @@ def test_corrected_programs_are_proved_on_the_machine_with_errors(sample: str, m
     assert found.axis_after < found.axis_before or machine == "uranesx"
 
 
+@pytest.mark.parametrize("case", [case for case in CASES if case[3] != "tools"])
+def test_rods_with_errors_are_bounded(case: tuple[str, str, str, str]) -> None:
+    """Dimensions of rods, joints, slides, and tables of the rotary axis: no place of any block is farther off."""
+    result = converted(*case)
+    tip, axis = dense(result, tuple(NEAR))
+    comparison = result.comparison
+    assert comparison is not None and comparison.unbounded == 0 and comparison.bounded_cuts == comparison.cuts
+    assert tip <= comparison.tip_bound <= 1.12 * tip and axis <= comparison.axis_bound <= max(1.12 * axis, 1e-7)
+    assert "checked, not proved" not in statement(comparison, result.witness)
+
+
 @pytest.mark.parametrize("sample", [pytest.param("blade.cls", marks=pytest.mark.slow), "tool_axis_tour.apt"])
 def test_between_points_the_tool_stays_where_lost_motion_is_taken_up(sample: str) -> None:
     """Joints bow a little at every point of a program by the tip: that is no turning back, which would be 6 to 10 um off."""
@@ -86,7 +99,7 @@ def test_an_axis_led_past_a_singular_direction_is_no_error_left() -> None:
 
 
 def test_the_figures_stand_in_the_json_and_in_the_text(tmp_path: Path) -> None:
-    common = ["convert", "samples/pocket.cls", "-m", "uranesx", "-c", "linuxcnc", "--setup",
+    common = ["convert", "samples/inch_plate.apt", "-m", "uranesx", "-c", "linuxcnc", "--setup",
               "samples/delta.setup.toml", "--error-model", "samples/errors/uranesx.toml", "-o", str(tmp_path / "a.ngc")]
     run = CliRunner().invoke(app, [*common, "--json", str(tmp_path / "a.json")])
     figures = json.loads((tmp_path / "a.json").read_text())["geometric_errors"]

@@ -51,7 +51,7 @@ CASES: list[Case] = [
     ("tool_axis_tour.apt", "nutating-head", "linuxcnc", "auto", 12),
     ("indexed_4axis.cls", "mill-4axis", "linuxcnc", "auto", 11),
     ("inch_plate.apt", "mill-3axis", "siemens-840d", "auto", 11),
-    ("pocket.cls", "uranesx", "linuxcnc", "auto", 11),
+    ("inch_plate.apt", "uranesx", "linuxcnc", "auto", 11),
     ("h4a_indexed.cls", "h4a-c-table", "linuxcnc", "auto", 12),
     ("h4a_indexed.cls", "h4a-spindle-axis", "generic-iso", "auto", 11),
     ("indexed_4axis.cls", "mill-4axis", "siemens-840d", "tcp", 11),  # holes from below
@@ -60,7 +60,7 @@ CASES: list[Case] = [
     ("pocket.cls", "head-table", "fanuc-30i", "auto", 13),  # holes next to a steep error
     ("pocket.cls", "mill-4axis", "haas-ngc", "auto", 12),  # holes whose levels need unlike corrections
 ]
-AGAIN = (CASES[1], CASES[4], CASES[6], CASES[9], CASES[10], CASES[14], CASES[15])
+AGAIN = (CASES[1], CASES[2], CASES[4], CASES[6], CASES[9], CASES[10], CASES[14], CASES[15])
 """samples, machines and controls that other cases hold: with -m slow"""
 
 

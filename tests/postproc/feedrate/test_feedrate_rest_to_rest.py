@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,8 +12,8 @@ import ruckig
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.rest_to_rest import PointToPointMode, rest_seconds, rest_to_rest
 from tests.postproc.feedrate_kit import MIKRON
+from tests.source import ROOT, nodes, product
 
-ROOT = Path(__file__).parents[3]
 LIMITS = JointLimits(np.array([100.0, 50.0, 3.0]), np.array([1000.0, 800.0, 20.0]), np.array([5000.0, 60000.0, 300.0]))
 
 
@@ -142,15 +141,14 @@ def test_way_points_are_never_set(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_one_module_imports_ruckig() -> None:
     users, names = set(), set()
-    for package in ("toolpaths", "machines", "postproc"):
-        for file in (ROOT / package).rglob("*.py"):
-            for node in ast.walk(ast.parse(file.read_text())):
-                if isinstance(node, ast.Import) and any(name.name.split(".")[0] == "ruckig" for name in node.names):
-                    users.add(file.relative_to(ROOT).as_posix())
-                if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "ruckig":
-                    users.add(file.relative_to(ROOT).as_posix())
-                name = getattr(node, "attr", getattr(node, "value", ""))
-                if isinstance(name, str):
-                    names.add(name)
+    for file in product():
+        for node in nodes(file):
+            if isinstance(node, ast.Import) and any(name.name.split(".")[0] == "ruckig" for name in node.names):
+                users.add(file.relative_to(ROOT).as_posix())
+            if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "ruckig":
+                users.add(file.relative_to(ROOT).as_posix())
+            name = getattr(node, "attr", getattr(node, "value", ""))
+            if isinstance(name, str):
+                names.add(name)
     assert users == {"postproc/feedrate/rest_to_rest.py"}
     assert not any(name.startswith(("intermediate_pos", "per_section")) for name in names)

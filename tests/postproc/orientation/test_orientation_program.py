@@ -10,7 +10,6 @@ import pytest
 
 import toolpaths
 from postproc.base.options import Options
-from postproc.control.rollover import endless
 from postproc.orientation.plans.orient import orient
 from postproc.pipeline.convert import convert
 from postproc.placement.program import program_seconds
@@ -52,7 +51,7 @@ def test_a_plan_takes_as_long_as_its_program(name: str, counts: dict[str, Any]) 
     and counts its turns. The program rounds corners between rapids, the count stops there, so that it is above by some
     percent at most."""
     m, (setup, _) = machine(name), load_setup(SAMPLES / "tools.setup.toml")
-    m = replace(m, turns=tuple(replace(turns, **counts) if j in endless(m) else turns for j, turns in enumerate(m.turns)))
+    m = replace(m, turns=tuple(replace(turns, **counts) if m.endless[j] else turns for j, turns in enumerate(m.turns)))
     assert setup is not None
     choice, found = orient(strips(), m, setup, Options())
     assert choice is not None, found

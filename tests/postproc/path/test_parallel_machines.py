@@ -38,8 +38,9 @@ def sample(file: str, name: str, setup_name: str) -> PostResult:
 
 
 @pytest.mark.parametrize(("name", "file", "moves"), [
-    *((name, "pocket.cls", 80) for name in DELTAS[::2]), *((name, "inch_plate.apt", 10) for name in DELTAS[1::2]),
-    ("uranesx", "inch_plate.apt" if DELTAS.index("uranesx") % 2 == 0 else "pocket.cls", 10)])
+    *((name, "inch_plate.apt", 10) for name in DELTAS if name != "delta-cone"), ("delta-cone", "pocket.cls", 80),
+    ("uranesx", "pocket.cls", 80),
+    *(pytest.param(name, "pocket.cls", 80, marks=pytest.mark.slow) for name in DELTAS[::2] if name not in ("delta-cone", "uranesx"))])
 def test_three_axis_on_every_delta(name: str, file: str, moves: int) -> None:
     result = sample(file, name, "delta")
     tip, axis, compared = deviations(result)
@@ -48,13 +49,15 @@ def test_three_axis_on_every_delta(name: str, file: str, moves: int) -> None:
     assert tip <= result.comparison.worst_tip * 1.3 + 5e-4
 
 
+@pytest.mark.slow
 def test_bicubic_on_uranesx() -> None:
     tip, _, compared = deviations(sample("bicubic.cls", "uranesx", "delta"))
     assert compared >= 3600 and tip < TOLERANCE
 
 
 @pytest.mark.parametrize(("name", "file", "moves"), [
-    (H4A[0], "h4a_dome.cls", 780), (H4A[1], "h4a_indexed.cls", 20), (H4A[0], "pocket.cls", 80),
+    (H4A[0], "h4a_dome.cls", 780), (H4A[1], "h4a_indexed.cls", 20),
+    pytest.param(H4A[0], "pocket.cls", 80, marks=pytest.mark.slow),
     pytest.param(H4A[1], "h4a_dome.cls", 780, marks=pytest.mark.slow),
     pytest.param(H4A[0], "h4a_indexed.cls", 20, marks=pytest.mark.slow)])
 def test_five_axes_on_both_h4a(name: str, file: str, moves: int) -> None:
@@ -80,7 +83,7 @@ def test_words_are_the_letters_of_the_machine() -> None:
     ("tool_axis_tour.apt", "h4a-c-table", "reach.axis", "15.0000 degrees away"),
     ("tool_axis_tour.apt", "h4a-spindle-axis", "reach.axis", "15.0000 degrees away"),
     ("indexed_4axis.cls", "h4a-spindle-axis", "reach.axis", "degrees away"),
-    ("blade.cls", "h4a-spindle-axis", "reach.clearance", "workspace x: passed by"),
+    pytest.param("blade.cls", "h4a-spindle-axis", "reach.clearance", "workspace x: passed by", marks=pytest.mark.slow),
     ("five_tilted.cls", "h4a-c-table", "reach.clearance", "workspace y: passed by"),
 ])
 def test_samples_that_tilt_too_far_are_refused(file: str, name: str, code: str, words: str) -> None:
@@ -289,7 +292,7 @@ def codes_are_errors(found: set[str]) -> bool:
 @pytest.mark.parametrize(("name", "setup_name", "letter"), [("delta-parallel-x", "delta", "X"), ("h4a-c-table", "h4a", "Y")])
 def test_a_leg_on_its_other_root_is_caught(name: str, setup_name: str, letter: str) -> None:
     """One word in the middle of the text put to the leg's other solution for the same pose."""
-    result = sample("pocket.cls", name, setup_name)
+    result = sample("inch_plate.apt", name, setup_name)
     m = result.machine
     steps, tip, axis = poses(result)
     k = len(steps) // 2

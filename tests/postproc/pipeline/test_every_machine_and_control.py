@@ -53,13 +53,9 @@ def part_for(machine: str) -> tuple[toolpaths.Toolpath, object]:
     return toolpaths.read_bytes(PART)[0], setup
 
 
-LIKE_ANOTHER = [name for name in machines.names() if name.startswith("delta-") and name not in ("delta-star", "delta-cone")]
-"""layouts of one kind; make slow takes them too"""
-
-
+@pytest.mark.covering
 @pytest.mark.parametrize("control", sorted(builtin_files()))
-@pytest.mark.parametrize("machine", [pytest.param(name, marks=pytest.mark.slow if name in LIKE_ANOTHER else ())
-                                     for name in machines.names()])
+@pytest.mark.parametrize("machine", machines.names())
 def test_a_small_part_is_written_and_proved(machine: str, control: str) -> None:
     path, setup = part_for(machine)
     tolerance = 0.02 if (machine, control) == ("h4a-spindle-axis", "haas-ngc") else 0.01  # three decimals of a degree

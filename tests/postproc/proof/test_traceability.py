@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ast
 import re
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
+from tests.source import ROOT, nodes
+
 PAGE = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
 FAULTS = ROOT / "tests" / "mutants"
 
@@ -25,7 +25,7 @@ def test_every_test_that_is_named_is_there() -> None:
     assert len(table) > 20
     for rule, _, test, _ in table:
         file, _, name = test.strip("`").partition("::")
-        found = ast.walk(ast.parse((ROOT / file).read_text("utf-8")))
+        found = nodes(ROOT / file)
         assert any(isinstance(node, ast.FunctionDef) and node.name == name for node in found), (rule, test)
 
 
@@ -37,7 +37,7 @@ def test_every_rule_has_its_page_and_its_planted_fault() -> None:
 
 @pytest.mark.skipif(not FAULTS.is_dir(), reason="the table of planted faults is not there")
 def test_every_planted_fault_that_is_named_is_in_the_table() -> None:
-    known = {node.value for file in FAULTS.glob("faults*.py") for node in ast.walk(ast.parse(file.read_text("utf-8")))
+    known = {node.value for file in FAULTS.glob("faults*.py") for node in nodes(file)
              if isinstance(node, ast.Constant) and isinstance(node.value, str)}
     assert {cells[3] for cells in rows("Rules of the controls")} - known == {"-"}
 

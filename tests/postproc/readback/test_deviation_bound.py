@@ -114,27 +114,13 @@ def test_other_pivots_of_the_control_and_errors_are_bounded_together():
     assert axis <= result.comparison.axis_bound
 
 
-@pytest.mark.parametrize(("file", "machine", "setup"), [("pocket.cls", "uranesx", "delta"),
-                                                        ("h4a_indexed.cls", "h4a-c-table", "h4a")])
-def test_rods_with_errors_are_bounded(file, machine, setup):
-    """Dimensions of rods, joints, slides, and tables of the rotary axis."""
-    given = setup_of((SAMPLES / f"{setup}.setup.toml").read_text())
-    model = str(SAMPLES / f"errors/{machine}.toml")
-    result = good(convert(path_of(file), machine, "linuxcnc", setup=given, error_model=model))
-    tip, axis = dense(result, tuple(NEAR))
-    comparison = result.comparison
-    assert comparison.unbounded == 0 and comparison.bounded_cuts == comparison.cuts
-    assert tip <= comparison.tip_bound <= 1.12 * tip and axis <= comparison.axis_bound <= max(1.12 * axis, 1e-7)
-    assert "checked, not proved" not in statement(comparison, result.witness)
-
-
 def test_errors_that_no_bound_is_known_for_are_checked_not_proved(monkeypatch):
     """The machine's own poses are looked at, and the text says so."""
     monkeypatch.setattr(ActualDelta, "error_rates", lambda self, q, reach: None)
     setup = setup_of((SAMPLES / "delta.setup.toml").read_text())
     model = str(SAMPLES / "errors/uranesx.toml")
-    result = good(convert(path_of("pocket.cls"), "uranesx", "linuxcnc", setup=setup, error_model=model))
-    assert result.comparison.unbounded > 10 and result.comparison.bounded_cuts < result.comparison.cuts
+    result = good(convert(path_of("inch_plate.apt"), "uranesx", "linuxcnc", setup=setup, error_model=model))
+    assert result.comparison.unbounded > 5 and result.comparison.bounded_cuts < result.comparison.cuts
     assert "(checked, not proved: " in result.text
     assert "checked, not proved" in statement(result.comparison, result.witness)
 

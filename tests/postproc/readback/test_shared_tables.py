@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.source import nodes
+
 ROOM = Path(__file__).parents[3] / "postproc"
 LISTED = (ROOM / "readback" / "SHARED.md").read_text("utf-8")
 WRITERS = ("compile", "word_rows", "rounding", "feed", "commands", "canned", "cycle_refusals", "sections", "block_delete",
@@ -28,7 +30,7 @@ def imported(files: list[Path]) -> set[tuple[str, str]]:
     """(module, name) of all that files import from the project."""
     found = set()
     for file in files:
-        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+        for node in nodes(file):
             if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] in PROJECT:
                 found |= {(node.module, name.name) for name in node.names}
     return found

@@ -1,0 +1,92 @@
+"""`verify --tool-table`: lengths at the machine as each control writes them, and the program verified with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from postproc.cli.app import app
+from postproc.controllers.model import load_controller
+from postproc.verification.tool_table import lengths_of
+from tests.postproc.kit import SAMPLES
+from toolpaths.diagnostics import DiagnosticError
+
+CL = Path(__file__).parents[2] / "golden" / "short_five_axis.apt"
+TABLES = {
+    "linuxcnc": "; table\nT1 P1 Z+120.031 D6.0 ;T9 Z1 in a remark\nT2 P2 D10 Z95.5\nT3 P3 D1\n",
+    "generic-iso": "T1 P1 Z120.031\nT2 P2 Z95.5\n",
+    "fanuc-30i": "%\nG10 L10 P1 R110.\nG10 L10 P1 R120.\nG10 L11 P1 R0.031\nG10L10P2R95.5\nG10 L12 P1 R5.\n%\n",
+    "haas-ngc": "%\nO01234\nG10 L10 P1 R120.031 (T9)\nG10 L10 P2 R95.5\nM30\n%\n",
+    "siemens-840d": "N10 $TC_DP1[1,1]=120\nN20 $TC_DP3[1,1]=120 $TC_DP12[1,1]=0.031\n$TC_DP3[2,1]=90\n$TC_DP21[2,1]=5.5\n"
+                    "$TC_DP3[2,2]=7\n",
+    "heidenhain-tnc640": "BEGIN TOOL    .T MM\nT     NAME        L          R       DL\n"
+                         "0                 +0         +0      +0\n"
+                         "1     D6 L9       +120.0     +3      +0.031\n2                 +95.5      +5\n[END]\n"}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_are_read_as_the_control_writes_them(name: str) -> None:
+    controller, _ = load_controller(name)
+    assert controller is not None
+    found = lengths_of(TABLES[name], controller, "tools")
+    assert {k: found[k] for k in (1, 2)} == pytest.approx({1: 120.031, 2: 95.5})
+    assert lengths_of("register;length\n1;120.031\n\n2;95.5\n", controller, "t.csv") == {1: 120.031, 2: 95.5}
+
+
+def test_inches_of_klartext_are_inches() -> None:
+    controller, _ = load_controller("heidenhain-tnc640")
+    assert controller is not None
+    table = TABLES["heidenhain-tnc640"].replace(".T MM", ".T INCH").replace("+120.0 ", "+4.0   ").replace("+0.031", "+0")
+    table = table.replace("+95.5", "+3.75")
+    assert lengths_of(table, controller, "TOOL.T")[1] == pytest.approx(101.6)
+
+
+@pytest.mark.parametrize(("name", "table", "code", "line"), [
+    ("fanuc-30i", "G10 L10 P1 R120\n", "tool-table.point", 1), ("fanuc-30i", "\nG10 L10 R120.\n", "tool-table.words", 2),
+    ("heidenhain-tnc640", TABLES["heidenhain-tnc640"].replace("+120.0", "+12O.0"), "tool-table.number", 4),
+    ("linuxcnc", "tool,length\n1,120,0.3\n2,x\n", "tool-table.number", 3),
+    ("siemens-840d", "T1 P1 Z120\n", "tool-table.empty", 0), ("linuxcnc", "T1 Z120000\n", "tool-table.length", 1)])
+def test_what_is_no_table_is_refused(name: str, table: str, code: str, line: int) -> None:
+    controller, _ = load_controller(name)
+    assert controller is not None
+    with pytest.raises(DiagnosticError) as caught:
+        lengths_of(table, controller, "tools")
+    fault = caught.value.diagnostics[0]
+    assert fault.code == code and fault.hint and list(fault.lines) == ([line] if line else [])
+
+
+def run(*args: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, [*map(str, args)])
+    return done.exit_code, done.output
+
+
+def test_verify_takes_the_lengths_of_the_table(tmp_path: Path) -> None:
+    """A head in axis positions: a hundredth too long is inside the tolerance, two are not; a missing tool is named."""
+    given = ("-m", "head-table", "-c", "generic-iso", "--setup", str(SAMPLES / "tools.setup.toml"))
+    program, table = tmp_path / "part.nc", tmp_path / "tools.tbl"
+    assert run("convert", str(CL), *given, "-o", str(program))[0] == 0
+    verify = ("verify", str(program), str(CL), *given, "--tool-table", str(table))
+    for length, right in (("120", True), ("120.01", True), ("119.99", True), ("120.06", False), ("95.5", False)):
+        table.write_text(f"T1 P1 Z{length}\n")
+        code, text = run(*verify)
+        assert code == (0 if right else 1), text
+        assert f"register 1 of the tool table {float(length):.4f} mm" in text
+        assert ("NOT proved" in text) == (not right) and ("second witness agrees" in text) == right
+    table.write_text("T7 P1 Z120\n")
+    code, text = run(*verify)
+    assert code == 1 and "tool-table.missing" in text and "no length in register 1 (T1)" in text
+    code, text = run(*verify[:-1], str(tmp_path / "none.tbl"))
+    assert code == 1 and "tool-table.open" in text
+
+
+def test_a_table_turning_machine_takes_any_length_up(tmp_path: Path) -> None:
+    given = ("-m", "mikron-ucp710", "-c", "linuxcnc", "--setup", str(SAMPLES / "tools.setup.toml"))
+    program, table = tmp_path / "part.ngc", tmp_path / "tools.tbl"
+    assert run("convert", str(CL), *given, "-o", str(program))[0] == 0
+    table.write_text("T1 P1 Z101.5\n")
+    assert run("verify", str(program), str(CL), *given, "--tool-table", str(table))[0] == 0
+    table.write_text("T1 P1 Z390\n")
+    code, text = run("verify", str(program), str(CL), *given, "--tool-table", str(table))
+    assert code == 1 and "verify.travel" in text

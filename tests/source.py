@@ -1,0 +1,27 @@
+"""Source files of the project, read and taken apart once for all tests that look at them."""
+
+from __future__ import annotations
+
+import ast
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+@cache
+def tree(path: Path) -> ast.Module:
+    """The syntax of a file; nobody changes it."""
+    return ast.parse(path.read_text("utf-8"))
+
+
+@cache
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """All nodes of a file, in the order of `ast.walk`."""
+    return tuple(ast.walk(tree(path)))
+
+
+@cache
+def product() -> tuple[Path, ...]:
+    """Every module of the three packages."""
+    return tuple(sorted(p for top in ("toolpaths", "machines", "postproc") for p in (ROOT / top).rglob("*.py")))
