@@ -14,7 +14,7 @@ from pydantic import create_model
 import machines.kinds as kinds
 from machines.kind_check import build_faults, contract_faults
 from machines.kinematics.base import Kinematics
-from machines.machine import Limits, Machine, Timing, Turns
+from machines.machine import ClampCodes, Limits, Machine, Timing, Turns
 from machines.models import KeyProblem, KinematicsModel, MachineModel
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
@@ -158,6 +158,7 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         timing=Timing(timing.tool_change, timing.clamp, timing.unclamp, frozenset(timing.assumed)),
         control_kinematics=model.control_kinematics(), file=file.file,
         stop=model.control.stop or "" if model.control is not None else "",
+        hooks=model.hooks, clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
         turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))
 
 

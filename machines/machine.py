@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from machines.choices import Park, RolloverRule, Stop
+from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
@@ -59,6 +60,14 @@ class Turns:
 
 
 @dataclass(frozen=True)
+class ClampCodes:
+    """M codes, e.g. "M10", that clamp and release a rotary axis; "" where the machine does so by itself."""
+
+    clamp: str = ""
+    unclamp: str = ""
+
+
+@dataclass(frozen=True)
 class ControlKinematics:
     """A kinematics module that the control itself runs, so that programs hold tip coordinates in the part.
 
@@ -89,6 +98,8 @@ class Machine:
         stop: what a stop of the program switches off: "spindle and coolant", "spindle", "nothing", or "" where the machine
             file does not say
         turns: per joint, how it counts its turns; () as by `Turns()`
+        clamps: per joint, the codes that clamp and release it; () as by `ClampCodes()`
+        hooks: blocks of the shop at certain places of a program
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
 
@@ -107,9 +118,17 @@ class Machine:
     stop: Stop | Literal[""] = ""
     stated: Limits | None = None
     turns: tuple[Turns, ...] = ()
+    clamps: tuple[ClampCodes, ...] = ()
+    hooks: HooksModel = field(default_factory=HooksModel)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
+        object.__setattr__(self, "clamps", self.clamps or (ClampCodes(),) * len(self.axis_names))
+
+    @property
+    def clamp_codes(self) -> dict[str, ClampCodes]:
+        """The codes of the axes that the program clamps, by letter."""
+        return {name: codes for name, codes in zip(self.axis_names, self.clamps, strict=True) if codes.clamp}
 
     @property
     def endless(self) -> Bools:

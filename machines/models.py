@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 
 from machines.choices import Park, RolloverRule, Stop
+from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from machines.machine import ControlKinematics
 from machines.user_file import UserModel
@@ -34,6 +35,7 @@ def _whole_turn(turn: tuple[float, float]) -> tuple[float, float]:
 
 
 Turn = Annotated[tuple[float, float], AfterValidator(_whole_turn)]
+MCode = Annotated[str, Field(pattern=r"^(M[0-9]{1,5})?$")]
 Travel = Annotated[tuple[float, float] | Literal["unlimited"], AfterValidator(_upward)]
 
 
@@ -98,6 +100,11 @@ class AxisModel(UserModel):
     park: Park = "turn"
     """where an axis that turns on and on is parked: at the whole turn that is nearest to home, or at home itself, all turns
     unwound; a modulo axis that rolls over has no turns to unwind"""
+    clamp: MCode = ""
+    """M code that clamps this rotary axis, e.g. "M10", where the program has to say it; the builder's manual has it. Empty:
+    the machine clamps by itself"""
+    unclamp: MCode = ""
+    """M code that releases it, before every block that turns it, e.g. "M11" """
     assumed: tuple[Literal["travel", "velocity", "acceleration", "jerk"], ...] = ()
     """keys of this table whose figure no document states"""
 
@@ -143,6 +150,8 @@ class MachineModel(UserModel):
     """linear axis that lifts the tool off the part at home"""
     timing: TimingModel
     control: ControlModel | None = None
+    hooks: HooksModel = HooksModel()
+    """blocks of the shop round tool calls, indexing moves, operations and stops"""
 
     def problems(self) -> Iterator[KeyProblem]:
         """Faults between tables; the geometry's first, for without it the rest means nothing."""
@@ -185,7 +194,7 @@ class MachineModel(UserModel):
             elif axis.travel == "unlimited" and not rotary[name]:
                 yield KeyProblem("machine.travel", ("axes", name, "travel"),
                                  f"linear axis {name} cannot have unlimited travel", "write travel = [lower, upper] in mm")
-            elif problem := _modulo_problem(name, axis, rotary[name]):
+            elif problem := _modulo_problem(name, axis, rotary[name]) or _clamp_problem(name, axis, rotary[name]):
                 yield problem
             elif not axis.range[0] <= axis.home <= axis.range[1]:
                 yield KeyProblem("machine.home", ("axes", name, "home"),
@@ -208,4 +217,17 @@ def _modulo_problem(name: str, axis: AxisModel, rotary: bool) -> KeyProblem | No
     if axis.rollover == "sign" and axis.modulo_range[0] != 0.0:
         return KeyProblem("machine.modulo", ("axes", name, "modulo_range"), f"axis {name}: where the sign of a word is the "
                        f"direction, words are 0 to 360 degrees, not {list(axis.modulo_range)}", "modulo_range = [0, 360]")
+    return None
+
+
+def _clamp_problem(name: str, axis: AxisModel, rotary: bool) -> KeyProblem | None:
+    """What stands against the clamp codes of an axis."""
+    used = "clamp" if axis.clamp else "unclamp"
+    if not axis.clamp and not axis.unclamp:
+        return None
+    if not rotary:
+        return KeyProblem("machine.clamp", ("axes", name, used), f"linear axis {name} has {used}", f"take {used} out")
+    if not axis.clamp or not axis.unclamp or axis.clamp == axis.unclamp:
+        return KeyProblem("machine.clamp", ("axes", name, used), f"axis {name} has clamp = {axis.clamp!r} and unclamp = "
+                          f"{axis.unclamp!r}", 'write both, two codes, e.g. clamp = "M10", unclamp = "M11"')
     return None

@@ -21,6 +21,7 @@ from postproc.reference.events import (
     numbers,
     register_changes,
     spindle_after,
+    stops_between,
     tool_changes,
     words,
 )
@@ -36,10 +37,11 @@ _STOPS = frozenset({"STOP", "OPSTOP"})
 
 
 def commands_of(toolpath: Toolpath, moves: Moves, path: JointPath, controller: ControllerFile, native: Bools,
-                restart: bool = False, tool_call: bool = True) -> tuple[Commands, list[Diagnostic]]:
+                restart: bool = False, tool_call: bool = True, stops: bool = False) -> tuple[Commands, list[Diagnostic]]:
     """Commands by block, and what could not be carried out; with `restart` every operation restates its tool; without
-    `tool_call` no length register may be left in force by what ran before."""
-    writing = _Writing(toolpath, moves, path, controller, restart)
+    `tool_call` no length register may be left in force by what ran before; with `stops` the program stops optionally
+    between tools."""
+    writing = _Writing(toolpath, moves, path, controller, restart, stops)
     for at, event in enumerate(toolpath.events):
         writing.operations(event)
         writing.event(at, event)
@@ -62,7 +64,9 @@ def operation_starts(toolpath: Toolpath, moves: Moves) -> list[tuple[int, int]]:
 class _Writing:
     """Goes through the records of a path and puts commands at their blocks."""
 
-    def __init__(self, toolpath: Toolpath, moves: Moves, path: JointPath, controller: ControllerFile, restart: bool) -> None:
+    def __init__(self, toolpath: Toolpath, moves: Moves, path: JointPath, controller: ControllerFile, restart: bool,
+                 stops: bool) -> None:
+        self.stops = {(c.index, c.line) for c in stops_between(toolpath)} if stops else set[tuple[int, int]]()
         self.toolpath, self.moves, self.path, self.controller, self.restart = toolpath, moves, path, controller, restart
         self.result: dict[int, list[Command]] = {}
         self.first_move = np.searchsorted(moves.row, np.arange(len(toolpath) + 1))
@@ -178,7 +182,11 @@ class _Writing:
         key = event.index, event.line
         if key in self.changes:
             follows = {e.word for e in self.toolpath.events[at + 1:at + 20] if e.index == event.index}
-            out += self.compensation.off() + self.state.change(self.changes[key], follows, moves_on)
+            change = self.state.change(self.changes[key], follows, moves_on)
+            if key in self.stops:
+                at = next(k for k, c in enumerate(change) if c.name == "CHANGE_TOOL")
+                change.insert(at, Command("OPTIONAL_PROGRAM_STOP", (), event.line))
+            out += self.compensation.off() + change
             self.loaded = self.changes[key]
             self.to_come.pop(0)
             self._preload(out, event.line)

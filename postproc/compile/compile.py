@@ -8,9 +8,11 @@ import numpy as np
 
 from postproc.compile.block_delete import after, skipped, with_skips
 from postproc.compile.canned import holes_of
+from postproc.compile.clamps import with_clamps
 from postproc.compile.commands import commands_of
 from postproc.compile.cycle_refusals import not_native
 from postproc.compile.feed import Feeds, PlannedTimes, plan_feeds
+from postproc.compile.hooks import with_hooks
 from postproc.compile.long_turns import long_turns, standing_unsaid, without_standing
 from postproc.compile.program import Command, Commands, Hole, Program
 from postproc.compile.sections import sections_of, with_sections
@@ -41,7 +43,7 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                        toolpath.pass_[moves.row[path.move]], native, job.options.feed_mode, controller.feed,
                        planned)
     commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.apart,
-                                        job.setup.output.tool_call)
+                                        job.setup.output.tool_call, job.setup.output.stop_between_tools)
     end = np.where(path.home[:, None], np.round(path.q * control.unit, int(places.max())), words.end)
     write = without_standing(words.write, end, control.rolls)
     keep = write.any(axis=1) | (path.code == ARC)
@@ -57,6 +59,8 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                       placed, kept_holes, places, sections, skip[keep], control.rolls,
                       control.machine.home * control.unit)
     found += long_turns(program, toolpath.file)
+    program = with_clamps(program, control.machine.clamp_codes, controller.plane_turns)
+    program = with_hooks(program, job.hooks, {tool.number: tool.name for tool in reversed(toolpath.tools)})
     found += standing_unsaid(control.rolls, control.machine.axis_names, job.setup.output.apart, bool(skip.any()),
                              toolpath.file)
     return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, toolpath.file),

@@ -205,6 +205,9 @@ class TiltedMode(Mode):
     """turns about the axes of the moving frame, in order; "rotary": the frame is that of the rotary axes themselves"""
     decimals: int = Field(default=4, ge=0, le=9)
     """of the angles"""
+    turns_axes: bool = True
+    """the control may turn rotary axes where the plane is stated, if only by what its angles are rounded by: axes whose
+    clamps the program works are free there"""
     tables_only: bool = False
     """only for machines whose rotary axes all carry the part"""
 
@@ -259,6 +262,18 @@ class ControllerFile(UserModel):
     def keeps_length(self) -> bool:
         """True where a tool change puts the length of the tool in force for good: no code takes it back."""
         return self.tools.length_automatic and not self.codes.length_cancel
+
+    @property
+    def plane_turns(self) -> bool:
+        """True where stating a tilted plane may turn rotary axes."""
+        return self.modes.tilted is not None and self.modes.tilted.turns_axes
+
+    def with_passive(self, more: tuple[str, ...]) -> ControllerFile:
+        """The controller with more codes that move nothing: those of the shop's hooks."""
+        if not more:
+            return self
+        passive = tuple(dict.fromkeys((*self.program.passive, *more)))
+        return self.model_copy(update={"program": self.program.model_copy(update={"passive": passive})})
 
     def divided(self, files: bool) -> ControllerFile:
         """The controller that writes operations into files of their own, where that is asked for."""

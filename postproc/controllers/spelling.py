@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from machines.hooks import PassiveWord
 from machines.user_file import UserModel
 from postproc.controllers.texts import DwellText, Named, Numbered, Registered, WorkOffsets, placeholders
 
@@ -63,8 +64,9 @@ class ProgramBlocks(UserModel):
     operation: tuple[Annotated[str, placeholders("comment", "name", "number")], ...] = ()
     """blocks at the start of each operation, from where a program can be taken up: {name} of the operation, {comment} with
     it, {number} 100, 200, ..."""
-    passive: tuple[Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?$")], ...] = ()
-    """codes of the shop's own blocks that move nothing: read back without being executed"""
+    passive: tuple[PassiveWord, ...] = ()
+    """codes of the shop's own blocks that move nothing and change no state, or the words that such a statement begins with
+    ("CYCLE977", "TCH PROBE"): read back without being executed"""
     path_tolerance: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...] = ()
     """blocks that set the control's own smoothing; {tolerance} and {chain} in mm, {axis} in degrees"""
     relies_on_turns: Annotated[str, placeholders("axes")] = ""

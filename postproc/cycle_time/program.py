@@ -13,6 +13,7 @@ from postproc.cycle_time.shape import NOTHING, shape
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import arc_sweeps, coordinates, positions
 from postproc.readback.text.canonical import LOADED, OFFSET, REGISTER, REST, SMOOTH, Canonical
+from postproc.readback.text.clamps import closing, opening
 from postproc.readback.text.modal import columns, fill_values, modal_state
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
@@ -206,29 +207,38 @@ def _speeds(inch: Bools, motion: Motion, blocks: MotionBlocks, by_radius: bool) 
 def _pauses(words: Words, block: Ints, line: Ints, motion: Motion, machine: Machine) -> Pauses:
     """Rests by the codes of the program; dwells stand with the row that they follow, those of 0 s are stops."""
     at, codes = words.pick("M")
-    at, codes = at[np.isin(codes, RESTING_M)], codes[np.isin(codes, RESTING_M)]
+    clamps, unclamps = closing(machine.clamp_codes), opening(machine.clamp_codes)
+    resting = np.isin(codes, (*RESTING_M, *clamps, *unclamps))
+    at, codes = at[resting], codes[resting]
     changes, other = words.pick(LOADED)[0], np.concatenate([words.pick(sign)[0] for sign in (REGISTER, OFFSET, "S")])
     rests = np.flatnonzero(motion.dwell > 0.0)
     empty = words.pick(REST)[0][words.pick(REST)[1] == 0.0]
     where = np.concatenate([at, changes, other, empty, block[rests]])
     row = np.searchsorted(block, where) - 1
     row[len(where) - len(rests):] = rests
-    cause = np.concatenate([np.where(np.isin(codes, (3.0, 4.0)), Cause.SPINDLE, Cause.OTHER),
+    of_codes = np.where(np.isin(codes, (3.0, 4.0)), Cause.SPINDLE, Cause.OTHER)
+    of_codes[np.isin(codes, (*clamps, *unclamps))] = Cause.INDEXING
+    cause = np.concatenate([of_codes,
                             np.full(len(changes), Cause.TOOL_CHANGE), np.full(len(other), Cause.OTHER),
                             np.full(len(empty) + len(rests), Cause.DWELL)])
     seconds = np.where(cause == Cause.TOOL_CHANGE, machine.timing.tool_change, 0.0)
+    seconds[:len(at)] += np.where(np.isin(codes, clamps), machine.timing.clamp, 0.0)
+    seconds[:len(at)] += np.where(np.isin(codes, unclamps), machine.timing.unclamp, 0.0)
     seconds[len(where) - len(rests):] = motion.dwell[rests]
     order = np.lexsort((where, row))
     return Pauses(row[order], cause[order], seconds[order], line[where[order]])
 
 
 def _with_indexing(blocks: MotionBlocks, machine: Machine) -> Pauses:
-    """The pauses with clamp and unclamp: where a run of rapids turns axes that the cut behind it leaves at rest."""
+    """The pauses with clamp and unclamp: where a run of rapids turns axes that the cut behind it leaves at rest.
+
+    Of axes that the machine clamps by itself; codes of the program that do so are pauses of their own."""
     timing, pauses = machine.timing, blocks.pauses
+    own = blocks.axes.rotary & ~np.array([bool(codes.clamp) for codes in machine.clamps])
     seconds = timing.clamp + timing.unclamp
     if seconds <= 0.0 or not len(blocks):
         return pauses
-    turned = np.abs((blocks.end - blocks.start)[:, blocks.axes.rotary]).max(axis=1, initial=0.0) > NOTHING
+    turned = np.abs((blocks.end - blocks.start)[:, own]).max(axis=1, initial=0.0) > NOTHING
     cuts = np.flatnonzero(~blocks.rapid)
     following = np.searchsorted(cuts, np.arange(len(blocks)))
     moves_on = np.append(turned[cuts], True)[following]

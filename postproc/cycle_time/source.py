@@ -14,6 +14,7 @@ from postproc.control.rollover import rollovers
 from postproc.controllers.model import ControllerFile
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.program import BlockOrigin, blocks_of
+from postproc.job.job import with_shop
 from postproc.pipeline.result import PostResult
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
@@ -47,6 +48,7 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
     Tool lengths come from the set-up, by length register as by tool number; the work offset stands where the set-up puts
     the part. `others`: files of subprograms by name.
     """
+    controller = with_shop(controller, machine, setup)
     placement, found = part_placement(setup)
     if placement is None:
         return None, found
@@ -76,7 +78,7 @@ def _executed(data: bytes, controller: ControllerFile, control: Control, lengths
     """Text to canonical words to motion."""
     machine = control.machine
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(controller, machine.axis_names, home, machine.stop, control.rolls)
+    reader = reader_for(controller, machine.axis_names, home, machine.stop, control.rolls, machine.clamp_codes)
     code, found = reader.read(data, file, others)
     if code is None or has_errors(found):
         return None, None, found

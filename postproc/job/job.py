@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.base.options import Options
@@ -57,6 +58,11 @@ class Job:
     """geometric errors of the machine"""
     stated: tuple[tuple[int, str], ...] = ()
     """(tool number, what the set-up states of its spindle and coolant), where the CL file states none"""
+
+    @property
+    def hooks(self) -> HooksModel:
+        """Blocks of the shop, those of the set-up before those of the machine file."""
+        return self.machine.hooks.under(self.setup.hooks)
 
     @property
     def work_system(self) -> Frame:
@@ -150,6 +156,11 @@ class Job:
         """The linked moves that operations begin with."""
         begins = np.concatenate([[True], np.diff(self.operation) != 0])
         return [int(k) for k in np.flatnonzero(begins & self.moves.link)]
+
+
+def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) -> ControllerFile:
+    """The controller that knows the codes of the shop's own blocks."""
+    return controller.with_passive(machine.hooks.under(setup.hooks).passive)
 
 
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,

@@ -10,7 +10,8 @@ from machines.loader import load as load_machine
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile, load_controller
-from postproc.job.job import prepare
+from postproc.job.job import prepare, with_shop
+from postproc.pipeline.hooks import check_hooks
 from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
@@ -62,7 +63,7 @@ def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup
     assert spec is not None and setup is not None
     given = bool(options.setup) or setup != SetupFile()
     options = replace(options, setup_mark=fingerprint(setup, options.setup) if given else "")
-    return spec.divided(setup.output.files), machine, setup, options
+    return with_shop(spec.divided(setup.output.files), machine, setup), machine, setup, options
 
 
 def _begun(path: Toolpath, machine: Machine, controller: str | FilePath, spec: ControllerFile, setup: SetupFile,
@@ -138,7 +139,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     if has_errors(found):
         return replace(begun, diagnostics=tuple(found))
     job, more = prepare(path, machine, spec, start.setup, options)
-    found += more
+    found += [*more, *(check_hooks(job) if job is not None else [])]
     if job is None or has_errors(found):
         return replace(begun, diagnostics=tuple(found))
     asked = start.asked or start.setup

@@ -22,6 +22,7 @@ from postproc.path.rewinds import drawing_of
 from postproc.path.singular import check_singular
 from postproc.path.travel import check_travel
 from postproc.path.turn_steps import with_short_turns
+from postproc.pipeline.hooks import check_hooks
 from postproc.pipeline.program_header import header_lines
 from postproc.pipeline.program_lines import cl_lines
 from postproc.pipeline.result import PostResult, StageName, shared_fields
@@ -101,6 +102,7 @@ def prepared(begun: BegunStage, progress: Progress | None) -> tuple[BegunStage |
     found = [*found, *_bad_meshes(begun.setup, options.setup)]
     if job is None:
         return begun, found
+    found += check_hooks(job)
     return handed_on(PreparedStage, begun, job=job, toolpath=begun.toolpath if has_errors(found) else job.toolpath), found
 
 

@@ -81,6 +81,14 @@ def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
     return [said for said, _, other in tool_loads(toolpath) if other]
 
 
+def stops_between(toolpath: Toolpath) -> list[ToolChange]:
+    """The tool changes, but for the first, before which the file itself does not stop: where `stop_between_tools` does."""
+    changes = tool_changes(toolpath)
+    stops = [(e.index, e.line) for e in toolpath.events if e.word in ("STOP", "OPSTOP")]
+    before = {(c.index, c.line) for c in changes[1:] if not any(i == c.index and line <= c.line for i, line in stops)}
+    return [c for c in changes if (c.index, c.line) in before]
+
+
 def register_changes(toolpath: Toolpath) -> list[ToolChange]:
     """Records that name the loaded tool again with another length register."""
     loads = tool_loads(toolpath)

@@ -103,6 +103,8 @@ def _plain(event: Event, spindle: Spindle, controller: ControllerFile, report: R
     bare = re.sub(r"\([^()]*\)|;.*", "", text).strip().upper()
     if not bare:
         return [Event(event.index, "PPRINT", (text.strip("(); "),), event.line)] if text else []
+    if any(name[1:2].isalpha() and bare.startswith(name) for name in controller.program.passive):
+        return [Event(event.index, "INSERT", (bare,), event.line)]
     if not _BLOCK.fullmatch(bare):
         report(Severity.ERROR, "insert.refused", f"{event.word}/{text[:60]} is no block of G-code", event.line,
                "write text for people with PPRINT")

@@ -14,6 +14,9 @@ DIGITS = 8
 _ASIDE = {"description", "placement"}
 """keys that change no word of a program: what `place` may choose from"""
 
+_LATER: tuple[tuple[str, ...], ...] = (("hooks",), ("output", "stop_between_tools"))
+"""keys that set-ups have not always had: at their defaults they are left out, so that programs keep their fingerprint"""
+
 
 def fingerprint(setup: SetupFile, file: str) -> str:
     """The same for set-ups that say the same, whatever their names, comments, bases, order and folders.
@@ -21,6 +24,10 @@ def fingerprint(setup: SetupFile, file: str) -> str:
     Meshes count by what they hold, not by their names. `file` is that of the set-up, whose folder meshes are named from.
     """
     values = setup.model_dump(mode="json", exclude=_ASIDE)
+    default = SetupFile().model_dump(mode="json")
+    for path in _LATER:
+        if value_at(values, path) == value_at(default, path):
+            del value_at(values, path[:-1])[path[-1]]
     for key in file_keys(values):
         try:
             data = read_input(Path(file).parent / str(value_at(values, key)))

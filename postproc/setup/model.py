@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from machines.hooks import HooksModel
 from machines.user_file import UserModel, read_toml, validate
 from postproc.base.options import OutputMode
 from postproc.setup.bodies import BodiesModel, ToolBody
@@ -95,6 +96,10 @@ class OutputSettings(UserModel):
     is measured into the work offset. [tools.N] gauge_length (N = 0 for a tool without a number) is then part of the work
     offset that the header names"""
 
+    stop_between_tools: bool = False
+    """an optional stop (M1) before every tool change but the first, spindle and coolant off; where the CL file stops there
+    itself, none besides"""
+
     @property
     def apart(self) -> bool:
         """True where nothing that holds in one operation may be needed in the next."""
@@ -166,6 +171,8 @@ class SetupFile(UserModel):
     """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""
     rewind: RewindSettings = RewindSettings()
     joints: Joints = Joints()
+    hooks: HooksModel = HooksModel()
+    """blocks of the shop for this job, as in the machine file: a key that is stated here takes the place of that there"""
     bodies: BodiesModel | None = None
     """part, table and fixtures that the tools must not touch"""
     orientation: OrientationLimits = OrientationLimits()

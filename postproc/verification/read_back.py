@@ -12,8 +12,10 @@ from postproc.base.header_words import HEADER, NO_FILE, Head, read_head, same_na
 from postproc.base.memory import give_back
 from postproc.base.options import Options
 from postproc.job.job import Job
+from postproc.readback.comparison.clamps import check_clamps
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
+from postproc.readback.comparison.hooks import check_hooks
 from postproc.readback.comparison.length_margins import LengthMargin, length_margins, longer_run
 from postproc.readback.comparison.slow_moves import planned_feeds
 from postproc.readback.comparison.starts import check_end, check_start
@@ -77,7 +79,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     give_back()
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls)
+    reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls,
+                        machine.clamp_codes)
     code, diagnostics = reader.read(data, gcode, others)
     head = read_head(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]
@@ -108,7 +111,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
         comparison = compare(motion, job, executed, gcode, planned)
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
-               *check_stops(code, motion, job, faults),
+               *check_stops(code, motion, job, faults), *check_clamps(code, motion, job, comparison.owner, faults),
+               *check_hooks(as_bytes(data), code, motion, job, comparison.owner, faults),
               *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     if gcode and _by_post(job):

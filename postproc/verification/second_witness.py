@@ -114,7 +114,8 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
                 "{register}" in codes.length_offset,
                 sum(COMMANDS[kind] for kind, (on, _) in switching(codes).items() if on),
-                program=as_bytes(program) if control.rolls else b"",
+                program=as_bytes(program) if control.rolls or job.machine.clamp_codes else b"",
+                clamps={a: (c.clamp, c.unclamp) for a, c in job.machine.clamp_codes.items()} if program else {},
                 modulo={job.machine.axis_names[j]: roll.rule for j, roll in control.rolls.items()},
                 origin=control.origin, work_offset=offset_joints(control))
     try:

@@ -36,6 +36,8 @@ class Case:
     """the text of the program, where it is one file"""
     modulo: dict[str, Literal["shortest", "sign"]] = field(default_factory=dict)
     """"shortest" or "sign" by letter of axes that the control counts modulo 360 degrees: which path a word turns them"""
+    clamps: dict[str, tuple[str, str]] = field(default_factory=dict)
+    """codes that clamp and release, by letter of the axes whose clamps the program works"""
     origin: Array | None = None
     """(3,) the zero of the work offset in the table frame, as the program takes it"""
     work_offset: Array | None = None

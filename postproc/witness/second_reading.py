@@ -7,6 +7,7 @@ from time import process_time
 
 import numpy as np
 
+from postproc.witness.clamps import check_clamps
 from postproc.witness.clfile import commanded
 from postproc.witness.commanded import ARC, LINE, Commanded
 from postproc.witness.evidence import Case, ExecutedBlocks, Finding, Testimony
@@ -98,13 +99,16 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     found += _rods(poses)
     faults, turned = check_turning(case, executed)
     found += faults
+    feeding = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
+    faults, clamped = check_clamps(case, executed, w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
+    found += faults
     faults, zeros = _zero(case, c, place, poses)
     found += faults
     good = w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM))
     worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
     counts = {"positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()),
               "holes": holes, "feeds": feeds, **{_NAMES[k]: v for k, v in states.items()}, "work offset": zeros,
-              "turns of modulo axes": turned}
+              "turns of modulo axes": turned, "clamps": clamped}
     return found, worst, counts, silent
 
 

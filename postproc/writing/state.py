@@ -32,6 +32,7 @@ class WriterState:
         self.controller, self.program, self.cycles = controller, program, cycles
         self.length_offsets, self.smoothing, self.axis_smoothing = length_offsets, smoothing, axis_smoothing
         self.work_offset = controller.program.work_offsets.get(work_offset, work_offset)
+        self.offset_name = controller.program.offset_name(work_offset)
         self.name = "".join(c if c.isascii() and c.isalnum() else "_" for c in name).upper()[:24] or "PROGRAM"
         self.subprograms = subprograms and bool(controller.subprograms.call)
         self.files: dict[str, list[str]] = {}
@@ -190,3 +191,8 @@ def clean(controller: ControllerFile, text: str) -> str:
     """A comment's text without characters that it must not hold, cut to the line length."""
     forbidden = controller.comment.forbidden
     return "".join(" " if c in forbidden or not 32 <= ord(c) < 127 else c for c in text[:comment_room(controller)])
+
+
+def plain_name(text: str) -> str:
+    """A name as any block can hold it: letters, digits, blanks and - . _ alone."""
+    return "".join(c if c.isascii() and (c.isalnum() or c in " -._") else "_" for c in text.strip())

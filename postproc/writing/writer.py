@@ -9,12 +9,14 @@ from itertools import chain
 
 import numpy as np
 
+from postproc.compile.clamps import CLAMP, UNCLAMP
+from postproc.compile.hooks import HOOK
 from postproc.compile.program import PER_MINUTE, Command, Hole
 from postproc.control.rollover import HALF
 from postproc.controllers.model import Mode
 from postproc.controllers.texts import blocks_of
 from postproc.reference.coolant import COMMANDS, switching
-from postproc.writing.state import WriterState
+from postproc.writing.state import WriterState, plain_name
 from toolpaths.arrays import Ints
 
 _LABEL = re.compile(r"%|[NO]\d")
@@ -263,6 +265,10 @@ class Writer(WriterState, ABC):
             yield from self.enter(section) if command.name == "ENTER_SECTION" else self.leave(section)
         elif command.name.startswith("START_SPINDLE"):
             yield from self.spindle(command)
+        elif command.name in (CLAMP, UNCLAMP):
+            yield str(command.args[0])
+        elif command.name == HOOK:
+            yield self.hooked(command)
         elif command.name == "RESTATE":
             self.forget()
         elif command.name == "OPERATION_START":
@@ -274,6 +280,14 @@ class Writer(WriterState, ABC):
             yield str(command.args[0])
         else:
             yield from self.numbered_command(command)
+
+    def hooked(self, command: Command) -> str:
+        """A block of the shop; modal codes are stated again behind it, since a macro may leave others."""
+        text, number, name, operation = (str(arg) for arg in command.args)
+        self.turning = self.cooling = None
+        self.forget()
+        return text.format(tool_number=self.plain(max(float(number), 0.0)), tool_name=plain_name(name),
+                           operation=plain_name(operation), work_offset=self.offset_name)
 
     def operation(self, name: str, restart: bool) -> Iterator[str]:
         """The start of an operation: its blocks, and every modal code stated again behind them.

@@ -228,10 +228,12 @@ def _differ(a: Floats, b: Floats) -> Bools:
 
 
 def _indexed(q0: Floats, q1: Floats, machine: Machine) -> Floats:
-    """As `_moved`, with unclamping and clamping where rotary joints turn."""
+    """As `_moved`, with unclamping and clamping where rotary joints turn: at once, but one by one where codes do it."""
     link = _shortest(q1[None] - q0[:, None], machine.endless)
-    turns = (np.abs(link[..., np.array(machine.rotary)]) > SAME).any(axis=-1)
-    return np.asarray(_moved(q0, q1, machine) + np.where(turns, machine.timing.clamp + machine.timing.unclamp, 0.0))
+    turns = np.abs(link[..., np.array(machine.rotary)]) > SAME
+    codes = [one.clamp for one, rotary in zip(machine.clamps, machine.rotary, strict=True) if rotary]
+    clamps = sum(turns[..., [c == code for c in codes]].any(axis=-1).astype(np.float64) for code in dict.fromkeys(codes))
+    return np.asarray(_moved(q0, q1, machine) + clamps * (machine.timing.clamp + machine.timing.unclamp))
 
 
 def _moved(q0: Floats, q1: Floats, machine: Machine) -> Floats:

@@ -23,6 +23,7 @@ from postproc.readback.text.canonical import Canonical
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between, lengths
+from toolpaths.shapes import arrays
 
 STEP = 0.1
 """mm"""
@@ -97,6 +98,7 @@ def length_margins(motion: Motion, executed: BlockPoses, again: Motion, longer: 
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(tool="E", tip="E", axis="E", q="E J", slope="E J", clear="E")
 class _Rates:
     """What a longer tool does to E blocks.
 

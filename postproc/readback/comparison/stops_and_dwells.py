@@ -11,7 +11,7 @@ from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
 from postproc.readback.text.canonical import Canonical, in_files
 from postproc.readback.text.modal import codes
-from postproc.reference.events import Spindle, numbers, spindle_after, words
+from postproc.reference.events import Spindle, numbers, spindle_after, stops_between, words
 from postproc.reference.holes import Phase
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.units import PER_MINUTE
@@ -22,10 +22,13 @@ _STOPS = (("STOP", 0.0), ("OPSTOP", 1.0))
 
 
 def check_stops(code: Canonical, motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
-    """As many stops (M0, M1) as the CL file has, and no less time of rest."""
+    """As many stops (M0, M1) as the CL file has, with those that the set-up wants between tools, and no less time of
+    rest."""
     result = []
     for word, number in _STOPS:
         lines = [event.line for event in job.toolpath.events if event.word == word]
+        if word == "OPSTOP" and job.setup.output.stop_between_tools:
+            lines = sorted([*lines, *(change.line for change in stops_between(job.toolpath))])
         blocks = codes(code.words, "M", (number,))[0]
         stated = len(blocks)
         if stated > len(lines):

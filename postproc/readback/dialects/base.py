@@ -11,6 +11,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from machines.choices import Stop
+from machines.machine import ClampCodes
 from postproc.control.control import InterpolationMode
 from postproc.control.rollover import Rollover
 from postproc.controllers.model import ControllerFile, Stops
@@ -25,6 +26,7 @@ from postproc.readback.text.canonical import (
     offset_number,
     placed,
 )
+from postproc.readback.text.clamps import clamp_numbers, two_meanings
 from postproc.readback.text.flow import Structure, expand
 from postproc.readback.text.magnitude import negative_smoothing, too_large
 from postproc.readback.text.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
@@ -49,12 +51,14 @@ class Reader(ABC):
         rises_first: canned cycles as RS274/NGC has them, see `Offsets`
         arc_slack: mm by which the radius may differ between the ends of an arc
         sides, smoothing_hint: what the control calls cutter compensation and its own smoothing
+        neutral: statements that change nothing of what is read back
         units_codes, units_from: what states mm or inches, and what says them where nothing does
         units_stay: that is a setting of the control, which no program changes
         stating: by group, the words that state it; a block that relies on one that nothing states is an error in `verify`
         leaving: by law, the codes that switch it off; modes_named: what the control calls it
         stop: what M0 and M1 switch off, by the controller file or by that of the machine (`[control] stop`)
         changes: what a tool change switches off
+        clamps: codes of the clamps that programs work, by axis
         rolls: modulo axes by joint; turn_codes: M126 and M127 say which path they take
     """
 
@@ -66,6 +70,7 @@ class Reader(ABC):
     arc_slack = float("inf")
     sides: ClassVar[dict[int, str]] = {40: "off (G40)", 41: "left (G41)", 42: "right (G42)"}
     smoothing_hint = "G64 P Q as the post writes it, or G61"
+    neutral: ClassVar[frozenset[str]] = frozenset()
     units_codes = "G20 or G21"
     units_from = "the program before left them"
     units_stay = False
@@ -78,7 +83,9 @@ class Reader(ABC):
                                                                "tilted": "the tilted plane"}
 
     def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None,
-                 stop: Stop | Literal[""] = "", rolls: dict[int, Rollover] | None = None) -> None:
+                 stop: Stop | Literal[""] = "", rolls: dict[int, Rollover] | None = None,
+                 clamps: Mapping[str, ClampCodes] | None = None) -> None:
+        self.clamps = clamps or {}
         self.axes, self.controller, self.home, self.rolls = axes, controller, home, rolls or {}
         stops = controller.stops if controller is not None else Stops()
         self.stop, self.changes = stop or stops.switch_off, stops.tool_change
@@ -112,7 +119,9 @@ class Reader(ABC):
 
     def check(self, words: Words, file: str) -> list[Diagnostic]:
         """Codes and words that cannot be executed, as errors."""
-        return check_codes(words, self.groups, (*self.m_codes, *self.switches), self.letters, self.axes, file)
+        own = (*self.m_codes, *self.switches)
+        found = check_codes(words, self.groups, (*own, *clamp_numbers(self.clamps)), self.letters, self.axes, file)
+        return [*found, *two_meanings(self.clamps, own, file)]
 
     def read(self, data: bytes | str, file: str = "", others: Mapping[str, bytes] | None = None,
              ) -> tuple[Canonical | None, list[Diagnostic]]:

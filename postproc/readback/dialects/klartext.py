@@ -97,7 +97,9 @@ class KlartextReader(Reader):
     def _statement(self, row: str, line: int, new: New, statements: list[DialectStatement], file: str) -> list[Diagnostic]:
         """One block that is no plain L."""
         body = re.sub(r"^\s*\d+\s+", "", row.strip() + " ").strip() if not row.strip().isdigit() else ""
-        if not body or body.startswith(_PASSIVE):
+        own = self.controller.program.passive if self.controller is not None else ()
+        if not body or body.startswith(_PASSIVE) or any(re.match(rf"{re.escape(p)}(?![A-Z0-9])", body) for p in own
+                                                        if p[1:2].isalpha()):
             return []
         made = _named(body)
         if made is None:

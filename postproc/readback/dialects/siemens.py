@@ -72,6 +72,7 @@ class SiemensReader(Reader):
     letters = "GMFSTDNIJKRLP?~>"
     stating = {k: v for k, v in Reader.stating.items() if k != "level"} | {"length": "D, or a tool"}
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tcp": ("TRAFOOF",), "tilted": ("CYCLE800",)}
+    neutral: ClassVar[frozenset[str]] = PASSIVE
     units_codes = "G70, G71, G700 or G710"
     units_from = "machine data 20150 and 20152 have the reset position of group 13"
     smoothing_hint = "CYCLE832 as the post writes it, or G60"
@@ -125,7 +126,9 @@ class SiemensReader(Reader):
         if file != self.main_file:
             subprograms[own] = (1, min(back, default=lines))
         times = dict(zip(*(a.tolist() for a in words.pick("P")), strict=True))
-        calls = {b: Call(b, s.name, int(times.get(b, 1.0))) for b, s in named if s.name not in KNOWN}
+        passive = self.controller.program.passive if self.controller is not None else ()
+        known = KNOWN.union(passive)
+        calls = {b: Call(b, s.name, int(times.get(b, 1.0))) for b, s in named if s.name not in known}
         calls |= {int(b): Call(int(b), f"L{int(n)}", int(times.get(b, 1.0)))
                   for b, n in zip(*(a.tolist() for a in words.pick("L")), strict=True)}
         unknown = [c for c in calls.values() if c.name not in self.names | set(spans) and not c.name.startswith("L")]

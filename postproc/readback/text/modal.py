@@ -22,6 +22,9 @@ GROUPS: Groups = {
     "compensation": (40, 41, 42), "path": (61, 61.1, 64), "once": (4, 53), "arc_distance": (90.1, 91.1),
 }
 """of NIST RS274/NGC and LinuxCNC; a dialect adds its own"""
+MACROS = ("G65", "G66")
+"""calls of a macro, whose arguments may be any words"""
+_ARGUMENTS = [ord(a) for a in "PQRLHDE"]
 _PART = 200_000
 """words that are looked at together"""
 
@@ -130,11 +133,20 @@ def modal_state(words: Words) -> Modal:
 
 
 def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
-    """Words without the blocks that hold a code the controller file calls passive."""
+    """Words without codes that the controller file calls passive, and what stands behind them in their blocks: all words of
+    a macro call, up to the next G or M code those of other G codes, of M codes those that are no axis, feed or speed."""
     drop = np.zeros(len(words.letter), dtype=bool)
+    ends = (words.letter == ord("G")) | (words.letter == ord("M"))
     for code in passive:
-        lines = words.line[(words.letter == ord(code[0])) & (words.value == float(code[1:]))]
-        drop |= np.isin(words.line, lines)
+        if not code[1:2].isdigit():
+            continue
+        value = float(code[1:])
+        for k in np.flatnonzero((words.letter == ord(code[0])) & (words.value == value)).tolist():
+            stop = int(np.searchsorted(words.line, words.line[k], side="right"))
+            if code not in MACROS:
+                stop = next((i for i in range(k + 1, stop) if ends[i]), stop)
+            drop[k] = True
+            drop[k + 1:stop] = True if code[0] == "G" else np.isin(words.letter[k + 1:stop], _ARGUMENTS)
     return words.take(~drop)
 
 

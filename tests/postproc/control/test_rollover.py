@@ -195,8 +195,8 @@ def test_a_reader_of_the_other_rule_is_caught_by_the_second_witness(controller: 
                                                                      monkeypatch: pytest.MonkeyPatch) -> None:
     real = reader_for
 
-    def other(spec, letters, home=None, stop="", rolls=None):  # type: ignore[no-untyped-def]
-        return real(spec, letters, home, stop, {j: replace(r, rule=as_if) for j, r in (rolls or {}).items()})
+    def other(spec, letters, home=None, stop="", rolls=None, clamps=None):  # type: ignore[no-untyped-def]
+        return real(spec, letters, home, stop, {j: replace(r, rule=as_if) for j, r in (rolls or {}).items()}, clamps)
     monkeypatch.setattr("postproc.verification.read_back.reader_for", other)
     result = postproc.convert(winding(-1.0), rolling(rule), controller, TOOLS, Options(output="axes"))
     assert not result.ok and errors(result) & {"witness.turning", "verify.path", "verify.axis", "verify.rapid", "verify.tip",

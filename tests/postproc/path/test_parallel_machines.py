@@ -40,7 +40,8 @@ def sample(file: str, name: str, setup_name: str) -> PostResult:
 @pytest.mark.parametrize(("name", "file", "moves"), [
     *((name, "inch_plate.apt", 10) for name in DELTAS if name != "delta-cone"), ("delta-cone", "pocket.cls", 80),
     ("uranesx", "pocket.cls", 80),
-    *(pytest.param(name, "pocket.cls", 80, marks=pytest.mark.slow) for name in DELTAS[::2] if name not in ("delta-cone", "uranesx"))])
+    *(pytest.param(name, "pocket.cls", 80, marks=pytest.mark.slow)
+      for name in DELTAS[::2] if name not in ("delta-cone", "uranesx"))])
 def test_three_axis_on_every_delta(name: str, file: str, moves: int) -> None:
     result = sample(file, name, "delta")
     tip, axis, compared = deviations(result)

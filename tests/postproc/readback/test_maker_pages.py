@@ -218,3 +218,8 @@ def test_a_number_without_a_point_is_refused_where_its_unit_is_a_parameter() -> 
     for dialect in (FANUC, HAAS):
         assert faults(dialect, program(dialect, "G0 X1. Y0. Z9.\n")) == {}
         assert len(faults(dialect, program(dialect, "G0 X1 Y0. Z9.\n"))) == 1
+
+
+def test_only_haas_states_planes_that_turn_nothing() -> None:
+    """G254 lets the offset follow the axes as they stand; G53.1, CYCLE800 and PLANE ... TURN drive them to the plane."""
+    assert {name for name in builtin_files() if spec(name).plane_turns} == {"fanuc-30i", "siemens-840d", "heidenhain-tnc640"}

@@ -1,0 +1,88 @@
+"""Clamps of rotary axes: free where they turn, closed in cuts through which they stand."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from machines.machine import ClampCodes
+from postproc.job.job import Job
+from postproc.readback.comparison.faults import Faults
+from postproc.readback.execution.execute import Motion
+from postproc.readback.text.canonical import LAW, Canonical, in_files
+from postproc.readback.text.modal import codes, fill
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic
+
+TURNS = 1e-6
+"""degrees of a word that turns an axis"""
+
+
+def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults: Faults) -> list[Diagnostic]:
+    """Axes that the program clamps by codes turn only behind the release, and are clamped in cuts through which they stand.
+
+    `owner` (E,): the move that each row serves. What a block states of clamps acts behind its motion: nobody knows better.
+    """
+    machine, found = job.machine, list[Diagnostic]()
+    if not machine.clamp_codes:
+        return found
+    moves, cut = job.moves.without_pecks(), cutting_rows(motion, job, owner)
+    for letter, one in machine.clamp_codes.items():
+        state = _states(code, one)
+        j = machine.axis_names.index(letter)
+        degrees = np.concatenate([motion.start[j:j + 1], motion.end[:, j]])
+        turns = np.abs(np.diff(degrees)) > TURNS
+        before, line = state[motion.block - 1], motion.line
+        bad = np.flatnonzero(turns & (before != 1.0))
+        if len(bad):
+            how = "clamped" if before[bad[0]] == 0.0 else "not released since the program began"
+            found.append(faults.error("verify.clamp", f"axis {letter} turns while it is {how}", 0, int(line[bad[0]]),
+                                      len(bad), f"{one.unclamp} in a block before it"))
+        found += _planes(code, state, letter, one, job, faults)
+        ends = _standing(cut, turns)
+        loose = ends[state[motion.block[ends]] != 0.0]
+        if len(loose):
+            found.append(faults.error("verify.clamp", f"axis {letter} stands through a cut and is not clamped",
+                                      int(moves.line[owner[loose[0]]]), int(line[loose[0]]), len(loose),
+                                      f"{one.clamp} before the cut"))
+    return found
+
+
+def cutting_rows(motion: Motion, job: Job, owner: Ints) -> Bools:
+    """(E,) rows that cut: at feed, and serving a move that no link leads to."""
+    moves = job.moves.without_pecks()
+    inside = (owner >= 0) & (owner < len(moves))
+    return np.asarray((motion.code > 0) & inside & ~moves.link[np.clip(owner, 0, len(moves) - 1)])
+
+
+def stretches(which: Bools) -> Ints:
+    """(N, 2) first and one past the last of the stretches where `which` (E,) is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]).astype(np.int8)))
+    return np.asarray(edges.reshape(-1, 2))
+
+
+def _states(code: Canonical, one: ClampCodes) -> Floats:
+    """(B + 1,) behind each block: 0 clamped, 1 free, -1 not known."""
+    free = float(one.unclamp[1:])
+    blocks, number = codes(code.words, "M", (float(one.clamp[1:]), free))
+    return fill(blocks, (number == free).astype(np.float64), code.words.lines, -1.0)
+
+
+def _planes(code: Canonical, state: Floats, letter: str, one: ClampCodes, job: Job, faults: Faults) -> list[Diagnostic]:
+    """Planes that the control may turn the axis for while it is clamped."""
+    if not job.controller.plane_turns:
+        return []
+    blocks, law = code.words.pick(LAW)
+    tilted = np.array([one.name == "tilted" for one in code.laws] + [False])[law.astype(np.int64)]
+    bad = blocks[tilted & (state[blocks - 1] != 1.0)]
+    if not len(bad):
+        return []
+    line = int(in_files(code.line[bad[:1]], code.files)[0])
+    return [faults.error("verify.clamp", f"a plane is stated while axis {letter} is not free: the control may turn it there",
+                         0, line, len(bad), f"{one.unclamp} in a block before it")]
+
+
+def _standing(cut: Bools, turns: Bools) -> Ints:
+    """The last row of each stretch of cuts through which an axis stands."""
+    edges = stretches(cut)
+    total = np.concatenate([[0], np.cumsum(turns)])
+    return np.asarray(edges[total[edges[:, 1]] == total[edges[:, 0]], 1] - 1)
