@@ -55,6 +55,7 @@ numeric: $(STAMP)
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
+	$(BIN)/ruff check --select D100,D101,D103,D419,ANN001,ANN201 toolpaths machines postproc
 	$(BIN)/mypy
 
 # Pinned versions with hashes, and the project itself from this tree, so that edits count at once.

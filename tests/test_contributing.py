@@ -41,3 +41,21 @@ def test_one_point_in_every_frame() -> None:
         assert rows[frame][0] == pytest.approx(tip, abs=1e-6) and rows[frame][1] == pytest.approx(axis, abs=1e-6)
     assert rows["platform"][0] == pytest.approx([0.0, 0.0, -length]) and rows["tool"] == [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     assert move["blocks"][-1].split(" F")[0].removeprefix("feed ") in text
+
+
+def test_local_hooks_are_what_make_lint_runs() -> None:
+    """Rules of `.pre-commit-config.yaml` hold in CI too."""
+    hooks = re.findall(r"entry: \.venv/bin/(.*)", (ROOT / ".pre-commit-config.yaml").read_text("utf-8"))
+    lint = re.search(r"^lint:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
+    assert lint is not None and len(hooks) == 3
+    for hook in hooks:
+        assert f"$(BIN)/{hook.replace(' --fix', '')}" in lint[1]
+
+
+def test_the_forge_runs_every_python_that_is_promised() -> None:
+    workflow = (ROOT / ".github/workflows/ci.yml").read_text("utf-8")
+    versions = re.findall(r'"(3\.\d+)"', workflow)
+    least = re.search(r'requires-python = ">=(3\.\d+)"', (ROOT / "pyproject.toml").read_text("utf-8"))
+    assert least is not None and versions[0] == least[1] and len(versions) >= 3
+    targets = set(re.findall(r"make PYTHON=python (\w+)", workflow))
+    assert targets and all(re.search(rf"^{name}:", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE) for name in targets)

@@ -8,8 +8,8 @@ from typing import NotRequired, TypedDict
 import numpy as np
 
 from machines.calibration.problem import CalibrationResult
+from machines.calibration.rotary_bench import PARTS
 from machines.calibration.rotary_fit import RotaryFit
-from machines.calibration.simulator import PARTS
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.csv_table import UNITS

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.calibration.problem import CalibrationResult, linear, solve
-from machines.calibration.simulator import MOUNTS, PARTS, Bench, motion_jacobian, mount_jacobian
+from machines.calibration.rotary_bench import MOUNTS, PARTS, Bench, motion_jacobian, mount_jacobian
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, ErrorFrame, SerialErrors
 from machines.geometric_error.tables.curves import Fourier

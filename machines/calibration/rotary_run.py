@@ -17,9 +17,9 @@ from machines.calibration.result_figures import (
     weighted,
 )
 from machines.calibration.reversal import Reversal, cost_without, identify, plan, statistics
+from machines.calibration.rotary_bench import PARTS, Bench
 from machines.calibration.rotary_fit import RotaryFit, distinguishable, error_model, fit_rotary, hidden
 from machines.calibration.run import CalibrationRun
-from machines.calibration.simulator import PARTS, Bench
 from machines.calibration.unit_and_sign_checks import reversal_table_fault, rotary_table_fault
 from machines.geometric_error.actual.axis_motion import ALONG
 from machines.geometric_error.actual.model import ErrorModel

@@ -17,8 +17,8 @@ from machines.calibration.measurement_file import ReversalModel
 from machines.calibration.noise import Noise, noise_of
 from machines.calibration.problem import CalibrationProblem, solve
 from machines.calibration.reversal import identify, reversal_span
+from machines.calibration.rotary_bench import PARTS, Bench
 from machines.calibration.rotary_fit import rotary_span
-from machines.calibration.simulator import PARTS, Bench
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS
 from machines.kinematics.base import Kinematics

@@ -181,11 +181,6 @@ class H4Linear(OnSlides):
         return ClearanceGeometry(p[:, :3], p[:, 3], self.platform.legs.carriages(q[:, :4]), self.platform.ends(p), gauge,
                                  axis)
 
-    def random_slides(self, rng: np.random.Generator, n: int) -> Floats:
-        """Slides (n, 4) of random places and tilts of the workspace."""
-        place, tilt = self.workspace.random(rng, n)
-        return self.platform.inverse(np.column_stack([place, tilt]))
-
     def middle_rig(self) -> ClearanceGeometry:
         """The same in the middle of the workspace, rotary axis at 0."""
         return self.rig(np.column_stack([self.platform.inverse(self.platform.home[None]), [0.0]]))
@@ -271,6 +266,7 @@ def tilted(v: Floats, tilt: Floats) -> Floats:
 
 
 def unit(v: Floats) -> Floats:
+    """Unit vectors (N, 3) along v (N, 3); NaN where v is 0."""
     norm = np.linalg.norm(v, axis=1, keepdims=True)
     result: Floats = v / np.where(norm > 0.0, norm, np.nan)
     return result

@@ -166,10 +166,6 @@ class LinearDelta(OnSlides):
         return ClearanceGeometry(place, np.zeros(len(q)), self.legs.carriages(q), place[:, None, :] + self.platform, place,
                                  axis)
 
-    def random_slides(self, rng: np.random.Generator, n: int) -> Floats:
-        """Slides (n, 3) of random places of the workspace."""
-        return self.legs.inverse(self.workspace.random(rng, n)[0][:, None, :] + self.platform)
-
     def middle_rig(self) -> ClearanceGeometry:
         """The same in the middle of the workspace."""
         tip = (self.workspace.middle + self._gauge_to_tip())[None]

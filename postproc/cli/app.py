@@ -101,8 +101,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
             feed: Annotated[FeedSource, word_option("--feed", FeedSource, "programmed: the feeds of the CL file; planned: "
-                                                    "reduced where an axis would exceed velocity, acceleration or "
-                                                    "jerk")] = "programmed",
+                                                    "lower where an axis or a tool would exceed its limits")] = "programmed",
             merge_feeds: Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="merge "
                                                        "neighbouring F words within this part")] = 0.0,
             smooth: Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the "
@@ -228,11 +227,6 @@ def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", 
 def main() -> None:
     """The command line under its guard, for callers that have imported it already."""
     raise SystemExit(guarded(app))
-
-
-def _choice(option: str, value: str, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(allowed)}", param_hint=option)
 
 
 def _residual_files(files: list[Path], error_model: str) -> list[Path]:

@@ -22,17 +22,24 @@ LONGEST_NAME = 255
 
 
 def machine_of(name: str) -> Machine:
+    """The machine of a name or a file."""
     import machines
 
     return machines.load(name)
 
 
 def controller_of(name: str) -> str:
+    """The same name, where its file is a controller."""
     controller_file(name)
     return name
 
 
 def controller_file(name: str) -> Any:
+    """The controller of a name or a file.
+
+    Raises:
+        DiagnosticError: where the file has errors; carries all of them.
+    """
     from postproc.controllers.model import load_controller
     from toolpaths.diagnostics import DiagnosticError
 
@@ -76,6 +83,7 @@ def _plain(value: object) -> object:
 
 
 def print_json(values: object) -> None:
+    """JSON on standard output."""
     import json
 
     typer.echo(json.dumps(values, indent=2, allow_nan=False, default=_plain))

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from toolpaths.diagnostics import Diagnostic
 
 
-UNKNOWN: dict[str, Any] = {"cycle_time_s": None, "lower_bound_s": None, "band_s": None, "feed_s": None, "operations": [],
-                           "limiting": {}}
+UNKNOWN: dict[str, Any] = {"cycle_time_s": None, "lower_bound_s": None, "band_s": None, "feed_s": None,
+                           "feed_override_percent": None, "operations": [], "limiting": {}}
 """what is reported of a file that is refused"""
 
 
@@ -40,6 +40,9 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
          calibrate: Annotated[str, typer.Option("--calibrate", metavar="LOG.csv", help="fit the model to a measured run of "
                                                 "FILE: columns nc_line, time_s")] = "",
          output: Annotated[str, typer.Option("-o", "--output", metavar="MODEL.toml", help="write the fitted model")] = "",
+         override: Annotated[float, typer.Option("--override", metavar="PERCENT", min=1.0, max=300.0, help="feed override: "
+                                                 "feeds at PERCENT of what is programmed, rapids and taps as they are; "
+                                                 "with --calibrate, at which the run was measured")] = 100.0,
          setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools")] = "",
          tolerance: ToleranceOption = 0.01,
          axis_tolerance: AxisToleranceOption = 0.05,
@@ -61,12 +64,13 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
 
     options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model,
                       error_beyond=beyond)
+    share = override / 100.0
     values: dict[str, Any] = {}
     text = ""
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
         m = machine_of(machine)
-        blocks, planner, times, found = _blocks(file, m, controller, model, options, progress)
+        blocks, planner, times, found = _blocks(file, m, controller, model, options, share, progress)
         if blocks is not None and calibrate:
             planner, values, more = _calibrated(blocks, m, planner, calibrate)
             if output and planner is not None:
@@ -76,7 +80,8 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
             found, times = [*found, *more], None
         if blocks is not None and planner is not None:
             e = estimate(blocks, m, planner, times=times)
-            values, text = figures.as_dict(e) | values, figures.as_text(e, file.name)
+            values = figures.as_dict(e) | {"feed_override_percent": override} | values
+            text = figures.as_text(e, file.name, share)
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
@@ -85,7 +90,7 @@ def _check(output: str, calibrate: str) -> None:
         raise typer.BadParameter("there is no calibrated model without --calibrate", param_hint="-o")
 
 
-def _blocks(file: Path, machine: Machine, controller: str, model: str, options: Options,
+def _blocks(file: Path, machine: Machine, controller: str, model: str, options: Options, override: float,
             progress: Any) -> tuple[MotionBlocks | None, CycleTimeModel | None, BlockTimes | None, list[Diagnostic]]:
     """The blocks of a CL file (converted first) or of a program, the model of the control, and times that are planned."""
     from postproc.controllers.model import load_controller
@@ -105,7 +110,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
         setup, found = load_setup(options.setup or None)
         require(found)
         assert setup is not None
-        blocks, found = from_gcode(data, machine, spec, setup, str(file), NeighbourFiles(file))
+        blocks, found = from_gcode(data, machine, spec, setup, str(file), NeighbourFiles(file), override)
         return blocks, planner, None, found
     import toolpaths
     from postproc.pipeline.convert import convert
@@ -115,11 +120,11 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     result = convert(path, machine, controller, options=options, diagnostics=found, progress=progress)
     if not result.ok or planner is None:
         return None, planner, None, list(result.diagnostics)
-    blocks, times, found = from_conversion(result), None, []
+    blocks, times, found = from_conversion(result, override), None, []
     if planner.kind == "ideal":
         from postproc.cycle_time.planned import planned_times
 
-        times, found = planned_times(result, blocks, planner)
+        times, found = planned_times(result, blocks, planner, override)
     return blocks, planner, times, [*result.diagnostics, *found]
 
 

@@ -63,7 +63,7 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
     program = with_hooks(program, job.hooks, {tool.number: tool.name for tool in reversed(toolpath.tools)})
     found += standing_unsaid(control.rolls, control.machine.axis_names, job.setup.output.apart, bool(skip.any()),
                              toolpath.file)
-    return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, toolpath.file),
+    return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, job),
                             *_mapped(feeds, moves, path, job),
                             *not_native(toolpath, moves, path, native, controller, skip)]
 
@@ -114,12 +114,14 @@ def _mapped(feeds: Feeds, moves: Moves, path: JointPath, job: Job) -> list[Diagn
                  lines=np.unique(moves.line[path.move[rows]])[:6].tolist(), count=len(rows))]
 
 
-def _slowed(feeds: Feeds, moves: Moves, path: JointPath, planned: bool, file: str) -> list[Diagnostic]:
+def _slowed(feeds: Feeds, moves: Moves, path: JointPath, planned: bool, job: Job) -> list[Diagnostic]:
     rows = np.flatnonzero(feeds.slowed)
     if not len(rows):
         return []
     share = path.seconds[rows] / feeds.seconds[rows]
     excess = "exceed its velocity, acceleration or jerk" if planned else "be faster than its limit"
+    if planned and any(tool.limited for tool in job.setup.tools.values()):
+        excess += ", or the tool a limit of the set-up"
     return [info("feed.reduced", f"feed reduced, down to {100.0 * share.min():.1f} %, where an axis would "
-                 f"{excess}", file=file, lines=np.unique(moves.line[path.move[rows]])[:6].tolist(),
+                 f"{excess}", file=job.toolpath.file, lines=np.unique(moves.line[path.move[rows]])[:6].tolist(),
                  count=len(rows))]

@@ -41,7 +41,7 @@ class BlockEnds:
     """The ends of K blocks at their planned words, and what T joints that lose motion do there; mm and rad.
 
     Attributes:
-        off: (K, 3) tip less wanted by mean approach directions; by_way: (K, 3, T) more per approach direction
+        off: (K, 3) tip less wanted by mean approach directions; by_approach: (K, 3, T) more per approach direction
         tip_rates: (K, 3, 3) tip per last decimal of X, Y, Z; back: (K, T, 3) joints per last decimal
         gap: (K, T) what the joints lose
         bend: (3, K, T) shift, low, high: what planned motion does to the approach directions but for the last run one

@@ -47,7 +47,7 @@ back"""
 
 
 @dataclass(frozen=True)
-@arrays(residual_tip="K 3", residual_axis="K 3", moved="J", owner="L", part="L", apart="A")
+@arrays(moved="J", owner="L", part="L", apart="A")
 class ErrorCorrection:
     """What the correction did to the blocks that it corrects, mm and rad.
 
@@ -55,7 +55,6 @@ class ErrorCorrection:
         tip_before, axis_before: worst deviation of the machine with errors at nominal ends of blocks of CL moves, and in
             long ones wherever errors may turn
         tip_after, axis_after: worst deviation at their corrected ends: the residual
-        residual_tip, residual_axis: (K, 3) at the ends of the blocks given, actual less wanted; 0 at home blocks
         added: points added; resolved: arcs that became lines
         partial: blocks near a pole, whose axis is corrected in part
         moved: (J,) largest correction of each joint
@@ -69,8 +68,6 @@ class ErrorCorrection:
     axis_before: float
     tip_after: float
     axis_after: float
-    residual_tip: Floats
-    residual_axis: Floats
     added: int
     resolved: int
     partial: int
@@ -141,8 +138,8 @@ def compensate(path: JointPath, moves: Moves, tools: Ints, kinematics: Callable[
     tip_after, axis_after = after.tolist()
     uncertainty_tip, uncertainty_axis = _uncertainty(path, live, work, model)
     report = ErrorCorrection(
-        tip_before, axis_before, tip_after, max(axis_after, axis_left), residual_tip=found.residual[:, :3],
-        residual_axis=found.residual[:, 3:], added=len(corrected) - before_cut, resolved=int(resolved.sum()),
+        tip_before, axis_before, tip_after, max(axis_after, axis_left),
+        added=len(corrected) - before_cut, resolved=int(resolved.sum()),
         partial=int(found.partial[live].sum()), moved=np.abs(found.q - path.q).max(axis=0, initial=0.0),
         owner=whole.owner, part=whole.part, apart=apart, uncertainty_tip=uncertainty_tip, uncertainty_axis=uncertainty_axis)
     return corrected, report, diagnostics
@@ -211,11 +208,11 @@ def _turned_in_travel(found: CorrectedEnds, path: JointPath, control: Control, w
     rows = np.flatnonzero((inside != found.q)[:, work.rotary].any(axis=1) & ~path.home)
     if not len(rows):
         return found
-    q, after, residual = found.q.copy(), found.after.copy(), found.residual.copy()
+    q, after = found.q.copy(), found.after.copy()
     q[rows] = work.at(path.q[rows], rows, work.approach[rows], inside[rows][:, work.rotary])
-    residual[rows] = work.residual(path.q[rows], q[rows], rows, work.approach[rows])
-    after[rows] = np.linalg.norm(residual[rows].reshape(-1, 2, 3), axis=2)
-    return replace(found, q=q, after=after, residual=residual)
+    left = work.residual(path.q[rows], q[rows], rows, work.approach[rows])
+    after[rows] = np.linalg.norm(left.reshape(-1, 2, 3), axis=2)
+    return replace(found, q=q, after=after)
 
 
 def kept_in_travel(q: Floats, path: JointPath, control: Control) -> Floats:

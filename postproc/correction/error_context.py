@@ -35,14 +35,13 @@ STANDS = 1e-9
 
 
 @dataclass(frozen=True)
-@arrays(q="K J", before="K 2", after="K 2", residual="K 6", partial="K", unmeasured="K J")
+@arrays(q="K J", before="K 2", after="K 2", partial="K", unmeasured="K J")
 class CorrectedEnds:
     """Corrected joints (K, J) and what `correct` said of them, for all blocks."""
 
     q: Floats
     before: Floats
     after: Floats
-    residual: Floats
     partial: Bools
     unmeasured: Bools
 
@@ -247,7 +246,7 @@ class ErrorContext:
     def ends(self) -> CorrectedEnds:
         """All block ends, by the approach directions `approach`; home blocks as they are."""
         n, joints = self.path.q.shape
-        ends, before, after, residual = self.path.q.copy(), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 6))
+        ends, before, after = self.path.q.copy(), np.zeros((n, 2)), np.zeros((n, 2))
         partial, unmeasured = np.zeros(n, dtype=bool), np.zeros((n, joints), dtype=bool)
         for k in groups(self.tools):
             rows = k[~self.path.home[k]]
@@ -261,9 +260,8 @@ class ErrorContext:
             ends[rows] = self._exact_turns(found.q, rows)
             before[rows] = np.stack([found.tip_before, found.axis_before], axis=1)
             after[rows] = np.stack([found.tip_after, found.axis_after], axis=1)
-            residual[rows] = np.concatenate([found.tip_residual, found.axis_residual], axis=1)
             partial[rows], unmeasured[rows] = found.partial, found.unmeasured
-        return CorrectedEnds(ends, before, after, residual, partial, unmeasured)
+        return CorrectedEnds(ends, before, after, partial, unmeasured)
 
     def _exact_turns(self, q: Floats, rows: Ints) -> Floats:
         """The same joints, those of a group with the rotary axes of its first block to the last digit."""

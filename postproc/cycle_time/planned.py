@@ -11,26 +11,27 @@ from postproc.cycle_time.lookahead import lookahead
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes
 from postproc.pipeline.result import PostResult
-from postproc.planning.pass_geometry import stops_of
-from postproc.planning.planned import PlannedMotion, Source
+from postproc.planning.planned import PlannedMotion
 from postproc.planning.planned_errors import planned_correction
+from postproc.planning.planned_source import source_of
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
-from toolpaths.smoothing.smooth import Tolerance
 
 
-def planned_times(result: PostResult, blocks: MotionBlocks, model: CycleTimeModel) -> tuple[BlockTimes, list[Diagnostic]]:
-    """Times of a conversion's blocks; a warning where no pass could be planned, so that all times are the model's."""
+def planned_times(result: PostResult, blocks: MotionBlocks, model: CycleTimeModel,
+                  override: float = 1.0) -> tuple[BlockTimes, list[Diagnostic]]:
+    """Times of a conversion's blocks, which were made with this `override`; a warning where no pass could be planned, so
+    that all times are the model's."""
     times = lookahead(blocks, model)
     job, path = result.job, result.path
     if job is None or path is None or blocks.move is None:
         return times, []
     moves = result.moves or job.moves
-    source = Source(result.nominal or path, moves, job.machine, job.kinematics,
-                    Tolerance(job.options.tolerance, job.axis_tolerance), stops_of(job.toolpath, moves), job.toolpath.file,
-                    planned_correction(job, result.compensation, path))
-    motion = result.motion or PlannedMotion(source, np.zeros(0))
+    source = source_of(job, moves, result.nominal or path, planned_correction(job, result.compensation, path),
+                       override * model.override)
+    kept = result.motion if source.override == 1.0 else None
+    motion = kept or PlannedMotion(source, np.zeros(0))
     try:
         spans = [(int(one.move.min()), int(one.move.max()), made.seconds)
                  for one, made in zip(motion.passes, motion.plans, strict=True)]

@@ -51,7 +51,7 @@ class BlockOrigin:
 
 
 def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Control, origin: BlockOrigin | None = None,
-              own_path: bool = True, by_radius: bool = False) -> MotionBlocks:
+              own_path: bool = True, by_radius: bool = False, override: float = 1.0) -> MotionBlocks:
     """The blocks that move, with their pauses.
 
     Args:
@@ -60,6 +60,7 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
         own_path: True where a program without a path mode blends without a limit, and a feed keeps the units that held when
             it was stated (LinuxCNC), else both are the control's
         by_radius: inverse time of arcs counts radians
+        override: the operator's feed override, 1 for 100 %: of feeds alone, not of rapids and taps
     """
     origin = origin or BlockOrigin.by_tool(motion)
     block = _block_of(code, motion)
@@ -76,7 +77,8 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
                           pauses,
                           origin.cl_line, origin.move, _tip_lengths(motion, control))
     inch = _feed_inch(words, block, own_path)
-    blocks = replace(blocks, speed=_speeds(inch, motion, blocks, by_radius))
+    turned = np.where(np.isnan(motion.pitch), override, 1.0)
+    blocks = replace(blocks, speed=_speeds(inch, motion, blocks, by_radius) * turned)
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
     blocks = _unrolled(blocks, motion, control, unit) if (motion.frame > 0).any() else blocks.take(moving)
     return replace(blocks, pauses=_with_indexing(blocks, machine))

@@ -42,12 +42,16 @@ def _cutting(cause: dict[str, Any]) -> float:
     return float(sum(cause[f"{name}_s"] for name in ("feed", "limits", "corners", "stops")))
 
 
-def as_text(e: Estimate, name: str) -> str:
-    """The same for people."""
+def as_text(e: Estimate, name: str, override: float = 1.0) -> str:
+    """The same for people; `override` is the feed override that the blocks were made with."""
     d, s = as_dict(e), shares(e)
     lines = [f"{name}: {clock(e.seconds)} ({e.seconds:.2f} s), 95 % between {clock(e.band[0])} and {clock(e.band[1])}; "
              f"lower bound {clock(e.lower_bound)}",
              f"model {e.model.kind}: {e.model.description}"]
+    feed = "the programmed feed"
+    if override != 1.0:
+        feed = f"feeds at {100.0 * override:g} %"
+        lines.append(f"feed override {100.0 * override:g} %: of feeds, not of rapids, taps and dwells")
     if e.model.assumed:
         lines.append(f"assumed, not documented: {', '.join(e.model.assumed)}")
     lines.append("time by activity: " + ", ".join(f"{key.removesuffix('_s').replace('_', ' ')} {value:.2f} s"
@@ -57,7 +61,7 @@ def as_text(e: Estimate, name: str) -> str:
         lines += table_text([(op["operation"] or "without a name", clock(op["time_s"])) for op in d["operations"]],
                             align="lr", indent=2)
     if d["most_expensive"]:
-        lines.append("largest losses against the programmed feed:")
+        lines.append(f"largest losses against {feed}:")
         for place in d["most_expensive"]:
             cl = f", CL line {place['cl_line']}" if place["cl_line"] is not None else ""
             lines.append(f"  NC line {place['nc_line']}{cl}: {place['lost_s']:.3f} s, {place['cause'].replace('_', ' ')}")

@@ -26,8 +26,11 @@ from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.input_files import read_input, unreadable
 
 
-def from_conversion(result: PostResult) -> MotionBlocks:
-    """The blocks of a conversion that has succeeded, with operations and lines of its CL file."""
+def from_conversion(result: PostResult, override: float = 1.0) -> MotionBlocks:
+    """The blocks of a conversion that has succeeded, with operations and lines of its CL file.
+
+    `override` as of `blocks_of`.
+    """
     assert result.job is not None and result.comparison is not None and result.comparison.executed is not None and result.ok
     job = result.job
     code, motion = result.comparison.executed
@@ -38,15 +41,16 @@ def from_conversion(result: PostResult) -> MotionBlocks:
     kept = np.flatnonzero(job.moves.phase != Phase.PECK)
     origin = BlockOrigin(path.operation[moves.row[owner]].astype(np.int64), names,
                          np.where(inside, moves.line[owner], -1).astype(np.int64), np.where(inside, kept[owner], -1))
-    return _blocks(code, motion, result.machine, job.control, result.controller, origin)
+    return _blocks(code, motion, result.machine, job.control, result.controller, origin, override)
 
 
 def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup: SetupFile, file: str = "",
-               others: Mapping[str, bytes] | None = None) -> tuple[MotionBlocks | None, list[Diagnostic]]:
+               others: Mapping[str, bytes] | None = None,
+               override: float = 1.0) -> tuple[MotionBlocks | None, list[Diagnostic]]:
     """The blocks of a program, from the machine's home; None and why where it cannot be executed.
 
     Tool lengths come from the set-up, by length register as by tool number; the work offset stands where the set-up puts
-    the part. `others`: files of subprograms by name.
+    the part. `others`: files of subprograms by name; `override` as of `blocks_of`.
     """
     controller = with_shop(controller, machine, setup)
     placement, found = part_placement(setup)
@@ -66,7 +70,7 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
         found.append(error("gcode.feed", "cutting blocks without a feed in force", file=file,
                            lines=motion.line[missing][:6].tolist(), count=int(missing.sum()), hint="state F before them"))
         return None, found
-    blocks = _blocks(code, motion, machine, control, controller, None) if len(motion) else None
+    blocks = _blocks(code, motion, machine, control, controller, None, override) if len(motion) else None
     if blocks is None or not len(blocks):
         return None, [*found, error("gcode.no_motion", "the program moves nothing", file=file,
                                     hint="there is no time to estimate")]
@@ -89,9 +93,9 @@ def _executed(data: bytes, controller: ControllerFile, control: Control, lengths
 
 
 def _blocks(code: Canonical, motion: Motion, machine: Machine, control: Control, controller: ControllerFile,
-            origin: BlockOrigin | None) -> MotionBlocks:
+            origin: BlockOrigin | None, override: float) -> MotionBlocks:
     return blocks_of(code, motion, machine, control, origin, own_path=controller.writer == "linuxcnc",
-                     by_radius=controller.feed.arc_inverse == "radius")
+                     by_radius=controller.feed.arc_inverse == "radius", override=override)
 
 
 _RECORD = re.compile(rb"(N?\d+\s*)?[A-Z][A-Z0-9]*\s*/")

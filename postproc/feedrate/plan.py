@@ -16,7 +16,7 @@ from postproc.feedrate.motion import CHUNK, SAMPLE, MotionPiece, Plan
 from postproc.feedrate.paths import Eased, ParametricPath
 from postproc.feedrate.problem import MotionKnots
 from postproc.feedrate.profile import Profile, linear_profile, spline_profile
-from postproc.feedrate.rows import steady_tool_speed
+from postproc.feedrate.rows import rows, steady_tool_speed
 from postproc.feedrate.second_order import second_order
 from postproc.feedrate.shares import shares
 from postproc.feedrate.solve_again import solved_again
@@ -93,7 +93,10 @@ def plan(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, st
 
 def plan_second_order(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, stops: Sequence[float] = (),
                       options: PlannerOptions | None = None, knots: Floats | None = None) -> Plan:
-    """Least time under velocity, acceleration and feed only: a bound, and the plan of machines that state no jerk."""
+    """Least time under velocity, acceleration and feed only: a bound, and the plan of machines that state no jerk.
+
+    A jerk limit of the tool holds where the speed is constant.
+    """
     options = options or PlannerOptions()
     allowed = AllowedFeed(feed, options.override)
     pieces = []
@@ -101,7 +104,12 @@ def plan_second_order(path: ParametricPath, limits: JointLimits, feed: FeedLimit
         sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
         at = eased.derivatives(sigma)
         cap = np.minimum(squared_speed(at.dq, limits.velocity), allowed(eased.parameter(sigma)[0]) ** 2)
-        x = second_order(sigma, at.dq, at.d2q, limits.acceleration, cap, options.method.kernel)
+        most, dq, d2q = limits.acceleration, at.dq, at.d2q
+        if limits.tool is not None:
+            found = rows(eased, sigma, limits, allowed)
+            most, dq, d2q = found.limits.acceleration, found.dq, found.d2q
+            cap = np.minimum(found.cap, steady_tool_speed(eased, sigma, limits.tool) ** 2)
+        x = second_order(sigma, dq, d2q, most, cap, options.method.kernel)
         pieces.append(MotionPiece(eased, linear_profile(sigma, x)))
     return Plan(tuple(pieces), limits, allowed, options.step)
 

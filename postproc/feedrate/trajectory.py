@@ -39,13 +39,6 @@ class Usage:
         """The largest of all."""
         return float(max(self.velocity.max(), self.acceleration.max(), self.jerk.max(), self.feed, self.tool.max()))
 
-    @property
-    def slowdown(self) -> float:
-        """Factor on time that brings every ratio to 1 (less than 1: to spare); jerk falls by its cube."""
-        tilt, acceleration, jerk = self.tool.tolist()
-        return float(max(self.velocity.max(), self.feed, tilt, max(self.acceleration.max(), acceleration) ** 0.5,
-                         max(self.jerk.max(), jerk) ** (1.0 / 3.0)))
-
     def worse(self, other: Usage) -> Usage:
         """The larger of each two ratios."""
         larger = (np.maximum(getattr(self, name), getattr(other, name)) for name in (*ORDERS, "feed", "tool"))

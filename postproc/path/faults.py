@@ -35,6 +35,7 @@ def merged(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
 
 
 def moved_axes(moves: Moves, rows: Ints, moved: Floats, file: str) -> list[Diagnostic]:
+    """What is reported of tool axes that were moved by `moved` (K,) rad onto directions that the machine can take."""
     if not bool((moved > 1e-6).any()):
         return []
     where = rows[moved > 1e-6]
@@ -44,6 +45,7 @@ def moved_axes(moves: Moves, rows: Ints, moved: Floats, file: str) -> list[Diagn
 
 def unreachable(control: Control, kin: Kinematics, moves: Moves, rows: Ints, axis: Floats, q: Floats,
                  file: str) -> list[Diagnostic]:
+    """Errors at poses `rows` (K,) for which q (K, J) is no solution."""
     bad = np.flatnonzero(~np.isfinite(q).all(axis=1) | _elsewhere(kin, moves.tip[rows], q))
     if not len(bad):
         return []
@@ -86,6 +88,7 @@ def _elsewhere(kin: Kinematics, tip: Floats, q: Floats) -> Bools:
 
 
 def no_path(moves: Moves, row: int, file: str) -> Diagnostic:
+    """The error where no linking move leads to row `row` of the moves."""
     return error("link.blocked", "no linking move stays above the safe planes", file=file, lines=[int(moves.line[row])],
                  hint="give clearance.centre and a larger clearance.distance in the set-up")
 

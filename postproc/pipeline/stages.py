@@ -42,9 +42,9 @@ from postproc.pipeline.stage_values import (
     handed_on,
 )
 from postproc.pipeline.tolerance_shares import tolerance_shares
-from postproc.planning.pass_geometry import stops_of
-from postproc.planning.planned import PlannedMotion, Source, planned_motion
+from postproc.planning.planned import PlannedMotion, planned_motion
 from postproc.planning.planned_errors import PlannedCorrection, on_written, planned_correction
+from postproc.planning.planned_source import limits_not_kept, source_of
 from postproc.readback.comparison.slow_moves import with_fingerprint
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
@@ -55,7 +55,6 @@ from postproc.verification.second_witness import second_witness
 from postproc.writing.unwritable import unwritable
 from postproc.writing.writers import writer_for
 from toolpaths.diagnostics import Diagnostic, error, has_errors
-from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.units import DEG
 
 Progress = Callable[[str, int, int], None]
@@ -179,12 +178,10 @@ def planned(made: CheckedStage, progress: Progress | None) -> tuple[PlannedStage
 
 def plan_motion(job: Job, moves: Moves, path: JointPath,
                 correction: PlannedCorrection | None = None) -> tuple[PlannedMotion | None, DiagnosticList]:
-    """The motion of a path within the limits of the axes; None without --feed planned."""
+    """The motion of a path within the limits of axes and tools; None without --feed planned."""
     if job.options.feed != "planned":
-        return None, []
-    return planned_motion(Source(path, moves, job.machine, job.kinematics,
-                                 Tolerance(job.options.tolerance, job.axis_tolerance), stops_of(job.toolpath, moves),
-                                 job.toolpath.file, correction))
+        return None, limits_not_kept(job)
+    return planned_motion(source_of(job, moves, path, correction))
 
 
 def compiled(made: PlannedStage, progress: Progress | None) -> tuple[CompiledStage, DiagnosticList]:

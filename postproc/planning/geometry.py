@@ -82,10 +82,14 @@ class MachinePath:
         return SplinePath(self.fitted.t, self.fitted.c, DEGREE)
 
     @cached_property
+    def tool_spline(self) -> BSpline:
+        """of tip and axis (3 + 3), for limits at the tool; knots as of `fitted`"""
+        return make_interp_spline(self.s, self.values[:, self.joints:], k=DEGREE)
+
+    @cached_property
     def tool(self) -> SplinePath:
-        """of tip and axis, for limits at the tool"""
-        found = make_interp_spline(self.s, self.values[:, self.joints:], k=DEGREE)
-        return SplinePath(found.t, found.c, DEGREE)
+        """The same with its derivatives."""
+        return SplinePath(self.tool_spline.t, self.tool_spline.c, DEGREE)
 
     def derivatives(self, s: Floats) -> Derivatives:
         """Joints at s (N,)."""
@@ -110,20 +114,9 @@ class PathStretch:
     near: JointsNearby
 
 
-def machine_path(path: Smooth, first: float, last: float, kin: Kinematics, near: JointsNearby) -> MachinePath:
-    """The joints' spline along `path` from s = first to last, without a stop between.
-
-    Raises:
-        ArithmeticError: where the machine has no solution, with the s of the first such place.
-    """
-    found, = machine_paths([PathStretch(path, first, last, near)], kin)
-    if isinstance(found, str):
-        raise ArithmeticError(found)
-    return found
-
-
 def machine_paths(stretches: list[PathStretch], kin: Kinematics) -> list[MachinePath | str]:
-    """`machine_path` of each; what is wrong where the machine has no solution. Many short ones are solved together."""
+    """The joints' spline of each, without a stop between its ends; what is wrong where the machine has no solution, with the
+    s of the first such place. Many short ones are solved together."""
     result: list[MachinePath | str] = [""] * len(stretches)
     at = {i: sites(one.path, one.first, one.last) for i, one in enumerate(stretches)}
     for turn in range(ROUNDS + 1):

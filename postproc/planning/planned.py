@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from operator import add
 from typing import get_args
@@ -13,7 +13,7 @@ import numpy as np
 from machines.choices import MotionOrder
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits, Machine
-from postproc.feedrate.limits import JointLimits
+from postproc.feedrate.limits import JointLimits, ToolLimits
 from postproc.feedrate.motion import Plan
 from postproc.feedrate.plan import PlannerOptions, plan, plan_second_order
 from postproc.feedrate.shares import LimitShares
@@ -23,11 +23,13 @@ from postproc.planning.pass_geometry import PassGeometry, pass_geometry
 from postproc.planning.planned_errors import PlannedCorrection
 from postproc.planning.steady_feed import CORNER, steady_seconds
 from postproc.reference.moves import Moves
+from postproc.setup.model import ToolSetup
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, require
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.blend import SHARPEST
 from toolpaths.smoothing.smooth import Tolerance
+from toolpaths.units import DEG
 
 ORDERS: tuple[MotionOrder, ...] = get_args(MotionOrder)
 
@@ -35,6 +37,13 @@ ORDERS: tuple[MotionOrder, ...] = get_args(MotionOrder)
 def joint_limits(limits: Limits) -> JointLimits:
     """What the planner needs of a machine's limits."""
     return JointLimits(limits.velocity, limits.acceleration, limits.jerk)
+
+
+def tool_limits(tool: ToolSetup | None) -> ToolLimits | None:
+    """What the planner needs of a tool of the set-up; None where it has no limit."""
+    if tool is None or not tool.limited:
+        return None
+    return ToolLimits((tool.axis_rate or np.inf) * DEG, tool.tip_acceleration or np.inf, tool.tip_jerk or np.inf)
 
 
 @dataclass(frozen=True)
@@ -114,7 +123,8 @@ class PlannedMotion:
 
     def _plan(self, one: PassGeometry) -> Plan:
         try:
-            return plan_pass(one, self.source.moves, self.source.bounds)
+            options = PlannerOptions(override=self.source.override)
+            return plan_pass(one, self.source.moves, self.source.bounds_of(one), options)
         except (ValueError, ArithmeticError) as fault:
             lines = self.source.moves.line[one.move[[0, -1]]].tolist()
             raise DiagnosticError([error("plan.failed", f"no motion could be planned: {fault}", file=self.source.file,
@@ -136,19 +146,22 @@ class PlannedMotion:
         return reduce(add, (made.shares for made in self.plans)) if known else None
 
     def limiting(self) -> dict[str, dict[str, float]]:
-        """Seconds that each limit of each axis costs, as the plan's multipliers share them out."""
+        """Seconds that each limit of each axis costs, as the plan's multipliers share them out; "tool", where one has
+        limits: rate of its axis, acceleration and jerk of the tip."""
         shares = self.shares
         if shares is None:
             return {}
+        names = (*self.source.machine.axis_names, *(("tool",) if self.source.tools else ()))
         return {name: {f"{order}_s": float(shares.limits[k, j]) for k, order in enumerate(ORDERS)}
-                for j, name in enumerate(self.source.machine.axis_names)}
+                for j, name in enumerate(names)}
 
 
 @dataclass(frozen=True)
 @arrays(stops="S")
 class Source:
-    """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it stops, and how
-    geometric errors are corrected, where they are."""
+    """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it stops, how
+    geometric errors are corrected, where they are, the feed override (1 for 100 %) at which the motion is planned, and
+    limits by index of the tool."""
 
     path: JointPath
     moves: Moves
@@ -158,11 +171,17 @@ class Source:
     stops: Ints
     file: str = ""
     correction: PlannedCorrection | None = None
+    override: float = 1.0
+    tools: Mapping[int, ToolLimits] = field(default_factory=dict)
 
     @property
     def bounds(self) -> JointLimits:
         """Limits of the joints."""
         return joint_limits(self.machine.limits)
+
+    def bounds_of(self, one: PassGeometry) -> JointLimits:
+        """Limits of the joints, and of the tool that cuts a pass."""
+        return replace(self.bounds, tool=self.tools.get(int(self.moves.tool[one.move[0]])))
 
     def geometry(self, sharpest: float = SHARPEST) -> tuple[list[PassGeometry], list[Diagnostic]]:
         """See `pass_geometry`."""
@@ -178,7 +197,7 @@ def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnosti
     stopping, diagnostics = source.geometry(CORNER)
     if diagnostics:
         return None, diagnostics
-    return PlannedMotion(source, steady_seconds(stopping, source.bounds, len(source.path))), []
+    return PlannedMotion(source, steady_seconds([(one, source.bounds_of(one)) for one in stopping], len(source.path))), []
 
 
 def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits, options: PlannerOptions | None = None) -> Plan:

@@ -1,4 +1,5 @@
-"""The highest constant speed of each block at which no axis exceeds velocity, acceleration or jerk anywhere in it.
+"""The highest constant speed of each block at which no axis exceeds velocity, acceleration or jerk anywhere in it, nor the
+tool the limits that the set-up gives it.
 
 At a constant rate v of the path parameter the joints move with q' v, q'' v^2 and q''' v^3. The passes must stop at corners
 (`CORNER`): there no feed of a block keeps the limits, and the control slows down by itself.
@@ -8,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.feedrate.limits import JointLimits
+from postproc.feedrate.limits import JointLimits, ToolLimits
 from postproc.planning.geometry import DEGREE, MachinePath
 from postproc.planning.pass_geometry import PassGeometry
 from toolpaths.arrays import Floats
@@ -19,10 +20,13 @@ ROUNDING = 1e-3
 """Part of the speed that rounding of feed words may take"""
 
 
-def steady_seconds(passes: list[PassGeometry], limits: JointLimits, count: int) -> Floats:
-    """(count,) least seconds of each block of a Path at a constant feed; 0 where no limit binds."""
+def steady_seconds(passes: list[tuple[PassGeometry, JointLimits]], count: int) -> Floats:
+    """(count,) least seconds of each block of a Path at a constant feed; 0 where no limit binds.
+
+    `passes`: each with its limits.
+    """
     seconds = np.zeros(count)
-    for one in passes:
+    for one, limits in passes:
         travel = one.ends - one.begin
         with np.errstate(divide="ignore", invalid="ignore"):
             needed = travel / ((1.0 - ROUNDING) * steady_speed(one, limits))
@@ -42,13 +46,30 @@ def steady_speed(one: PassGeometry, limits: JointLimits) -> Floats:
 def span_speed(path: MachinePath, limits: JointLimits) -> Floats:
     """(S,) largest constant ds/dt on each span between knots, from below: derivatives stay within the hull of their
     B-spline coefficients (de Boor, A Practical Guide to Splines, XI)."""
-    t, c, spans = path.fitted.t, path.fitted.c, len(path.s) - DEGREE
-    speed = np.full(spans, np.inf)
-    for order, limit in enumerate((limits.velocity, limits.acceleration, limits.jerk), start=1):
+    speed = np.full(len(path.s) - DEGREE, np.inf)
+    orders = _hulls(path.fitted.t, path.fitted.c, len(speed))
+    for order, (limit, hull) in enumerate(zip((limits.velocity, limits.acceleration, limits.jerk), orders, strict=True), 1):
+        with np.errstate(divide="ignore"):
+            speed = np.minimum(speed, np.min(limit / np.max(np.abs(hull), axis=0), axis=1) ** (1.0 / order))
+    return speed if limits.tool is None else np.minimum(speed, _tool_speed(path, limits.tool, len(speed)))
+
+
+def _tool_speed(path: MachinePath, limits: ToolLimits, spans: int) -> Floats:
+    """(S,) the same for tip and tool axis, by the lengths of the coefficients' vectors."""
+    first, second, third = _hulls(path.tool_spline.t, path.tool_spline.c, spans)
+    tilt, acceleration, jerk = (np.linalg.norm(hull[..., columns], axis=2).max(axis=0) for hull, columns in
+                                ((first, np.s_[3:]), (second, np.s_[:3]), (third, np.s_[:3])))
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.minimum(limits.tilt_rate / tilt, np.minimum(
+            np.sqrt(limits.acceleration / acceleration), np.cbrt(limits.jerk / jerk))))
+
+
+def _hulls(t: Floats, c: Floats, spans: int) -> list[Floats]:
+    """Coefficients (degree, S, columns) between which each of three derivatives lies on each span."""
+    result = []
+    for order in (1, 2, 3):
         degree = DEGREE + 1 - order
         c = degree * np.diff(c, axis=0) / (t[degree + 1:-1] - t[1:-degree - 1])[:, None]
         t = t[1:-1]
-        hull = np.max([np.abs(c[k:k + spans]) for k in range(degree)], axis=0)
-        with np.errstate(divide="ignore"):
-            speed = np.minimum(speed, np.min(limit / hull, axis=1) ** (1.0 / order))
-    return speed
+        result.append(np.stack([c[k:k + spans] for k in range(degree)]))
+    return result

@@ -13,9 +13,10 @@ from toolpaths.input_files import read_input
 DIGITS = 8
 _ASIDE = {"description", "placement"}
 """keys that change no word of a program: what `place` may choose from"""
-
 _LATER: tuple[tuple[str, ...], ...] = (("hooks",), ("output", "stop_between_tools"))
 """keys that set-ups have not always had: at their defaults they are left out, so that programs keep their fingerprint"""
+_LATER_OF_TOOLS = ("tip_acceleration", "tip_jerk", "axis_rate")
+"""likewise, of each tool"""
 
 
 def fingerprint(setup: SetupFile, file: str) -> str:
@@ -28,6 +29,10 @@ def fingerprint(setup: SetupFile, file: str) -> str:
     for path in _LATER:
         if value_at(values, path) == value_at(default, path):
             del value_at(values, path[:-1])[path[-1]]
+    for tool in values["tools"].values():
+        for name in _LATER_OF_TOOLS:
+            if tool[name] is None:
+                del tool[name]
     for key in file_keys(values):
         try:
             data = read_input(Path(file).parent / str(value_at(values, key)))

@@ -62,6 +62,17 @@ class ToolSetup(ToolBody):
     """where the CL file states no SPINDL for this tool, e.g. spindle = { rpm = 8000, direction = "clockwise" }"""
     coolant: CoolantKind | None = None
     """where the CL file states no COOLNT for this tool"""
+    tip_acceleration: float | None = Field(default=None, gt=0.0)
+    """largest acceleration of the tip along its path on the part, mm/s2; kept by --feed planned; default: no limit"""
+    tip_jerk: float | None = Field(default=None, gt=0.0)
+    """largest jerk of the tip along its path on the part, mm/s3; kept by --feed planned; default: no limit"""
+    axis_rate: float | None = Field(default=None, gt=0.0)
+    """largest rate at which the tool axis turns on the part, degrees/s; kept by --feed planned; default: no limit"""
+
+    @property
+    def limited(self) -> bool:
+        """True where the tool has a limit of its own."""
+        return (self.tip_acceleration, self.tip_jerk, self.axis_rate) != (None, None, None)
 
     @property
     def length(self) -> float:

@@ -11,9 +11,6 @@ import numpy as np
 from postproc.witness.text import Array
 
 COMPILED_FROM = 20_000
-GRAIN = 2e-3
-"""mm and, times AXIS_GRAIN, rad: what rounding of the words may leave of a position"""
-AXIS_GRAIN = 1e-5
 _compiled: list[Callable[..., Any]] = []
 
 

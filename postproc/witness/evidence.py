@@ -114,4 +114,3 @@ class Testimony:
     worst_tip: float = 0.0
     worst_axis: float = 0.0
     seconds: float = 0.0
-    details: dict[str, Any] = field(default_factory=dict)

@@ -69,7 +69,6 @@ class ClText:
     records: list[Record]
     before: list[int]
     lines: list[int]
-    subroutines: bool
 
 
 def read(data: bytes) -> ClText:
@@ -93,7 +92,7 @@ def read(data: bytes) -> ClText:
     used = [k for k, r in enumerate(found) if r.major or r.body]
     lines = line_of[starts] if spans else starts
     return ClText(rows, _lines_of_points(text, spans, ends, line_of), [found[k] for k in used],
-                  [int(before[k]) for k in used], [int(lines[k]) for k in used], b"CALSUB" in text or b"SUB-BEGIN" in text)
+                  [int(before[k]) for k in used], [int(lines[k]) for k in used])
 
 
 def _lines_of_points(text: bytes, spans: list[tuple[int, int]], ends: Array, line_of: Array) -> Array:

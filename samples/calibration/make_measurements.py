@@ -12,9 +12,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from rotary_readings import simulate
 
 import machines
-from machines.calibration.simulator import PARTS, Bench, simulate
+from machines.calibration.rotary_bench import PARTS, Bench
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
 from machines.geometric_error.exchange.write_model import save

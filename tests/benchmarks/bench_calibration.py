@@ -20,10 +20,11 @@ import numpy as np
 import machines
 from machines.calibration.calibrate import calibrate
 from machines.calibration.reversal import conditioning, identify
-from machines.calibration.simulator import Bench, simulate
+from machines.calibration.rotary_bench import Bench
 from machines.geometric_error.actual.correction import correct
 from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load
+from samples.calibration.rotary_readings import simulate
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

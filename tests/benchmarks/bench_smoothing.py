@@ -41,9 +41,10 @@ from postproc.planning.planned import joint_limits
 from tests.postproc.feedrate_kit import MIKRON
 from tests.postproc.kit import SAMPLES, good, machine
 from tests.toolpaths.smoothing.test_smoothing import chain, off, wave
+from tests.toolpaths.smoothing_kit import smooth
 from toolpaths.arrays import Floats
 from toolpaths.shape import Curves
-from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth
+from toolpaths.smoothing.smooth import Smooth, Tolerance
 from toolpaths.units import DEG
 
 TOLERANCE = Tolerance(0.005, 0.025 * DEG)

@@ -8,10 +8,11 @@ import numpy as np
 import machines
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import SplinePath
-from postproc.planning.geometry import MachinePath, machine_path
+from postproc.planning.geometry import MachinePath, PathStretch, machine_paths
+from tests.toolpaths.smoothing_kit import smooth
 from toolpaths.arrays import Floats
 from toolpaths.shape import Curves
-from toolpaths.smoothing.smooth import Tolerance, smooth
+from toolpaths.smoothing.smooth import Tolerance
 
 TOLERANCE = Tolerance(0.005, np.radians(0.025))
 
@@ -48,7 +49,8 @@ def cl_path(points: int, places: int = 4) -> tuple[MachinePath, JointLimits]:
     def near(s: Floats) -> Floats:
         return np.stack([np.interp(s, found.s, joint) for joint in q.T], axis=1)
 
-    path = machine_path(found, 0.0, float(found.s[-1]), machine.kinematics, near)
+    path, = machine_paths([PathStretch(found, 0.0, float(found.s[-1]), near)], machine.kinematics)
+    assert isinstance(path, MachinePath), path
     own = machine.limits
     return path, JointLimits(own.velocity, own.acceleration, own.jerk)
 

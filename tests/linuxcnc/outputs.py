@@ -13,10 +13,11 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.pipeline.result import PostResult
-from postproc.readback.execution.execute import Motion, execute
+from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.text.words import Words, tokenise
 from tests.linuxcnc.interpreter import Canonical, Move, ToolEntry
+from tests.postproc.reader_kit import execute
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import has_errors
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.readback.execution.execute import execute
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.text.words import tokenise
 from tests.linuxcnc.interpreter import Move
+from tests.postproc.reader_kit import execute
 
 LETTERS = ("X", "Y", "Z")
 WORDS = {81: "", 82: " P0.5", 83: " Q4", 73: " Q3", 86: " P0.5"}

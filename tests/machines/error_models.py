@@ -14,6 +14,7 @@ from machines.geometric_error.tables.curves import Fourier, Polynomial, TableCur
 from machines.geometric_error.tables.names import DIRECTIONS, parse
 from machines.kinematics.base import Kinematics
 from machines.kinematics.serial import Serial
+from tests.machines.random_slides import random_slides
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
@@ -78,7 +79,7 @@ def joints(kinematics: Kinematics, n: int, seed: int = 0) -> Floats:
         turning = np.array(kinematics.rotary)
         q[:, turning] = rng.uniform(-2.0, 2.0, (n, int(turning.sum())))
         return q
-    slides = kinematics.random_slides(rng, n)
+    slides = random_slides(kinematics, rng, n)
     return slides if not any(kinematics.rotary) else np.column_stack([slides, rng.uniform(-1.0, 1.0, n)])
 
 

@@ -10,6 +10,7 @@ from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from machines.reach import Margins, is_checked, reach, reach_between, segment_distance
+from tests.machines.random_slides import random_slides
 
 NAMES = ("uranesx", "h4a-c-table", "h4a-spindle-axis")
 
@@ -21,7 +22,7 @@ def parallel(name: str) -> LinearDelta | H4Linear:
 
 
 def joints(kinematics: LinearDelta | H4Linear, n: int, seed: int = 0) -> np.ndarray:
-    slides = kinematics.random_slides(np.random.default_rng(seed), n)
+    slides = random_slides(kinematics, np.random.default_rng(seed), n)
     return slides if isinstance(kinematics, LinearDelta) else np.column_stack([slides, np.zeros(n)])
 
 

@@ -10,10 +10,13 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from postproc.control.control import Control, Rapids
 from postproc.controllers.model import ControllerFile, load_controller
+from postproc.readback.dialects.iso import IsoReader
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.execution.poses import BlockPoses
+from postproc.readback.text.canonical import ProgramText
+from postproc.readback.text.words import Words
 from tests.postproc.kit import machine
 from toolpaths.diagnostics import Diagnostic, has_errors
 
@@ -74,3 +77,12 @@ def faults(dialect: str, text: str, on: str = "mill-3axis") -> dict[str, list[in
         if d.severity.name == "ERROR":
             result.setdefault(d.code, list(d.lines))
     return result
+
+
+def execute(words: Words, letters: tuple[str, ...], offsets: Offsets, file: str = "") -> tuple[Motion, list[Diagnostic]]:
+    """The motion of a program in RS274/NGC words, without subprograms, that starts with the machine at home."""
+    reader = IsoReader(letters)
+    found = reader.check(words, file)
+    canonical, more = reader.translated(ProgramText(words), np.arange(words.lines + 1), file)
+    motion, last = run(canonical, letters, offsets, file)
+    return motion, [*found, *more, *last]

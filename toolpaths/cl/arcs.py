@@ -106,7 +106,8 @@ def arcs_of(r: CircleRecords, full_circles: bool, log: DiagnosticLog) -> Arcs:
 def _normals(r: CircleRecords, log: DiagnosticLog) -> Floats:
     norm = np.linalg.norm(r.normal, axis=1)
     for k in np.flatnonzero(np.abs(norm - 1.0) > UNIT_ROUNDING):
-        log.error("cl.arc-axis", f"the axis of the circle has length {norm[k]:.4g}, it must be 1", int(r.line[k]))
+        log.error("cl.arc-axis", f"the axis of the circle has length {norm[k]:.4g}, it must be 1", int(r.line[k]),
+                  "give the axis as a unit vector (length 1)")
     return np.where((norm > 0.0)[:, None], unit(r.normal), [0.0, 0.0, 1.0])
 
 
@@ -143,7 +144,7 @@ def _sweep(u: Floats, v: Floats, normal: Floats, r: CircleRecords, full_circles:
     angle = np.where(np.isnan(r.sweep), angle, r.sweep)
     for k in np.flatnonzero(angle > _TURN * (_MOST_TURNS + 1)):
         log.error("cl.circle-times", f"an arc of {angle[k] / _TURN:.6g} turns; at most {_MOST_TURNS} are read",
-                  int(r.line[k]))
+                  int(r.line[k]), f"divide the arc: at most {_MOST_TURNS} turns in one record")
     return angle, back
 
 
@@ -151,19 +152,21 @@ def _check_written(angle: float, sweep: float, radius: float, line: int, log: Di
     miss = abs(math.remainder(angle - sweep, _TURN)) * radius
     if not sweep > 0.0 or miss > RADIUS_ERROR:
         log.error("cl.arc-sweep", f"a sweep of {math.degrees(sweep):.6g} degrees misses the end of the arc by "
-                  f"{miss:.3g} mm", line)
+                  f"{miss:.3g} mm", line, "correct the angle, or the GOTO that ends the arc")
 
 
 def _check_radius(start: Floats, end: Floats, r: CircleRecords, log: DiagnosticLog) -> None:
     for k in np.flatnonzero(start == 0.0):
-        log.error("cl.arc-radius", "the arc starts at its centre", int(r.line[k]))
+        log.error("cl.arc-radius", "the arc starts at its centre", int(r.line[k]),
+                  "correct the centre, or the point before the arc")
     miss = np.maximum(np.abs(start - end), np.nan_to_num(np.abs(start - r.radius)))
     for k in np.flatnonzero((miss > RADIUS_WARNING) & (start > 0.0)):
         bad = miss[k] > RADIUS_ERROR
         given = "" if math.isnan(r.radius[k]) else f", {r.radius[k]:.4f} mm as written"
         (log.error if bad else log.warning)(
             "cl.arc-radius", f"start and end of the arc are {start[k]:.4f} and {end[k]:.4f} mm from its axis{given}; "
-            f"{RADIUS_ERROR if bad else RADIUS_WARNING} mm of difference is allowed", int(r.line[k]))
+            f"{RADIUS_ERROR if bad else RADIUS_WARNING} mm of difference is allowed", int(r.line[k]),
+                "correct the centre or the end of the arc, or have the CAM system write points")
 
 
 def _check_sense(sweep: Floats, line: Ints, log: DiagnosticLog) -> None:

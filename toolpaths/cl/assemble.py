@@ -239,7 +239,8 @@ def _kinds(b: ToolpathBuilder, n: int) -> tuple[Array, Array, Array]:
     role = np.full(n, Role.POINT, np.int8)
     rows = np.array(list(b.roles), np.int64)
     if (rows >= n).any():
-        b.log.error("cl.data-comment", "$$-> SPLINE counts more points than follow")
+        b.log.error("cl.data-comment", "$$-> SPLINE counts more points than follow",
+                    hint="write the file again: its end is missing, or correct the count")
     inside = rows < n
     role[rows[inside]] = np.array(list(b.roles.values()), np.int8)[inside]
     kind = np.full(n, Kind.FEED, np.int8)
@@ -274,7 +275,7 @@ def _has_start(b: ToolpathBuilder, rows: PointRows, kind: Array, k: int, row: in
     if row >= len(rows):
         return False
     if row == 0:
-        b.log.error("cl.arc-start", "an arc needs a point before it", b.arcs.line[k])
+        b.log.error("cl.arc-start", "an arc needs a point before it", b.arcs.line[k], "put a GOTO before the arc")
         return False
     if kind[row] == Kind.RAPID:
         b.log.error("cl.arc-rapid", "RAPID does not go with an arc", b.arcs.line[k], "put RAPID before a GOTO")

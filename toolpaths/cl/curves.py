@@ -23,7 +23,8 @@ _TANGENT = re.compile(r"\)\s*,\s*TANTO\b", re.IGNORECASE)
 def indirv(b: ToolpathBuilder, s: Statement) -> None:
     """INDIRV/i, j, k: the direction in which the next curve begins."""
     if len(s.numbers) != 3:
-        b.log.error("cl.indirv", f"INDIRV/{s.body}: it takes three numbers", b.line)
+        b.log.error("cl.indirv", f"INDIRV/{s.body}: it takes three numbers", b.line,
+                    "write INDIRV/i,j,k: the direction in which the arc starts")
         return
     b.toward = (s.numbers[0], s.numbers[1], s.numbers[2])
 
@@ -32,7 +33,8 @@ def indirp(b: ToolpathBuilder, s: Statement) -> None:
     """INDIRP/x, y, z: a point towards which the next curve begins."""
     start = b.last_point()
     if len(s.numbers) != 3 or start is None or math.isnan(start[0]):
-        b.log.error("cl.indirv", f"INDIRP/{s.body}: it takes three numbers and a GOTO before it", b.line)
+        b.log.error("cl.indirv", f"INDIRP/{s.body}: it takes three numbers and a GOTO before it", b.line,
+                    "write GOTO, then INDIRP/x,y,z: a point towards which the arc starts")
         return
     x, y, z = (v - w for v, w in zip(s.numbers, start, strict=True))
     b.toward = (x, y, z)
@@ -51,10 +53,12 @@ def tlon(b: ToolpathBuilder, s: Statement) -> None:
         end = _end_on_plane(b, arc, found, _TANGENT.search(s.body) is not None)
     if arc is None or end is None:
         b.log.error("cl.circle", f"TLON,GOFWD/{s.body[:60]}: only arcs of CIRCLE to LINE and CYLNDR to PLANE through "
-                    "POINT are understood", b.line)
+                    "POINT are understood", b.line,
+                    "have the CAM system write arcs as points (GOTO) or as CIRCLE with numbers")
         return
     if b.toward is None:
-        b.log.error("cl.indirv", "TLON,GOFWD without INDIRV: the direction of the arc is not known", b.line)
+        b.log.error("cl.indirv", "TLON,GOFWD without INDIRV: the direction of the arc is not known", b.line,
+                    "put INDIRV/i,j,k before it")
         return
     b.arcs.toward[len(b.arcs.row)] = b.toward
     b.arcs.add(b.row, tuple(arc[:6]), b.line, arc[6])
@@ -71,7 +75,8 @@ def helical(b: ToolpathBuilder, s: Statement) -> None:
     b.arc_records += 1
     found = _labelled(s.words)
     if {word: len(n) for word, n in found.items()} != _HELICAL:
-        b.log.error("cl.circle", f"HELICAL/{s.body[:60]}: it takes " + ", ".join(_HELICAL) + " with their numbers", b.line)
+        b.log.error("cl.circle", f"HELICAL/{s.body[:60]}: it takes " + ", ".join(_HELICAL) + " with their numbers", b.line,
+                    "write all words with their numbers, or have the CAM system write points (GOTO)")
         return
     pitch, height = abs(found["PITCH"][0]), abs(found["HEIGHT"][0])
     sweep = 2.0 * math.pi * height / pitch if pitch > 0.0 and height > 0.0 else math.radians(abs(found["ANGLE"][0]))
@@ -150,18 +155,19 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
     knots, control = _gather(b)
     start = b.last_point()
     if start is None or math.isnan(start[0]):
-        b.log.error("cl.nurbs", "a spline needs a GOTO before it", b.line)
+        b.log.error("cl.nurbs", "a spline needs a GOTO before it", b.line, "put a GOTO before the spline")
         return
     if b.rapids and b.rapids[-1] == b.row:
         b.log.error("cl.nurbs", "RAPID does not go with a spline", b.line, "put RAPID before a GOTO")
         return
     if len(control) != len(knots) + 2 or not knots:
         b.log.error("cl.nurbs", f"the spline has {len(knots)} knots and {len(control)} control points; a cubic has two "
-                    "more points than knots", b.line)
+                    "more points than knots", b.line, "have the CAM system write the curve as points (GOTO)")
         return
     inner = np.array(knots) / knots[-1] if knots[-1] > 0.0 else np.array([-1.0])
     if (np.diff(np.append(0.0, inner)) < 0.0).any():
-        b.log.error("cl.nurbs", "the knots of the spline do not rise from 0", b.line)
+        b.log.error("cl.nurbs", "the knots of the spline do not rise from 0", b.line,
+                    "have the CAM system write the curve as points (GOTO)")
         return
     points = spline_points(np.array([start, *control]), inner, SPLINE_CHORD / b.scale).tolist()
     for x, y, z in points[:-1]:
@@ -190,7 +196,8 @@ def _gather(b: ToolpathBuilder) -> tuple[list[float], list[Triple]]:
         elif len(n) == 3:
             control.append((n[0], n[1], n[2]))
         else:
-            b.log.error("cl.nurbs", f"CNTRL has {len(n)} numbers, it takes 3", b.program.lines[b.index])
+            b.log.error("cl.nurbs", f"CNTRL has {len(n)} numbers, it takes 3", b.program.lines[b.index],
+                        "write CNTRL/x,y,z")
     return knots, control
 
 

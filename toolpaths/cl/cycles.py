@@ -55,7 +55,8 @@ def _again(b: ToolpathBuilder, s: Statement) -> None:
     if len(s.words) == 1 and b.next_statement_is("CYCLE"):
         return
     if not isinstance(last, CycleValues):
-        b.log.error("cl.cycle", "CYCLE/ON before any cycle", b.line)
+        b.log.error("cl.cycle", "CYCLE/ON before any cycle", b.line,
+                    "state the cycle first (CYCLE/DRILL,DEPTH,...), or take CYCLE/ON out")
         return
     _arm(b, values(replace(last, empty=()), s.words[1:]))
 
@@ -231,7 +232,8 @@ def words_as_written(b: ToolpathBuilder, s: Statement) -> None:
     if isinstance(found, list) and all(isinstance(w, (str, float, int)) for w in found):
         b.memory[_WORDS] = tuple(w if isinstance(w, str) else float(w) for w in found)
     else:
-        b.log.error("cl.data-comment", "$$-> WORDS takes a JSON list of words and numbers", b.line)
+        b.log.error("cl.data-comment", "$$-> WORDS takes a JSON list of words and numbers", b.line,
+                    "correct the list, for example $$-> WORDS / [\"DEPTH\", 5.0], or take the line out")
 
 
 HANDLERS = {"CYCLE": cycle, "$$->WORDS": words_as_written}

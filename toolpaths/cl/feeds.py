@@ -91,7 +91,8 @@ def _inverse(b: ToolpathBuilder, s: Statement) -> None:
     elif s.has("AUTO", "ON", "OFF"):
         b.event("FEDRAT", tuple(w for w in s.words if w != ""))
     else:
-        b.log.error("cl.feed", f"FEDRAT/{s.body}: INVERS needs a number, AUTO or OFF", b.line)
+        b.log.error("cl.feed", f"FEDRAT/{s.body}: INVERS needs a number, AUTO or OFF", b.line,
+                    "write FEDRAT/INVERS,2.5, FEDRAT/INVERS,AUTO or FEDRAT/INVERS,OFF")
 
 
 HANDLERS = {"FEDRAT": fedrat}

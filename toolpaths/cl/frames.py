@@ -64,12 +64,14 @@ def rotation_of(x: Floats, y: Floats) -> Floats | None:
 def system_of_rows(b: ToolpathBuilder, numbers: list[float], word: str) -> Map | None:
     """Rotation and origin (mm) of three rows of four; None and a diagnostic where they are no system."""
     if len(numbers) != 12:
-        b.log.error("cl.frame", f"{word} has {len(numbers)} numbers, it takes 12", b.line)
+        b.log.error("cl.frame", f"{word} has {len(numbers)} numbers, it takes 12", b.line,
+                    "write three rows of X, Y, Z and origin: 12 numbers")
         return None
     rows = np.array(numbers).reshape(3, 4)
     matrix = rotation_of(rows[:, 0], rows[:, 1])
     if matrix is None or float(matrix[:, 2] @ rows[:, 2]) < 1.0 - _ORTHOGONAL:
-        b.log.error("cl.frame", f"the axes of {word} are not three right-handed unit vectors at right angles", b.line)
+        b.log.error("cl.frame", f"the axes of {word} are not three right-handed unit vectors at right angles", b.line,
+                    "correct the axes: X, Y, Z of length 1, Z = X x Y")
         return None
     return matrix, rows[:, 3] * b.scale
 
@@ -78,12 +80,14 @@ def msys(b: ToolpathBuilder, s: Statement) -> None:
     """MSYS/origin, X axis, Y axis (nine numbers)."""
     numbers = s.numbers
     if len(numbers) != 9:
-        b.log.error("cl.frame", f"MSYS has {len(numbers)} numbers, it takes origin, X and Y axis (9)", b.line)
+        b.log.error("cl.frame", f"MSYS has {len(numbers)} numbers, it takes origin, X and Y axis (9)", b.line,
+                    "write MSYS/x,y,z, X axis, Y axis: 9 numbers")
         return
     n = np.array(numbers)
     matrix = rotation_of(n[3:6], n[6:9])
     if matrix is None:
-        b.log.error("cl.frame", "the axes of MSYS are not unit vectors at right angles", b.line)
+        b.log.error("cl.frame", "the axes of MSYS are not unit vectors at right angles", b.line,
+                    "correct the axes: X and Y of length 1, at right angles")
         return
     set_system(b, "MSYS", matrix, n[:3] * b.scale)
 
@@ -98,12 +102,14 @@ def csys(b: ToolpathBuilder, s: Statement) -> None:
 def mcs(b: ToolpathBuilder, s: Statement) -> None:
     """MCS/X axis, Y axis, Z axis, origin (12 numbers): the work plane of Autodesk's posts for CAMplete and MANUSnc."""
     if len(s.numbers) != 12:
-        b.log.error("cl.frame", f"MCS has {len(s.numbers)} numbers, it takes X, Y and Z axis and origin (12)", b.line)
+        b.log.error("cl.frame", f"MCS has {len(s.numbers)} numbers, it takes X, Y and Z axis and origin (12)", b.line,
+                    "write X axis, Y axis, Z axis, origin: 12 numbers")
         return
     axes = np.array(s.numbers).reshape(4, 3)
     matrix = rotation_of(axes[0], axes[1])
     if matrix is None or float(matrix[:, 2] @ axes[2]) < 1.0 - _ORTHOGONAL:
-        b.log.error("cl.frame", "the axes of MCS are not three right-handed unit vectors at right angles", b.line)
+        b.log.error("cl.frame", "the axes of MCS are not three right-handed unit vectors at right angles", b.line,
+                    "correct the axes: X, Y, Z of length 1, Z = X x Y")
         return
     set_system(b, "MCS", matrix, axes[3] * b.scale)
 
@@ -114,12 +120,13 @@ def mcsys(b: ToolpathBuilder, s: Statement) -> None:
     shape = tuple(w for w in s.words if isinstance(w, str))
     if shape != ("NUM", "POINT", "VECTOR", "VECTOR") or len(n) != 10:
         b.log.error("cl.frame", f"MCSYS/{s.body[:60]}: it takes NUM, a number, POINT, origin, VECTOR, X axis, VECTOR, "
-                    "Y axis", b.line)
+                    "Y axis", b.line, "write MCSYS/NUM,1,POINT,x,y,z,VECTOR,i,j,k,VECTOR,i,j,k")
         return
     work_offset(b, n[0])
     matrix = rotation_of(np.array(n[4:7]), np.array(n[7:10]))
     if matrix is None:
-        b.log.error("cl.frame", "the axes of MCSYS are not unit vectors at right angles", b.line)
+        b.log.error("cl.frame", "the axes of MCSYS are not unit vectors at right angles", b.line,
+                    "correct the axes: X and Y of length 1, at right angles")
     else:
         set_system(b, "MCSYS", matrix, np.array(n[1:4]) * b.scale)
 
@@ -127,7 +134,8 @@ def mcsys(b: ToolpathBuilder, s: Statement) -> None:
 def zero(b: ToolpathBuilder, s: Statement) -> None:
     """ZERO/n: the work offset of the control that the points after it are in."""
     if len(s.numbers) != 1:
-        b.log.error("cl.frame", f"ZERO/{s.body}: it takes the number of a work offset", b.line)
+        b.log.error("cl.frame", f"ZERO/{s.body}: it takes the number of a work offset", b.line,
+                    "write for example ZERO/1")
     else:
         work_offset(b, s.numbers[0])
 
@@ -143,7 +151,7 @@ def work_offset(b: ToolpathBuilder, number: float) -> None:
 def trans(b: ToolpathBuilder, s: Statement) -> None:
     """TRANS/x, y, z: points from here on are shifted by it; the next TRANS replaces it."""
     if len(s.numbers) != 3 or len(s.words) != 3:
-        b.log.error("cl.frame", f"TRANS/{s.body}: only three numbers are understood", b.line)
+        b.log.error("cl.frame", f"TRANS/{s.body}: only three numbers are understood", b.line, "write TRANS/x,y,z")
         return
     shift = np.array(s.numbers) * b.scale
     b.shift = np.zeros(3) if indexing.cancels(b, shift) else shift
@@ -157,13 +165,15 @@ def origin(b: ToolpathBuilder, s: Statement) -> None:
         n = np.array(numbers)
         matrix = rotation_of(n[3:6], np.cross(n[6:9], n[3:6]))
         if matrix is None:
-            b.log.error("cl.frame", "the axes of ORIGIN are not unit vectors at right angles", b.line)
+            b.log.error("cl.frame", "the axes of ORIGIN are not unit vectors at right angles", b.line,
+                        "correct the axes: X and Y of length 1, at right angles")
         else:
             set_system(b, "ORIGIN", matrix, n[:3] * b.scale)
     elif len(numbers) == 3:
         b.log.warning("cl.origin", "ORIGIN places the part on a machine; give that in the set-up file", b.line)
     else:
-        b.log.error("cl.frame", f"ORIGIN has {len(numbers)} numbers, it takes 3 or 9", b.line)
+        b.log.error("cl.frame", f"ORIGIN has {len(numbers)} numbers, it takes 3 or 9", b.line,
+                    "write ORIGIN/x,y,z, or with X axis and Y axis behind it")
 
 
 def comment(b: ToolpathBuilder, s: Statement) -> None:
@@ -189,7 +199,6 @@ _NO_ANGLE = 1e-9
 """rad"""
 _AXES = {"AAXIS": 0, "BAXIS": 1, "CAXIS": 2, "A": 0, "B": 1, "C": 2, "XAXIS": 0, "YAXIS": 1, "ZAXIS": 2}
 _TURNED = frozenset({"creo", "solidworks-clt"})
-_NO_AXIS_WORDS = frozenset({"CLW", "CCLW", "INCR", "ATANGL", "TABLE", "HEAD", "NEXT", "ROTREF", "AXIS"})
 
 
 def rotate(b: ToolpathBuilder, s: Statement) -> None:

@@ -39,7 +39,8 @@ def goto(b: ToolpathBuilder, s: Statement) -> None:
                     "comma or a blank splits a number", b.line, "state the feed by FEDRAT before the GOTO")
         return
     if len(numbers) not in (3, 6, 9):
-        b.log.error("cl.goto", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9", b.line)
+        b.log.error("cl.goto", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9", b.line,
+                    "write GOTO/x,y,z, or with the tool axis GOTO/x,y,z,i,j,k")
         return
     if s.tail:
         b.contacts.append(b.row)
@@ -50,7 +51,8 @@ def godlta(b: ToolpathBuilder, s: Statement) -> None:
     """A move by (dx, dy, dz), or by one number along the tool axis, away from the part where positive."""
     numbers = s.numbers
     if len(numbers) != len(s.words) or len(numbers) not in (1, 3, 6):
-        b.log.error("cl.godlta", f"GODLTA/{s.body[:60]}: it takes 1, 3 or 6 numbers", b.line)
+        b.log.error("cl.godlta", f"GODLTA/{s.body[:60]}: it takes 1, 3 or 6 numbers", b.line,
+                    "write GODLTA/x,y,z, or GODLTA/d along the tool axis")
         return
     if b.row == 0:
         b.log.error("cl.godlta", "GODLTA before any point: there is nothing to move from", b.line,
@@ -64,7 +66,8 @@ def from_(b: ToolpathBuilder, s: Statement) -> None:
     """Where the tool stands; a RAPID before it counts for the move after it."""
     numbers = s.numbers
     if len(numbers) not in (3, 6):
-        b.log.error("cl.from", f"FROM/{s.body[:60]}: it takes 3 or 6 numbers", b.line)
+        b.log.error("cl.from", f"FROM/{s.body[:60]}: it takes 3 or 6 numbers", b.line,
+                    "write FROM/x,y,z, or with the tool axis FROM/x,y,z,i,j,k")
         return
     waiting = bool(b.rapids) and b.rapids[-1] == b.row
     b.add_point(_triple(numbers, 0), _triple(numbers, 3), role=Role.START)
@@ -79,7 +82,8 @@ def gohome(b: ToolpathBuilder, s: Statement) -> None:
         b.rapids.append(b.row)
         b.add_point(_triple(numbers, 0), _triple(numbers, 3), role=Role.HOME)
     elif s.words[:1] == ("",):
-        b.log.error("cl.from", f"GOHOME/{s.body[:60]}: its first number is missing", b.line)
+        b.log.error("cl.from", f"GOHOME/{s.body[:60]}: its first number is missing", b.line,
+                    "write GOHOME alone, or GOHOME/x,y,z")
     else:
         b.event("GOHOME", tuple(w for w in s.words if w != ""))
 
@@ -94,7 +98,7 @@ def rapid(b: ToolpathBuilder, s: Statement) -> None:
 def tlaxis(b: ToolpathBuilder, s: Statement) -> None:
     """The tool axis of points of three numbers from here on. In `.clt` it is that in the part, whatever ROTABL says."""
     if len(s.numbers) != 3:
-        b.log.error("cl.tlaxis", f"TLAXIS/{s.body}: only three numbers are understood", b.line)
+        b.log.error("cl.tlaxis", f"TLAXIS/{s.body}: only three numbers are understood", b.line, "write TLAXIS/i,j,k")
     elif b.dialect.frame_turns:
         b.world_axes.append((b.row, _triple(s.numbers, 0), b.line))
         use_world_axis(b)
@@ -107,19 +111,21 @@ def zsurf(b: ToolpathBuilder, s: Statement) -> None:
     if len(s.words) == 1 and s.numbers:
         b.zsurf = s.numbers[0]
     else:
-        b.log.error("cl.motion-word", f"ZSURF/{s.body}: only a single height is understood", b.line)
+        b.log.error("cl.motion-word", f"ZSURF/{s.body}: only a single height is understood", b.line,
+                    "write ZSURF/z, or have the CAM system write Z in each GOTO")
 
 
 def circle(b: ToolpathBuilder, s: Statement) -> None:
     """An arc that ends in the very next GOTO."""
     b.arc_records += 1
     if not b.next_is_point():
-        b.log.error("cl.circle-end", "CIRCLE is not followed by a GOTO, which gives its end", b.line)
+        b.log.error("cl.circle-end", "CIRCLE is not followed by a GOTO, which gives its end", b.line,
+                    "put the GOTO of the end behind CIRCLE")
         return
     numbers = _circle_numbers(s.numbers)
     if numbers is None:
         b.log.error("cl.circle", f"CIRCLE has {len(s.numbers)} numbers, it takes center, axis, radius (4, 6, 7 or 11)",
-                    b.line)
+                    b.line, "write CIRCLE/ centre x,y,z, axis i,j,k, radius")
         return
     sweep = s.after("SWEEP")
     vector, sense = _axis_and_sense(b, s, numbers)
@@ -130,7 +136,8 @@ def _turns(b: ToolpathBuilder, s: Statement) -> float:
     """The whole turns of TIMES, 0 without it."""
     times = s.after("TIMES")
     if s.has("TIMES") and (times is None or times < 0.0 or times != math.floor(times)):
-        b.log.error("cl.circle-times", f"{s.major}/...{s.tail}: TIMES takes a whole number", b.line)
+        b.log.error("cl.circle-times", f"{s.major}/...{s.tail}: TIMES takes a whole number", b.line,
+                    "write for example TIMES,2")
         return 0.0
     return times or 0.0
 
@@ -159,13 +166,15 @@ def movarc(b: ToolpathBuilder, s: Statement) -> None:
     b.arc_records += 1
     angle, numbers = s.after("ANGLE"), _labelled(s) if s.has("CENTER") else s.numbers
     if len(numbers) != 7 or (angle is None and not s.has("CENTER")):
-        b.log.error("cl.circle", f"MOVARC/{s.body[:60]}: it takes center, axis, radius, ANGLE, degrees", b.line)
+        b.log.error("cl.circle", f"MOVARC/{s.body[:60]}: it takes center, axis, radius, ANGLE, degrees", b.line,
+                    "write MOVARC/ centre x,y,z, axis i,j,k, radius, ANGLE, degrees")
     elif b.dialect.planes is Planes.OVER_BOTTOM and angle is not None and abs(abs(angle) - 180.0) < _HALF_TURN:
         b.log.error("cl.circle", f"MOVARC/...ANGLE, {angle:g}: this post does not determine the sense of half a turn",
                     b.line,
                     "write the file with the post Common ISO 4343 APT")
     elif not b.next_is_point():
-        b.log.error("cl.circle-end", "MOVARC is not followed by a GOTO, which gives its end", b.line)
+        b.log.error("cl.circle-end", "MOVARC is not followed by a GOTO, which gives its end", b.line,
+                    "put the GOTO of the end behind MOVARC")
     else:
         sweep = _NAN if angle is None else math.radians(abs(angle))
         b.arcs.add(b.row, tuple(numbers[:6]), b.line, numbers[6], _turns(b, s) if angle is None else 0.0,

@@ -140,7 +140,8 @@ def _units(program: StatementList, given: LengthUnit | None, log: DiagnosticLog)
     """The unit of the file: as given, by its UNITS word, by its feed units, else mm."""
     said = units_said(program)
     for body, line in said.wrong:
-        log.error("cl.units", f"UNITS/{body}: the units are MM or INCHES", line)
+        log.error("cl.units", f"UNITS/{body}: the units are MM or INCHES", line,
+                  "write UNITS/MM or UNITS/INCHES, or give --units")
     if given is not None:
         if said.words and given not in said.words:
             log.warning("cl.units", f"the file says {'/'.join(said.words)}, {given} was asked for and is taken",

@@ -162,7 +162,8 @@ def fini(b: ToolpathBuilder, s: Statement) -> None:
 def mode(b: ToolpathBuilder, s: Statement) -> None:
     """MODE and SET: incremental coordinates are refused, the rest is an event (MODE) or nothing (SET)."""
     if s.has("INCR", "INCRE", "INCREM") and not s.has("OFF"):
-        b.log.error("cl.motion-word", f"{s.major}/{s.body}: incremental coordinates are not supported", b.line)
+        b.log.error("cl.motion-word", f"{s.major}/{s.body}: incremental coordinates are not supported", b.line,
+                    "have the CAM system write absolute coordinates")
     elif s.major == "MODE":
         plain_event(b, s)
 
@@ -181,7 +182,8 @@ def _json(b: ToolpathBuilder, s: Statement) -> dict[str, object] | None:
         found = None
     if isinstance(found, dict):
         return found
-    b.log.error("cl.data-comment", f"{s.major} takes a JSON object", b.line)
+    b.log.error("cl.data-comment", f"{s.major} takes a JSON object", b.line,
+                "correct the object, or take the line out")
     return None
 
 
@@ -199,7 +201,7 @@ def own_item(b: ToolpathBuilder, s: Statement) -> None:
             b.declared.operations.append(Operation(str(found.get("name", "")), str(found.get("tool_name", "")),
                                                    _index(found, "frame"), bool(found.get("turning")), b.line))
     except (TypeError, ValueError, KeyError) as fault:
-        b.log.error("cl.data-comment", f"{s.major}: {fault}", b.line)
+        b.log.error("cl.data-comment", f"{s.major}: {fault}", b.line, "correct the object, or take the line out")
 
 
 def _index(found: dict[str, object], key: str) -> int:
@@ -238,7 +240,8 @@ def own_spline(b: ToolpathBuilder, s: Statement) -> None:
     if b.declared is None:
         return
     if not 0 <= count <= len(b.points) + len(b.program.lines):
-        b.log.error("cl.data-comment", f"$$-> SPLINE / {s.body}: it takes a count of points", b.line)
+        b.log.error("cl.data-comment", f"$$-> SPLINE / {s.body}: it takes a count of points", b.line,
+                    "write for example $$-> SPLINE / 12")
         return
     b.roles.update(dict.fromkeys(range(b.row, b.row + int(count)), Role.SPLINE))
 
@@ -250,7 +253,8 @@ def own_use(b: ToolpathBuilder, s: Statement) -> None:
     values = [int(n) for n in s.numbers]
     if len(values) != 2 or not 0 <= values[0] < len(b.declared.operations) \
             or not -1 <= values[1] < len(b.declared.tools):
-        b.log.error("cl.data-comment", f"$$-> USE / {s.body}: no such operation or tool was declared", b.line)
+        b.log.error("cl.data-comment", f"$$-> USE / {s.body}: no such operation or tool was declared", b.line,
+                    "declare it before its use, or take the line out")
         return
     b.operation.set(b.row, values[0])
     b.declared.tool.set(b.row, values[1])

@@ -77,7 +77,8 @@ def _register(b: ToolpathBuilder, register: float | None) -> float | None:
 def change(b: ToolpathBuilder, number: float, register: float | None, more: tuple[float, ...] = ()) -> None:
     """Load tool `number`; the event LOADTL and the tool index follow."""
     if number != math.floor(number) or not 0 <= number < _MAX_NUMBER:
-        b.log.error("cl.tool-number", f"{number:g} is no tool number", b.line)
+        b.log.error("cl.tool-number", f"{number:g} is no tool number", b.line,
+                    "tool numbers are whole numbers from 1 on")
         return
     register = _register(b, register)
     state = _state(b)
@@ -109,7 +110,8 @@ def loadtl(b: ToolpathBuilder, s: Statement) -> None:
     length, register (ISO): numbers behind a word belong to it."""
     numbers = s.numbers
     if not numbers:
-        b.log.error("cl.tool-number", f"LOADTL/{s.body}: it takes a tool number", b.line)
+        b.log.error("cl.tool-number", f"LOADTL/{s.body}: it takes a tool number", b.line,
+                    "write for example LOADTL/3")
         return
     register = s.after("ADJUST", "OSETNO", "OFFSET")
     placed = [w for w in takewhile(lambda w: isinstance(w, float) or not w, s.words) if isinstance(w, float)]
@@ -131,7 +133,8 @@ def load(b: ToolpathBuilder, s: Statement) -> None:
         b.log.warning("cl.wire", "LOAD/WIRE: this operation cuts with a wire, not with a tool", b.line)
         return
     if number is None:
-        b.log.error("cl.tool-number", f"LOAD/{s.body}: it takes TOOL and a number", b.line)
+        b.log.error("cl.tool-number", f"LOAD/{s.body}: it takes TOOL and a number", b.line,
+                    "write for example LOAD/TOOL,3")
         return
     change(b, number, s.after("ADJUST", "OSETNO"))
 
@@ -139,7 +142,8 @@ def load(b: ToolpathBuilder, s: Statement) -> None:
 def turret(b: ToolpathBuilder, s: Statement) -> None:
     """TURRET/number[, OSETNO, register, ...]."""
     if not s.numbers:
-        b.log.error("cl.tool-number", f"TURRET/{s.body}: it takes a station number", b.line)
+        b.log.error("cl.tool-number", f"TURRET/{s.body}: it takes a station number", b.line,
+                    "write for example TURRET/3")
         return
     change(b, s.numbers[0], s.after("OSETNO"))
 

@@ -14,7 +14,6 @@ from itertools import count
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.blend import SHARPEST, SegmentBlends, chosen
@@ -77,17 +76,12 @@ class Smooth:
         return values[:, :3], axis / np.linalg.norm(axis, axis=1, keepdims=True)
 
 
-def smooth(curves: Curves, tolerance: Tolerance, sharpest: float = SHARPEST) -> Smooth | None:
-    """The smoothed motion along a chain of curves, each beginning where the one before ends; None where nothing moves.
-
-    Args:
-        sharpest: rad; the motion stops where tip and axis together turn by more in one joint
-    """
-    return smooth_all(curves, np.array([0, len(curves)]), tolerance, sharpest)[0]
-
-
 def smooth_all(curves: Curves, first: Ints, tolerance: Tolerance, sharpest: float = SHARPEST) -> list[Smooth | None]:
-    """`smooth` of many chains, curves [first[k], first[k + 1]) of each; what comes out does not depend on the others."""
+    """The smoothed motion along chains of curves, [first[k], first[k + 1]) of each, each curve beginning where the one
+    before ends; None where nothing moves. What comes out of one chain does not depend on the others.
+
+    `sharpest`, rad: the motion stops where tip and axis together turn by more in one joint.
+    """
     travel = lengths(curves, tolerance.scale)
     moving = travel > STILL
     begin = np.concatenate(([0], np.cumsum(moving)))[first]
@@ -177,15 +171,3 @@ def _more_corners(corner: Bools, parts: ChainSegments, chord: Ints, all_of_it: b
     more[np.maximum(chord - 1, 0)] = True
     more[np.minimum(chord, len(corner) - 1)] = True
     return more
-
-
-def deviation(found: Smooth, curves: Curves, parts: int = 4) -> tuple[float, float]:
-    """Largest distance (tip mm, axis rad) from the curves at the same parameter, at `parts` places on each move."""
-    travel = np.diff(found.s)
-    rows = np.flatnonzero(travel > 0.0)
-    worst = np.zeros(2)
-    for part in np.linspace(0.0, 1.0, parts + 1):
-        tip, axis = found.at(found.s[rows] + part * travel[rows])
-        wanted, wanted_axis = curves.take(rows).at(np.full(len(rows), part))
-        worst = np.maximum(worst, [np.linalg.norm(tip - wanted, axis=1).max(), angle_between(axis, wanted_axis).max()])
-    return float(worst[0]), float(worst[1])

@@ -44,32 +44,12 @@ def homogeneous(torsor: Floats, order: Order = "xyz") -> Floats:
     return result
 
 
-def about(transform: Floats, point: Floats) -> Floats:
-    """The transforms (N, 4, 4) acting about a point (3,) mm instead of the origin."""
-    result = np.array(transform, dtype=np.float64)
-    result[:, :3, 3] += point - transform[:, :3, :3] @ point
-    return result
-
-
 def inverse(transform: Floats) -> Floats:
     """Inverse (N, 4, 4) of rigid transforms (N, 4, 4)."""
     result = np.array(transform, dtype=np.float64)
     turned = np.swapaxes(transform[:, :3, :3], 1, 2)
     result[:, :3, :3] = turned
     result[:, :3, 3] = -np.einsum("nij,nj->ni", turned, transform[:, :3, 3])
-    return result
-
-
-def transport(transform: Floats) -> Floats:
-    """Transport matrices (N, 6, 6): what a small torsor in frame j is, seen at and along frame k (C 1.25).
-
-    Args:
-        transform: (N, 4, 4), frame k in frame j, so coordinates in k to coordinates in j
-    """
-    turned = np.swapaxes(transform[:, :3, :3], 1, 2)
-    result = np.zeros((len(transform), 6, 6))
-    result[:, :3, :3] = result[:, 3:, 3:] = turned
-    result[:, :3, 3:] = turned @ np.swapaxes(cross_matrix(transform[:, :3, 3]), 1, 2)
     return result
 
 

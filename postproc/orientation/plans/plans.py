@@ -31,7 +31,7 @@ class OrientationPlan:
 
     Attributes:
         states: the state of each pass, see `StateTable`
-        picked: a Turned per pass
+        picked: a Candidate per pass
         cuts, rapids (N,): seconds of each pass
         links (N + 1,): seconds before each pass, and back home
         seconds: all together

@@ -30,7 +30,6 @@ from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 
-TIGHT = 1.01  # bound over worst pose that is near enough
 HALVINGS = 26
 """at most, of one block"""
 SAME = 1e-5

@@ -13,7 +13,7 @@ from postproc.readback.execution.frames import AXES, ExecutionFrame, FrameTable
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.execution.rows import INCH, BlockSection, MotionRows
 from postproc.readback.execution.sections import run_section
-from postproc.readback.text.canonical import CALL, LAW, REST, TURNS, Canonical, ProgramText, WordMeaning, in_files, placed
+from postproc.readback.text.canonical import CALL, LAW, REST, TURNS, Canonical, WordMeaning, in_files, placed
 from postproc.readback.text.modal import Modal, columns, fill, fill_values, modal_state, number_of
 from postproc.readback.text.words import Words
 from postproc.reference.coolant import FLOOD, MIST
@@ -215,14 +215,3 @@ def _feeds(words: Words, modal: Modal, rows: MotionRows) -> tuple[Floats, Bools]
     if rows.hole.any():
         value = np.where(np.isfinite(rows.feed), rows.feed, value)
     return value, (rows.code > 0) & ~(value > 0.0)
-
-
-def execute(words: Words, letters: tuple[str, ...], offsets: Offsets, file: str = "") -> tuple[Motion, list[Diagnostic]]:
-    """The motion of a program in RS274/NGC words, without subprograms, that starts with the machine at home."""
-    from postproc.readback.dialects.iso import IsoReader
-
-    reader = IsoReader(letters)
-    found = reader.check(words, file)
-    canonical, more = reader.translated(ProgramText(words), np.arange(words.lines + 1), file)
-    motion, last = run(canonical, letters, offsets, file)
-    return motion, [*found, *more, *last]

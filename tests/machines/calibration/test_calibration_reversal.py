@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from machines.calibration.problem import linear, solve
 from machines.calibration.reversal import conditioning, cost_without, identify, plan, reversal_matrix, statistics
+from machines.calibration.rotary_bench import Bench, mount_jacobian
 from machines.calibration.rotary_fit import error_model, fit_rotary
-from machines.calibration.simulator import Bench, mount_jacobian, simulate
+from samples.calibration.rotary_readings import simulate
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

@@ -17,6 +17,7 @@ from machines.geometric_error.files.loader import load
 from machines.kinematics.base import Kinematics
 from tests.machines.independent_machine import Curve, Errors, Machine
 from tests.machines.random_error_files import Draw
+from tests.machines.random_slides import random_slides
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
@@ -63,7 +64,7 @@ def drawn(folder: Path, name: str, seed: int, both: bool = False, n: int = 8, si
         low, high = np.nan_to_num(machine.limits.lower, neginf=-7.0), np.nan_to_num(machine.limits.upper, posinf=7.0)
         q = rng.uniform(low, high, (n, len(low)))
     else:
-        q = kin.random_slides(rng, n)
+        q = random_slides(kin, rng, n)
         q = np.column_stack([q, rng.uniform(-0.7, 0.7, n)]) if any(machine.rotary) else q
     return Case(own, file, kin, load(file, machine), q)
 

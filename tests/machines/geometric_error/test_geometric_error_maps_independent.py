@@ -14,6 +14,7 @@ import machines
 from machines.geometric_error.actual.correction import correct
 from machines.geometric_error.files.loader import load
 from tests.machines.independent_machine import UNITS, Machine, moved
+from tests.machines.random_slides import random_slides
 from toolpaths.arrays import Floats
 
 TOOL = 77.0
@@ -123,7 +124,7 @@ def test_a_second_reading_of_the_map_agrees(name: str, letters: str, seed: int, 
     model, kin = load(drawn.write(tmp_path), machine), machine.kinematics.with_tool(TOOL)
     rng = np.random.default_rng(seed)
     if "legs" in drawn.own.kinematics:
-        q = kin.random_slides(rng, 200)
+        q = random_slides(kin, rng, 200)
         q = np.column_stack([q, rng.uniform(-0.9, 0.9, len(q))]) if any(machine.rotary) else q
     else:
         q = rng.uniform(-1.0, 1.0, (200, kin.joints)) * np.where(machine.rotary, 0.9, 150.0)

@@ -22,6 +22,7 @@ from machines.geometric_error.files.loader import load, load_checked
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.linear_delta import LinearDelta
 from tests.machines.error_models import joints, model, rod_errors
+from tests.machines.random_slides import random_slides
 from toolpaths.arrays import Floats
 
 NAMES = ("uranesx", "h4a-c-table", "h4a-spindle-axis")
@@ -224,7 +225,7 @@ def test_deltas_without_rods_take_the_distance_of_their_pairs(name: str, tmp_pat
     found = load(tmp_path / "e.toml", machine)
     kin = machine.kinematics.with_tool(TOOL)
     assert isinstance(kin, LinearDelta) and found.rods is not None and found.rods.pairs == (40.0, 40.0, 40.0)
-    q = kin.random_slides(np.random.default_rng(5), 40)
+    q = random_slides(kin, np.random.default_rng(5), 40)
     tip, axis = kin.forward(q)
     actual = found.on(kin)
     w = actual.coordinates(q)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import machines
 from machines.geometric_error.actual.actual_serial import ActualSerial
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
-from machines.geometric_error.actual.transforms import about, homogeneous, inverse, transport, turns
+from machines.geometric_error.actual.transforms import cross_matrix, homogeneous, inverse, turns
 from machines.geometric_error.tables.curves import Polynomial, TableCurve
 from machines.geometric_error.tables.names import parse
 from machines.kinematics.serial import Serial
@@ -186,6 +186,19 @@ def test_the_transform_of_the_reference_entry_by_entry() -> None:
     assert turns(torsor[:, 3:])[0] == pytest.approx(Rotation.from_euler("XYZ", [a, b, c]).as_matrix(), abs=1e-15)
 
 
+def transport(transform: np.ndarray) -> np.ndarray:
+    """Transport matrices (N, 6, 6): what a small torsor in frame j is, seen at and along frame k (C 1.25).
+
+    Args:
+        transform: (N, 4, 4), frame k in frame j, so coordinates in k to coordinates in j
+    """
+    turned = np.swapaxes(transform[:, :3, :3], 1, 2)
+    result = np.zeros((len(transform), 6, 6))
+    result[:, :3, :3] = result[:, 3:, 3:] = turned
+    result[:, :3, 3:] = turned @ np.swapaxes(cross_matrix(transform[:, :3, 3]), 1, 2)
+    return result
+
+
 def test_transport_is_what_a_small_torsor_does_farther_down_the_chain() -> None:
     rng = np.random.default_rng(8)
     frame = homogeneous(rng.normal(size=(4, 6)))
@@ -194,5 +207,3 @@ def test_transport_is_what_a_small_torsor_does_farther_down_the_chain() -> None:
     wanted = np.einsum("nij,nj->ni", transport(frame), small)
     assert moved[:, :3, 3] == pytest.approx(wanted[:, :3], abs=1e-11)
     assert moved[:, [2, 0, 1], [1, 2, 0]] == pytest.approx(wanted[:, 3:], abs=1e-11)
-    point = rng.normal(size=3)
-    assert (about(frame, point) @ np.append(point, 1.0))[:, :3] == pytest.approx(point + frame[:, :3, 3], abs=1e-14)

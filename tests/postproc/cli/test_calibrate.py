@@ -146,8 +146,9 @@ def test_a_fit_without_support_is_refused(folder: Path) -> None:
 
 
 def test_all_six_errors_from_a_file(folder: Path) -> None:
-    from machines.calibration.simulator import PARTS, Bench, simulate
+    from machines.calibration.rotary_bench import PARTS, Bench
     from machines.geometric_error.tables.csv_table import write_csv
+    from samples.calibration.rotary_readings import simulate
 
     rng, bench = np.random.default_rng(1), Bench(12)
     wave = np.zeros((12, 6))

@@ -80,6 +80,46 @@ def test_the_same_program_for_another_control(program: Path) -> None:
     assert values["model"] == "lookahead" and "corner_tolerance" in values["assumed"]
 
 
+SLOW = """G21 G90 G94 G17 G64 P0.01
+M3 S1000
+G0 X0 Y0 Z300
+F60
+G1 X100
+G4 P3
+G93 G1 Y100 F1
+G94 F60
+G0 X0 Y0
+G98 G84 Z295 R300 F100
+G80
+M5
+M2
+"""
+"""200 mm of cuts in 160 s (G94 and G93), a dwell of 3 s, a tap of 5 mm at 100 mm/min out and back, rapids"""
+
+
+@pytest.mark.parametrize("name", ["linuxcnc", "lookahead", "ideal"])
+def test_the_feed_override_is_of_cuts_alone(tmp_path: Path, name: str) -> None:
+    (tmp_path / "part.ngc").write_text(SLOW)
+    given = tmp_path / "part.ngc", "-m", "mill-3axis", "-c", "linuxcnc", "--model", name
+    whole, half, double = figures(*given), figures(*given, "--override", 50), figures(*given, "--override", 200)
+    assert [v["feed_override_percent"] for v in (whole, half, double)] == [100.0, 50.0, 200.0]
+    for other, factor in ((half, 2.0), (double, 0.5)):
+        longer = 160.0 * (factor - 1.0)
+        assert other["cycle_time_s"] - whole["cycle_time_s"] == pytest.approx(longer, abs=0.5)
+        assert other["lower_bound_s"] - whole["lower_bound_s"] == pytest.approx(longer, abs=0.5)
+        assert other["rapids_s"] == pytest.approx(whole["rapids_s"], abs=0.02)
+        assert other["causes"]["dwell_s"] == whole["causes"]["dwell_s"] == pytest.approx(3.0, abs=0.01)
+        check(other)
+    assert "feed override 50 %: of feeds, not of rapids, taps and dwells" in call(*given, "--override", 50).stdout
+    assert "override" not in call(*given).stdout.replace("model", "")
+
+
+def test_the_feed_override_of_a_cl_file() -> None:
+    given = SAMPLES / "pocket.cls", "-m", "mill-3axis", "-c", "linuxcnc", "--setup", TOOLS
+    whole, half = figures(*given), figures(*given, "--override", 50)
+    assert half["cutting_s"] > 1.6 * whole["cutting_s"] and half["rapids_s"] == pytest.approx(whole["rapids_s"], rel=1e-3)
+
+
 def test_a_log_calibrates_into_a_file(program: Path, tmp_path: Path) -> None:
     truth = model("lookahead").model_copy(update={"corner_tolerance": 0.004, "stated_share": 0.4, "override": 0.9})
     b = blocks(PROGRAM.removesuffix("M2\n"))
@@ -107,6 +147,7 @@ def test_a_log_calibrates_into_a_file(program: Path, tmp_path: Path) -> None:
     (("{program}", "-m", "mill-3axis", "--calibrate", "none.csv"), 1, "time.open"),
     (("{program}", "-m", "mill-3axis", "-o", "x.toml"), 2, "--calibrate"),
     (("{program}", "-m", "mill-3axis", "--units", "feet"), 2, "feet"),
+    (("{program}", "-m", "mill-3axis", "--override", "0"), 2, "--override"),
     (("{program}", "-m", "mill-3axis", "--json", "{program}"), 2, "would replace"),
     (("{program}",), 2, "--machine"),
 ])

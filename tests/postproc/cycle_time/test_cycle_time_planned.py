@@ -57,6 +57,22 @@ def test_one_straight_pass_is_rest_to_rest() -> None:
     assert timed(blocks, ideal).seconds[cut].sum() == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize("override", [0.5, 2.0])
+def test_the_operators_override_in_the_planned_motion(override: float) -> None:
+    """The same line at 50 % and 200 % of 1200 mm/min; a model whose control runs feeds faster multiplies it."""
+    path = toolpath("RAPID", "GOTO/0,0,50", "RAPID", "GOTO/0,0,5", "FEDRAT/MMPM,1200", "GOTO/200,0,5", "RAPID",
+                    "GOTO/200,0,50")
+    result = postproc.convert(path, "mill-3axis", "linuxcnc", TOOLS)
+    blocks, ideal = from_conversion(result, override), model("ideal")
+    cut, speed = np.flatnonzero(~blocks.rapid), 20.0 * override
+    expected = 200.0 / speed + 2.0 * np.sqrt(speed / 30000.0)
+    assert planned_times(result, blocks, ideal, override)[0].seconds[cut].sum() == pytest.approx(expected, rel=4e-3)
+    assert timed(blocks, ideal).seconds[cut].sum() == pytest.approx(expected, rel=4e-3)
+    faster = ideal.model_copy(update={"override": 1.0 / override})
+    expected = 200.0 / 20.0 + 2.0 * np.sqrt(20.0 / 30000.0)
+    assert planned_times(result, blocks, faster, override)[0].seconds[cut].sum() == pytest.approx(expected, rel=4e-3)
+
+
 def test_other_times_keep_rests_between_blocks() -> None:
     blocks = from_conversion(converted("pocket.cls", "mill-3axis"))
     own = timed(blocks, model("lookahead"))

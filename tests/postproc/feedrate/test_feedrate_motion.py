@@ -174,6 +174,16 @@ def test_limits_at_the_tool_hold_by_length() -> None:
         np.testing.assert_allclose(np.linalg.norm(samples.qdd, axis=1), samples.tool[:, 1], rtol=1e-9, atol=1e-9)
 
 
+def test_second_order_limits_at_the_tool() -> None:
+    """On a circle: sqrt(A r) from acceleration, less up to 7.6 % for the octagon; from the tilt rate / |da/ds|."""
+    circle = Circle(20.0)
+    for most, speed in ((ToolLimits(acceleration=500.0), 100.0), (ToolLimits(tilt_rate=0.3), 60.0),
+                        (ToolLimits(jerk=20000.0), 200.0)):
+        samples = plan_second_order(circle, replace(FREE, tool=most)).trajectory()
+        assert 0.95 * speed < samples.sd.max() < 1.005 * speed
+        assert samples.tool is not None and samples.tool[5:-5, 1].max() < 1.02 * most.acceleration
+
+
 class Screw(PolynomialPath):
     """Tip on a slender helix: its steady jerk is along the binormal, k t sd^3 with curvature k and torsion t.
 

@@ -12,6 +12,7 @@ from postproc.control.control import Control
 from postproc.joints.joint_path import nearest_solution
 from postproc.path.bound import CurveBlocks, bounds
 from postproc.path.linearise import linearise
+from tests.machines.random_slides import random_slides
 from tests.postproc.joint_kit import DEG, angle, machine, segments, tilted, unit
 from toolpaths.shape import Curves
 
@@ -26,7 +27,7 @@ def moves(name: str, count: int, seed: int, size: float = 1.0) -> tuple[np.ndarr
     if isinstance(kin, Serial):
         q0 = rng.uniform(-1, 1, (count, kin.joints)) * np.where(kin.rotary, 1.5, 100.0)
         return q0, q0 + step
-    slides = kin.random_slides(rng, count)  # type: ignore[attr-defined]
+    slides = random_slides(kin, rng, count)  # type: ignore[attr-defined]
     q0 = np.column_stack([slides, rng.uniform(-1, 1, (count, kin.joints - slides.shape[1]))])
     return q0, q0 + 0.3 * step
 

@@ -11,6 +11,7 @@ import machines
 import postproc
 import toolpaths
 from postproc.setup.model import load_setup
+from tests.machines.random_slides import random_slides
 from tests.postproc.joint_kit import machine
 
 SAMPLES = Path(__file__).parents[3] / "samples"
@@ -19,7 +20,7 @@ PARALLEL = [name for name in machines.names() if machine(name).kinematics.singul
 
 def places(name: str, count: int) -> np.ndarray:
     kin = machine(name).kinematics
-    slides = kin.random_slides(np.random.default_rng(3), count)  # type: ignore[attr-defined]
+    slides = random_slides(kin, np.random.default_rng(3), count)  # type: ignore[attr-defined]
     return np.column_stack([slides, np.zeros((count, kin.joints - slides.shape[1]))])
 
 

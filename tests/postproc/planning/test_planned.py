@@ -14,18 +14,19 @@ from machines.machine import Machine
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.plan import PlannerOptions
 from postproc.pipeline.result import PostResult
-from postproc.planning.geometry import MachinePath, PathStretch, machine_path, machine_paths
+from postproc.planning.geometry import MachinePath, PathStretch, machine_paths
 from postproc.planning.pass_geometry import PassGeometry, chains, pass_geometry, stops_of
 from postproc.planning.planned import PassFeed, PlannedMotion, Source, joint_limits, plan_pass, planned_motion
 from postproc.planning.steady_feed import CORNER, steady_speed
 from postproc.setup.model import load_setup
 from tests.postproc.kit import SAMPLES, convert, good, goto, machine, toolpath
+from tests.toolpaths.smoothing_kit import smooth
 from toolpaths import read
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import DiagnosticError
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
-from toolpaths.smoothing.smooth import Tolerance, smooth
+from toolpaths.smoothing.smooth import Tolerance
 
 TOLERANCE = Tolerance(0.01, np.radians(0.05))
 
@@ -309,9 +310,7 @@ def test_stretches_together_are_those_alone_and_one_out_of_reach_spoils_no_other
     assert [isinstance(one, MachinePath) for one in found] == [True, False, True]
     assert "no joints at s = " in str(found[1])
     for one, own in ((stretches[0], found[0]), (stretches[2], found[2])):
-        alone = machine_path(one.path, one.first, one.last, kin, one.near)
-        assert isinstance(own, MachinePath) and own.s.tolist() == alone.s.tolist()
+        alone, = machine_paths([one], kin)
+        assert isinstance(own, MachinePath) and isinstance(alone, MachinePath) and own.s.tolist() == alone.s.tolist()
         np.testing.assert_allclose(own.values, alone.values, rtol=0.0, atol=1e-12)
         assert own.worst == pytest.approx(alone.worst, rel=1e-6) and own.worst <= 0.05
-    with pytest.raises(ArithmeticError, match="no joints"):
-        machine_path(stretches[1].path, 0.0, 5000.0, kin, stretches[1].near)

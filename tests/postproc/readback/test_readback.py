@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from postproc.readback.comparison import align
-from postproc.readback.execution.execute import Motion, execute
+from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.text.words import tokenise
 from tests.postproc.kit import Peer, codes, unit
+from tests.postproc.reader_kit import execute
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shape import Curves
 

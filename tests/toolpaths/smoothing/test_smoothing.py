@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, make_interp_spline
 
+from tests.toolpaths.smoothing_kit import smooth
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between, rotation
 from toolpaths.shape import Curves
 from toolpaths.smoothing.blend import HIGHEST, ramp
 from toolpaths.smoothing.bspline import DEGREE, KnotVectors, basis
 from toolpaths.smoothing.fit import fit
-from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth, smooth_all
+from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all
 from toolpaths.smoothing.stretches import corners
 from toolpaths.smoothing.sweep import Data, Normal, compiled_sweep, sweep
 

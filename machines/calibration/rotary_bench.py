@@ -1,4 +1,4 @@
-"""The measurement of a rotary axis, simulated exactly: axis, indexer on it turning back, reflector on the indexer.
+"""The bench on which a rotary axis is measured: axis, indexer on it turning back, reflector on the indexer.
 
 The chain of C 1.11 in homogeneous transforms: C0 (mounting of the axis), nominal turn, errors of the axis, RX0 (mounting of
 the indexer), its turn back, its errors, RL (mounting of the reflector). What the instrument reads is the displacement of the
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from machines.geometric_error.actual.transforms import carried, homogeneous, inverse
+from machines.geometric_error.actual.transforms import carried, homogeneous
 from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 
@@ -39,34 +39,7 @@ class Bench:
         return result
 
 
-def simulate(bench: Bench, axis: Floats, indexer: Floats, mounts: Floats, noise: float | Floats = 0.0,
-             rng: np.random.Generator | None = None, order: Floats | None = None) -> Floats:
-    """Readings (m, n, 6): dx dy dz in mm, rotation vector in rad.
-
-    Args:
-        axis: (n, 6) torsors of the axis at its positions (C 1.14)
-        indexer: (n, 6) torsors of the indexer at its increments, numbered along its own travel (C 1.17)
-        mounts: (m, 3, 6) torsors of C0, RX0, RL in each set-up (C 1.12, 1.15, 1.18)
-        noise: standard deviation of the readings, one or (6,)
-        order: (m,) increments by which the indexer is turned in each set-up; default 0, 1, 2, ...
-    """
-    m, turned = len(mounts), np.arange(len(mounts)) if order is None else np.asarray(order, dtype=np.int64)
-    readings = np.stack([_setup(bench, axis, indexer, mounts[k], int(turned[k])) for k in range(m)])
-    if rng is None:
-        return readings
-    return np.asarray(readings + rng.normal(size=readings.shape) * noise)
-
-
-def _setup(bench: Bench, axis: Floats, indexer: Floats, mounts: Floats, k: int) -> Floats:
-    n = bench.steps
-    actual = _chain(bench, axis, np.roll(indexer, -k, axis=0), np.tile(mounts[:, None], (1, n, 1)))
-    nominal = _chain(bench, np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((3, n, 6)))
-    moved = actual @ inverse(nominal)
-    shift = actual[:, :3, 3] - nominal[:, :3, 3]
-    return np.concatenate([shift, _vector(moved[:, :3, :3])], axis=1)
-
-
-def _chain(bench: Bench, axis: Floats, indexer: Floats, mounts: Floats) -> Floats:
+def chain(bench: Bench, axis: Floats, indexer: Floats, mounts: Floats) -> Floats:
     """(n, 4, 4) of the reflector in the bed; mounts (3, n, 6)."""
     turn = np.zeros((bench.steps, 6))
     turn[:, 5] = bench.angles
@@ -78,15 +51,6 @@ def _chain(bench: Bench, axis: Floats, indexer: Floats, mounts: Floats) -> Float
     result = np.eye(4)
     for torsor in links:
         result = result @ homogeneous(torsor)
-    return result
-
-
-def _vector(turns: Floats) -> Floats:
-    """Rotation vectors (n, 3) of small turns (n, 3, 3)."""
-    sine = 0.5 * np.stack([turns[:, i, j] - turns[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=1)
-    size = np.linalg.norm(sine, axis=1)
-    scale = np.where(size > 0.0, np.arcsin(np.minimum(size, 1.0)) / np.where(size > 0.0, size, 1.0), 1.0)
-    result: Floats = sine * scale[:, None]
     return result
 
 
@@ -108,5 +72,5 @@ def _frames(bench: Bench) -> tuple[Floats, Floats, Floats, Floats]:
     n, c, s = bench.steps, np.cos(bench.angles), np.sin(bench.angles)
     turned = np.zeros((n, 3, 3))
     turned[:, 0, 0], turned[:, 0, 1], turned[:, 1, 0], turned[:, 1, 1], turned[:, 2, 2] = c, -s, s, c, 1.0
-    reflector = _chain(bench, np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((3, n, 6)))[:, :3, 3]
+    reflector = chain(bench, np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((3, n, 6)))[:, :3, 3]
     return np.tile(np.eye(3), (n, 1, 1)), turned, reflector, np.tile([0.0, 0.0, bench.axis_to_indexer], (n, 1))

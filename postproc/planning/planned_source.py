@@ -1,0 +1,36 @@
+"""What a job plans: its path and moves with the limits of its tools; a warning where nobody keeps these."""
+
+from __future__ import annotations
+
+from postproc.feedrate.limits import ToolLimits
+from postproc.job.job import Job
+from postproc.path.model import JointPath
+from postproc.planning.pass_geometry import stops_of
+from postproc.planning.planned import Source, tool_limits
+from postproc.planning.planned_errors import PlannedCorrection
+from postproc.reference.moves import Moves
+from toolpaths.diagnostics import Diagnostic, warning
+from toolpaths.smoothing.smooth import Tolerance
+
+
+def source_of(job: Job, moves: Moves, path: JointPath, correction: PlannedCorrection | None = None,
+              override: float = 1.0) -> Source:
+    """The source of the planned motion of a job's path; `correction` and `override` as of `Source`."""
+    return Source(path, moves, job.machine, job.kinematics, Tolerance(job.options.tolerance, job.axis_tolerance),
+                  stops_of(job.toolpath, moves), job.toolpath.file, correction, override, limits_by_tool(job))
+
+
+def limits_by_tool(job: Job) -> dict[int, ToolLimits]:
+    """Limits by index of the tool, of those that have one."""
+    found = {k: tool_limits(job.setup.tools.get(str(job.number_of(k)))) for k in range(len(job.toolpath.tools))}
+    return {k: limits for k, limits in found.items() if limits is not None}
+
+
+def limits_not_kept(job: Job) -> list[Diagnostic]:
+    """A warning where tools of the CL file have limits in the set-up and the feeds are not planned."""
+    numbers = sorted({job.number_of(k) for k in limits_by_tool(job)})
+    if not numbers:
+        return []
+    return [warning("setup.tool_limits", "tip_acceleration, tip_jerk and axis_rate of "
+                    f"{', '.join(f'[tools.{n}]' for n in numbers)} are not kept: the feeds are those of the CL file",
+                    file=job.options.setup or "", count=len(numbers), hint="convert with --feed planned")]

@@ -1,0 +1,139 @@
+"""Limits of a tool in the set-up (tip_acceleration, tip_jerk, axis_rate): kept by planned feeds and by the planned motion,
+measured on the CL curve with the feeds of the words; named where feeds are not planned."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import postproc
+from postproc.cli.app import app
+from postproc.cycle_time.planned import planned_times
+from postproc.cycle_time.source import from_conversion
+from postproc.pipeline.result import PostResult
+from postproc.planning.pass_geometry import PassGeometry, pass_geometry, stops_of
+from postproc.planning.steady_feed import CORNER
+from postproc.setup.fingerprint import fingerprint
+from postproc.setup.model import SetupFile, ToolSetup
+from tests.postproc.kit import execute, good, machine, toolpath
+from tests.postproc.planning.test_planned_feed import STENCIL, cuts, seconds, wave
+from tests.postproc.time_kit import model
+from toolpaths.arrays import Floats
+from toolpaths.smoothing.smooth import Smooth, Tolerance
+
+STATED = {"tip_acceleration": 150.0, "tip_jerk": 1000.0, "axis_rate": 6.0}
+"""Each is exceeded by the programmed feed of 3000 mm/min, and by what the axes alone allow."""
+
+
+def converted(limits: dict[str, float], feed: str = "planned", number: str = "1") -> PostResult:
+    lines = wave(160)
+    setup = SetupFile(tools={"1": ToolSetup(gauge_length=120.0), number: ToolSetup(gauge_length=120.0, **limits)})
+    path = toolpath("RAPID", lines[0], "FEDRAT/MMPM,3000", *lines[1:])
+    return good(postproc.convert(path, machine("mikron-ucp710"), "linuxcnc", setup, postproc.Options(feed=feed)))
+
+
+def at_the_tool(path: Smooth, s: Floats) -> tuple[Floats, Floats, Floats]:
+    """|axis'|, degrees per mm, |tip''| and |tip'''| at s (N,), by differences."""
+    tip, axis = (part.reshape(len(s), 4, 3) for part in
+                 path.at((s[:, None] + STENCIL * np.array([-1.5, -0.5, 0.5, 1.5])).ravel()))
+    bend = (tip[:, 3] - tip[:, 2] - tip[:, 1] + tip[:, 0]) / (2.0 * STENCIL**2)
+    third = (tip[:, 3] - 3.0 * tip[:, 2] + 3.0 * tip[:, 1] - tip[:, 0]) / STENCIL**3
+    turn = np.degrees(np.linalg.norm(axis[:, 2] - axis[:, 1], axis=1) / STENCIL)
+    return turn, np.linalg.norm(bend, axis=1), np.linalg.norm(third, axis=1)
+
+
+def geometry(result: PostResult) -> PassGeometry:
+    job, path = result.job, result.path
+    assert job is not None and path is not None
+    stops = stops_of(job.toolpath, job.moves)
+    one, = pass_geometry(path, job.moves, job.kinematics, Tolerance(0.01, np.radians(0.05)), stops, CORNER)[0]
+    return one
+
+
+def largest(result: PostResult) -> dict[str, float]:
+    """What the words do at the tool: each block at its feed, at nine places."""
+    one, steps, first = geometry(result), cuts(result), execute(result)
+    before = first[first.index(next(step for step in first if step.kind == "feed")) - 1].end
+    speed = (one.ends - one.begin) / seconds(steps, before)
+    found: dict[str, float] = dict.fromkeys(STATED, 0.0)
+    for part in np.linspace(0.0, 1.0, 9):
+        s = np.clip(one.begin + part * (one.ends - one.begin), 2.0 * STENCIL, one.smooth.s[-1] - 2.0 * STENCIL)
+        turn, bend, third = at_the_tool(one.smooth, s)
+        here = {"axis_rate": turn * speed, "tip_acceleration": bend * speed**2, "tip_jerk": third * speed**3}
+        for name, values in here.items():
+            found[name] = max(found[name], float(values.max()))
+    return found
+
+
+@pytest.mark.parametrize("name", sorted(STATED))
+def test_planned_feeds_keep_a_limit_of_the_tool(name: str) -> None:
+    free, kept = largest(converted({})), largest(converted({name: STATED[name]}))
+    assert free[name] > 1.2 * STATED[name]
+    assert 0.7 * STATED[name] < kept[name] < 1.01 * STATED[name]
+
+
+def test_the_limit_of_another_tool_changes_nothing() -> None:
+    assert [s.feed for s in cuts(converted(STATED, number="7"))] == [s.feed for s in cuts(converted({}))]
+
+
+def test_the_time_that_the_limits_of_the_tool_cost_is_reported() -> None:
+    motion = converted({"tip_acceleration": 20.0}).motion
+    assert motion is not None and motion.limiting()["tool"]["acceleration_s"] > 0.5 * motion.seconds
+
+
+def test_the_report_names_the_tool() -> None:
+    reduced, = (d for d in converted({"tip_acceleration": 100.0}).diagnostics if d.code == "feed.reduced")
+    assert "or the tool a limit of the set-up" in reduced.message
+
+
+def ideal(limits: dict[str, float], **without: Any) -> float:
+    """s of a line of 200 mm at 1200 mm/min, from rest to rest, as the ideal model plans it."""
+    path = toolpath("RAPID", "GOTO/0,0,50", "RAPID", "GOTO/0,0,5", "FEDRAT/MMPM,1200", "GOTO/200,0,5", "RAPID",
+                    "GOTO/200,0,50")
+    mill = machine("mill-3axis")
+    mill = replace(mill, limits=replace(mill.limits, **without))
+    result = good(postproc.convert(path, mill, "linuxcnc", SetupFile(tools={"1": ToolSetup(**limits)})))
+    blocks = from_conversion(result)
+    times, found = planned_times(result, blocks, model("ideal"))
+    assert not found
+    return float(times.seconds[~blocks.rapid].sum())
+
+
+def test_the_planned_motion_accelerates_no_faster_than_the_tool_may() -> None:
+    """v/A more than the path takes at full speed; on machines that state no jerk as well."""
+    assert ideal({"tip_acceleration": 5.0}) == pytest.approx(200.0 / 20.0 + 20.0 / 5.0, rel=3e-3)
+    none = np.full(3, np.inf)
+    assert ideal({"tip_acceleration": 5.0}, jerk=none) == pytest.approx(200.0 / 20.0 + 20.0 / 5.0, rel=3e-3)
+    assert ideal({}, jerk=none) < 10.2
+
+
+def test_limits_that_nobody_keeps_are_named(tmp_path: Path) -> None:
+    """The hint followed: with --feed planned the warning is gone."""
+    (tmp_path / "part.cls").write_text("TOOL PATH/A,TOOL,T\nTLDATA/MILL,10,0,50,0,0\nMSYS/0,0,0,1,0,0,0,1,0\nLOAD/TOOL,1\n"
+                                       "SPINDL/RPM,1000,CLW\nRAPID\nGOTO/0,0,50,0,0,1\nFEDRAT/MMPM,800\nGOTO/0,0,0\n"
+                                       "GOTO/30,0,0\nGOTO/30,20,0\nEND-OF-PATH\n")
+    (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 100\ntip_acceleration = 300\n")
+    words = ["convert", str(tmp_path / "part.cls"), "-m", "mill-3axis", "-c", "linuxcnc", "-o", str(tmp_path / "o.ngc"),
+             "--setup", str(tmp_path / "s.toml")]
+    plain, planned = CliRunner().invoke(app, words), CliRunner().invoke(app, [*words, "--feed", "planned"])
+    assert plain.exit_code == 0 == planned.exit_code, plain.output + planned.output
+    assert "setup.tool_limits" in plain.output and "--feed planned" in plain.output
+    assert "setup.tool_limits" not in planned.output
+
+
+def test_the_fingerprint_counts_limits_that_are_stated() -> None:
+    """Set-ups without them keep the fingerprint that older programs name."""
+    def setup(**limits: float) -> SetupFile:
+        return SetupFile(tools={"1": ToolSetup(gauge_length=120.0, **limits)})
+
+    older = setup().model_dump(mode="json", exclude={"description": True, "placement": True, "tools": {"1": set(STATED)}})
+    text = json.dumps(older, sort_keys=True, separators=(",", ":"))
+    marks = [fingerprint(one, "") for one in (setup(), *(setup(**{name: 5.0}) for name in STATED))]
+    assert marks[0] == hashlib.sha256(text.encode()).hexdigest()[:8] and len(set(marks)) == 4
