@@ -23,7 +23,7 @@ FILES = {
     "postproc.reference.records": "blocks of INSERT records",
     "postproc.base.header_words": "heads of programs: written and read in one place",
     "postproc.cycle_time.source": "whether a file is a CL file or a program",
-    "postproc.readback.comparison.hooks": "blocks of programs",
+    "postproc.readback.comparison.hooks": "blocks of the shop in programs",
     "postproc.readback.comparison.slow_moves": "F words of programs",
     "postproc.readback.comparison.unstated_codes": "codes of programs",
     "postproc.verification.tool_table": "tool tables of controls",
