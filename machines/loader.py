@@ -15,7 +15,7 @@ import machines.kinds as kinds
 from machines.kind_check import build_faults, contract_faults
 from machines.kinematics.base import Kinematics
 from machines.machine import ClampCodes, Limits, Machine, Timing, Turns
-from machines.models import KeyProblem, KinematicsModel, MachineModel
+from machines.models import ControlModel, KeyProblem, KinematicsModel, MachineModel, register_beyond
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.units import DEG
@@ -149,7 +149,7 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
     kinematics = model.kinematics.build()
     names = kinematics.axis_names
     retract = names.index(model.retract_axis) if model.retract_axis else -1
-    timing = model.timing
+    timing, control = model.timing, model.control or ControlModel()
     limits = _limits(model, kinematics)
     return Machine(
         name=file.name, description=model.description, structure=model.kinematics.describe(), kinematics=kinematics,
@@ -158,7 +158,9 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         timing=Timing(timing.tool_change, timing.clamp, timing.unclamp, frozenset(timing.assumed)),
         control_kinematics=model.control_kinematics(), file=file.file,
         stop=model.control.stop or "" if model.control is not None else "",
-        hooks=model.hooks, clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
+        hooks=model.hooks, length_register=register_beyond(control.length_register),
+        radius_register=None if control.radius_register is None else register_beyond(control.radius_register),
+        clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
         turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))
 
 

@@ -99,6 +99,8 @@ class Machine:
             file does not say
         turns: per joint, how it counts its turns; () as by `Turns()`
         clamps: per joint, the codes that clamp and release it; () as by `ClampCodes()`
+        length_register, radius_register: what H and D of a tool are more than its number where the CL file names none; None:
+            D is no rule of its own
         hooks: blocks of the shop at certain places of a program
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
@@ -119,6 +121,8 @@ class Machine:
     stated: Limits | None = None
     turns: tuple[Turns, ...] = ()
     clamps: tuple[ClampCodes, ...] = ()
+    length_register: int = 0
+    radius_register: int | None = None
     hooks: HooksModel = field(default_factory=HooksModel)
 
     def __post_init__(self) -> None:

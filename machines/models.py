@@ -35,6 +35,7 @@ def _whole_turn(turn: tuple[float, float]) -> tuple[float, float]:
 
 
 Turn = Annotated[tuple[float, float], AfterValidator(_whole_turn)]
+Register = Annotated[str, Field(pattern=r"^T( \+ [1-9][0-9]{0,3})?$")]
 MCode = Annotated[str, Field(pattern=r"^(M[0-9]{1,5})?$")]
 Travel = Annotated[tuple[float, float] | Literal["unlimited"], AfterValidator(_upward)]
 
@@ -138,6 +139,14 @@ class ControlModel(UserModel):
     PLC decides on most controls. Default: what the controller file has ([stops])"""
 
 
+    length_register: Register = "T"
+    """the length register H of a tool for which the CL file names none or the tool's number T: "T", or "T + 20"; of controls
+    that name registers"""
+    radius_register: Register | None = None
+    """the register D of a CUTCOM that names none or the tool's number, by the same rule, e.g. "T + 30"; default: that
+    of the length where D is modal, else the tool's own"""
+
+
 class MachineModel(UserModel):
     """A machine file."""
 
@@ -199,6 +208,11 @@ class MachineModel(UserModel):
             elif not axis.range[0] <= axis.home <= axis.range[1]:
                 yield KeyProblem("machine.home", ("axes", name, "home"),
                                  f"home {axis.home:g} of {name} lies outside its travel {list(axis.range)}")
+
+
+def register_beyond(rule: str) -> int:
+    """What a rule ("T + 20") adds to the number of the tool."""
+    return int(rule.partition("+")[2] or 0)
 
 
 def _modulo_problem(name: str, axis: AxisModel, rotary: bool) -> KeyProblem | None:

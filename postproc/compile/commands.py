@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.compile.cutter_compensation import RadiusCompensation
+from postproc.compile.needless_pairs import needless_pairs
 from postproc.compile.program import Command, CommandName, Commands
 from postproc.compile.spindle_coolant_state import SpindleCoolantState
 from postproc.controllers.model import ControllerFile
@@ -198,6 +199,9 @@ class _Writing:
         """The commands by block, with what ends at the end, and what was not carried out."""
         self.compensation.off_before(len(self.moves))
         self.at(len(self.path)).extend(self.compensation.off())
+        undone = needless_pairs(self.result, len(self.path))
+        for k, group in undone.items():
+            self.result[k] = group
         lost = [warning("event.not_carried_out", f"{word} is not carried out", file=self.toolpath.file, lines=lines[:6],
                         count=len(lines)) for word, lines in self.lost.items()]
         return self.result, lost + self.compensation.diagnostics(self.toolpath.file)

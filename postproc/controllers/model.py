@@ -231,6 +231,14 @@ class Stops(UserModel):
     """what a tool change switches off by itself"""
 
 
+class LinkRules(UserModel):
+    """Linking moves as the control's maker wants them."""
+
+    index: Literal["plane", "home"] = "plane"
+    """where the tool waits while a link turns rotary axes, where the set-up does not say: on the safe plane, or with the
+    retract axis at home"""
+
+
 class ControllerFile(UserModel):
     """A controller."""
 
@@ -257,6 +265,7 @@ class ControllerFile(UserModel):
     kinematics: InterpolationRules = InterpolationRules()
     modes: Modes = Modes()
     rollover: RolloverRules = RolloverRules()
+    links: LinkRules = LinkRules()
 
     @property
     def keeps_length(self) -> bool:
@@ -268,12 +277,12 @@ class ControllerFile(UserModel):
         """True where stating a tilted plane may turn rotary axes."""
         return self.modes.tilted is not None and self.modes.tilted.turns_axes
 
-    def with_passive(self, more: tuple[str, ...]) -> ControllerFile:
-        """The controller with more codes that move nothing: those of the shop's hooks."""
-        if not more:
+    def with_shop(self, passive: tuple[str, ...], number: int | None) -> ControllerFile:
+        """The controller with more codes that move nothing, those of the shop's hooks, and the number of the program."""
+        if not passive and number is None:
             return self
-        passive = tuple(dict.fromkeys((*self.program.passive, *more)))
-        return self.model_copy(update={"program": self.program.model_copy(update={"passive": passive})})
+        more = {"passive": tuple(dict.fromkeys((*self.program.passive, *passive))), "number": number or self.program.number}
+        return self.model_copy(update={"program": self.program.model_copy(update=more)})
 
     def divided(self, files: bool) -> ControllerFile:
         """The controller that writes operations into files of their own, where that is asked for."""

@@ -9,7 +9,15 @@ from pydantic import Field
 
 from machines.hooks import PassiveWord
 from machines.user_file import UserModel
-from postproc.controllers.texts import DwellText, Named, Numbered, Registered, WorkOffsets, placeholders
+from postproc.controllers.texts import (
+    WORK_OFFSETS,
+    DwellText,
+    Named,
+    Numbered,
+    Registered,
+    WorkOffsets,
+    placeholders,
+)
 
 
 class Format(UserModel):
@@ -50,6 +58,19 @@ class Comment(UserModel):
     """characters that a comment must not hold"""
 
 
+class FurtherOffsets(UserModel):
+    """Work offsets beyond the nine, by number."""
+
+    block: Numbered
+    """the block that puts one in force; {number}"""
+    first: int = Field(default=1, ge=0)
+    """the least number"""
+    last: int = Field(ge=1)
+    """the greatest"""
+    needs: Annotated[str, placeholders("name")] = ""
+    """what the control must have for it: a comment at the head of programs with one; {name} is its name"""
+
+
 class ProgramBlocks(UserModel):
     """Blocks that stand around every program."""
 
@@ -57,10 +78,15 @@ class ProgramBlocks(UserModel):
     """{name} is the program's name, {number} its number in four digits"""
     number: int = Field(default=1, ge=1, le=9999)
     """of the program, where the controller has numbers"""
+    stock: tuple[Annotated[str, placeholders("x0", "y0", "z0", "x1", "y1", "z1")], ...] = ()
+    """blocks behind `begin` that state the stock for the control's graphics, where the set-up has one ([rewind.stock]): its
+    least and greatest X, Y, Z, mm in the work offset with all rotary axes at 0"""
     preamble: tuple[Annotated[str, placeholders("work_offset")], ...] = ()
     """safe start: units, modes and planes that the program relies on; {work_offset} is the set-up's code"""
     work_offsets: WorkOffsets = Field(default_factory=dict)
     """what the controller writes for G54 to G59 and G59.1 to G59.3; empty: those codes themselves"""
+    more_offsets: dict[Numbered, FurtherOffsets] = Field(default_factory=dict)
+    """further work offsets by the name that a set-up states for one, with {number}"""
     operation: tuple[Annotated[str, placeholders("comment", "name", "number")], ...] = ()
     """blocks at the start of each operation, from where a program can be taken up: {name} of the operation, {comment} with
     it, {number} 100, 200, ..."""
@@ -77,9 +103,33 @@ class ProgramBlocks(UserModel):
     end: tuple[Named, ...] = ("%",)
     """{name} and {number} as in `begin`"""
 
+    def offset_block(self, code: str) -> str | None:
+        """The block of a work offset as the set-up names it: one of the nine, or a further one by the control's own name;
+        None where the control has none of that name."""
+        if code in self.work_offsets or (code in WORK_OFFSETS and not self.work_offsets):
+            return self.work_offsets.get(code, code)
+        for name, more in self.more_offsets.items():
+            head, tail = name.split("{number}")
+            match = re.fullmatch(rf"{re.escape(head)}([1-9][0-9]*|0){re.escape(tail)}", code)
+            if match and more.first <= int(match[1]) <= more.last:
+                return more.block.format(number=match[1])
+        return None
+
+    def offset_needs(self, code: str) -> str:
+        """What the control must have for a further work offset, "" for nothing."""
+        found = (more for name, more in self.more_offsets.items() if code.startswith(name.split("{number}")[0]))
+        more = None if code in self.work_offsets else next(found, None)
+        return more.needs.format(name=code) if more is not None else ""
+
+    @property
+    def offsets_named(self) -> str:
+        """All names of work offsets that a set-up may state."""
+        more = [f"{n.format(number=o.first)} to {n.format(number=o.last)}" for n, o in self.more_offsets.items()]
+        return ", ".join(["G54 to G59", "G59.1 to G59.3", *more])
+
     def offset_name(self, code: str) -> str:
         """A work offset of the set-up as the control names it; of a parameter with a name, that name and its number."""
-        text = self.work_offsets.get(code, code)
+        text = self.offset_block(code) or code
         named = re.search(r"=\+?(\d+) *;(.+)$", text)
         return f"{named[2].strip().lower()} {named[1]}" if named else text
 

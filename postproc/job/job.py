@@ -21,7 +21,7 @@ from postproc.job.rounding import Rounding, decimals, helix_bound, rounding_boun
 from postproc.path.links import SafeSpace, safe_space
 from postproc.reference.events import register_changes, tool_changes
 from postproc.reference.hole_depths import unfit_holes
-from postproc.reference.length_registers import own_registers
+from postproc.reference.length_registers import by_rule, own_registers
 from postproc.reference.moves import Moves, build_moves
 from postproc.reference.records import checked_records, plain_records
 from postproc.reference.spindle_defaults import standing_cuts, stated_by_setup, with_defaults
@@ -33,6 +33,7 @@ from postproc.setup.model import Placement, SetupFile, part_placement, work_fram
 from postproc.setup.system import standing
 from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, warning
+from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Frame, Role, Toolpath
 from toolpaths.units import DEG
 
@@ -63,6 +64,17 @@ class Job:
     def hooks(self) -> HooksModel:
         """Blocks of the shop, those of the set-up before those of the machine file."""
         return self.machine.hooks.under(self.setup.hooks)
+
+    @property
+    def stock(self) -> Floats | None:
+        """(2, 3) least and greatest X, Y, Z of the set-up's stock in the work offset, rotary axes at 0, mm; None without."""
+        box = self.setup.rewind.stock
+        if box is None or self.control.plane is not None:
+            return None
+        sides = np.array([box.low, box.high])
+        corners = sides[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]
+        placed = self.placement.points(corners) - self.control.origin
+        return np.stack([placed.min(axis=0), placed.max(axis=0)])
 
     @property
     def work_system(self) -> Frame:
@@ -118,11 +130,24 @@ class Job:
         return result
 
     def home_rows(self) -> frozenset[int]:
-        """Moves whose link goes by home: the first, and those after a tool change or GOHOME."""
+        """Moves whose link goes by home: the first, those after a tool change or GOHOME, and those whose link turns rotary
+        axes where they are to be turned at home."""
         first = np.searchsorted(self.moves.row, [e.index for e in self.toolpath.events if e.word == "GOHOME"]
                                 + [c.index for c in tool_changes(self.toolpath)])
         restart = self.operation_starts() if self.setup.output.apart else []
-        return frozenset({0, *first.tolist(), *restart})
+        return frozenset({0, *first.tolist(), *restart, *(self.indexed() if self.index_at_home else [])})
+
+    @property
+    def index_at_home(self) -> bool:
+        """True where the retract axis stands at home while a link turns rotary axes."""
+        return (self.setup.clearance.index or self.controller.links.index) == "home" and self.machine.retract_axis >= 0
+
+    def indexed(self) -> list[int]:
+        """The linked moves that begin with another tool axis than the move before has ended with."""
+        rows = np.flatnonzero(self.moves.link)
+        rows = rows[rows > 0]
+        turned = angle_between(self.moves.axis[rows - 1], self.moves.axis[rows]) > self.axis_tolerance
+        return [int(k) for k in rows[turned]]
 
     @cached_property
     def rounding(self) -> Rounding:
@@ -159,8 +184,8 @@ class Job:
 
 
 def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) -> ControllerFile:
-    """The controller that knows the codes of the shop's own blocks."""
-    return controller.with_passive(machine.hooks.under(setup.hooks).passive)
+    """The controller that knows the codes of the shop's own blocks, and the number of the program."""
+    return controller.with_shop(machine.hooks.under(setup.hooks).passive, setup.output.program_number)
 
 
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,
@@ -176,10 +201,12 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     if not any(d.severity is Severity.ERROR and d.code.split(".")[0] in ("spindle", "insert") for d in diagnostics):
         diagnostics += standing_cuts(toolpath)
+    toolpath = by_rule(toolpath, controller, machine.length_register, machine.radius_register)
     toolpath, found = own_registers(toolpath, controller)
     diagnostics += found
+    diagnostics += _work_offset(controller, setup, options)
     toolpath, found = cut_operations(toolpath, setup.output.longest)
-    diagnostics += found
+    diagnostics += [*found, *_program_number(toolpath, controller, setup, options)]
     diagnostics += [*unfit_holes(toolpath, controller), *_refused(toolpath), *_no_inverse_time(controller, options)]
     setup, found = standing(setup, toolpath, options.setup)
     diagnostics += found
@@ -215,6 +242,25 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
               modes, errors, tuple(stated))
     return job, diagnostics + _tool_lengths(job) + _unused_tools(job)
+
+
+def _work_offset(controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:
+    """A work offset that the control has not."""
+    program = controller.program
+    if program.offset_block(setup.work_offset_code) is not None:
+        return []
+    return [error("setup.work_offset_code", f"work_offset_code = {setup.work_offset_code!r}: this control has no such work "
+                  "offset", file=options.setup, hint=f"allowed are {program.offsets_named}")]
+
+
+def _program_number(toolpath: Toolpath, controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:
+    """A number of the program that one of its subprograms bears."""
+    last, number = 1000 + len(toolpath.operations), setup.output.program_number
+    numbered = setup.output.divided and "{number}" in controller.subprograms.call
+    if number is None or not numbered or not 1000 < number <= last:
+        return []
+    return [error("setup.program_number", f"program_number = {number}: subprograms bear the numbers 1001 to {last}",
+                  file=options.setup, hint=f"a number below 1001 or above {last}")]
 
 
 def _measured(control: Control, controller: ControllerFile, axis: Floats, setup: SetupFile,

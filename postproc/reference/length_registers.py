@@ -1,16 +1,41 @@
-"""Length registers (ADJUST, OSETNO of LOADTL) on controls whose tools bring their lengths along."""
+"""Registers of length (ADJUST, OSETNO of LOADTL) and radius (CUTCOM): by a rule of the shop where the file names none, and
+on controls whose tools bring their lengths along."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 from postproc.controllers.model import ControllerFile
-from postproc.reference.events import TOOL_WORDS, ToolChange, tool_loads
+from postproc.reference.events import TOOL_WORDS, ToolChange, compensation_side, numbers, tool_loads
 from toolpaths.diagnostics import Diagnostic, error, info, warning
 from toolpaths.toolpath import Event, Toolpath
 
 EDGES = range(1, 10)
 """cutting edges D of a tool (SINUMERIK 840D operator's guide HMI Advanced, 5.1.1; MD18105 as delivered)"""
+
+
+def by_rule(toolpath: Toolpath, controller: ControllerFile, length: int, radius: int | None) -> Toolpath:
+    """The path whose records name registers by the rules of the shop, H = T + `length`, D = T + `radius`, where the file
+    names none, or the tool's number, as CAM systems do by themselves; where the controller's codes have none, nothing is
+    named."""
+    codes = controller.codes
+    cutcom = radius is not None and "{register}" in codes.compensation_left
+    lengths = bool(length) and "{register}" in codes.length_offset
+    if not lengths and not cutcom:
+        return toolpath
+    tool, events = -1, list[Event]()
+    for event in toolpath.events:
+        said = numbers(event)
+        if event.word in TOOL_WORDS and said:
+            tool = int(said[0])
+            if lengths and (len(said) == 1 or said[1] == said[0]):
+                event = replace(event, values=(float(tool), float(tool + length)))
+        elif event.word == "CUTCOM" and cutcom and (
+                not said or said[0] == tool) and tool > 0 and compensation_side(event) in ("LEFT", "RIGHT"):
+            side = tuple(v for v in event.values if isinstance(v, str))
+            event = replace(event, values=(*side, float(tool + (radius or 0))))
+        events.append(event)
+    return replace(toolpath, events=tuple(events))
 
 
 def own_registers(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolpath, list[Diagnostic]]:

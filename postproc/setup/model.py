@@ -51,6 +51,9 @@ class LinkClearance(UserModel):
     """added to the path's own extent where no distance is given, mm"""
     link_angle: float = Field(default=5.0, gt=0.0, le=180.0)
     """a rapid that turns the tool axis by more than this is linked by the safe planes, degrees"""
+    index: Literal["plane", "home"] | None = None
+    """where the tool waits while a link turns rotary axes: on the safe plane, or with the retract axis at home (G53 Z0);
+    default: as the controller file has it ([links] index)"""
 
 
 class ToolSetup(ToolBody):
@@ -107,6 +110,11 @@ class OutputSettings(UserModel):
     is measured into the work offset. [tools.N] gauge_length (N = 0 for a tool without a number) is then part of the work
     offset that the header names"""
 
+    program_number: int | None = Field(default=None, ge=1, le=9999)
+    """of the program on controls that number them (O1234); default: that of the controller file"""
+    program_name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,24}$")] | None = None
+    """of the program on controls that name them (BEGIN PGM NAME MM) and of its subprograms; default: that of the output
+    file"""
     stop_between_tools: bool = False
     """an optional stop (M1) before every tool change but the first, spindle and coolant off; where the CL file stops there
     itself, none besides"""
@@ -166,8 +174,9 @@ class SetupFile(UserModel):
     description: str = ""
     work_offset: str = ""
     """name of the system of the CL file that is the work offset; default: its first"""
-    work_offset_code: str = Field(default="G54", pattern=r"^G(5[4-9]|59\.[1-3])$")
-    """register of the control that holds it: G54 to G59, or G59.1 to G59.3 where the control has them"""
+    work_offset_code: str = Field(default="G54", pattern=r"^(G[0-9]+(\.[0-9])?( P[0-9]+)?|preset [0-9]+)$")
+    """register of the control that holds it: G54 to G59, G59.1 to G59.3 where the control has them, or a further one by the
+    control's own name, as "G54.1 P12" (Fanuc), "G154 P40" (Haas), "G520" (Siemens), "preset 12" (TNC)"""
     part: PartPlacement = PartPlacement()
     placement: PlacementLimits = PlacementLimits()
     clearance: LinkClearance = LinkClearance()

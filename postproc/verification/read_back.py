@@ -12,7 +12,7 @@ from postproc.base.header_words import HEADER, NO_FILE, Head, read_head, same_na
 from postproc.base.memory import give_back
 from postproc.base.options import Options
 from postproc.job.job import Job
-from postproc.readback.comparison.clamps import check_clamps
+from postproc.readback.comparison.clamps import check_clamps, check_index
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.hooks import check_hooks
@@ -112,6 +112,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(code, motion, job, comparison.owner, faults),
+               *check_index(motion, job, home, comparison.owner, faults),
                *check_hooks(as_bytes(data), code, motion, job, comparison.owner, faults),
               *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)

@@ -112,7 +112,7 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
     control, codes = job.control, job.controller.codes
     case = Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
-                "{register}" in codes.length_offset,
+                named := "{register}" in codes.length_offset, job.machine.length_register if named else 0,
                 sum(COMMANDS[kind] for kind, (on, _) in switching(codes).items() if on),
                 program=as_bytes(program) if control.rolls or job.machine.clamp_codes else b"",
                 clamps={a: (c.clamp, c.unclamp) for a, c in job.machine.clamp_codes.items()} if program else {},

@@ -29,6 +29,8 @@ class Case:
     errors: bool = False
     registers: bool = True
     """False: the control has no length registers to be named, a tool brings its own length along"""
+    register_beyond: int = 0
+    """what the length register of a tool is more than its number where the file names none"""
     coolants: int = 15
     """bits of the kinds of coolant that the control has codes for: it gives the nearest of them for others"""
     oriented: bool = False

@@ -176,7 +176,8 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     rows = np.flatnonzero(w.inside & (w.code > 0) & cuts & (w.on_path() | w.gap | w.returns))
     row = w.targets.row[w.owner[rows] - w.returns[rows]]
     tool, coolant = tools_of(c, case.setup)[row], _coolants(c, case.setup)[row]
-    register = np.where((c.register[row] == OWN) | (not case.registers), tool, c.register[row])
+    own = np.where(tool >= 0, tool + case.register_beyond, tool)
+    register = np.where((c.register[row] == OWN) | (c.register[row] == tool) | (not case.registers), own, c.register[row])
     register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)), -1, register)
     direction, rpm = c.spindle[row], c.rpm[row]
     if not (case.setup.get("output") or {}).get("tool_call", True):

@@ -23,15 +23,18 @@ class WriterState:
     negative: anti-clockwise, 0 unknown), `rounded` its ratio to what was asked. `files` are the subprograms in files of
     their own, by name, once the program is written. `turning` and `cooling` say whether spindle and coolant run, None where
     nobody knows, `flowing` the kinds of coolant that may run (`postproc.reference.coolant`); `taken` are block numbers that
-    subprograms bear; `ahead` the axis words of a stretch of blocks, and the first of them.
+    subprograms bear; `stock` (2, 3) least and greatest X, Y, Z of the stock; `ahead` the axis words of a stretch of blocks,
+    and the first of them.
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
                  smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "",
-                 subprograms: bool = False) -> None:
+                 subprograms: bool = False, stock: Floats | None = None) -> None:
+        self.stock = stock
         self.controller, self.program, self.cycles = controller, program, cycles
         self.length_offsets, self.smoothing, self.axis_smoothing = length_offsets, smoothing, axis_smoothing
-        self.work_offset = controller.program.work_offsets.get(work_offset, work_offset)
+        self.work_offset = controller.program.offset_block(work_offset) or work_offset
+        self.offset_needs = controller.program.offset_needs(work_offset)
         self.offset_name = controller.program.offset_name(work_offset)
         self.name = "".join(c if c.isascii() and c.isalnum() else "_" for c in name).upper()[:24] or "PROGRAM"
         self.subprograms = subprograms and bool(controller.subprograms.call)
@@ -90,8 +93,10 @@ class WriterState:
         return float(self.program.feed[hole.drill]) * (self.rounded if hole.key.startswith("TAP") else 1.0)
 
     def spindle_speed(self, asked: float) -> float:
-        """The speed as S can state it, 1/min: more than 0 where it is asked for."""
-        places = self.controller.format.speed_decimals
+        """The speed as S can state it, 1/min: more than 0 where it is asked for; decimals that are less than a part in ten
+        thousand of it are left out, no spindle keeps them."""
+        most = self.controller.format.speed_decimals
+        places = min(most, max(SPEED_DIGITS - math.floor(math.log10(asked)), 0)) if asked > 0.0 else most
         return round(asked, places) or (10.0**-places if asked > 0.0 else 0.0)
 
     def cycle_of(self, hole: Hole) -> CannedCycle:
@@ -173,6 +178,8 @@ class WriterState:
         return {"register": self.register, "work_offset": self.work_offset, "direction": direction, **angles}
 
 
+SPEED_DIGITS = 3
+"""decimals of a speed from 1 to 10; one less each time that it is ten times as great"""
 _ZEROS = re.compile(r"0+ ")
 _MINUS_ZERO = re.compile(r"-0(?=\.?0* )")
 

@@ -21,6 +21,7 @@ from toolpaths.arrays import Ints
 
 _LABEL = re.compile(r"%|[NO]\d")
 """blocks that carry a number of their own"""
+_SWITCH = re.compile(r"M\d+")
 _HUNDRED = re.compile(r"N\d+")
 """number of an operation"""
 SKIP = "/"
@@ -59,6 +60,7 @@ class Writer(WriterState, ABC):
         main, subs = self.sorted_blocks()
         inside = [block for blocks in subs.values() for block in blocks] if place != "files" else []
         yield from (self.framed(block.format(**named)) for block in frame.begin)
+        yield from (self.framed(block) for block in self.stock_blocks())
         yield from (self.framed(self.comment(part)) for line in (*header, *self.relies_on()) for part in self.folded(line))
         yield from map(self.numbered, inside if place == "before" else [])
         yield from map(self.numbered, main) if self.numbers_blocks else main
@@ -70,6 +72,14 @@ class Writer(WriterState, ABC):
             name = self.controller.subprograms.file.format(name=self.name, number=number)
             blocks.insert(len(self.controller.subprograms.begin), self.comment(f"{OF_PROGRAM} {self.name}"))
             self.files[name] = [self.numbered(block) for block in blocks]
+
+    def stock_blocks(self) -> list[str]:
+        """The stock for the graphics of the control, where it is known and the control has blocks for it."""
+        if self.stock is None or not self.controller.program.stock:
+            return []
+        texts = self.number_text(self.stock.ravel(), self.controller.format.linear_decimals)
+        values = dict(zip(("x0", "y0", "z0", "x1", "y1", "z1"), texts, strict=True))
+        return [block.format(**values) for block in self.controller.program.stock]
 
     def sorted_blocks(self) -> tuple[Iterable[str], dict[int, list[str]]]:
         """Blocks of the main program up to its ending, and those of the subprograms by number, one for each operation."""
@@ -109,7 +119,7 @@ class Writer(WriterState, ABC):
         off = {codes.spindle_stop} if self.turning is False else set()
         off |= {codes.coolant_off} if self.cooling is False else set()
         left = [code for code in self.coolant_off() if self.flowing and code != codes.coolant_off]
-        return left + [block for block in self.controller.program.ending if not set(block.split()) <= off]
+        return left + [kept for block in self.controller.program.ending if (kept := _without(block, off))]
 
     def start(self) -> Iterator[str]:
         """Safe start: modes that the program uses off, then the preamble."""
@@ -129,7 +139,8 @@ class Writer(WriterState, ABC):
 
     def relies_on(self) -> list[str]:
         """Settings of the control that the program needs, each once."""
-        needed = [text for mode in self.used_modes() for text in mode.relies_on]
+        needed = [self.offset_needs] if self.offset_needs else []
+        needed += [text for mode in self.used_modes() for text in mode.relies_on]
         letters, text = self.beyond_a_turn(), self.controller.program.relies_on_turns
         needed += [text.format(axes=" ".join(letters))] if letters and text else []
         for rule in ("shortest", "sign"):
@@ -377,3 +388,11 @@ class Writer(WriterState, ABC):
         self.length_off = self.controller.tools.length_with_z
         if not self.length_off and self.length_offsets and self.controller.codes.length_offset:
             yield self.controller.codes.length_offset.format(register=register)
+
+
+def _without(block: str, off: set[str]) -> str:
+    """A block of the ending without what is off already, where it holds nothing but M codes."""
+    words = block.split()
+    if not all(_SWITCH.fullmatch(word) for word in words):
+        return block
+    return " ".join(word for word in words if word not in off)

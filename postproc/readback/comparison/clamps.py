@@ -1,4 +1,4 @@
-"""Clamps of rotary axes: free where they turn, closed in cuts through which they stand."""
+"""Rotary axes between cuts: free where they turn, clamped in cuts through which they stand, the tool at home meanwhile."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from postproc.readback.text.modal import codes, fill
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 
+AWAY = 0.01
+"""mm next to home that rounding explains"""
 TURNS = 1e-6
 """degrees of a word that turns an axis"""
 
@@ -86,3 +88,28 @@ def _standing(cut: Bools, turns: Bools) -> Ints:
     edges = stretches(cut)
     total = np.concatenate([[0], np.cumsum(turns)])
     return np.asarray(edges[total[edges[:, 1]] == total[edges[:, 0]], 1] - 1)
+
+
+def check_index(motion: Motion, job: Job, home: Floats, owner: Ints, faults: Faults) -> list[Diagnostic]:
+    """Linking moves that turn rotary axes before a move with another tool axis, where the retract axis is to be at home
+    (J,) meanwhile: an error where the set-up says so, a warning where the controller file does.
+
+    Moves of a machine with geometric errors are home as far as its correction goes."""
+    if not job.index_at_home or job.control.tip_law or job.corrects:
+        return []
+    moves = job.moves.without_pecks()
+    first = np.zeros(len(moves) + 1, dtype=bool)
+    first[np.searchsorted(moves.row, job.moves.row[job.indexed()])] = True
+    linking = first[np.clip(owner, 0, len(moves))] & ~cutting_rows(motion, job, owner)
+    rotary = np.flatnonzero(np.array(job.machine.rotary))
+    before = np.concatenate([motion.start[None], motion.end[:-1]])
+    turns = (np.abs(motion.end - before)[:, rotary] > TURNS).any(axis=1)
+    lift = job.machine.retract_axis
+    bad = np.flatnonzero(linking & turns & (np.abs(before[:, lift] - home[lift]) > AWAY))
+    if not len(bad):
+        return []
+    name, k = job.machine.axis_names[lift], int(bad[0])
+    judge = faults.error if job.setup.clearance.index == "home" else faults.warning
+    off = abs(float(before[k, lift] - home[lift]))
+    return [judge("verify.index", f"rotary axes turn while {name} is {off:.3f} mm from home", 0, int(motion.line[k]),
+                  len(bad), f'retract {name} to home before it, or write index = "plane" under [clearance] of the set-up')]

@@ -54,7 +54,7 @@ class _Asked:
         """That of a job."""
         direction, rpm = spindle_states(job.toolpath)
         code = job.setup.work_offset_code
-        offset = reader.offset_of(job.controller.program.work_offsets.get(code, code))
+        offset = reader.offset_of(job.controller.program.offset_block(code) or code)
         coolant = coolant_states(job.toolpath, job.controller.codes)
         columns = (loaded_tools(job.toolpath), loaded_registers(job.toolpath), direction, rpm, coolant,
                    compensation_states(job.toolpath), _radius_registers(job))

@@ -56,6 +56,8 @@ class FanucReader(IsoReader):
     laws: ClassVar[tuple[float, ...]] = _LAWS
     tcp_code = 43.4
     extended_offset = 54.1
+    last_offset = 300
+    """of G54.1 P (B-64484EN: 48, or 300 as an option)"""
     repeats = "K"
     units_from = "the program before left them, also over power off"
     smoothing_hint = "G05.1 Q1 as the post writes it, or G61"
@@ -171,7 +173,11 @@ class FanucReader(IsoReader):
     def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """Laws, extended work offsets, the reference position, coolant through the tool."""
         for b in codes(words, "G", (self.extended_offset,))[0].tolist():
-            new.append((b, OFFSET, offset_number(f"G54.1 P{block(words, b).get('P', 0.0):g}")))
+            number = block(words, b).get("P", 0.0)
+            new.append((b, OFFSET, offset_number(f"G54.1 P{number:g}")))
+            if number not in range(1, self.last_offset + 1):
+                found.append(error("gcode.offset", f"G{self.extended_offset:g} P{number:g}: there is no such work offset",
+                                   file=file, lines=[int(line[b])], hint=f"P1 to P{self.last_offset}"))
         for b in codes(words, "G", (5.1,))[0].tolist():
             self.contour_control(take(words, drop, b, "QR"), int(line[b]), file, found)
         self.modes(words, new, drop, line, file, found)

@@ -35,6 +35,7 @@ class HaasReader(FanucReader):
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tilted": ("G255",)}
     tcp_code = 234.0
     extended_offset = 154.0
+    last_offset = 99
     arc_slack = 0.01
     """mm, assumed: the manual has no spiral"""
     repeats = "L"
