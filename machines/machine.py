@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
+from machines.choices import Park, RolloverRule, Stop
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
@@ -53,8 +55,8 @@ class Turns:
 
     modulo: bool = False
     low: float = 0.0
-    rollover: str = ""
-    park: str = "turn"
+    rollover: RolloverRule | Literal[""] = ""
+    park: Park = "turn"
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ class Machine:
     timing: Timing = field(default_factory=Timing)
     control_kinematics: ControlKinematics | None = None
     file: str = ""
-    stop: str = ""
+    stop: Stop | Literal[""] = ""
     stated: Limits | None = None
     turns: tuple[Turns, ...] = ()
     clamps: tuple[ClampCodes, ...] = ()

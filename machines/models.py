@@ -9,10 +9,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
+from machines.choices import Park, RolloverRule, Stop
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from machines.machine import ControlKinematics
-from machines.stop import Stop
 from machines.user_file import UserModel
 
 Positive = Annotated[float, Field(gt=0)]
@@ -95,10 +95,10 @@ class AxisModel(UserModel):
     1008#0 ROA = 1 and 1260 = 360; Siemens: MD30310 $MA_ROT_IS_MODULO; LinuxCNC: WRAPPED_ROTARY = 1"""
     modulo_range: Turn = (0.0, 360.0)
     """degrees, the turn that words of a modulo axis are written in"""
-    rollover: Literal["shortest", "sign", "none"] | None = None
+    rollover: RolloverRule | None = None
     """which path the control takes to a word of a modulo axis: the shorter one (Fanuc 1008#1 RAB = 0, Heidenhain M126), that
     of the word's sign (Fanuc RAB = 1, LinuxCNC), or none: it counts the turns after all. Default: that of the controller"""
-    park: Literal["turn", "home"] = "turn"
+    park: Park = "turn"
     """where an axis that turns on and on is parked: at the whole turn that is nearest to home, or at home itself, all turns
     unwound; a modulo axis that rolls over has no turns to unwind"""
     clamp: MCode = ""

@@ -132,11 +132,11 @@ class _Checks:
         return np.minimum(rig.tilt - low, high - rig.tilt)
 
     def _stops(self) -> Iterator[MarginColumn]:
-        stops = (("slide", self.clearance.carriage_angle), ("platform", self.clearance.platform_angle))
+        stops = (("slide", False, self.clearance.carriage_angle), ("platform", True, self.clearance.platform_angle))
         for k, letter in enumerate(self.letters[: len(self.legs.lengths)]):
-            for where, most in stops:
+            for where, carried, most in stops:
                 if most is not None:
-                    yield f"joint {letter} at {where}", True, partial(self._swing, k, most, where == "platform")
+                    yield f"joint {letter} at {where}", True, partial(self._swing, k, most, carried)
 
     def _swing(self, k: int, most: float, carried: bool, rig: ClearanceGeometry) -> Floats:
         """The stop `most` less the rod's angle from its direction in the middle; `carried` by the tilting platform."""

@@ -24,9 +24,9 @@ FILES = {
     "postproc.base.header_words": "heads of programs: written and read in one place",
     "postproc.cycle_time.source": "whether a file is a CL file or a program",
     "postproc.readback.comparison.hooks": "blocks of the shop in programs",
-    "postproc.verification.tool_table": "tool tables of controls",
     "postproc.readback.comparison.slow_moves": "F words of programs",
     "postproc.readback.comparison.unstated_codes": "codes of programs",
+    "postproc.verification.tool_table": "tool tables of controls",
     "postproc.writing.linuxcnc": "comments that LinuxCNC obeys", "postproc.writing.state": "decimals of words",
     "postproc.writing.writer": "labels of blocks"}
 """single files besides"""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from toolpaths.choices import DialectName, LengthUnit
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
 
@@ -14,7 +15,8 @@ __all__ = ["read", "read_bytes", "write"]
 ReadProgress = Callable[[int, int], None]
 
 
-def read(path: str | Path, *, units: str | None = None, dialect: str | None = None, allow_unknown: Iterable[str] = (),
+def read(path: str | Path, *, units: LengthUnit | None = None, dialect: DialectName | None = None,
+         allow_unknown: Iterable[str] = (),
          progress: ReadProgress | None = None) -> tuple[Toolpath, list[Diagnostic]]:
     """The toolpath of a CL file, and what reading it showed; see `toolpaths.cl.read.read_bytes` for the options."""
     from toolpaths.cl.read import read_file
@@ -22,7 +24,7 @@ def read(path: str | Path, *, units: str | None = None, dialect: str | None = No
     return result.toolpath, result.diagnostics
 
 
-def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, dialect: str | None = None,
+def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = None, dialect: DialectName | None = None,
                allow_unknown: Iterable[str] = ()) -> tuple[Toolpath, list[Diagnostic]]:
     """The same from the text of a CL file; `file` is its name in diagnostics."""
     from toolpaths.cl import read as reader

@@ -8,12 +8,14 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
+
+from toolpaths.choices import FigureEnding
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FORMATS = (".png", ".svg")
+FORMATS: tuple[FigureEnding, ...] = get_args(FigureEnding)
 """by the ending of the file"""
 DOTS = 130
 """per inch, of PNG"""
@@ -25,7 +27,7 @@ _RULES: Any = {"svg.hashsalt": "postproc", "font.family": "DejaVu Sans", "axes.g
                "axes.formatter.use_mathtext": False, "text.parse_math": False}
 
 
-def image(size: tuple[float, float], title: str, fill: Callable[[Figure], None], ending: str) -> bytes:
+def image(size: tuple[float, float], title: str, fill: Callable[[Figure], None], ending: FigureEnding) -> bytes:
     """An image file of a sheet.
 
     Args:

@@ -97,13 +97,18 @@ def clean(folder: Path) -> list[Diagnostic]:
             noted += _recovered(journal) if journal.exists() else []
             if not journal.exists():
                 path.unlink()
-    kept = {_NAME.fullmatch(p.name)["run"]  # type: ignore[index]
-            for p, kind in _leftovers(folder) if kind in (JOURNAL, POINTER)}
+    kept = {_run_of(p) for p, kind in _leftovers(folder) if kind in (JOURNAL, POINTER)}
     for path, _ in [x for x in found if x[1] in (NEW, OLD)]:
-        if _NAME.fullmatch(path.name)["run"] not in kept:  # type: ignore[index]
+        if _run_of(path) not in kept:
             with contextlib.suppress(OSError):
                 path.unlink()
     return noted
+
+
+def _run_of(path: Path) -> str:
+    """The run that a temporary file is of."""
+    found = _NAME.fullmatch(path.name)
+    return found["run"] if found else ""
 
 
 def interrupted(folder: Path) -> Path | None:

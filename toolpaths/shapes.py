@@ -119,20 +119,27 @@ def _compiled(fields: list[_Field]) -> Callable[[Any], None]:
     """One function of all checks of a class: as many comparisons of types and of tuples as it has arrays."""
     always = {letter for f in fields if not (f.optional or f.several) for letter in f.letters}
     sometimes = sorted({letter for f in fields for letter in f.letters} - always)
-    lines, known = ["def check(self):", *(f" {letter} = None" for letter in sometimes)], set[str]()
-    names: dict[str, Any] = {"ndarray": np.ndarray, "put": object.__setattr__, "as_type": _as_type, "fail": _fail,
-                             "fields": fields}
+    lines, known = ["def check(self):", " held = self.__dict__", *(f" {letter} = None" for letter in sometimes)], set[str]()
+    names: dict[str, Any] = {"ndarray": np.ndarray, "as_type": _as_type, "fail": _fail, "fields": fields}
+    seen: dict[tuple[str, ...], str] = {}
     for k, f in enumerate(fields):
         names[f"kind{k}"] = np.dtype(f.kind) if f.kind else None
-        put = [] if f.several else [f" put(self, {f.name!r}, a)"]
+        put = [] if f.several else [f" held[{f.name!r}] = a"]
+        like = seen.get(f.parts or ())
+        compared = [f"if a.shape != {like}:", " fail(self, fields)"]
+        compared = _comparison(f.parts, known, sometimes) if like is None else compared
+        if like is None and f.parts and "_" not in f.parts and not (f.optional or f.several):
+            seen[f.parts] = f"shape{k}"
+            compared.append(f"shape{k} = a.shape")
         body = [f"if a.__class__ is not ndarray{f' or a.dtype is not kind{k}' if f.kind else ''}:",
-                f" a = as_type(a, kind{k}, self, {f.name!r})", *put, *_comparison(f.parts, known, sometimes),
-                "if a.flags.writeable:", " a = a.view()", " a.flags.writeable = False", *put]
+                f" a = as_type(a, kind{k}, self, {f.name!r})", *put, *compared,
+                "if a.flags.writeable:", " a = a.view()", " a.setflags(False)", *put]
         if f.several:
-            lines += [f" if self.{f.name} is not None:", "  made = []", f"  for a in self.{f.name}:",
-                      *(f"   {line}" for line in body), "   made.append(a)", f"  put(self, {f.name!r}, tuple(made))"]
+            lines += [f" if held[{f.name!r}] is not None:", "  made = []", f"  for a in held[{f.name!r}]:",
+                      *(f"   {line}" for line in body), "   made.append(a)", f"  held[{f.name!r}] = tuple(made)"]
         else:
-            lines += [f" a = self.{f.name}", " if a is not None:", *(f"  {line}" for line in body)]
+            lines.append(f" a = held[{f.name!r}]")
+            lines += [" if a is not None:", *(f"  {line}" for line in body)] if f.optional else [f" {line}" for line in body]
     exec("\n".join(lines), names)
     made: Callable[[Any], None] = names["check"]
     return made

@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from toolpaths.arrays import Array, Floats, shared
+from toolpaths.choices import CycleKind, GivenDialect, GivenUnit, LengthUnit
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays
 
@@ -118,7 +119,7 @@ class Cycle:
     `feed` and `feed_mode` as in Toolpath; `steps` are the pecks (first, following).
     """
 
-    kind: str
+    kind: CycleKind
     depth: float
     clearance: float
     retract: float | None
@@ -170,8 +171,8 @@ class ClSource:
     """The bytes of the CL file that a path was read from, and with which units and dialect ("": as the file says)."""
 
     data: bytes
-    units: str = ""
-    dialect: str = ""
+    units: GivenUnit = ""
+    dialect: GivenDialect = ""
 
 
 @dataclass(frozen=True)
@@ -221,7 +222,7 @@ class Toolpath:
     events: tuple[Event, ...] = ()
     normal: Floats | None = None
     contact: Floats | None = None
-    units: str = "mm"
+    units: LengthUnit = "mm"
     name: str = ""
     """PARTNO"""
     file: str = ""

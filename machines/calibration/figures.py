@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from machines.calibration.result_figures import CalibrationFigures, FoundParameter, Numbers, PlannedCampaign, Signature
+from toolpaths.choices import FigureEnding
 from toolpaths.drawing import ADJACENT, image, plain
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ BOUND = 1.96
 """standard deviations of the 95 % bounds drawn"""
 
 
-def draw(figures: dict[str, Any], title: str, ending: str) -> bytes:
+def draw(figures: CalibrationFigures, title: str, ending: FigureEnding) -> bytes:
     """The figures of a `Calibration` as an image file.
 
     Args:
@@ -41,7 +43,7 @@ def draw(figures: dict[str, Any], title: str, ending: str) -> bytes:
     return image((SIZE[0], SIZE[1] * len(panels)), title, fill, ending)
 
 
-def _panels(figures: dict[str, Any]) -> list[tuple[Any, Any]]:
+def _panels(figures: CalibrationFigures) -> list[tuple[Any, Any]]:
     """(function, what it draws), top to bottom; signatures by unit."""
     curves = figures.get("signatures", {})
     units = sorted({curve["unit"] for curve in curves.values()})
@@ -54,17 +56,17 @@ def _panels(figures: dict[str, Any]) -> list[tuple[Any, Any]]:
     return found + ([(_conditions, figures["plan"])] if figures.get("plan") else [])
 
 
-def _signatures(place: Axes, curves: dict[str, Any]) -> None:
+def _signatures(place: Axes, curves: dict[str, Signature]) -> None:
     for name, curve in curves.items():
-        x, y, sigma = (_floats(curve[key]) for key in ("degrees", "values", "sigma"))
+        x, y, sigma = _floats(curve["degrees"]), _floats(curve["values"]), _floats(curve["sigma"])
         line, = place.plot(x, y, marker="." if len(x) < MANY else "", label=plain(name))
         place.fill_between(x, y - BOUND * sigma, y + BOUND * sigma, color=line.get_color(), alpha=0.2, linewidth=0.0)
     _labelled(place, "position [deg]", f"signature [{next(iter(curves.values()))['unit']}], 95 % bounds")
     place.legend(**ADJACENT)
 
 
-def _parameters(place: Axes, chosen: dict[str, Any]) -> None:
-    values, sigma = (_floats([p[key] for p in chosen.values()]) for key in ("value", "sigma"))
+def _parameters(place: Axes, chosen: dict[str, FoundParameter]) -> None:
+    values, sigma = _floats([p["value"] for p in chosen.values()]), _floats([p["sigma"] for p in chosen.values()])
     at = np.arange(len(values))
     place.errorbar(at, values, yerr=BOUND * sigma, fmt="o", markersize=3.0, capsize=3.0)
     named = at[:: -(-len(at) // MANY)]
@@ -72,7 +74,7 @@ def _parameters(place: Axes, chosen: dict[str, Any]) -> None:
     _labelled(place, "parameter", f"value [{next(iter(chosen.values()))['unit']}], 95 % bounds")
 
 
-def _residuals(place: Axes, rows: dict[str, Any]) -> None:
+def _residuals(place: Axes, rows: dict[str, Numbers]) -> None:
     for name, row in rows.items():
         place.plot(_floats(row), linestyle="", marker=".", label=plain(name))
     for bound in (-BOUND, BOUND):
@@ -81,7 +83,7 @@ def _residuals(place: Axes, rows: dict[str, Any]) -> None:
     place.legend(**ADJACENT)
 
 
-def _conditions(place: Axes, plan: list[dict[str, Any]]) -> None:
+def _conditions(place: Axes, plan: list[PlannedCampaign]) -> None:
     setups, number = [c["setups"] for c in plan], _floats([c["condition_number"] for c in plan])
     place.plot(setups, number, marker="o")
     place.set_xticks(setups)

@@ -145,8 +145,9 @@ def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, star
     wanted = run.checked.parameters
     unknowns = sum(not wanted or name.startswith(wanted) for name in start.names)
     unknowns += len(SETUP[measured.kind]) if measured.zeroed else 0
-    figures = account(result, result.rank, result.condition_number, unknowns, fitted.cost_instrument) | {
-        "setup_mm": fitted.setup, "residuals": weighted(rows, measured.sigma, [c.name for c in COLUMNS[run.kind]])}
+    figures = account(result, result.rank, result.condition_number, unknowns, fitted.cost_instrument)
+    figures["setup_mm"] = fitted.setup
+    figures["residuals"] = weighted(rows, measured.sigma, [c.name for c in COLUMNS[run.kind]])
     if isinstance(given, BarModel):
         figures["centre_mm"] = [c + fitted.setup[name] for c, name in zip(given.centre, SETUP["distance"], strict=False)]
     if not result.converged:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from machines.calibration.noise import CHANCE, Noise
-from machines.calibration.result_figures import parameters
+from machines.calibration.result_figures import CalibrationFigures, parameters
 from machines.calibration.run import CalibrationRun
 from machines.calibration.unit_and_sign_checks import TableFault
 from machines.geometric_error.actual.model import ErrorModel
@@ -34,18 +33,18 @@ class CalibrationOutcome:
     """What was found: the model (None where the data do not support it) and the figures of `calibrate --json`."""
 
     model: ErrorModel | None
-    figures: dict[str, Any]
+    figures: CalibrationFigures
 
     def description(self, source: str) -> str:
         """One line for the model's file: what it is from, and what its covariance was scaled by."""
-        scale, left = self.figures.get("covariance_scale", 1.0), self.figures.get("reduced")
+        scale, left = self.figures["covariance_scale"], self.figures["reduced"]
         if left is None or scale == 1.0:
             return f"from {source}"
         return (f"from {source}; covariance scaled by {scale:.4g}: {left:.4g} times the stated noise is left of the "
                 f"readings, {self.figures['spare']} degrees of freedom")
 
 
-def done(run: CalibrationRun, model: ErrorModel, figures: dict[str, Any], noise: Noise | None, sigma: str,
+def done(run: CalibrationRun, model: ErrorModel, figures: CalibrationFigures, noise: Noise | None, sigma: str,
          fault: Callable[[], TableFault | None], start: ErrorModel | None = None,
          wanted: Sequence[str] = ()) -> CalibrationOutcome:
     """The calibration, its parameters in the figures.
@@ -60,7 +59,7 @@ def done(run: CalibrationRun, model: ErrorModel, figures: dict[str, Any], noise:
     _large(run, model, start)
     _residual(run, figures, noise, sigma, fault)
     found = parameters(model, wanted)
-    figures |= {"parameters": found, "kept": len(model.names) - len(found)}
+    figures["parameters"], figures["kept"] = found, len(model.names) - len(found)
     return CalibrationOutcome(model, figures)
 
 
@@ -85,7 +84,7 @@ def uncertain(run: CalibrationRun, code: str, message: str, hint: str, key: str 
         run.problem(code, message, hint, key)
 
 
-def _residual(run: CalibrationRun, figures: dict[str, Any], noise: Noise | None, sigma: str,
+def _residual(run: CalibrationRun, figures: CalibrationFigures, noise: Noise | None, sigma: str,
               fault: Callable[[], TableFault | None]) -> None:
     """What is left of the readings against what the file says of their noise."""
     if noise is None:
@@ -116,7 +115,7 @@ def _silent(run: CalibrationRun, noise: Noise, message: str, found: TableFault |
         run.warn("calibrate.silent", f"{message}: it is stated too large", stated)
 
 
-def _loud(run: CalibrationRun, figures: dict[str, Any], noise: Noise, message: str, found: TableFault | None,
+def _loud(run: CalibrationRun, figures: CalibrationFigures, noise: Noise, message: str, found: TableFault | None,
           stated: str) -> None:
     """More is left than the stated noise leaves: refused, unless it is asked for."""
     accepted = run.checked.accept_residual

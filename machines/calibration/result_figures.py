@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import NotRequired, TypedDict
 
 import numpy as np
 
@@ -19,9 +19,69 @@ from toolpaths.arrays import Floats
 
 CURVE = 5
 """degrees between the points of a drawn series"""
+Numbers = list[float | None]
+"""plain numbers, None where one is not finite"""
 
 
-def account(result: CalibrationResult, rank: int, number: float, unknowns: int, cost_instrument: float) -> dict[str, Any]:
+class FoundParameter(TypedDict):
+    """A parameter that was found; see `parameters`."""
+
+    value: float
+    sigma: float | None
+    unit: str
+    at: str
+
+
+class Signature(TypedDict):
+    """A curve over the position of an axis; see `signature`."""
+
+    degrees: Numbers
+    values: Numbers
+    sigma: Numbers
+    unit: str
+
+
+class PlannedCampaign(TypedDict):
+    """What so many set-ups would determine."""
+
+    setups: int
+    condition_number: float | None
+    sigma_arcsec: NotRequired[float | None]
+    minutes: NotRequired[float]
+
+
+class CalibrationFigures(TypedDict):
+    """The keys of `calibrate --json`: of every fit (`account`), and of its kind."""
+
+    parameters: dict[str, FoundParameter]
+    kept: int
+    rank: int
+    unknowns: int
+    condition_number: float | None
+    readings: int
+    spare: int
+    rms_before: float
+    rms_instrument: float
+    rms_after: float
+    reduced: float | None
+    chance: float | None
+    covariance_scale: float
+    converged: bool
+    not_identifiable: list[list[str]]
+    residuals: NotRequired[dict[str, Numbers]]
+    signatures: NotRequired[dict[str, Signature]]
+    plan: NotRequired[list[PlannedCampaign]]
+    axis_arcsec: NotRequired[Numbers]
+    axis_sigma_arcsec: NotRequired[Numbers]
+    indexer_arcsec: NotRequired[Numbers]
+    set_by_closure: NotRequired[list[str]]
+    residual_rms_arcsec: NotRequired[float]
+    setup_mm: NotRequired[dict[str, float]]
+    centre_mm: NotRequired[list[float]]
+
+
+def account(result: CalibrationResult, rank: int, number: float, unknowns: int,
+            cost_instrument: float) -> CalibrationFigures:
     """Of every fit: rank of so many unknowns, condition number (None where it is infinite), weighted residual (root mean
     square) before, with nothing found but what belongs to the instrument, and after; `reduced` is that after, by readings
     less unknowns (None where there are no more readings than that), `chance` that readings at their stated noise leave as
@@ -36,7 +96,7 @@ def account(result: CalibrationResult, rank: int, number: float, unknowns: int, 
             "converged": result.converged, "not_identifiable": [list(group) for group in result.not_identifiable]}
 
 
-def parameters(model: ErrorModel, wanted: Sequence[str] = ()) -> dict[str, Any]:
+def parameters(model: ErrorModel, wanted: Sequence[str] = ()) -> dict[str, FoundParameter]:
     """By name, of those that begin as one of `wanted` (all without): value, sigma (None where it is not known), unit (um or
     arcsec), at: the position that a value of a table is of, "X -300", "X -300 +" with its approach direction ("" for all
     others)."""
@@ -61,13 +121,13 @@ def _places(model: ErrorModel) -> dict[str, str]:
     return found
 
 
-def signature(degrees: Floats, values: Floats, sigma: Floats, unit: str) -> dict[str, Any]:
+def signature(degrees: Floats, values: Floats, sigma: Floats, unit: str) -> Signature:
     """A curve (N,) over the axis's position with its standard deviation; mm or rad in, `unit` out."""
     return {"degrees": listed(degrees), "values": listed(values / UNITS[unit]), "sigma": listed(sigma / UNITS[unit]),
             "unit": unit}
 
 
-def series_signatures(fitted: RotaryFit) -> dict[str, Any]:
+def series_signatures(fitted: RotaryFit) -> dict[str, Signature]:
     """The six series of a rotary axis over a turn, by reading; amplitudes that are not reported count as 0."""
     degrees = np.arange(0.0, 360.0 + CURVE, CURVE)
     phase = np.radians(degrees)[:, None] * np.arange(1, fitted.amplitudes.shape[2] + 1)
@@ -81,12 +141,12 @@ def series_signatures(fitted: RotaryFit) -> dict[str, Any]:
     return found
 
 
-def weighted(rows: Floats, sigma: Floats | float, names: list[str]) -> dict[str, list[float | None]]:
+def weighted(rows: Floats, sigma: Floats | float, names: list[str]) -> dict[str, Numbers]:
     """Residuals (K, R) of K named rows in standard deviations (broadcast), None where there is no reading."""
     return {name: listed(row) for name, row in zip(names, rows / sigma, strict=True)}
 
 
-def listed(values: Floats) -> list[float | None]:
+def listed(values: Floats) -> Numbers:
     """Plain numbers, None where one is not finite."""
     return [finite(float(v)) for v in values]
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
+from machines.calibration.result_figures import CalibrationFigures
 from toolpaths.table_text import table_text
 
 FIGURES = 4
@@ -15,14 +15,14 @@ UNCERTAINTY_DIGITS = 3
 """figures that an uncertainty is written with, and its value to the same decimal"""
 
 
-def text(figures: dict[str, Any], head: str) -> str:
+def text(figures: CalibrationFigures | None, head: str) -> str:
     """Lines: what was written, how well the readings determine it, where ball and bar are, then each error found."""
-    if not figures:
+    if figures is None:
         return head
     return "\n".join([head, *_quality(figures), *_instrument(figures), *_errors(figures)])
 
 
-def _quality(figures: dict[str, Any]) -> list[str]:
+def _quality(figures: CalibrationFigures) -> list[str]:
     number = figures["condition_number"]
     shown = "infinite" if number is None else f"{number:#.{FIGURES}g}"
     return [f"rank {figures['rank']} of {figures['unknowns']}, condition number {shown}, {figures['readings']} readings",
@@ -30,16 +30,17 @@ def _quality(figures: dict[str, Any]) -> list[str]:
             f"nothing found of the machine, {figures['rms_after']:#.{FIGURES}g} after", *_scaled(figures)]
 
 
-def _scaled(figures: dict[str, Any]) -> list[str]:
+def _scaled(figures: CalibrationFigures) -> list[str]:
     """What the covariance was scaled by, where more than the stated noise is left."""
-    scale = figures.get("covariance_scale", 1.0)
+    scale = figures["covariance_scale"]
     times = f"{math.sqrt(scale):.{FIGURES}g}"
     return [] if scale == 1.0 else [f"standard deviations are {times} times those of the stated noise"]
 
 
-def _instrument(figures: dict[str, Any]) -> list[str]:
+def _instrument(figures: CalibrationFigures) -> list[str]:
     """Ball, bar and zero."""
-    setup, lines = figures.get("setup_mm", {}), []
+    setup: dict[str, float] = figures.get("setup_mm", {})
+    lines: list[str] = []
     if "centre_mm" in figures:
         ball = ", ".join(f"{v:.4f}" for v in figures["centre_mm"])
         length = setup["bar.length"]
@@ -57,13 +58,13 @@ def _ball(setup: dict[str, float]) -> tuple[float, ...]:
     return tuple(setup[f"ball.{x}"] for x in "xyz")
 
 
-def _errors(figures: dict[str, Any]) -> list[str]:
+def _errors(figures: CalibrationFigures) -> list[str]:
     """Each parameter that was found; how many others stay."""
-    noted = {name: p for name, p in figures["parameters"].items() if p["sigma"] is not None}
-    untold, kept = [name for name in figures["parameters"] if name not in noted], figures["kept"]
+    noted = [(name, p, sigma) for name, p in figures["parameters"].items() if (sigma := p["sigma"]) is not None]
+    untold, kept = [name for name, p in figures["parameters"].items() if p["sigma"] is None], figures["kept"]
     lines = ["found, with one standard deviation:"] if noted else []
-    lines += table_text([(name, f"{_value(p['value'], p['sigma'])} {p['unit']}", f"{p['at'] and 'at '}{p['at']}")
-                         for name, p in noted.items()], indent=2) if noted else []
+    lines += table_text([(name, f"{_value(p['value'], sigma)} {p['unit']}", f"{p['at'] and 'at '}{p['at']}")
+                         for name, p, sigma in noted], indent=2) if noted else []
     lines += [f"not known, 0 in the model: {', '.join(untold)}"] if untold else []
     return lines + ([f"other parameters, which stay as they were: {kept}"] if kept else [])
 

@@ -80,14 +80,6 @@ class Reversal:
     conditioning: Conditioning
     covariance: Floats
 
-    @property
-    def lacking(self) -> str:
-        """What is missing where the readings do not determine both signatures, "" where they do."""
-        if self.result.supported:
-            return ""
-        return (f"rank {self.conditioning.rank} of {self.conditioning.unknowns}: measure one more set-up, the indexer "
-                "turned by a number of increments that has no divisor in common with the number of steps")
-
 
 def identify(readings: Floats, sigma: float | Floats, offsets: bool = True, robust: bool = False,
              shifts: Sequence[int] | None = None) -> Reversal:

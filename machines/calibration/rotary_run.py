@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from machines.calibration.folded_names import folded
 from machines.calibration.measurement_file import COLUMNS, ReversalModel, RotaryMeasurementModel
 from machines.calibration.outcome import CalibrationOutcome, done
-from machines.calibration.result_figures import account, finite, listed, series_signatures, signature, weighted
+from machines.calibration.result_figures import (
+    CalibrationFigures,
+    account,
+    finite,
+    listed,
+    series_signatures,
+    signature,
+    weighted,
+)
 from machines.calibration.reversal import Reversal, cost_without, identify, plan, statistics
 from machines.calibration.rotary_bench import PARTS, Bench
 from machines.calibration.rotary_fit import RotaryFit, distinguishable, error_model, fit_rotary, hidden
@@ -42,8 +48,10 @@ def reversal(run: CalibrationRun, given: ReversalModel, table: CsvTable) -> Cali
     sigma = given.sigma_arcsec * ARCSEC
     fitted = identify(readings, sigma, given.zeroed, run.checked.robust, given.shifts or None)
     figures = _reversal_figures(run, given, fitted, readings, sigma)
-    if fitted.lacking:
-        run.problem("calibrate.rank", f"the readings do not distinguish axis and indexer: {fitted.lacking}")
+    if not fitted.result.supported:
+        run.problem("calibrate.rank", "the readings do not distinguish axis and indexer: rank "
+                    f"{fitted.conditioning.rank} of {fitted.conditioning.unknowns}: measure one more set-up, the indexer "
+                    "turned by a number of increments that has no divisor in common with the number of steps")
         return CalibrationOutcome(None, figures)
     name = ErrorName(DIRECTIONS.index(given.axis), False, given.axis)
     x = 2.0 * np.pi * np.arange(given.steps) / given.steps
@@ -54,12 +62,12 @@ def reversal(run: CalibrationRun, given: ReversalModel, table: CsvTable) -> Cali
 
 
 def _reversal_figures(run: CalibrationRun, given: ReversalModel, fitted: Reversal, readings: Floats,
-                      sigma: float) -> dict[str, Any]:
+                      sigma: float) -> CalibrationFigures:
     degrees = np.asarray(np.arange(given.steps) * (360.0 / given.steps), dtype=np.float64)
     curves = {"axis": (fitted.axis, fitted.axis_sigma), "indexer": (fitted.indexer, fitted.indexer_sigma)}
     known, planned = fitted.conditioning, _planned(given.steps, 12, 864)
     alone = cost_without(readings, sigma, given.zeroed, run.checked.robust, given.shifts or None)
-    return account(fitted.result, known.rank, known.condition_number, known.unknowns, alone) | {
+    return {**account(fitted.result, known.rank, known.condition_number, known.unknowns, alone),
         "signatures": {k: signature(degrees, *curve, "arcsec") for k, curve in curves.items()},
         "residuals": weighted(fitted.residuals, sigma, [f"set-up {k}" for k in range(len(readings))]),
         "axis_arcsec": listed(fitted.axis / ARCSEC), "axis_sigma_arcsec": listed(fitted.axis_sigma / ARCSEC),
@@ -103,9 +111,9 @@ def rotary(run: CalibrationRun, given: RotaryMeasurementModel, table: CsvTable) 
                 lambda: rotary_table_fault(bench, readings, sigma, given.harmonics, [table.unit[p] for p in PARTS]))
 
 
-def _rotary_figures(given: RotaryMeasurementModel, bench: Bench, fitted: RotaryFit, sigma: Floats) -> dict[str, Any]:
+def _rotary_figures(given: RotaryMeasurementModel, bench: Bench, fitted: RotaryFit, sigma: Floats) -> CalibrationFigures:
     planned = _planned(given.steps, SETUPS, 216)
-    return account(fitted.result, fitted.noted, fitted.condition_number, fitted.amplitudes.size, fitted.cost_instrument) | {
+    return {**account(fitted.result, fitted.noted, fitted.condition_number, fitted.amplitudes.size, fitted.cost_instrument),
         "not_identifiable": [[name] for name in fitted.lost], "signatures": series_signatures(fitted),
         "residuals": weighted(fitted.residuals.reshape(-1, 6).T, sigma[:, None], list(PARTS)),
         "plan": [{"setups": k, "condition_number": finite(distinguishable(bench, k, sigma, given.harmonics))}

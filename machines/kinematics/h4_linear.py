@@ -59,22 +59,22 @@ class H4Linear(OnSlides):
     platform_turns = True
 
     @property
-    def branches(self) -> int:  # type: ignore[override]
+    def branches(self) -> int:  # type: ignore[override]  # nothing assigns it
         """`pairs`, times 16 with `all_roots`"""
         return self.pairs * (16 if self.all_roots else 1)
 
     @property
-    def gauge_below(self) -> float:  # type: ignore[override]
+    def gauge_below(self) -> float:  # type: ignore[override]  # nothing assigns it
         """`gauge`"""
         return self.gauge
 
     @property
-    def workspace(self) -> Workspace:  # type: ignore[override]
+    def workspace(self) -> Workspace:  # type: ignore[override]  # nothing assigns it
         """of C and the tilt, in the machine frame"""
         return self.platform.workspace
 
     @property
-    def legs(self) -> Legs:  # type: ignore[override]
+    def legs(self) -> Legs:  # type: ignore[override]  # nothing assigns it
         """of the platform"""
         return self.platform.legs
 

@@ -58,7 +58,7 @@ class LinearDelta(OnSlides):
         object.__setattr__(self, "side", float(np.sign(determinant(rods)[0])))
 
     @property
-    def branches(self) -> int:  # type: ignore[override]
+    def branches(self) -> int:  # type: ignore[override]  # nothing assigns it
         """1, or 8 with `all_roots`"""
         return 8 if self.all_roots else 1
 

@@ -26,7 +26,7 @@ class OnSlides(Kinematics):
     gauge_below: float
 
     @property
-    def on_rods(self) -> OnSlides:  # type: ignore[override]
+    def on_rods(self) -> OnSlides:  # type: ignore[override]  # nothing assigns it
         """Itself."""
         return self
 

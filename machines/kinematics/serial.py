@@ -81,7 +81,7 @@ class Serial(Kinematics):
         return self.rotary
 
     @property
-    def slides_square(self) -> bool:  # type: ignore[override]
+    def slides_square(self) -> bool:  # type: ignore[override]  # nothing assigns it
         """See the base class."""
         kinds = [joint.rotary for joint in self.chain]
         first = kinds.index(False) if False in kinds else 0

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from postproc.base.header_words import chosen_axes, feed_line, setup_line
+from toolpaths.choices import GivenDialect, GivenUnit
 
 FeedModeChoice = Literal["auto", "per-minute", "inverse-time"]
 OutputMode = Literal["auto", "axes", "tcp", "tilted"]
@@ -23,8 +24,8 @@ class Options:
     feed_mode: FeedModeChoice = "auto"
     setup: str = ""
     """file of the set-up"""
-    units: str = ""
-    dialect: str = ""
+    units: GivenUnit = ""
+    dialect: GivenDialect = ""
     allow_unknown: tuple[str, ...] = ()
     output: OutputMode = "auto"
     feed: FeedSource = "programmed"

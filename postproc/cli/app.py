@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from postproc.base.options import FeedModeChoice, FeedSource, OutputMode
 from postproc.cli.calibrate import calibrate
 from postproc.cli.console import (
     Json,
@@ -33,18 +34,23 @@ from postproc.cli.options import (
     ControllerName,
     DialectOption,
     MachineName,
+    MaxTilt,
+    Orient,
     ProofOf,
     ProofOption,
     RequireProof,
     ToleranceOption,
     UnitsOption,
+    ending_of,
     only_with_errors,
+    word_option,
 )
-from postproc.cli.orient import EXAMPLES, ORIENTATIONS, MaxTilt, Orient
+from postproc.cli.orient import EXAMPLES
 from postproc.cli.orient import orient as orient_command
 from postproc.cli.place import EXAMPLES as PLACES
 from postproc.cli.place import place
 from postproc.cli.time import time
+from toolpaths.choices import FieldEnding, GivenDialect, GivenUnit
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
@@ -71,7 +77,7 @@ ToolTable = Annotated[str, typer.Option("--tool-table", metavar="FILE", help="th
                                         "lengths of tools at the machine")]
 ErrorsOfProgram = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric "
                                               "errors that the program corrects")]
-OutputModeOption = Annotated[str, typer.Option("--output-mode", metavar="{auto,axes,tcp,tilted}", help=(
+OutputModeOption = Annotated[OutputMode, word_option("--output-mode", OutputMode, (
     "axes: machine coordinates, no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, TCPM, G234); tilted: tilted work "
     "plane, 3+2 (G68.2, CYCLE800, PLANE SPATIAL, G254)"))]
 
@@ -93,14 +99,12 @@ def options_of_all(version: Annotated[bool, typer.Option("--version", is_eager=T
 @app.command(epilog="Example: postproc convert part.cls -m mikron-ucp710 -c linuxcnc -o part.ngc")
 def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="G-code file to write")],
-            feed_mode: Annotated[str, typer.Option("--feed-mode", metavar="{auto,per-minute,inverse-time}",
-                                                   help="F in mm/min (G94), or one over the time of the "
-                                                   "block (G93)")] = "auto",
+            feed_mode: Annotated[FeedModeChoice, word_option("--feed-mode", FeedModeChoice, "F in mm/min (G94), or one over "
+                                                             "the time of the block (G93)")] = "auto",
             output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-            feed: Annotated[str, typer.Option("--feed", metavar="{programmed,planned}",
-                                              help="programmed: the feeds of the CL file; planned: lower where an "
-                                              "axis or a tool would exceed its limits")] = "programmed",
+            feed: Annotated[FeedSource, word_option("--feed", FeedSource, "programmed: the feeds of the CL file; planned: "
+                                                    "lower where an axis or a tool would exceed its limits")] = "programmed",
             merge_feeds: Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="merge "
                                                        "neighbouring F words that differ by up to PERCENT")] = 0.0,
             smooth: Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the "
@@ -112,13 +116,10 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                                  "point before and after correction: .csv, or drawn: .png, .svg; may be repeated")] = None,
             require_proof: RequireProof = False, proof: ProofOption = False, json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
-    _choice("--orient", orient, ORIENTATIONS)
-    _choice("--feed", feed, ("programmed", "planned"))
-    _choice("--output-mode", output_mode, ("auto", "axes", "tcp", "tilted"))
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
-                      output=output_mode, feed=feed,  # type: ignore[arg-type]
+                      output=output_mode, feed=feed,
                       merge_feeds=merge_feeds / 100.0, smooth=smooth,
-                      error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
+                      error_model=error_model, error_beyond=beyond, orient=orient,
                       max_tilt=max_tilt, name=output.stem, require_proof=require_proof)
     only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
@@ -161,9 +162,8 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            error_model: ErrorsOfProgram = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
            require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTable = "", json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
-    _choice("--orient", orient, ORIENTATIONS)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
-                      error_model=error_model, orient=orient, max_tilt=max_tilt,  # type: ignore[arg-type]
+                      error_model=error_model, orient=orient, max_tilt=max_tilt,
                       require_proof=require_proof)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup,
                                          "the error model": error_model, "the tool table": tool_table,
@@ -193,9 +193,8 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
           json: Json = "") -> None:
     """Show one point of a CL file through every stage, from its record to its blocks and back."""
     only_with_errors(beyond, error_model)
-    _choice("--orient", orient, ORIENTATIONS)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
-                      error_model=error_model, error_beyond=beyond, orient=orient,  # type: ignore[arg-type]
+                      error_model=error_model, error_beyond=beyond, orient=orient,
                       max_tilt=max_tilt)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
                                          **own_files(machine, controller)})
@@ -232,46 +231,36 @@ def main() -> None:
     raise SystemExit(guarded(app))
 
 
-def _choice(option: str, value: str, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(allowed)}", param_hint=option)
-
-
 def _residual_files(files: list[Path], error_model: str) -> list[Path]:
     """The files of --residuals; wrong use without an error model, or where one is neither table nor drawing."""
     if not files:
         return []
-    from postproc.report.residual_files import ENDINGS
-
     if not error_model:
         raise typer.BadParameter("residuals need --error-model", param_hint="--residuals")
     for name in files:
-        if name.suffix.lower() not in ENDINGS:
-            raise typer.BadParameter(f"{name.name} ends neither in .csv nor in .png or .svg", param_hint="--residuals")
+        _field_ending(name)
     return files
+
+
+def _field_ending(file: Path) -> FieldEnding:
+    ending: FieldEnding = ending_of(file, FieldEnding, "--residuals", "ends neither in .csv nor in .png or .svg")
+    return ending
 
 
 def _fields(result: PostResult, files: list[Path]) -> tuple[list[str | bytes], list[Diagnostic]]:
     from postproc.report.residual_files import contents
 
-    return contents(result, [name.suffix.lower() for name in files])
+    return contents(result, [_field_ending(name) for name in files])
 
 
-def _options(tolerance: float, axis_tolerance: float, feed_mode: str, setup: str, units: str, dialect: str,
-             allow_unknown: list[str] | None) -> Options:
+def _options(tolerance: float, axis_tolerance: float, feed_mode: FeedModeChoice, setup: str, units: GivenUnit,
+             dialect: GivenDialect, allow_unknown: list[str] | None) -> Options:
     from postproc.base.options import Options
 
     for option, value in (("--tolerance", tolerance), ("--axis-tolerance", axis_tolerance)):
         if not 1e-6 <= value <= 10.0:
             raise typer.BadParameter(f"{value} is not between 1e-6 and 10", param_hint=option)
-    _choice("--feed-mode", feed_mode, ("auto", "per-minute", "inverse-time"))
-    if units:
-        _choice("--units", units, ("mm", "inch"))
-    if dialect:
-        from toolpaths.cl.text.dialects import DIALECTS
-
-        _choice("--dialect", dialect, tuple(DIALECTS))
-    return Options(tolerance, axis_tolerance, feed_mode, setup, units, dialect,  # type: ignore[arg-type]
+    return Options(tolerance, axis_tolerance, feed_mode, setup, units, dialect,
                    tuple(w.upper() for w in allow_unknown or ()))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -42,17 +42,16 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json):
         found, diagnostics = run(file, accept_residual)
-        figures: dict[str, Any] = {} if found is None else found.figures
         if found is not None and found.model is not None:
-            if figure is not None:
+            if figure is not None and ending is not None:
                 from machines.calibration.figures import draw
 
-                outputs[figure] = draw(figures, f"calibration: {file.name}", ending)
+                outputs[figure] = draw(found.figures, f"calibration: {file.name}", ending)
             files = write_model(replace(found.model, name=output.stem), found.description(file.name))
             model = files.pop(f"{output.stem}.toml")
             refuse_inputs([output.parent / name for name in files], {"the measurements": str(file)})
             outputs |= {**{output.parent / name: content for name, content in files.items()}, output: model}
     done = found is not None and found.model is not None
-    report(tuple(diagnostics), json, {"output": str(output) if done else None, **figures,
+    report(tuple(diagnostics), json, {"output": str(output) if done else None, **({} if found is None else found.figures),
                                       "diagnostics": [d.as_dict() for d in diagnostics]},
-           text(figures, f"{output}: written" if done else "nothing written"), outputs)
+           text(None if found is None else found.figures, f"{output}: written" if done else "nothing written"), outputs)

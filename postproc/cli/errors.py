@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
+from machines.geometric_error.tables.choices import MapDirections
 from postproc.cli.console import Json, machine_of, own_files, print_json, refuse_overwriting, report, shown_errors
 from postproc.cli.error_files import finish, loaded, model_files, or_refused, pairs, writable
 from postproc.cli.errors_import import EXAMPLE, import_
 from postproc.cli.group import Group
-from postproc.cli.options import MachineName, figure_ending
+from postproc.cli.options import MachineName, figure_ending, word_option
 
 errors_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                          help="Error models: check, export to tables, maps and "
@@ -45,9 +46,9 @@ At = Annotated[list[str] | None, typer.Option("--at", metavar="AXIS=POSITION", h
 MapToolLengthOption = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0,
                                                     help="displacements are those "
                                                     "of the tip of this tool; 0: of the gauge point")]
-MapDirectionsOption = Annotated[str, typer.Option("--directions", metavar="{machine,table}",
-                                                  help="axes along which the map gives its values; those of the "
-                                                  "table turn with the rotary axes under the part")]
+MapDirectionsOption = Annotated[MapDirections, word_option("--directions", MapDirections, "axes along which the map gives "
+                                                           "its values; those of the table turn with the rotary axes under "
+                                                           "the part")]
 
 
 @errors_app.command("check", epilog="Example: postproc errors check errors.toml -m mikron-ucp710 --tool-length 120")
@@ -65,7 +66,7 @@ def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0
         model, found = loaded(file, m)
         figures = survey(model, m, tool_length)
         found += [*beyond_travel(model, m, str(file)), *unmeasured(model, m, str(file))]
-        if figure is not None:
+        if figure is not None and ending is not None:
             from machines.geometric_error.exchange.figures import model_figure
 
             outputs[figure] = model_figure(model, m, tool_length, ending)
@@ -127,8 +128,6 @@ def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = 
            json: Json = "") -> None:
     """Write an error map of a model, as controls hold it, and report its interpolation error."""
     refuse_overwriting({"-o": str(output), "--json": json}, {"the error model": str(file), **own_files(machine)})
-    if directions not in ("machine", "table"):
-        raise typer.BadParameter(f"{directions!r} is not available; choose from machine, table", param_hint="--directions")
     from machines.geometric_error.exchange import exports
     from machines.geometric_error.tables.csv_table import UNITS
     from postproc.cli.error_text import map_figures

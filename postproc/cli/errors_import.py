@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
+from machines.geometric_error.tables.choices import MapDirections, TableRule, TableSign
 from postproc.cli.console import Json, machine_of, own_files, refuse_overwriting, shown_errors
 from postproc.cli.error_files import doubted, finish, merged_into, model_files, pairs, required
-from postproc.cli.options import MachineName
+from postproc.cli.options import MachineName, word_option
 
 EXAMPLE = "Example: postproc errors import X=x.comp y.csv -m mill-3axis -o errors.toml"
 Sources = Annotated[list[str], typer.Argument(metavar="SOURCE...", help="tables per axis or of location errors (x.csv), of "
@@ -22,14 +23,13 @@ Into = Annotated[Path | None, typer.Option("--into", metavar="MODEL.toml", help=
                                            "with their covariance")]
 Covariance = Annotated[Path | None, typer.Option("--covariance", metavar="C.csv", help="square table of what is imported, "
                                                  "um and arcsec")]
-Interpolation = Annotated[str, typer.Option("--interpolation", metavar="{linear,spline}",
-                                            help="between rows: linear or spline")]
+Interpolation = Annotated[TableRule, word_option("--interpolation", TableRule, "between rows: linear or spline")]
 Repeats = Annotated[list[str] | None, typer.Option("--repeats", metavar="AXIS=PERIOD", help="degrees or mm after which a "
                                                    "table or map repeats, e.g. C=360")]
-Sign = Annotated[int, typer.Option("--sign", metavar="{1,-1}",
-                                     help="-1 where the numbers say how the part moves relative to the tool")]
+Sign = Annotated[TableSign, word_option("--sign", TableSign, "-1 where the numbers say how the part moves relative to the "
+                                        "tool")]
 ScrewFileTypeOption = Annotated[int, typer.Option("--type", metavar="{0,1}", min=0, max=1,
-                                                    help="COMP_FILE_TYPE of LinuxCNC's files")]
+                                                   help="COMP_FILE_TYPE of LinuxCNC's files")]
 ToolLengthOption = Annotated[float, typer.Option("--tool-length", metavar="MM", min=0.0, max=10_000.0,
                                                  help="of the tool whose tip a "
                                                  "map displaces; 0: the gauge point")]
@@ -41,8 +41,8 @@ NearOption = Annotated[list[str] | None, typer.Option("--near", metavar="AXIS=AM
                                                       help="with --average: readings within this "
                                                       "amount of each other belong to one place, mm or degrees")]
 Large = Annotated[bool, typer.Option("--large", help="accept errors above 1 mm or 0.5 degrees")]
-DirectionsOption = Annotated[str, typer.Option("--directions", metavar="{machine,table}",
-                                                  help="axes along which a map gives its values")]
+DirectionsOption = Annotated[MapDirections, word_option("--directions", MapDirections, "axes along which a map gives its "
+                                                        "values")]
 
 
 def import_(sources: Sources, machine: MachineName, output: OutputOption, into: Into = None, covariance: Covariance = None,
@@ -51,10 +51,6 @@ def import_(sources: Sources, machine: MachineName, output: OutputOption, into: 
             average: Average = False,
             near: NearOption = None, large: Large = False, json: Json = "") -> None:
     """Import tables of errors as an error model."""
-    for option, value, allowed in (("--interpolation", interpolation, ("linear", "spline")),
-                                   ("--sign", str(sign), ("1", "-1")), ("--directions", directions, ("machine", "table"))):
-        if value not in allowed:
-            raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(allowed)}", param_hint=option)
     files_of = [source.split("=", 1)[-1] for source in sources]
     refuse_overwriting({"-o": str(output), "--json": json},
                        {**{name: name for name in files_of}, **own_files(machine)})
@@ -69,7 +65,7 @@ def import_(sources: Sources, machine: MachineName, output: OutputOption, into: 
         known = (*m.axis_names, *"xyz")
         periods, at = in_units(pairs("--repeats", repeats, known)), in_units(pairs("--zero", zero, known))
         apart = in_units(pairs("--near", near, known))
-        how = ImportOptions(interpolation, periods, float(sign), kind, tool_length, directions,  # type: ignore[arg-type]
+        how = ImportOptions(interpolation, periods, float(sign), kind, tool_length, directions,
                             at, average, apart, large)
         read, found = read_sources(sources, m, how)
         model, noted = required(read, found), [f"read: {', '.join(files_of)}"]

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
+from typing import TextIO
 
 INTERNAL = 70
 """exit code of a fault of the program itself (EX_SOFTWARE of BSD's sysexits.h)"""
@@ -135,10 +136,10 @@ def _console_gone(fault: OSError) -> int:
     return 1
 
 
-def _silence(stream: object) -> None:
+def _silence(stream: TextIO) -> None:
     """What is left in a stream goes nowhere, so that Python does not complain of it at its end."""
     try:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # type: ignore[attr-defined]
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     except (OSError, ValueError, AttributeError):
         return
 

@@ -3,9 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_args
 
 import typer
+
+from postproc.base.options import Orientation
+from toolpaths.choices import FigureEnding, GivenDialect, GivenUnit
+
+
+def word_option(option: str, words: Any, said: str) -> Any:
+    """An option that takes one of the values of a Literal; another is wrong use, and help shows the values."""
+    known = {str(word): word for word in get_args(words)}
+    shown = [word for word in known if word]
+
+    def taken(value: object) -> Any:
+        if str(value) not in known:
+            raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(shown)}", param_hint=option)
+        return known[str(value)]
+
+    return typer.Option(option, parser=taken, metavar=f"{{{','.join(shown)}}}", help=said)
+
 
 ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]
 MachineName = Annotated[str, typer.Option("-m", "--machine", metavar="MACHINE",
@@ -14,13 +31,16 @@ ToleranceOption = Annotated[float, typer.Option("--tolerance", metavar="MM", min
                                                 help="largest deviation of the tip")]
 AxisToleranceOption = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0,
                                                help="largest deviation of the tool axis")]
-UnitsOption = Annotated[str, typer.Option("--units", metavar="{mm,inch}", help="units of a CL file that states none")]
-DialectOption = Annotated[str, typer.Option("--dialect", metavar="NAME",
-                                            help="read the CL file as this dialect instead of the recognised one: generic, "
-                                            "nx, makino, creo, solidworks, solidworks-clt, catia, ncl, camplete, mfgsuite, "
-                                            "autodesk-iso, hsmworks")]
+UnitsOption = Annotated[GivenUnit, word_option("--units", GivenUnit, "units of a CL file that states none")]
+DialectOption = Annotated[GivenDialect, word_option("--dialect", GivenDialect, "read the CL file as this dialect instead of "
+                                                    "the recognised one")]
 ControllerName = Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER",
                                              help="name from `postproc controller list`, or a TOML file")]
+MaxTilt = Annotated[float, typer.Option("--max-tilt", metavar="DEG", min=0.0, max=120.0, help="largest angle of "
+                                        "a chosen axis to the surface normal, else to the programmed axis")]
+Orient = Annotated[Orientation, word_option("--orient", Orientation, "keep: the tool axes of the CL file; per-pass, "
+                                            "whole-part, auto: turned for the least planned time (3+2 passes of ball "
+                                            "cutters)")]
 Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="hold the end value outside the measured range")]
 RequireProof = Annotated[bool, typer.Option("--require-proof", help="refuse a program in which the deviation of some "
                                             "block has no proved bound and is only sampled")]
@@ -34,15 +54,19 @@ Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WOR
                                                  "repeated")]
 
 
-def figure_ending(figure: Path | None) -> str:
-    """Ending of the file of --figure, "" without one; wrong use where nothing can be drawn with it."""
+def figure_ending(figure: Path | None) -> FigureEnding | None:
+    """Ending of the file of --figure, None without one; wrong use where nothing can be drawn with it."""
     if figure is None:
-        return ""
-    from toolpaths.drawing import FORMATS
+        return None
+    ending: FigureEnding = ending_of(figure, FigureEnding, "--figure", "is not a .png or .svg file")
+    return ending
 
-    ending = figure.suffix.lower()
-    if ending not in FORMATS:
-        raise typer.BadParameter(f"{figure.name} is not a .png or .svg file", param_hint="--figure")
+
+def ending_of(file: Path, endings: Any, option: str, wrong: str) -> Any:
+    """The ending of a file as a value of a Literal; wrong use of `option` where it is none."""
+    ending = file.suffix.lower()
+    if ending not in get_args(endings):
+        raise typer.BadParameter(f"{file.name} {wrong}", param_hint=option)
     return ending
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from postproc.base.options import Orientation
 from postproc.cli.console import (
     Json,
     controller_of,
@@ -23,9 +24,11 @@ from postproc.cli.options import (
     ClFile,
     DialectOption,
     MachineName,
+    MaxTilt,
     ToleranceOption,
     UnitsOption,
     figure_ending,
+    word_option,
 )
 
 if TYPE_CHECKING:
@@ -34,12 +37,6 @@ if TYPE_CHECKING:
     from postproc.orientation.plans.choice import OrientationChoice
     from toolpaths.diagnostics import Diagnostic
 
-ORIENTATIONS = ("keep", "per-pass", "whole-part", "auto")
-MaxTilt = Annotated[float, typer.Option("--max-tilt", metavar="DEG", min=0.0, max=120.0, help="largest angle of "
-                                        "a chosen axis to the surface normal, else to the programmed axis")]
-Orient = Annotated[str, typer.Option("--orient", metavar="{keep,per-pass,whole-part,auto}",
-                                     help="keep: the tool axes of the CL file; per-pass, whole-part, auto: "
-                                     "turned for the least planned time (3+2 passes of ball cutters)")]
 EXAMPLES = """Examples:
 
 postproc orient part.cls -m mikron-ucp710 --max-tilt 45
@@ -56,8 +53,7 @@ def orient(file: ClFile,
            controller: Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER",
                                                    help="controller for which the plan is proved")] = "linuxcnc",
            max_tilt: MaxTilt = 60.0,
-           plan: Annotated[str, typer.Option("--orient", metavar="{keep,per-pass,whole-part,auto}",
-                                             help="plan whose passes are shown")] = "auto",
+           plan: Annotated[Orientation, word_option("--orient", Orientation, "plan whose passes are shown")] = "auto",
            passes: Annotated[list[int] | None, typer.Option("--pass", metavar="N", min=0, help="show this pass in full "
                                                             "(number of the table; may be repeated)")] = None,
            figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="drawing of plans, passes and, of "
@@ -72,7 +68,8 @@ def orient(file: ClFile,
            allow_unknown: Allow = None,
            json: Json = "") -> None:
     """Choose the tool orientation of 3+2 passes for the least planned time, and say why."""
-    _check(plan, figure, units, dialect, passes or [])
+    ending = figure_ending(figure)
+    _check(passes or [])
     refuse_overwriting({"--figure": str(figure or ""), "--json": json},
                        {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
                         **own_files(machine, controller)})
@@ -80,7 +77,7 @@ def orient(file: ClFile,
 
     options = Options(tolerance, axis_tolerance, setup=setup, units=units, dialect=dialect, error_model=error_model,
                       allow_unknown=tuple(w.upper() for w in allow_unknown or ()), max_tilt=max_tilt,
-                      orient=plan)  # type: ignore[arg-type]
+                      orient=plan)
     values: dict[str, Any] = {}
     text = ""
     outputs: dict[Path, str | bytes] = {}
@@ -92,25 +89,15 @@ def orient(file: ClFile,
 
             shown = _known(passes or [], choice)
             values, text = as_dict(choice, options.orient), as_text(choice, options.orient, shown)
-            if figure is not None:
+            if figure is not None and ending is not None:
                 from postproc.orientation.figures.sheet import draw
 
-                outputs[figure] = draw(choice, options.orient, shown, figure.suffix.lower())
+                outputs[figure] = draw(choice, options.orient, shown, ending)
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
-def _check(plan: str, figure: Path | None, units: str, dialect: str, passes: list[int]) -> None:
+def _check(passes: list[int]) -> None:
     """Wrong use."""
-    for option, value, known in (("--orient", plan, ORIENTATIONS), ("--units", units or "mm", ("mm", "inch"))):
-        if value not in known:
-            raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(known)}", param_hint=option)
-    if dialect:
-        from toolpaths.cl.text.dialects import DIALECTS
-
-        if dialect not in DIALECTS:
-            raise typer.BadParameter(f"{dialect!r} is not available; choose from {', '.join(DIALECTS)}",
-                                     param_hint="--dialect")
-    figure_ending(figure)
     if len(set(passes)) > MOST:
         raise typer.BadParameter(f"{len(set(passes))} passes at once, at most {MOST} are shown in full; all are in --json",
                                  param_hint="--pass")

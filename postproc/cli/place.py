@@ -15,12 +15,13 @@ from postproc.cli.options import (
     ClFile,
     DialectOption,
     MachineName,
+    MaxTilt,
+    Orient,
     ToleranceOption,
     UnitsOption,
     figure_ending,
     only_with_errors,
 )
-from postproc.cli.orient import ORIENTATIONS, MaxTilt, Orient
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -62,7 +63,8 @@ def place(file: ClFile,
                                                       ".svg")] = None,
           json: Json = "") -> None:
     """Place and turn the part on the table for the least planned time, inside the limits of the set-up."""
-    _check(orient, units, dialect, setup, figure)
+    ending = figure_ending(figure)
+    _check(setup)
     only_with_errors(beyond, error_model)
     refuse_overwriting({"-o": str(output), "--json": json, "--figure": str(figure or "")},
                        {"the CL file": str(file), "the set-up": str(setup), "the error model": error_model,
@@ -73,37 +75,31 @@ def place(file: ClFile,
 
     options = Options(tolerance, axis_tolerance, setup=str(setup), units=units, dialect=dialect, error_model=error_model,
                       error_beyond=beyond, allow_unknown=tuple(w.upper() for w in allow_unknown or ()), max_tilt=max_tilt,
-                      orient=orient)  # type: ignore[arg-type]
+                      orient=orient)
     values: dict[str, Any] = {}
     text = ""
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
         choice, found = _chosen(file, machine_of(machine), controller, options, progress)
         if choice is not None:
-            if figure is not None:
+            if figure is not None and ending is not None:
                 from postproc.placement.figure import placement_figure
 
-                outputs[figure] = placement_figure(choice, figure.suffix.lower())
+                outputs[figure] = placement_figure(choice, ending)
             outputs[output] = placed_text(setup, output, choice.part)
             values = figures.as_dict(choice) | {"output": str(output)}
             text = figures.as_text(choice) + f"\nwritten: {output}"
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
-def _check(orient: str, units: str, dialect: str, setup: Path, figure: Path | None) -> None:
+def _check(setup: Path) -> None:
     """Wrong use.
 
     Raises:
         typer.BadParameter: says what there is to choose from.
     """
-    from toolpaths.cl.text.dialects import DIALECTS
     from toolpaths.input_files import is_regular, there_is
 
-    for option, value, known in (("--orient", orient, ORIENTATIONS), ("--units", units or "mm", ("mm", "inch")),
-                                 ("--dialect", dialect or next(iter(DIALECTS)), tuple(DIALECTS))):
-        if value not in known:
-            raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(known)}", param_hint=option)
-    figure_ending(figure)
     if there_is(setup) and not is_regular(setup):
         raise typer.BadParameter(f"{setup} is not a regular file: its text is read twice", param_hint="--setup")
 

@@ -54,7 +54,7 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
          beyond: Beyond = False,
          json: Json = "") -> None:
     """Estimate how long a program takes, with a band, and where the time goes."""
-    _check(output, calibrate, units, dialect)
+    _check(output, calibrate)
     only_with_errors(beyond, error_model)
     refuse_overwriting({"-o": output, "--json": json}, {"the file": str(file), "the set-up": setup, "the log": calibrate,
                                                         "the error model": error_model, **own_files(machine, controller),
@@ -86,17 +86,9 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
-def _check(output: str, calibrate: str, units: str, dialect: str) -> None:
+def _check(output: str, calibrate: str) -> None:
     if output and not calibrate:
         raise typer.BadParameter("it writes the model that --calibrate fits: give --calibrate too", param_hint="-o")
-    if units and units not in ("mm", "inch"):
-        raise typer.BadParameter(f"{units!r} is not available; choose from mm, inch", param_hint="--units")
-    if dialect:
-        from toolpaths.cl.text.dialects import DIALECTS
-
-        if dialect not in DIALECTS:
-            raise typer.BadParameter(f"{dialect!r} is not available; choose from {', '.join(DIALECTS)}",
-                                     param_hint="--dialect")
 
 
 def _blocks(file: Path, machine: Machine, controller: str, model: str, options: Options, override: float,

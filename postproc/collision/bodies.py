@@ -8,15 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.collision.form import CUTTER, HOLDER, PARTS, SHANK, ToolForm, stacked
+from postproc.collision.form import CUTTER, HOLDER, SHANK, ToolForm, stacked
 from postproc.collision.mesh import load_mesh
 from postproc.collision.search import nearest
 from postproc.collision.solid import TriangleSolid, solid
 from postproc.collision.swept import Swept
-from postproc.setup.bodies import BodiesModel, MeshUnits
+from postproc.collision.touch_words import touch_words
+from postproc.setup.bodies import BodiesModel
 from postproc.setup.bodies import SolidModel as Given
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats
+from toolpaths.choices import LengthUnit
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 
 PART = "the part"
@@ -72,14 +74,7 @@ class Touch:
     place: int
 
     def __str__(self) -> str:
-        who, what = f"{PARTS[self.part]} of T{self.tool}", self.body.name
-        if self.distance == -np.inf:
-            return f"{who} is inside {what}"
-        if self.limit < 0.0:
-            return f"{who} cuts {-self.distance:.3f} mm into {what}, allowed {-self.limit:.3f}"
-        if self.distance <= 0.0:
-            return f"{who} touches {what} by {-self.distance:.2f} mm"
-        return f"{who} comes within {self.distance:.2f} mm of {what}, allowed {self.limit:.2f}"
+        return touch_words(self.tool, self.part, self.body.name, self.distance, self.limit)
 
 
 def scene(setup: SetupFile, placement: Placement, file: str) -> tuple[Scene | None, list[Diagnostic]]:
@@ -145,7 +140,7 @@ def _where(body: Body) -> str:
     return f"{body.name}: {len(body.solid)} triangles, {spans} mm of the table frame"
 
 
-def _solid(given: Given, where: Placement, folder: Path, units: MeshUnits,
+def _solid(given: Given, where: Placement, folder: Path, units: LengthUnit,
            key: str) -> tuple[TriangleSolid | None, list[Diagnostic]]:
     """A mesh or box in the table frame."""
     if given.file is not None:

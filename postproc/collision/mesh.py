@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from toolpaths.choices import LengthUnit
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.input_files import advice, check_input, read_input, reason, shown, unreadable
 from toolpaths.units import MM_PER_INCH
@@ -23,7 +24,7 @@ _SMALL, _LARGE = 1.0, 20000.0
 """mm: a solid whose largest side is outside is likely in another unit"""
 
 
-def load_mesh(path: str | FilePath, units: str = "mm", key: str = "") -> tuple[Trimesh | None, list[Diagnostic]]:
+def load_mesh(path: str | FilePath, units: LengthUnit = "mm", key: str = "") -> tuple[Trimesh | None, list[Diagnostic]]:
     """A closed triangle mesh in mm; None and why where the file holds none.
 
     Args:
@@ -46,7 +47,7 @@ def load_mesh(path: str | FilePath, units: str = "mm", key: str = "") -> tuple[T
 
 
 @lru_cache(maxsize=32)
-def _loaded(path: str, _changed: int, _size: int, units: str) -> tuple[Trimesh | None, tuple[Diagnostic, ...]]:
+def _loaded(path: str, _changed: int, _size: int, units: LengthUnit) -> tuple[Trimesh | None, tuple[Diagnostic, ...]]:
     """The mesh of a file as it was at a moment."""
     import trimesh
 
@@ -120,7 +121,7 @@ def _edge_faults(mesh: Trimesh) -> tuple[int, int]:
     return int((count % 2 != 0).sum()), int((travel != 0.0).sum())
 
 
-def _odd_size(mesh: Trimesh, path: str, units: str) -> tuple[Diagnostic, ...]:
+def _odd_size(mesh: Trimesh, path: str, units: LengthUnit) -> tuple[Diagnostic, ...]:
     """Sizes that look like another unit."""
     size = float(mesh.extents.max())
     if _SMALL <= size <= _LARGE:

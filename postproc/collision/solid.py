@@ -60,7 +60,7 @@ class TriangleSolid:
             normals.append(normal)
             lows.append(np.append(np.minimum.reduceat(height.min(axis=1), first), none))
             highs.append(np.append(np.maximum.reduceat(height.max(axis=1), first), none))
-        return tuple(np.concatenate(rows[::-1]) for rows in (normals, lows, highs))  # type: ignore[return-value]
+        return np.concatenate(normals[::-1]), np.concatenate(lows[::-1]), np.concatenate(highs[::-1])
 
     def holds(self, point: Floats) -> bool:
         """True where a point (3,) lies inside: the solid angles of all triangles add up to 4 pi.

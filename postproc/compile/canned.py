@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.compile.program import Hole
+from postproc.compile.program import CycleKey, Hole
 from postproc.compile.word_rows import WordRows
 from postproc.control.control import Control
 from postproc.controllers.model import ControllerFile
@@ -12,6 +12,7 @@ from postproc.path.model import FEED, TRAVERSE, JointPath
 from postproc.reference.events import spindle_states
 from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
+from toolpaths.choices import CycleKind
 from toolpaths.toolpath import Kind, Toolpath
 
 ROUNDED = 1.5
@@ -128,7 +129,7 @@ def _rises_beyond(moves: Moves, path: JointPath, words: WordRows, z: int, first:
     return bool(fed_out and path.code[last] == TRAVERSE and words.end[last, z] > initial)
 
 
-def _states_retract(controller: ControllerFile, key: str) -> bool:
+def _states_retract(controller: ControllerFile, key: CycleKey) -> bool:
     """True where the controller's cycle names the level that it retracts to."""
     specs = [table[key] for table in (controller.cycles.table, controller.cycles.with_dwell) if key in table]
     return any(name in spec.code for spec in specs for name in STATES_RETRACT)
@@ -156,7 +157,7 @@ def feeding_rapid(moves: Moves, path: JointPath, blocks: Ints) -> Bools:
 
 
 def _hole(toolpath: Toolpath, moves: Moves, path: JointPath, rows: WordRows, control: Control, controller: ControllerFile,
-          first: int, last: int, initial: float, key: str, placed: bool) -> Hole | None:
+          first: int, last: int, initial: float, key: CycleKey, placed: bool) -> Hole | None:
     """The hole of blocks `first` to `last`; the tool goes to the very place at the plane where blocks of their own have
     `placed` it there."""
     cycle = toolpath.cycles[int(moves.cycle[path.move[first]])]
@@ -181,6 +182,8 @@ def _hole(toolpath: Toolpath, moves: Moves, path: JointPath, rows: WordRows, con
     return Hole(first, last, int(moves.cycle[path.move[first]]), plane, deepest, out, initial, key, bottom)
 
 
-def cycle_key(kind: str, turning: int) -> str:
+def cycle_key(kind: CycleKind, turning: int) -> CycleKey:
     """The controller's table says taps that turn anti-clockwise from the others; a tap that stands has no entry."""
-    return kind if kind != "TAP" else {1: "TAP", -1: "TAP_LEFT"}.get(turning, "")
+    if kind != "TAP":
+        return kind
+    return "TAP" if turning == 1 else "TAP_LEFT" if turning == -1 else ""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +18,9 @@ from machines.machine import ClampCodes
 from postproc.compile.program import Command, Program
 from toolpaths.arrays import Bools, Ints
 
-CLAMP, UNCLAMP = "CLAMP", "UNCLAMP"
+ClampCommand = Literal["CLAMP", "UNCLAMP"]
+CLAMP: ClampCommand = "CLAMP"
+UNCLAMP: ClampCommand = "UNCLAMP"
 """commands; their argument is the code"""
 FIRST = frozenset({"DWELL", "CUTTER_COMPENSATION_OFF"})
 """commands at the place of a clamp that belong to the block before it"""
@@ -28,7 +31,7 @@ class _Switch:
     """A command at a block: behind the blocks before it and what begins there (`early`), or right before it."""
 
     block: int
-    name: str
+    name: ClampCommand
     early: bool
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.compile.cutter_compensation import RadiusCompensation
 from postproc.compile.needless_pairs import needless_pairs
-from postproc.compile.program import Command, Commands
+from postproc.compile.program import Command, CommandName, Commands
 from postproc.compile.spindle_coolant_state import SpindleCoolantState
 from postproc.controllers.model import ControllerFile
 from postproc.path.model import JointPath
@@ -233,7 +233,7 @@ def _behind(path: JointPath, move: int) -> int:
 def _spindle(state: Spindle, event: Event) -> Command:
     if state.direction == 0:
         return Command("STOP_SPINDLE_TURNING", (), event.line)
-    name = "START_SPINDLE_CLOCKWISE" if state.direction > 0 else "START_SPINDLE_COUNTERCLOCKWISE"
+    name: CommandName = "START_SPINDLE_CLOCKWISE" if state.direction > 0 else "START_SPINDLE_COUNTERCLOCKWISE"
     return Command(name, () if math.isnan(state.rpm) else (state.rpm,), event.line)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
-from postproc.compile.program import Command
+from postproc.compile.program import Command, CommandName
 from postproc.controllers.model import ControllerFile
 from postproc.path.model import TRAVERSE, JointPath
-from postproc.reference.events import compensation_side, numbers
+from postproc.reference.events import CompensationSide, compensation_side, numbers
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error, warning
@@ -18,6 +20,9 @@ UPRIGHT = 1.0 - 1e-9
 STILL = 1e-9
 """rad that a rotary axis may differ by and still stand"""
 STARTS = ("CUTTER_COMPENSATION_LEFT", "CUTTER_COMPENSATION_RIGHT")
+
+_SWITCH: dict[CompensationSide, CommandName] = {
+    "LEFT": "CUTTER_COMPENSATION_LEFT", "RIGHT": "CUTTER_COMPENSATION_RIGHT", "OFF": "CUTTER_COMPENSATION_OFF"}
 
 
 class RadiusCompensation:
@@ -36,7 +41,8 @@ class RadiusCompensation:
         self.without_tool: list[int] = []
         self.chosen: dict[int, list[int]] = {}
         """lines by register that is written though CUTCOM names none"""
-        self.active, self.since = "", 0
+        self.active: CompensationSide | Literal[""] = ""
+        self.since = 0
         self.written: list[int] = []
         self.tilted: list[int] = []
         self.lacking: list[int] = []
@@ -67,7 +73,7 @@ class RadiusCompensation:
     def begin(self, event: Event, move: int) -> None:
         """Carry one CUTCOM record out that acts before a row of Moves, or behind the linking move that leads there."""
         side, block = compensation_side(event), int(self.path.begin[move])
-        if side in ("", self.active) or (side == "OFF" and not self.active):
+        if not side or side == self.active or (side == "OFF" and not self.active):
             return
         self.out.setdefault(block, []).extend(self.off(event.line))
         if side == "OFF":
@@ -79,7 +85,7 @@ class RadiusCompensation:
             return
         self.active, self.since = side, block
         self.written.append(event.line)
-        command = Command(f"CUTTER_COMPENSATION_{side}", self._register(event, move), event.line)
+        command = Command(_SWITCH[side], self._register(event, move), event.line)
         self.out.setdefault(block, []).append(command)
 
     def _register(self, event: Event, move: int) -> tuple[float, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.base.options import FeedModeChoice
 from postproc.compile.merged_feeds import merged
 from postproc.compile.program import INVERSE, PER_MINUTE
 from postproc.control.control import Control
@@ -37,7 +38,7 @@ class PlannedTimes:
 
 
 def plan_feeds(path: JointPath, control: Control, step: Floats, asked: Floats, passes: Ints, native: Bools,
-               feed_mode: str, rules: FeedRules, planned: PlannedTimes | None = None) -> Feeds:
+               feed_mode: FeedModeChoice, rules: FeedRules, planned: PlannedTimes | None = None) -> Feeds:
     """Feed words for the blocks of a path.
 
     Args:
@@ -130,7 +131,7 @@ def _moves_tip(step: Floats, control: Control) -> Bools:
     return np.asarray((step[:, control.xyz] != 0.0).any(axis=1))
 
 
-def _modes(path: JointPath, control: Control, step: Floats, passes: Ints, native: Bools, feed_mode: str,
+def _modes(path: JointPath, control: Control, step: Floats, passes: Ints, native: Bools, feed_mode: FeedModeChoice,
            rules: FeedRules) -> Array:
     """(K,) inverse time for passes that move rotary axes while cutting, where X, Y, Z words are joints."""
     cutting = path.code != 0

@@ -9,10 +9,10 @@ import numpy as np
 
 from machines.hooks import HooksModel
 from postproc.compile.clamps import CLAMP, FIRST, UNCLAMP, cutting, runs, turning
-from postproc.compile.program import Command, Program
+from postproc.compile.program import Command, CommandName, Program
 from toolpaths.arrays import Ints
 
-HOOK = "HOOK"
+HOOK: CommandName = "HOOK"
 """command; its arguments are the block, and the tool's number, its name and the operation that it may name"""
 STOPS = frozenset({"PROGRAM_STOP", "OPTIONAL_PROGRAM_STOP"})
 

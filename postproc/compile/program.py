@@ -5,16 +5,30 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from postproc.control.control import InterpolationMode
 from postproc.control.planes import Plane
 from postproc.control.rollover import Rollover
+from postproc.reference.coolant import CoolantCommand
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.choices import CycleKind
 from toolpaths.shapes import arrays
 
 PER_MINUTE, INVERSE = 0, 1
+
+
+CycleKey = Literal[CycleKind, "TAP_LEFT", ""]
+"""of the controller's tables: the kind, and whether a tap turns anti-clockwise; "" for a tap that stands"""
+CommandName = Literal[
+    "CHANGE_TOOL", "SELECT_TOOL", "USE_TOOL_LENGTH_OFFSET", "CANCEL_TOOL_LENGTH_OFFSET",
+    "CUTTER_COMPENSATION_LEFT", "CUTTER_COMPENSATION_RIGHT", "CUTTER_COMPENSATION_OFF",
+    "START_SPINDLE_CLOCKWISE", "START_SPINDLE_COUNTERCLOCKWISE", "STOP_SPINDLE_TURNING", CoolantCommand,
+    "PROGRAM_STOP", "OPTIONAL_PROGRAM_STOP", "DWELL", "COMMENT", "INSERT",
+    "ENTER_SECTION", "LEAVE_SECTION", "OPERATION_START", "RESTATE", "CLAMP", "UNCLAMP", "HOOK"]
+"""canonical functions without motion, named as in NIST RS274/NGC where that has them"""
 
 
 @dataclass(frozen=True)
@@ -26,7 +40,7 @@ class Command:
     blocks that a switch may leave out: modal codes are stated again. `skip`: the block switch leaves it out.
     """
 
-    name: str
+    name: CommandName
     args: tuple[float | str, ...] = ()
     line: int = 0
     skip: bool = False
@@ -69,7 +83,7 @@ class Hole:
     bottom: float
     retract: float
     initial: float
-    key: str
+    key: CycleKey
     """of the controller's tables"""
     drill: int
     """the block that goes to the bottom; its feed is that of the cycle"""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from postproc.compile.program import Command
+from postproc.compile.program import Command, CommandName
 from postproc.reference.events import ToolChange
 
-_STOPPED, _DRY = "STOP_SPINDLE_TURNING", "COOLANT_OFF"
+_STOPPED: CommandName = "STOP_SPINDLE_TURNING"
+_DRY: CommandName = "COOLANT_OFF"
 
 
 class SpindleCoolantState:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal, get_args
 
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from postproc.base.options import Options
+from postproc.base.options import Options, OutputMode
 from postproc.control.control import Control, InterpolationMode, tool_frames
 from postproc.control.planes import Plane, stated
 from postproc.controllers.model import ControllerFile, Mode
@@ -18,7 +19,10 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Toolpath
 
-ASKED = ("auto", "axes", "tcp", "tilted")
+MissingMode = Literal["own kinematics", "no tip modes", "no tool call", "no tip mode of the control", "no retract axis",
+                      "no plane of the control", "rotary head"]
+"""what is missing for an output mode"""
+ASKED: tuple[OutputMode, ...] = get_args(OutputMode)
 PREFERRED: dict[bool, tuple[InterpolationMode, ...]] = {True: ("tilted", "axes", "tcp"), False: ("tcp", "axes")}
 """modes that "auto" takes, the first that can be had: where the tool axis of a run stands still, and where it turns"""
 Refused = frozenset[tuple[int, InterpolationMode]]
@@ -57,23 +61,19 @@ class OutputModes:
     refused: Refused = frozenset()
 
     @cached_property
-    def lacking(self) -> dict[InterpolationMode, str]:
-        """Why a law cannot be had, "" where it can."""
-        control, modes, name = self.control, self.controller.modes, self.control.machine.name
+    def lacking(self) -> dict[InterpolationMode, MissingMode | None]:
+        """What is missing for a law, None where it can be had."""
+        control, modes = self.control, self.controller.modes
         if control.base == "tcp":
-            own = "the control runs the kinematics of this machine for the whole program"
-            return {"axes": own, "tcp": "", "tilted": own}
-        machine = "" if control.has_tip_modes else f"{name} is not a serial machine with slides X, Y, Z along its " \
-            "axes and a rotary axis"
-        machine = machine or ("" if self.tool_call else "it needs the tool's length in a register, and the set-up has "
-                              "[output] tool_call = false")
+            return {"axes": "own kinematics", "tcp": None, "tilted": "own kinematics"}
+        machine: MissingMode | None = None
+        if not (control.has_tip_modes and self.tool_call):
+            machine = "no tool call" if control.has_tip_modes else "no tip modes"
         tables = modes.tilted is not None and modes.tilted.tables_only and not control.has_rotary_tables_only
-        return {"axes": "",
-                "tcp": machine or ("" if modes.tcp else "the controller has no tool-centre-point mode ([modes.tcp])")
-                or (f"the mode is entered at home with the tables at zero, and {name} names no retract_axis"
-                    if self.at_zero and control.machine.retract_axis < 0 else ""),
-                "tilted": machine or ("" if modes.tilted else "the controller has no tilted plane ([modes.tilted])")
-                or (f"the controller's plane is for rotary tables only, {name} has a rotary head" if tables else "")}
+        away = self.at_zero and control.machine.retract_axis < 0
+        return {"axes": None,
+                "tcp": machine or ("no tip mode of the control" if not modes.tcp else "no retract axis" if away else None),
+                "tilted": machine or ("no plane of the control" if not modes.tilted else "rotary head" if tables else None)}
 
     @cached_property
     def tcp(self) -> WordFrame:
@@ -105,11 +105,11 @@ class OutputModes:
     def law(self, operation: int, constant: bool) -> InterpolationMode:
         """The law of a run of that operation, `constant` where its tool axis stands still."""
         asked = ASKED[int(self.asked[operation])]
-        return self.possible(operation, constant)[0] if asked == "auto" else asked  # type: ignore[return-value]
+        return self.possible(operation, constant)[0] if asked == "auto" else asked
 
     def possible(self, operation: int, constant: bool) -> list[InterpolationMode]:
         """The laws that "auto" may take for such a run, in order: those that are refused only where there is no other."""
-        had = [law for law in PREFERRED[constant] if not self.lacking[law]]
+        had = [law for law in PREFERRED[constant] if self.lacking[law] is None]
         return [law for law in had if (operation, law) not in self.refused] or had[-1:]
 
     def cutting_laws(self) -> set[InterpolationMode]:
@@ -160,14 +160,29 @@ def output_modes(control: Control, controller: ControllerFile, setup: SetupFile,
                    *_no_subprograms(controller, setup, options)]
 
 
+def _missing(what: MissingMode, machine: str) -> str:
+    """What is missing for a mode, in words."""
+    words: dict[MissingMode, str] = {
+        "own kinematics": "the control runs the kinematics of this machine for the whole program",
+        "no tip modes": f"{machine} is not a serial machine with slides X, Y, Z along its axes and a rotary axis",
+        "no tool call": "it needs the tool's length in a register, and the set-up has [output] tool_call = false",
+        "no tip mode of the control": "the controller has no tool-centre-point mode ([modes.tcp])",
+        "no retract axis": f"the mode is entered at home with the tables at zero, and {machine} names no retract_axis",
+        "no plane of the control": "the controller has no tilted plane ([modes.tilted])",
+        "rotary head": f"the controller's plane is for rotary tables only, {machine} has a rotary head"}
+    return words[what]
+
+
 def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
     result = []
     can = ", ".join(law for law, why in modes.lacking.items() if not why)
     for asked in np.unique(modes.asked).tolist():
-        why = modes.lacking.get(ASKED[asked], "")  # type: ignore[call-overload]
-        if why:
+        law = ASKED[asked]
+        missing = modes.lacking[law] if law != "auto" else None
+        if missing is not None:
             lines = [op.line for op, a in zip(toolpath.operations, modes.asked, strict=True) if a == asked and op.line]
-            result.append(error("output.mode", f"output mode {ASKED[asked]} is not possible: {why}", file=toolpath.file,
+            result.append(error("output.mode", f"output mode {law} is not possible: "
+                                f"{_missing(missing, modes.control.machine.name)}", file=toolpath.file,
                                 lines=lines[:6], count=max(len(lines), 1), hint=f"this controller and machine have: {can}"))
     return result
 

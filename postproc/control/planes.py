@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -19,6 +20,10 @@ from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
+TurnOrder = Literal["ZXZ", "ZYX", "XYZ"]
+"""about which axes the three angles turn, each about the axes turned so far"""
+Convention = Literal[TurnOrder, "rotary"]
+"""how a plane's angles are written: those turns, or the words of the rotary axes"""
 _GIMBAL = 1e-9
 """sine or cosine of the middle angle below which the first and third turn are about one axis"""
 
@@ -61,14 +66,14 @@ def turn(letter: str, degrees: float) -> Floats:
     return result
 
 
-def rotation_of(convention: str, angles: tuple[float, ...]) -> Floats:
+def rotation_of(convention: TurnOrder, angles: tuple[float, ...]) -> Floats:
     """(3, 3) of three angles (degrees) under a convention of turns."""
     a, b, c = (turn(letter, angle) for letter, angle in zip(convention, angles, strict=True))
     result: Floats = a @ b @ c
     return result
 
 
-def angles_of(convention: str, rotation: Floats) -> tuple[float, float, float]:
+def angles_of(convention: TurnOrder, rotation: Floats) -> tuple[float, float, float]:
     """The three angles (degrees) of a rotation (3, 3) under a convention of turns; the inverse of `rotation_of`.
 
     Middle angles are in 0..180 (ZXZ) or -90..90 (the others). Where first and third turn are about one axis, the third
@@ -105,7 +110,8 @@ def _cardan(r: Floats) -> tuple[float, float, float]:
     return float(np.arctan2(r[1, 0], r[0, 0])), middle, float(np.arctan2(r[2, 1], r[2, 2]))
 
 
-def stated(convention: str, rotation: Floats, rotary: tuple[float, ...], places: int) -> tuple[tuple[float, ...], Floats]:
+def stated(convention: Convention, rotation: Floats, rotary: tuple[float, ...],
+           places: int) -> tuple[tuple[float, ...], Floats]:
     """(angles in degrees as the controller prints them, the rotation that those name).
 
     `rotary` are the words of the rotary axes, which are the angles of the convention "rotary".

@@ -8,13 +8,17 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from machines.stop import Stop
+from machines.choices import RolloverRule, Stop
 from machines.user_file import UserModel, load_toml
 from postproc.controllers.spelling import Codes, Comment, Format, ProgramBlocks, SubprogramFormat, Tools
 from postproc.controllers.texts import CYCLE_VALUES, placeholders
 from toolpaths.diagnostics import Diagnostic
 
 Worded = Annotated[str, placeholders("letter", "value")]
+
+
+LengthState = Literal["any", "off", "on"]
+"""whether the length register is in force where a mode begins"""
 
 
 class ArcRules(UserModel):
@@ -120,9 +124,9 @@ class InterpolationRules(UserModel):
 class RolloverRules(UserModel):
     """Modulo (roll-over) rotary axes: which path the control takes from word to word, and how words say it."""
 
-    default: Literal["shortest", "sign", "none"] = "none"
+    default: RolloverRule = "none"
     """of modulo axes whose machine file has no rollover; "none": they count their turns like others"""
-    rules: tuple[Literal["shortest", "sign", "none"], ...] = ("shortest", "sign", "none")
+    rules: tuple[RolloverRule, ...] = ("shortest", "sign", "none")
     """those that the control can have, by its parameters"""
     shortest: Worded = ""
     """how a word says that the shorter path is taken, with {letter} and {value}; empty: a parameter says it"""
@@ -159,7 +163,7 @@ class Mode(UserModel):
     """blocks of the safe start, in programs that use the mode"""
     relies_on: tuple[str, ...] = ()
     """settings of the control that the mode needs: comments at the head of programs that use it"""
-    length: Literal["any", "off", "on"] = "any"
+    length: LengthState = "any"
     """how the length register must stand where the mode is entered, and where its `leave` blocks begin"""
     arcs: bool = True
     """arcs may stand in it while the rotary axes stand still"""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import numpy as np
 
+from machines.choices import MotionOrder
 from machines.machine import Machine
 from postproc.cycle_time.blocks import Axes, Cause, MotionBlocks
 from postproc.cycle_time.bound import lower_bound
@@ -17,7 +19,7 @@ from toolpaths.arrays import Floats
 
 COVERAGE = 1.96
 """standard deviations on both sides that hold 95 % of a normal distribution"""
-_LIMITS = ("velocity", "acceleration", "jerk")
+_LIMITS: tuple[MotionOrder, ...] = get_args(MotionOrder)
 _TIMING = {"tool_change": Cause.TOOL_CHANGE, "clamp": Cause.INDEXING, "unclamp": Cause.INDEXING}
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 
+from machines.choices import MotionOrder
 from postproc.feedrate.limits import JointLimits, ToolLimits
 from toolpaths.arrays import Floats, Ints
 from toolpaths.shapes import arrays
@@ -15,7 +16,7 @@ REST_PAD = 3
 """Samples at rest before and behind, so that differences see the start and the end."""
 BINDS = 0.98
 """Ratio to a limit from which it is said to bind."""
-ORDERS = ("velocity", "acceleration", "jerk")
+ORDERS: tuple[MotionOrder, ...] = get_args(MotionOrder)
 
 
 @dataclass(frozen=True)

@@ -159,4 +159,4 @@ def _turns(values: Floats, lower: Floats, upper: Floats) -> tuple[Array, Array]:
         least = np.ceil((lower - TRAVEL_SLACK - values) / TWO_PI)
         most = np.floor((upper + TRAVEL_SLACK - values) / TWO_PI)
     least, most = (np.where(np.isnan(values), none, turns) for none, turns in ((1.0, least), (0.0, most)))
-    return tuple(np.clip(x, -_MANY, _MANY).astype(np.int32) for x in (least, most))  # type: ignore[return-value]
+    return np.clip(least, -_MANY, _MANY).astype(np.int32), np.clip(most, -_MANY, _MANY).astype(np.int32)

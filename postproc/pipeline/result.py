@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from machines.machine import Machine
 from postproc.base.options import Options
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from postproc.orientation.plans.choice import OrientationChoice
     from postproc.verification.tool_table import MeasuredLength
     from postproc.witness.evidence import Testimony
+
+StageName = Literal["prepare", "share", "place", "solve", "correct", "check", "plan", "compile", "write", "verify", "state"]
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ class PostResult:
     """what is left of geometric errors at the CL points; None where none are corrected"""
     refused: Refused = frozenset()
     """(operation, mode) that "auto" has passed over"""
-    reached: str = ""
+    reached: StageName | Literal[""] = ""
     """name of the last stage that ran, "" where none did"""
 
     @property

@@ -25,7 +25,7 @@ from postproc.path.turn_steps import with_short_turns
 from postproc.pipeline.hooks import check_hooks
 from postproc.pipeline.program_header import header_lines
 from postproc.pipeline.program_lines import cl_lines
-from postproc.pipeline.result import PostResult, shared_fields
+from postproc.pipeline.result import PostResult, StageName, shared_fields
 from postproc.pipeline.smoothed_stages import ExcludedPasses, written_moves
 from postproc.pipeline.stage_values import (
     BegunStage,
@@ -71,7 +71,7 @@ class Stage:
     conversion in either direction.
     """
 
-    name: str
+    name: StageName
     does: str
     run: Callable[[Any, Progress | None], tuple[BegunStage, DiagnosticList]]
 

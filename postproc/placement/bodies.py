@@ -19,6 +19,8 @@ from postproc.collision.mesh import load_mesh
 from postproc.collision.solid import TriangleSolid, solid
 from postproc.orientation.passes.pass_bodies import PassBodies, forms_of
 from postproc.orientation.passes.passes import PassContext
+from postproc.orientation.passes.reasons import Touching
+from postproc.placement.reasons import StandsIn
 from postproc.setup.bodies import BodiesModel
 from postproc.setup.bodies import SolidModel as Given
 from postproc.setup.model import Placement, SetupFile
@@ -49,8 +51,8 @@ class StationaryBodies:
     part: dict[str, tuple[Trimesh, TriangleSolid]]
     forms: dict[int, ToolForm]
 
-    def against(self, placement: Placement) -> str:
-        """Which body the part stands in, "" where it stands free."""
+    def against(self, placement: Placement) -> StandsIn | None:
+        """Which body the part stands in, None where it stands free."""
         pose = np.eye(4)
         pose[:3, :3], pose[:3, 3] = placement.rotation, placement.origin
         back = placement.inverse()
@@ -58,18 +60,19 @@ class StationaryBodies:
             self._moving.set_transform(name, pose)
         hit, names = self._moving.in_collision_other(self._standing, return_names=True)
         if hit:
-            return "{} stands in {}".format(*min(names))
+            part, body = min(names)
+            return StandsIn(part, body)
         for name, (mesh, whole) in self.part.items():
             first = placement.points(np.asarray(mesh.vertices[:1]))[0]
             for body in self.standing.bodies:
                 if body.solid.holds(first) or whole.holds(back.points(body.solid.corners[0, :1])[0]):
-                    return f"{name} stands in {body.name}"
-        return ""
+                    return StandsIn(name, body.name)
+        return None
 
-    def tool(self, work: PassContext) -> str:
-        """What the tools would touch on the passes of `work` with the axes of the file."""
+    def tool(self, work: PassContext) -> Touching | None:
+        """What the tools would touch on the passes of `work` with the axes of the file, None where nothing."""
         adjacent = PassBodies(work, self.standing, self.forms)
-        return next((str(why) for one in work.passes if (why := adjacent.touching(one, one.axis))), "")
+        return next((why for one in work.passes if (why := adjacent.touching(one, one.axis))), None)
 
     @cached_property
     def _standing(self) -> Any:
@@ -84,7 +87,7 @@ def _manager(meshes: dict[str, Trimesh]) -> Any:
     """Bodies for collision queries."""
     from trimesh import collision
 
-    manager: Any = collision.CollisionManager()  # type: ignore[no-untyped-call]
+    manager: Any = collision.CollisionManager()  # type: ignore[no-untyped-call]  # trimesh states no types here
     for name, mesh in meshes.items():
         manager.add_object(name, mesh)
     return manager

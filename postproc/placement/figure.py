@@ -12,6 +12,7 @@ from postproc.placement.place_times import TimedPlace
 from postproc.placement.region import region_of
 from postproc.placement.space import ANGLES, NAMES
 from toolpaths.arrays import Floats
+from toolpaths.choices import FigureEnding
 from toolpaths.drawing import ADJACENT, image
 from toolpaths.units import DEG
 
@@ -24,7 +25,7 @@ _OUTSIDE = "#ead7d5"
 _REFUSED, _LOST, _CHOSEN = "#c2453a", "#9aa0a6", "#c2453a"
 
 
-def placement_figure(choice: PlacementChoice, ending: str) -> bytes:
+def placement_figure(choice: PlacementChoice, ending: FigureEnding) -> bytes:
     """An image file of a choice, over the two free coordinates of widest range.
 
     Args:

@@ -9,7 +9,8 @@ from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import orient
 from postproc.placement.bodies import StationaryBodies
-from postproc.placement.place_times import TimedPlace, Timer, extents
+from postproc.placement.place_times import TimedPlace, Timer, extents, refused_pass
+from postproc.placement.reasons import NoOrientation, NoSafePlane
 from postproc.placement.space import Space
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Floats
@@ -36,27 +37,27 @@ class OrientedTimer(Timer):
 
     def _tried(self, place: Floats, best: float) -> TimedPlace:
         why = self.stands(place)
-        if why:
+        if why is not None:
             return self._refused(place, why)
         here = self.setup.model_copy(update={"part": self.space.part(place)})
         choice, found = orient(self.work.toolpath, self.machine, here, self.options)
         if choice is None:
-            return self._refused(place, next(d.message for d in found if d.severity == Severity.ERROR))
+            return self._refused(place, NoOrientation(next(d for d in found if d.severity == Severity.ERROR)))
         return self._of(place, choice)
 
     def _of(self, place: Floats, choice: OrientationChoice) -> TimedPlace:
         plan = choice.plans[self.options.orient]
         low, high = extents(plan.picked)
-        refused = next((f"line {made.one.line}: {made.refused}" for made in plan.picked if made.refused), "")
-        if refused or not np.isfinite(plan.seconds):
-            return self._refused(place, refused or "no safe plane above some pass is inside travel", low, high)
+        refused = refused_pass(plan.picked)
+        if refused is not None or not np.isfinite(plan.seconds):
+            return self._refused(place, refused or NoSafePlane(), low, high)
         singular, why = self._singular(plan.picked)
-        if why:
+        if why is not None:
             return self._refused(place, why, low, high, singular)
         self.planned += len(plan.picked)
         cutting, limiting = float(plan.cuts.sum()), dict[str, float]()
         for made, spent in zip(plan.picked, plan.cuts.tolist(), strict=True):
             name = " ".join(made.limiting).strip()
             limiting[name] = limiting.get(name, 0.0) + spent
-        return TimedPlace(place, plan.seconds, cutting, plan.seconds - cutting, plan.seconds, low, high, singular, "",
+        return TimedPlace(place, plan.seconds, cutting, plan.seconds - cutting, plan.seconds, low, high, singular, None,
                           limiting)

@@ -178,7 +178,7 @@ def _nowhere(result: FoundPlaces, timer: Timer, options: Options) -> Diagnostic:
         why = f"at best (turn {angles[0] / DEG:.3f} degrees) {what}"
     else:
         reasons = [why for _, _, why in result.lacks] + [one.refused for one in timer.known() if one is not result.now]
-        why = Counter(reasons or [result.now.refused]).most_common(1)[0][0]
+        why = Counter(map(str, reasons or [result.now.refused])).most_common(1)[0][0]
     return error("place.none", f"no place inside [placement] is possible: {why}", file=options.setup,
                  hint="wider limits, another tool length, a lower clearance.margin or a machine with more travel")
 

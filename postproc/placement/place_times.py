@@ -14,6 +14,7 @@ from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.index_time import PassEnds, ends, links_between
 from postproc.orientation.plans.shortest_sequence import seconds
 from postproc.placement.bodies import StationaryBodies
+from postproc.placement.reasons import NearSingular, NoSafePlane, Obstacle, RefusedPass
 from postproc.placement.rigid_move import moved
 from postproc.placement.space import Space
 from toolpaths.arrays import Floats
@@ -39,7 +40,7 @@ class TimedPlace:
         bound: least seconds that the file can take there
         low, high (J,): extents of the joints over all cuts and rapids, NaN where the machine does not reach
         singular: least distance from singular positions, inf for serial machines
-        refused: why the part cannot stand there, "" where it can
+        refused: why the part cannot stand there, None where it can
         limiting: planned seconds by what limits the passes most, e.g. {"X jerk": 3.2}
     """
 
@@ -51,7 +52,7 @@ class TimedPlace:
     low: Floats
     high: Floats
     singular: float
-    refused: str = ""
+    refused: Obstacle | None = None
     limiting: dict[str, float] = field(default_factory=dict)
 
     def margins(self, machine: Machine) -> Floats:
@@ -122,18 +123,18 @@ class Timer:
 
     def _tried(self, place: Floats, best: float) -> TimedPlace:
         why = self.stands(place)
-        if why:
+        if why is not None:
             return self._refused(place, why)
         work = moved(self.work, self.space.placement(place))
         made = [turned(one, one.axis, work.machine) for one in work.passes]
         low, high = extents(made)
-        why = next((f"line {one.one.line}: {one.refused}" for one in made if one.refused), "")
-        if why:
+        why = refused_pass(made)
+        if why is not None:
             return self._refused(place, why, low, high)
-        singular, why = self._singular(made)
+        singular, near = self._singular(made)
         edge = [ends(one, work) for one in made]
-        why = why or _no_height(edge, made) or ("" if self.bodies is None else self.bodies.tool(work))
-        if why:
+        why = near or _no_height(edge, made) or (None if self.bodies is None else self.bodies.tool(work))
+        if why is not None:
             return self._refused(place, why, low, high, singular)
         linking = _linking(work, edge)
         cuts, bound, lost = self._cutting(made, best - linking)
@@ -144,31 +145,29 @@ class Timer:
         limiting: dict[str, float] = {}
         for spent, name in cuts:
             limiting[name] = limiting.get(name, 0.0) + spent
-        return TimedPlace(place, cutting + linking, cutting, linking, bound + linking, low, high, singular, "", limiting)
+        return TimedPlace(place, cutting + linking, cutting, linking, bound + linking, low, high, singular, None, limiting)
 
-    def stands(self, place: Floats) -> str:
-        """What the part would stand in or hang over, "" where it stands free."""
+    def stands(self, place: Floats) -> Obstacle | None:
+        """What the part would stand in or hang over, None where it stands free."""
         over = self.space.overhang(place)
-        return over or ("" if self.bodies is None else self.bodies.against(self.space.placement(place)))
+        return over or (None if self.bodies is None else self.bodies.against(self.space.placement(place)))
 
-    def _refused(self, place: Floats, why: str, low: Floats | None = None, high: Floats | None = None,
+    def _refused(self, place: Floats, why: Obstacle, low: Floats | None = None, high: Floats | None = None,
                  singular: float = np.nan) -> TimedPlace:
         none = np.full(len(self.machine.axis_names), np.nan)
         return TimedPlace(place, np.inf, np.inf, np.inf, np.inf, none if low is None else low,
                           none if high is None else high,
                           singular, why)
 
-    def _singular(self, made: Sequence[Candidate]) -> tuple[float, str]:
+    def _singular(self, made: Sequence[Candidate]) -> tuple[float, NearSingular | None]:
         """Least distance from singular positions over all poses of a parallel machine, and what stands against it."""
         kin = self.machine.kinematics
         if not kin.singular_names:
-            return np.inf, ""
+            return np.inf, None
         found = np.concatenate([kin.singular_distance(q) for one in made for q in (one.q, *one.sites)])
         row, which = np.unravel_index(int(np.nanargmin(found)), found.shape)
         value = float(found[row, which])
-        name = kin.singular_names[int(which)]
-        why = f"{name} comes to {value:.4f} of a singular position, allowed at least {self.least:g}"
-        return value, why if value < self.least else ""
+        return value, NearSingular(kin.singular_names[int(which)], value, self.least) if value < self.least else None
 
     def _cutting(self, made: Sequence[Candidate], best: float) -> tuple[list[tuple[float, str]], float, bool]:
         """(seconds and what limits of each pass, bound, True where all together are proved not to be below `best`)."""
@@ -198,10 +197,15 @@ def _linking(work: PassContext, edge: list[PassEnds]) -> float:
     return seconds([0] * len(edge), rapids, links_between(work, [[one] for one in edge]))
 
 
-def _no_height(edge: list[PassEnds], made: Sequence[Candidate]) -> str:
+def refused_pass(made: Sequence[Candidate]) -> RefusedPass | None:
+    """The first pass that the machine cannot run."""
+    return next((RefusedPass(one.one.line, one.refused) for one in made if one.refused is not None), None)
+
+
+def _no_height(edge: list[PassEnds], made: Sequence[Candidate]) -> NoSafePlane | None:
     """A pass above which the safe plane is outside travel."""
     line = next((one.one.line for one, end in zip(made, edge, strict=True) if not np.isfinite(end.down + end.up)), None)
-    return "" if line is None else f"line {line}: no safe plane above the pass is inside travel"
+    return None if line is None else NoSafePlane(line)
 
 
 def extents(made: Sequence[Candidate]) -> tuple[Floats, Floats]:

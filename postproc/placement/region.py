@@ -20,6 +20,7 @@ from postproc.orientation.candidates.candidate_times import Candidate, turned
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.index_time import ends
 from postproc.path.reach import is_checked
+from postproc.placement.reasons import AxisLacks, Lack, MarginLacks, RefusedPass
 from postproc.placement.rigid_move import moved
 from postproc.placement.space import ANGLES, Space
 from toolpaths.arrays import Floats, Ints
@@ -52,7 +53,7 @@ class Region(Protocol):
     def margins(self, places: Floats) -> Floats:
         """(M,) mm that every axis stays inside travel there, negative where one lacks it."""
 
-    def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, str]:
+    def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, Lack]:
         """The place (3,) in a box with most margin, the margin, and what lacks how much where that is negative."""
 
 
@@ -76,7 +77,7 @@ class Slabs:
         parts = [places[k:k + count] @ self.g.T + self.c for k in range(0, len(places), count)]
         return np.concatenate([part.min(axis=1) for part in parts]) if parts else np.zeros(0)
 
-    def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, str]:
+    def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, Lack]:
         """The linear program max m, low <= p <= high, g . p + c >= m_j >= m, rows taken in as they are found to be broken.
 
         The margins m_j of the joints count a little, so that those that do not decide are centred as well.
@@ -103,7 +104,7 @@ class Slabs:
             place = np.clip(found.x[:ANGLES], low, high)
         values = self.g @ place + self.c
         margin = float(values.min())
-        return place, margin, f"axis {self.names[int(self.joint[int(values.argmin())])]} lacks {-margin:.3f} mm"
+        return place, margin, AxisLacks(self.names[int(self.joint[int(values.argmin())])], -margin)
 
     def _worst(self, values: Floats) -> list[int]:
         """The row of least margin of each joint and direction."""
@@ -111,7 +112,7 @@ class Slabs:
         return [int(k[values[k].argmin()]) for one in np.unique(key) if len(k := np.flatnonzero(key == one))]
 
 
-def region_of(work: PassContext, space: Space, angles: Floats, least: float) -> tuple[Region | None, str]:
+def region_of(work: PassContext, space: Space, angles: Floats, least: float) -> tuple[Region | None, RefusedPass | None]:
     """The region of a part turned by `angles` (3,), or why there is none.
 
     Args:
@@ -119,17 +120,17 @@ def region_of(work: PassContext, space: Space, angles: Floats, least: float) -> 
         least: distance that a parallel machine keeps from its singular positions
     """
     if not work.machine.kinematics.straight_slides:
-        return sampled(moved(work, space.placement(np.append(np.zeros(ANGLES), angles))), least), ""
+        return sampled(moved(work, space.placement(np.append(np.zeros(ANGLES), angles))), least), None
     places = np.vstack([np.zeros((1, ANGLES)), _STEP * np.eye(ANGLES)])
     joints = []
     for place in places:
         here = _unbounded(moved(work, space.placement(np.append(place, angles))))
         made = [turned(one, one.axis, here.machine) for one in here.passes]
-        why = next((f"line {one.one.line}: {one.refused}" for one in made if one.refused), "")
-        if why:
+        why = next((RefusedPass(one.one.line, one.refused) for one in made if one.refused is not None), None)
+        if why is not None:
             return None, why
         joints.append([_poses(one, here) for one in made])
-    return _slabs(joints, work.machine, space.room(angles)), ""
+    return _slabs(joints, work.machine, space.room(angles)), None
 
 
 def _unbounded(work: PassContext) -> PassContext:
@@ -221,7 +222,7 @@ class Sampled:
             result[good] = np.minimum(result[good], _PER_SHARE * (kin.singular_distance(q[good]).min(axis=1) - self.least))
         return np.where(np.isnan(result), _NONE, result)
 
-    def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, str]:
+    def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, Lack]:
         """The best of a lattice, then compass steps."""
         lattice = np.unique(np.stack(np.meshgrid(*np.linspace(low, high, _COARSE).T), axis=-1).reshape(-1, ANGLES), axis=0)
         values = self.margins(lattice)
@@ -236,7 +237,7 @@ class Sampled:
                 step = 0.5 * step
         return place, best, self._deciding(place)
 
-    def _deciding(self, place: Floats) -> str:
+    def _deciding(self, place: Floats) -> MarginLacks:
         """What has least margin at a place (3,), as what it lacks."""
         found: list[tuple[float, str, float, str]] = []
         for kin, tip, axis in self.poses:
@@ -244,7 +245,7 @@ class Sampled:
             q = max(branches, key=lambda branch: float(self._joints(kin, branch).min()))
             found += self._columns(kin, q)
         margin, name, unit, of = min(found)
-        return f"{name} lacks {-margin / unit:.4g} {of}" if margin > _NONE else name
+        return MarginLacks(name, -margin / unit if margin > _NONE else None, of)
 
     def _columns(self, kin: Kinematics, q: Floats) -> list[tuple[float, str, float, str]]:
         """(least margin of joints (N, J), what it is of, what its unit counts as, the unit), one each."""

@@ -30,7 +30,7 @@ def as_dict(choice: PlacementChoice) -> dict[str, Any]:
             "places_looked_at": choice.looked, "places_refused": choice.refused, "places_pruned": choice.pruned,
             "cuts_planned": choice.planned,
             "turned": [_degrees(one.place[ANGLES:]) | {"time_s": _finite(one.seconds)} for one in _turned(choice)],
-            "without_place": [_degrees(angles) | {"lacks_mm": _finite(-margin), "reason": why}
+            "without_place": [_degrees(angles) | {"lacks_mm": _finite(-margin), "reason": str(why)}
                               for angles, margin, why in choice.found.lacks]}
 
 
@@ -41,7 +41,7 @@ def _place(choice: PlacementChoice, one: TimedPlace) -> dict[str, Any]:
     return dict(zip(NAMES[:ANGLES], one.place[:ANGLES].tolist(), strict=True)) | _degrees(one.place[ANGLES:]) | {
         "time_s": _finite(one.seconds), "cutting_s": _finite(one.cutting), "linking_s": _finite(one.linking),
         "travel_margin": margins, "singular_distance": _finite(one.singular), "limiting_s": one.limiting,
-        "refused": one.refused}
+        "refused": str(one.refused or "")}
 
 
 def _degrees(angles: Floats) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def as_text(choice: PlacementChoice) -> str:
     for name, one in (("[part]", choice.found.now), ("placed", choice.best)):
         x, y, z, turn = one.place[:4]
         figures = ((f"{one.seconds:.3f}", f"{one.cutting:.3f}", f"{one.linking:.3f}", "") if math.isfinite(one.seconds)
-                   else ("-", "-", "-", one.refused))
+                   else ("-", "-", "-", str(one.refused or "")))
         rows.append((name, *(f"{round(value, 3) + 0.0:.3f}" for value in (x, y, z, turn / DEG)), *figures))
     lines = table_text(rows, ("", "x mm", "y mm", "z mm", "turn deg", "seconds", "cuts", "linking", ""), "lrrrrrrrl")
     gain = _gain(choice)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from postproc.placement.place_times import TimedPlace, Timer
+from postproc.placement.reasons import Obstacle, SmallTable
 from postproc.placement.region import Region, region_of
 from postproc.placement.space import ANGLES, FINE, Space
 from toolpaths.arrays import Floats
@@ -45,7 +46,7 @@ class FoundPlaces:
 
     now: TimedPlace
     best: TimedPlace | None = None
-    lacks: list[tuple[Floats, float, str]] = field(default_factory=list)
+    lacks: list[tuple[Floats, float, Obstacle]] = field(default_factory=list)
     attitudes: int = 0
     screened: int = 0
 
@@ -110,11 +111,11 @@ class PlaceSearch:
         low, high = self.space.room(angles)
         if bool((low > high + _SLACK).any()):
             over = float((low - high).max())
-            self.found.lacks.append((angles, -over, f"the table is too small by {over:.3f} mm"))
+            self.found.lacks.append((angles, -over, SmallTable(over)))
             return []
         region, why = region_of(self.timer.work, self.space, angles, self.timer.least)
         if region is None:
-            self.found.lacks.append((angles, np.nan, why))
+            self.found.lacks += [] if why is None else [(angles, np.nan, why)]
             return []
         high = np.maximum(low, high)
         centre, margin, what = region.deepest(low, high)
@@ -140,8 +141,8 @@ class PlaceSearch:
                 kept[key] = place
             if len(kept) == _SEEDS:
                 break
-        if not kept and bool(good.any()):
-            self.found.lacks.append((angles, np.nan, self.timer.stands(every[good][0])))
+        against = self.timer.stands(every[good][0]) if not kept and bool(good.any()) else None
+        self.found.lacks += [] if against is None else [(angles, np.nan, against)]
         return list(kept.values())
 
     def _by_bound(self, places: list[Floats]) -> list[Floats]:

@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
+from typing import Literal, get_args
 
 import numpy as np
 
+from postproc.placement.reasons import BeyondTable
 from postproc.setup.model import PartPlacement, Placement
 from postproc.setup.place import PlaceBox, PlacementLimits
 from toolpaths.arrays import Floats
@@ -19,7 +21,8 @@ from toolpaths.rotations import rotation
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
-NAMES = ("x", "y", "z", "turn", "tilt_y", "tilt_x")
+PlaceName = Literal["x", "y", "z", "turn", "tilt_y", "tilt_x"]
+NAMES: tuple[PlaceName, ...] = get_args(PlaceName)
 ANGLES = 3
 """coordinates from this one on are angles"""
 FINE = (1e-3, 1e-3, 1e-3, 1e-3 * DEG, 1e-3 * DEG, 1e-3 * DEG)
@@ -33,7 +36,7 @@ _MOST_ATTITUDES = 96
 class Dimension:
     """One coordinate: from `low` to `high`, or only `values` where there are any."""
 
-    name: str
+    name: PlaceName
     low: float
     high: float
     values: tuple[float, ...] = ()
@@ -110,16 +113,16 @@ class Space:
         inside = all(one.holds(float(v)) for one, v in zip(self.dims, place, strict=True))
         return inside and not self.overhang(place)
 
-    def overhang(self, place: Floats) -> str:
-        """By how much the part stands beyond its table, "" where it does not."""
+    def overhang(self, place: Floats) -> BeyondTable | None:
+        """By how much the part stands beyond its table, None where it does not."""
         if self.table is None:
-            return ""
+            return None
         corners = self.placement(place).points(self.corners)
         over = np.stack([np.array(self.table.low) - corners.min(axis=0), corners.max(axis=0) - np.array(self.table.high)])
         worst = float(over.max())
         if worst <= 1e-6:
-            return ""
-        return f"the part stands {worst:.3f} mm beyond the table in {'xyz'[int(over.max(axis=0).argmax())]}"
+            return None
+        return BeyondTable(worst, "xyz"[int(over.max(axis=0).argmax())])
 
     def room(self, angles: Floats) -> tuple[Floats, Floats]:
         """Least and greatest x, y, z (3,) of a part turned by `angles` (3,) so that it stays on its table; low > high
@@ -179,7 +182,7 @@ def space_of(limits: PlacementLimits, now: Placement, extent: tuple[Floats, Floa
     return Space(tuple(dims), point, limits.table, np.where(pick == 0, *box), place)
 
 
-def _dimension(name: str, limits: PlacementLimits, now: float) -> Dimension:
+def _dimension(name: PlaceName, limits: PlacementLimits, now: float) -> Dimension:
     angle = name in NAMES[ANGLES:]
     unit = DEG if angle else 1.0
     found = getattr(limits, name)

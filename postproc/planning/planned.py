@@ -6,9 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from operator import add
+from typing import get_args
 
 import numpy as np
 
+from machines.choices import MotionOrder
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits, Machine
 from postproc.feedrate.limits import JointLimits, ToolLimits
@@ -29,7 +31,7 @@ from toolpaths.smoothing.blend import SHARPEST
 from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.units import DEG
 
-ORDERS = ("velocity", "acceleration", "jerk")
+ORDERS: tuple[MotionOrder, ...] = get_args(MotionOrder)
 
 
 def joint_limits(limits: Limits) -> JointLimits:

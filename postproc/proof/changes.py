@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from postproc.base.version import VERSION
 from postproc.pipeline.result import VerifyResult
 from postproc.proof.file import AGAIN, ENDING, HashedFile, ProofFile, options_of, read_proof
-from postproc.proof.hashes import FileHash, Hashes, sha256
+from postproc.proof.hashes import FileHash, Hashes, ProofInput, sha256
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
 from toolpaths.input_files import STANDARD_INPUT, is_regular, read_input
 
-_NAMES = {"program": "program", "cl_file": "CL file", "setup": "set-up", "machine": "machine file",
+ChangedKey = Literal[ProofInput, "options"]
+_NAMES: dict[str, str] = {"program": "program", "cl_file": "CL file", "setup": "set-up", "machine": "machine file",
           "controller": "controller file", "error_model": "error model"}
 _SHOWN = 8
 """digits of a hash in messages"""
@@ -43,7 +44,7 @@ def proof_place(gcode: Path) -> Path:
     return gcode.with_name(gcode.name + ENDING)
 
 
-def compared(result: VerifyResult, inputs: dict[str, Hashes], proof: str) -> tuple[Kept | None, list[Diagnostic]]:
+def compared(result: VerifyResult, inputs: dict[ProofInput, Hashes], proof: str) -> tuple[Kept | None, list[Diagnostic]]:
     """What has changed since the proof of a program was written, warned where the program is right all the same.
 
     Args:
@@ -56,24 +57,25 @@ def compared(result: VerifyResult, inputs: dict[str, Hashes], proof: str) -> tup
     kept, found = read_proof(file)
     if kept is None:
         return None, found if proof else [replace(d, severity=Severity.WARNING) for d in found]
-    given = {"cl_file": _cl(result), **inputs}
-    changed = _program(result, kept, file.parent)
+    given: dict[ProofInput, Hashes] = {"cl_file": _cl(result), **inputs}
+    changed: dict[ChangedKey, str] = {"program": _program(result, kept, file.parent)}
     changed |= {key: _differs(getattr(kept.inputs, key), now) for key, now in given.items()}
     changed["options"] = _options(kept, result)
     named = {key: what for key, what in changed.items() if what}
     judge = warning if result.ok else error
     found = [judge(f"proof.{key}", _message(key, what), file=str(file), hint=_hint(key)) for key, what in named.items()]
+    keys: list[str] = list(named)
     if kept.postproc != VERSION:
-        named["postproc"] = kept.postproc
+        keys.append("postproc")
         found.append(info("proof.version", f"the proof is of postproc {kept.postproc}, this is {VERSION}", file=str(file)))
-    return Kept(str(file), tuple(named)), found
+    return Kept(str(file), tuple(keys)), found
 
 
 def _cl(result: VerifyResult) -> Hashes:
     return () if result.source is None else (FileHash(Path(result.cl_file).name, sha256(result.source.data)),)
 
 
-def _program(result: VerifyResult, kept: ProofFile, folder: Path) -> dict[str, str]:
+def _program(result: VerifyResult, kept: ProofFile, folder: Path) -> str:
     """The program, and the files of its subprograms, which stand next to it."""
     adjacent = Path(result.gcode).parent if result.gcode not in STANDARD_INPUT else folder
     now = [FileHash(Path(result.gcode).name, result.sha256)]
@@ -82,7 +84,7 @@ def _program(result: VerifyResult, kept: ProofFile, folder: Path) -> dict[str, s
             now.append(FileHash(one.file, sha256(read_input(adjacent / one.file))))
         except OSError:
             now.append(FileHash(one.file, ""))
-    return {"program": _differs(kept.program, tuple(now))}
+    return _differs(kept.program, tuple(now))
 
 
 def _differs(then: list[HashedFile], now: Hashes) -> str:
@@ -102,7 +104,7 @@ def _options(kept: ProofFile, result: VerifyResult) -> str:
     return ", ".join(f"{key} was {then[key]}, is {now[key]}" for key in then if then[key] != now[key])
 
 
-def _message(key: str, what: str) -> str:
+def _message(key: ChangedKey, what: str) -> str:
     if key == "program":
         return f"the program is not the one that was proved ({what}): it was edited since, or written again without --proof"
     if key == "options":
@@ -110,7 +112,7 @@ def _message(key: str, what: str) -> str:
     return f"the {_NAMES[key]} is not the one of the proof: {what}"
 
 
-def _hint(key: str) -> str:
+def _hint(key: ChangedKey) -> str:
     if key == "program":
         return f"what verify says now is of the program as it is; {AGAIN} for the one that was proved"
     if key == "options":

@@ -8,12 +8,12 @@ from postproc.base.options import Options
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.proof.changes import Kept, compared, proof_place
 from postproc.proof.file import proof_text
-from postproc.proof.hashes import Hashes, input_hashes
+from postproc.proof.hashes import Hashes, ProofInput, input_hashes
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, warning
 from toolpaths.input_files import is_regular, reason, shown
 
 
-def hashed(machine: str, controller: str, options: Options) -> dict[str, Hashes] | None:
+def hashed(machine: str, controller: str, options: Options) -> dict[ProofInput, Hashes] | None:
     """Hashes of all input files but the CL file; None where one is not read, which its reader says."""
     try:
         return input_hashes(machine, controller, options)
@@ -21,7 +21,7 @@ def hashed(machine: str, controller: str, options: Options) -> dict[str, Hashes]
         return None
 
 
-def kept(result: PostResult, machine: str, controller: str, wanted: bool, known: dict[str, Hashes] | None,
+def kept(result: PostResult, machine: str, controller: str, wanted: bool, known: dict[ProofInput, Hashes] | None,
          output: Path) -> tuple[dict[Path, str], list[Diagnostic]]:
     """The proof file by its place, where one is `wanted` (`known`: the hashes before the files were read); else a warning
     where that of an older program stands there.

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from postproc.base.version import VERSION
 from postproc.pipeline.result import PostResult
-from postproc.proof.hashes import FileHash, Hashes, sha256
+from postproc.proof.hashes import FileHash, Hashes, ProofInput, sha256
 from postproc.readback.comparison.compare import Comparison
 from postproc.verification.proof_text import statement
 from toolpaths.diagnostics import Diagnostic, error
@@ -117,7 +117,7 @@ class ProofFile(_Model):
     of_this_file: Digest
 
 
-def proof_text(result: PostResult, inputs: dict[str, Hashes], output: str) -> str:
+def proof_text(result: PostResult, inputs: dict[ProofInput, Hashes], output: str) -> str:
     """The file of a conversion that is written to `output`; `inputs` as `input_hashes` gives them."""
     assert result.comparison is not None and result.source is not None and result.toolpath is not None
     cl = FileHash(Path(result.toolpath.file).name, sha256(result.source.data))

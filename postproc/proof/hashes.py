@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from machines.kinds import code_file
 from machines.loader import builtin
@@ -17,6 +17,7 @@ from postproc.setup.files import file_keys, seen_from_here, value_at
 from toolpaths.input_files import read_input
 
 Hashes = tuple["FileHash", ...]
+ProofInput = Literal["program", "cl_file", "setup", "machine", "controller", "error_model"]
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ def sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def input_hashes(machine: str, controller: str, options: Options) -> dict[str, Hashes]:
+def input_hashes(machine: str, controller: str, options: Options) -> dict[ProofInput, Hashes]:
     """By input (set-up, machine, controller, error model): its file, the files of its `base` chain, files that it names.
 
     Args:

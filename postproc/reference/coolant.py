@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from postproc.controllers.spelling import Codes
@@ -9,23 +11,24 @@ from postproc.reference.events import state_at, words
 from toolpaths.arrays import Ints
 from toolpaths.toolpath import Toolpath
 
+CoolantCommand = Literal["COOLANT_OFF", "FLOOD_ON", "MIST_ON", "THROUGH_ON", "AIR_ON"]
 OFF, FLOOD, MIST, THROUGH, AIR, ANY = 0, 1, 2, 4, 8, -1
 """bits of what flows; ANY: COOLNT/ON, whatever the kind"""
 ALL = FLOOD | MIST | THROUGH | AIR
 LABELS = {FLOOD: "flood", MIST: "mist", THROUGH: "through the tool", AIR: "air"}
-COMMANDS = {"FLOOD_ON": FLOOD, "MIST_ON": MIST, "THROUGH_ON": THROUGH, "AIR_ON": AIR}
-_LESS = {"THROUGH_ON": "FLOOD_ON", "AIR_ON": "MIST_ON", "MIST_ON": "FLOOD_ON"}
+COMMANDS: dict[CoolantCommand, int] = {"FLOOD_ON": FLOOD, "MIST_ON": MIST, "THROUGH_ON": THROUGH, "AIR_ON": AIR}
+_LESS: dict[CoolantCommand, CoolantCommand] = {"THROUGH_ON": "FLOOD_ON", "AIR_ON": "MIST_ON", "MIST_ON": "FLOOD_ON"}
 """what is written where the controller has no code for a kind"""
 
 
-def asked(said: list[str]) -> str:
+def asked(said: list[str]) -> CoolantCommand:
     """The command that a COOLNT of these words asks for."""
     if "OFF" in said:
         return "COOLANT_OFF"
     return "THROUGH_ON" if "THRU" in said else "AIR_ON" if "AIR" in said else "MIST_ON" if "MIST" in said else "FLOOD_ON"
 
 
-def written(said: list[str], codes: Codes) -> str:
+def written(said: list[str], codes: Codes) -> CoolantCommand:
     """The command that can be written for it: the kind itself, or the nearest that the controller has a code for."""
     command = asked(said)
     while command in _LESS and not switching(codes)[command][0]:
@@ -33,7 +36,7 @@ def written(said: list[str], codes: Codes) -> str:
     return command
 
 
-def switching(codes: Codes) -> dict[str, tuple[str, str]]:
+def switching(codes: Codes) -> dict[CoolantCommand, tuple[str, str]]:
     """(code that switches on, code that switches off; empty: `coolant_off` does) by command."""
     return {"FLOOD_ON": (codes.flood, ""), "MIST_ON": (codes.mist, ""), "THROUGH_ON": (codes.through, codes.through_off),
             "AIR_ON": (codes.air, codes.air_off)}

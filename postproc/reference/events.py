@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 
@@ -171,9 +172,9 @@ def loaded_tools(toolpath: Toolpath) -> Ints:
     return np.array([-1, *(c.number for c in changes)])[state_at([0, *(c.index for c in changes)], len(toolpath))]
 
 
-def compensation_side(event: Event) -> str:
+def compensation_side(event: Event) -> CompensationSide | Literal[""]:
     """LEFT, RIGHT or OFF of a CUTCOM record, "" where it says none of them."""
-    return next((w for w in words(event) if w in _SIDES), "")
+    return next((side for w in words(event) for side in _SIDES if side == w), "")
 
 
 def loaded_registers(toolpath: Toolpath) -> Ints:
@@ -187,7 +188,8 @@ def compensation_states(toolpath: Toolpath) -> Ints:
     states, starts = [40], [0]
     for event in toolpath.events:
         if event.word == "CUTCOM":
-            states.append(_SIDES.get(compensation_side(event), states[-1]))
+            side = compensation_side(event)
+            states.append(_SIDES[side] if side else states[-1])
             starts.append(event.index)
         elif event.word in TOOL_WORDS:
             states.append(40)
@@ -195,4 +197,5 @@ def compensation_states(toolpath: Toolpath) -> Ints:
     return np.where(toolpath.cycle >= 0, 40, np.array(states)[state_at(starts, len(toolpath))])
 
 
-_SIDES = {"LEFT": 41, "RIGHT": 42, "OFF": 40}
+CompensationSide = Literal["LEFT", "RIGHT", "OFF"]
+_SIDES: dict[CompensationSide, int] = {"LEFT": 41, "RIGHT": 42, "OFF": 40}

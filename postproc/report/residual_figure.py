@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.report.residuals import ARCSEC, UM, Residuals
 from toolpaths.arrays import Floats, Ints
+from toolpaths.choices import FigureEnding
 from toolpaths.drawing import image
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ _LEAST = 1e-4
 _BEFORE, _AFTER, _BOUND = "#9aa0a6", "#1f6fb2", "#c2453a"
 
 
-def residual_figure(field: Residuals, title: str, ending: str) -> bytes:
+def residual_figure(field: Residuals, title: str, ending: FigureEnding) -> bytes:
     """An image file of a field; `ending` ".png" or ".svg"."""
     return image(_SIZE, title, lambda sheet: _fill(sheet, field), ending)
 

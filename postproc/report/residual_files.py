@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from postproc.pipeline.result import PostResult
 from postproc.report.residuals import as_csv, residuals, title
+from toolpaths.choices import FieldEnding
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.drawing import FORMATS
-
-ENDINGS = (".csv", *FORMATS)
-"""of files that a field is written to: a table, drawings"""
 
 
-def contents(result: PostResult, endings: list[str]) -> tuple[list[str | bytes], list[Diagnostic]]:
-    """What files of these endings (of ENDINGS) hold: the field as a table, or drawn; nothing, and why, where there is none.
-
-    Raises:
-        ValueError: for another ending.
-    """
+def contents(result: PostResult, endings: list[FieldEnding]) -> tuple[list[str | bytes], list[Diagnostic]]:
+    """What files of these endings hold: the field as a table, or drawn; nothing, and why, where there is none."""
     found = residuals(result) if result.ok else None
     if found is None:
         return [], [no_field(result.options.error_model)] if result.ok else []

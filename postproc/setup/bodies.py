@@ -8,8 +8,7 @@ from pydantic import Field, model_validator
 
 from machines.user_file import UserModel
 from postproc.setup.place import PlaceBox
-
-MeshUnits = Literal["mm", "inch"]
+from toolpaths.choices import LengthUnit
 
 
 class SolidModel(UserModel):
@@ -19,7 +18,7 @@ class SolidModel(UserModel):
     """closed triangle mesh"""
     box: PlaceBox | None = None
     """instead of a file: a box along the axes of its frame, mm"""
-    units: MeshUnits | None = None
+    units: LengthUnit | None = None
     """of the numbers in the file; default: that of [bodies]"""
 
     @model_validator(mode="after")
@@ -47,7 +46,7 @@ class BodiesModel(UserModel):
     """the machine's table, in the table frame"""
     fixtures: list[Fixture] = Field(default_factory=list)
     """[[bodies.fixtures]], one each"""
-    units: MeshUnits = "mm"
+    units: LengthUnit = "mm"
     """of the numbers in the files"""
     clearance: float = Field(default=1.0, ge=0.0)
     """that the cutter keeps from table and fixtures, shank and holder from everything, mm"""
@@ -109,7 +108,7 @@ class ToolBody(UserModel):
     """above the shank, to the gauge point and beyond, e.g. holder = [{lower = 40, upper = 50, length = 60}]"""
     holder_mesh: str | None = None
     """instead: mesh file of the holder in the frame of the tool, tip at 0, +z to the spindle; spun about z"""
-    holder_units: MeshUnits = "mm"
+    holder_units: LengthUnit = "mm"
     """of the numbers in that file"""
 
     @model_validator(mode="after")

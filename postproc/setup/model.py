@@ -11,6 +11,7 @@ from pydantic import Field
 
 from machines.hooks import HooksModel
 from machines.user_file import UserModel, read_toml, validate
+from postproc.base.options import OutputMode
 from postproc.setup.bodies import BodiesModel, ToolBody
 from postproc.setup.files import seen_from_here
 from postproc.setup.orientation import OrientationLimits
@@ -82,16 +83,13 @@ class ToolSetup(ToolBody):
         return self.gauge_length or 0.0
 
 
-Asked = Literal["auto", "axes", "tcp", "tilted"]
-
-
 class OutputSettings(UserModel):
     """What the words of the program mean, and how it is divided."""
 
-    default: Asked = "auto"
+    default: OutputMode = "auto"
     """axes: machine coordinates; tcp: tool-centre-point control; tilted: the tip in a tilted work plane, rotary axes
     standing still; auto: the best that controller and machine can. --output-mode goes before it"""
-    operations: dict[str, Asked] = Field(default_factory=dict)
+    operations: dict[str, OutputMode] = Field(default_factory=dict)
     """by name of the operation"""
     restart: bool = False
     """every operation begins at home with everything restated, so that the program can be taken up there"""

@@ -9,7 +9,7 @@ def pair(value: object) -> object:
     Raises:
         ValueError: says what is expected, with an example.
     """
-    numbers = isinstance(value, list | tuple) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
-    if not numbers or len(value) != 2:  # type: ignore[arg-type]
+    if not isinstance(value, list | tuple) or len(value) != 2 or not all(
+            isinstance(v, int | float) and not isinstance(v, bool) for v in value):
         raise ValueError("expected two numbers, [least, greatest], e.g. [-30, 30]")
-    return tuple(value)  # type: ignore[arg-type]
+    return tuple(value)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from postproc.witness.evidence import ExecutedBlocks
@@ -39,7 +41,7 @@ def seconds_of(e: ExecutedBlocks) -> Array:
         return np.asarray(60.0 * np.where(e.inverse, share, length) / e.feed)
 
 
-def _by_rule(step: Array, letters: tuple[str, ...], rule: str) -> Array:
+def _by_rule(step: Array, letters: tuple[str, ...], rule: Literal["xyz-first", "geometry", "all"]) -> Array:
     if rule == "all":
         return np.asarray(np.sqrt((step * step).sum(axis=1)))
     rest = "".join(name for name in letters if name not in "XYZ")

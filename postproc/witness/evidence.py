@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from postproc.witness.text import Array
 
@@ -36,7 +36,7 @@ class Case:
     oriented: bool = False
     program: bytes = b""
     """the text of the program, where it is one file"""
-    modulo: dict[str, str] = field(default_factory=dict)
+    modulo: dict[str, Literal["shortest", "sign"]] = field(default_factory=dict)
     """"shortest" or "sign" by letter of axes that the control counts modulo 360 degrees: which path a word turns them"""
     clamps: dict[str, tuple[str, str]] = field(default_factory=dict)
     """codes that clamp and release, by letter of the axes whose clamps the program works"""
@@ -75,7 +75,7 @@ class ExecutedBlocks:
     inverse: Array
     inch: Array
     by_tip: Array
-    rule: str
+    rule: Literal["xyz-first", "geometry", "all"]
     by_angle: bool
     tool: Array
     spindle: Array

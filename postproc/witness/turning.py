@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Literal
 
 import numpy as np
 
@@ -41,7 +42,7 @@ def check_turning(case: Case, executed: ExecutedBlocks) -> tuple[list[Finding], 
     return found, count
 
 
-def _steps(value: Array, how: Array, rule: str) -> Array:
+def _steps(value: Array, how: Array, rule: Literal["shortest", "sign"]) -> Array:
     """Degrees from word to word: the shorter path, or that of the sign, or the one that the word names."""
     place = np.abs(value) if rule == "sign" else value
     onward = np.round(np.mod(np.diff(place), _FULL), 7) % _FULL

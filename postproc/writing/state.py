@@ -10,7 +10,7 @@ from textwrap import wrap
 import numpy as np
 
 from postproc.compile.program import PER_MINUTE, Hole, Program, Section
-from postproc.controllers.model import CannedCycle, ControllerFile, Mode
+from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
 
@@ -154,7 +154,7 @@ class WriterState:
         self.length_off |= holds
         self.restate()
 
-    def _length(self, wanted: str) -> Iterator[str]:
+    def _length(self, wanted: LengthState) -> Iterator[str]:
         """The length register off or on, where it is not."""
         codes = self.controller.codes
         if wanted == "off" and self.register and not self.length_off:

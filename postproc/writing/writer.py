@@ -322,12 +322,13 @@ class Writer(WriterState, ABC):
 
     def coolant(self, command: Command) -> Iterator[str]:
         """One kind of coolant on, any other off before it; or all off. What the block switch may leave out is not known."""
-        wanted = COMMANDS.get(command.name, 0)
+        asked = next((name for name in COMMANDS if name == command.name), None)
+        wanted = COMMANDS[asked] if asked else 0
         if not wanted or self.flowing & ~wanted:
             yield from self.coolant_off()
             self.flowing = self.flowing if command.skip else 0
-        if wanted:
-            yield switching(self.controller.codes)[command.name][0]
+        if asked:
+            yield switching(self.controller.codes)[asked][0]
         self.flowing |= wanted
         self.cooling = None if command.skip else bool(wanted)
 

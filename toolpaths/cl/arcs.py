@@ -50,9 +50,13 @@ class ArcTable:
     def add(self, row: int, numbers: tuple[float, ...], line: int, radius: float = math.nan, times: float = 0.0,
             sense: int = 1, sweep: float = math.nan) -> None:
         """One record."""
-        for column, value in zip((self.row, self.numbers, self.radius, self.times, self.sense, self.sweep, self.line),
-                                 (row, numbers, radius, times, sense, sweep, line), strict=True):
-            column.append(value)  # type: ignore[attr-defined]
+        self.row.append(row)
+        self.numbers.append(numbers)
+        self.radius.append(radius)
+        self.times.append(times)
+        self.sense.append(sense)
+        self.sweep.append(sweep)
+        self.line.append(line)
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.choices import LengthUnit
 from toolpaths.cl.arcs import ArcTable
 from toolpaths.cl.text.dialects import SCALE, Dialect
 from toolpaths.cl.text.log import DiagnosticLog
@@ -57,7 +58,7 @@ class ModalValue(Generic[V]):
 class Declared:
     """Lists that text of our own writer states outright, and the tool index in use."""
 
-    units: str
+    units: LengthUnit
     frames: list[Frame] = field(default_factory=list)
     tools: list[Tool] = field(default_factory=list)
     operations: list[Operation] = field(default_factory=list)
@@ -89,7 +90,7 @@ class Extras:
 class ToolpathBuilder:
     """Reads one program. Handlers get it with the statement and use what they need."""
 
-    def __init__(self, program: StatementList, points: Points, dialect: Dialect, units: str, log: DiagnosticLog,
+    def __init__(self, program: StatementList, points: Points, dialect: Dialect, units: LengthUnit, log: DiagnosticLog,
                  allow_unknown: Iterable[str] = ()):
         self.program, self.points, self.dialect, self.log = program, points, dialect, log
         self.units, self.scale = units, SCALE[units]

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+from toolpaths.choices import CycleKind
 from toolpaths.cl.feeds import UNITS
 from toolpaths.cl.text.statements import Word
 
-KINDS = {"DRILL": "DRILL", "DEEP": "DEEP", "DEEP2": "DEEP", "PECK": "DEEP", "BRKCHP": "BRKCHP", "BREAKCHP": "BRKCHP",
-         "TAP": "TAP", "RIGID": "TAP", "BORE": "BORE", "BORE7": "BORE7", "BORE8": "BORE8", "BORE9": "BORE9", "REAM": "REAM",
-         "FACE": "FACE", "CSINK": "CSINK", "THRU": "THRU", "MILL": "MILL", "REVERS": "REVERS", "SHIFT": "SHIFT",
-         "CIRCUL": "CIRCUL", "THREAD": "THREAD", "SPOT": "DRILL", "SPDRL": "DRILL", "CBORE": "DRILL", "DEEPHL": "DEEP",
-         "CNSINK": "CSINK"}
+KINDS: dict[str, CycleKind] = {
+    "DRILL": "DRILL", "DEEP": "DEEP", "DEEP2": "DEEP", "PECK": "DEEP", "BRKCHP": "BRKCHP", "BREAKCHP": "BRKCHP",
+    "TAP": "TAP", "RIGID": "TAP", "BORE": "BORE", "BORE7": "BORE7", "BORE8": "BORE8", "BORE9": "BORE9", "REAM": "REAM",
+    "FACE": "FACE", "CSINK": "CSINK", "THRU": "THRU", "MILL": "MILL", "REVERS": "REVERS", "SHIFT": "SHIFT",
+    "CIRCUL": "CIRCUL", "THREAD": "THREAD", "SPOT": "DRILL", "SPDRL": "DRILL", "CBORE": "DRILL", "DEEPHL": "DEEP",
+    "CNSINK": "CSINK"}
 _RETRACT = frozenset({"RTRCTO", "RETURN"})
 _PECKS = frozenset({"STEP", "INCR", "PECKING", "1STPECK", "SUBPECK"})
 _OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "CSKDIA"})
@@ -32,7 +34,7 @@ CYCLE_WORDS = frozenset({*KINDS, *_RETRACT, *_PECKS, *_OTHER, *_UNUSED, *_PLAIN,
 class CycleValues:
     """What a CYCLE record states, file units; NaN or None where it does not."""
 
-    kind: str
+    kind: CycleKind
     words: tuple[Word, ...]
     depth: float = math.nan
     rapto: float = math.nan
@@ -55,7 +57,7 @@ class CycleValues:
     strange: tuple[str, ...] = field(default=(), compare=False)
 
 
-def kind_of(words: tuple[Word, ...]) -> tuple[str, tuple[Word, ...]]:
+def kind_of(words: tuple[Word, ...]) -> tuple[CycleKind, tuple[Word, ...]]:
     """(kind, the words after it): of several the one that says more than DRILL."""
     n = 0
     while n < len(words) and isinstance(words[n], str) and words[n] in KINDS:
@@ -91,7 +93,8 @@ def values(v: CycleValues, words: tuple[Word, ...]) -> CycleValues:
         found.setdefault("rapto", math.nan)
     if steps:
         found["steps"] = tuple(steps)
-    return replace(v, **found, free=tuple(free), empty=tuple(empty), strange=tuple(strange))  # type: ignore[arg-type]
+    stated = {**found, "free": tuple(free), "empty": tuple(empty), "strange": tuple(strange)}
+    return replace(v, **stated)  # type: ignore[arg-type]  # by names of fields
 
 
 def _unit_alone(words: tuple[Word, ...]) -> bool:

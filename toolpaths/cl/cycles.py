@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 
+from toolpaths.choices import CycleKind
 from toolpaths.cl.build import Heights, ToolpathBuilder
 from toolpaths.cl.cycle_words import KINDS, CycleValues, kind_of, values
 from toolpaths.cl.feeds import feed_in
@@ -60,7 +61,7 @@ def _again(b: ToolpathBuilder, s: Statement) -> None:
     _arm(b, values(replace(last, empty=()), s.words[1:]))
 
 
-def _variant(b: ToolpathBuilder, kind: str, words: tuple[Word, ...], rest: tuple[Word, ...]) -> tuple[Word, ...]:
+def _variant(b: ToolpathBuilder, kind: CycleKind, words: tuple[Word, ...], rest: tuple[Word, ...]) -> tuple[Word, ...]:
     """`rest` without the word that makes another cycle of a bore (NX: DRAG, NODRAG, MANUAL); what cannot be carried out as
     the cycle of its kind, a bore from below and a tap in steps, is refused."""
     steps = [str(w) for w in words[:len(words) - len(rest)] if w in _IN_STEPS]
@@ -121,7 +122,7 @@ def _placed(v: CycleValues, planes: Planes) -> CycleValues:
     if planes not in _COUNTED_DOWN and v.retract is not None and math.isnan(v.retract) and free:
         found["retract"] = free.pop(0)
     strange = tuple(f"{x:g}" for x in free if x not in (0.0, found.get("retract", v.retract)))
-    return replace(v, **found, free=(), strange=(*v.strange, *strange))  # type: ignore[arg-type]
+    return replace(v, **found, free=(), strange=(*v.strange, *strange))  # type: ignore[arg-type]  # by names of fields
 
 
 _COUNTED_DOWN = (Planes.BOTTOM, Planes.DOWN, Planes.OVER_BOTTOM)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
+from typing import Literal
 
 import numpy as np
 
@@ -77,7 +78,7 @@ def cutting_lengths(p: Toolpath) -> Floats:
     return length
 
 
-def axis_motion(p: Toolpath) -> str:
+def axis_motion(p: Toolpath) -> Literal["fixed", "indexed", "continuous"]:
     """"fixed" (one direction), "indexed" (it changes in rapids and at holes only) or "continuous"."""
     if len(p) < 2:
         return "fixed"

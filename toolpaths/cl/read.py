@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
+from toolpaths.choices import DialectName, LengthUnit
 from toolpaths.cl.assemble import assemble
 from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.forms import check_forms
@@ -42,14 +43,14 @@ class ReadResult:
     toolpath: Toolpath
     diagnostics: list[Diagnostic]
     unknown_words: dict[str, int] = field(default_factory=dict)
-    dialect: str = "generic"
+    dialect: DialectName = "generic"
     evidence: str = ""
     arc_records: int = 0
     cycle_records: int = 0
     lines: int = 0
 
 
-def read_file(path: str | Path, *, units: str | None = None, dialect: str | None = None,
+def read_file(path: str | Path, *, units: LengthUnit | None = None, dialect: DialectName | None = None,
               allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None) -> ReadResult:
     """Read the file at `path` (- for standard input); see `read_bytes`. A file that cannot be opened is a diagnostic too."""
     try:
@@ -61,7 +62,7 @@ def read_file(path: str | Path, *, units: str | None = None, dialect: str | None
                       progress=progress)
 
 
-def read_bytes(data: bytes | str, *, file: str = "", units: str | None = None, dialect: str | None = None,
+def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = None, dialect: DialectName | None = None,
                allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None) -> ReadResult:
     """Read the text of a CL file.
 
@@ -126,7 +127,7 @@ def _cut_off(data: bytes | str, lines: int, log: DiagnosticLog) -> None:
                     "be cut off", lines, "compare the last line with the CAM system, or write the file again")
 
 
-def _check_options(units: str | None, dialect: str | None) -> None:
+def _check_options(units: LengthUnit | None, dialect: DialectName | None) -> None:
     if units not in (None, "mm", "inch"):
         raise ValueError(f"units are mm or inch, not {units!r}")
     if dialect is not None and dialect not in DIALECTS:
@@ -135,7 +136,7 @@ def _check_options(units: str | None, dialect: str | None) -> None:
                          + ", ".join(DIALECTS))
 
 
-def _units(program: StatementList, given: str | None, log: DiagnosticLog) -> str:
+def _units(program: StatementList, given: LengthUnit | None, log: DiagnosticLog) -> LengthUnit:
     """The unit of the file: as given, by its UNITS word, by its feed units, else mm."""
     said = units_said(program)
     for body, line in said.wrong:
@@ -153,7 +154,7 @@ def _units(program: StatementList, given: str | None, log: DiagnosticLog) -> str
     return _units_of_feeds(said.feeds, log)
 
 
-def _units_of_feeds(feeds: dict[str, int], log: DiagnosticLog) -> str:
+def _units_of_feeds(feeds: dict[LengthUnit, int], log: DiagnosticLog) -> LengthUnit:
     if len(feeds) == 1:
         (unit, line), = feeds.items()
         add = log.info if unit == "mm" else log.warning

@@ -27,22 +27,22 @@ class ActualKinematics(Kinematics):
     model: ErrorModel
 
     @property
-    def axis_names(self) -> tuple[str, ...]:  # type: ignore[override]
+    def axis_names(self) -> tuple[str, ...]:  # type: ignore[override]  # nothing assigns it
         """Of the nominal machine."""
         return self.nominal.axis_names
 
     @property
-    def rotary(self) -> tuple[bool, ...]:  # type: ignore[override]
+    def rotary(self) -> tuple[bool, ...]:  # type: ignore[override]  # nothing assigns it
         """Of the nominal machine."""
         return self.nominal.rotary
 
     @property
-    def tool_length(self) -> float:  # type: ignore[override]
+    def tool_length(self) -> float:  # type: ignore[override]  # nothing assigns it
         """mm"""
         return self.nominal.tool_length
 
     @property
-    def branches(self) -> int:  # type: ignore[override]
+    def branches(self) -> int:  # type: ignore[override]  # nothing assigns it
         """Of the nominal machine."""
         return self.nominal.branches
 

@@ -26,12 +26,12 @@ class ActualByMap(Actual):
     map: ErrorMap
 
     @property
-    def kinematics(self) -> Kinematics:  # type: ignore[override]
+    def kinematics(self) -> Kinematics:  # type: ignore[override]  # nothing assigns it
         """Of the nominal machine."""
         return self.nominal.kinematics
 
     @property
-    def turns(self) -> int:  # type: ignore[override]
+    def turns(self) -> int:  # type: ignore[override]  # nothing assigns it
         """Of the nominal machine."""
         return self.nominal.turns
 

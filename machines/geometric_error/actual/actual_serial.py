@@ -34,7 +34,7 @@ class ActualSerial(Actual):
     errors: SerialErrors
 
     @property
-    def turns(self) -> int:  # type: ignore[override]
+    def turns(self) -> int:  # type: ignore[override]  # nothing assigns it
         """Rotary axes."""
         return sum(self.kinematics.rotary)
 

@@ -69,12 +69,12 @@ class RotatedCurve(Curve):
         return sum(curve.apart for curve in self.curves)
 
     @cached_property
-    def values(self) -> Floats:  # type: ignore[override]
+    def values(self) -> Floats:  # type: ignore[override]  # nothing assigns it
         """(P,) of all its curves."""
         return np.concatenate([curve.values for curve in self.curves])
 
     @cached_property
-    def range(self) -> tuple[float, float]:  # type: ignore[override]
+    def range(self) -> tuple[float, float]:  # type: ignore[override]  # nothing assigns it
         """Where all its curves hold."""
         ends = [curve.range for curve in self.curves]
         return max(low for low, _ in ends), min(high for _, high in ends)

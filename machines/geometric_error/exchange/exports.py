@@ -21,6 +21,7 @@ from machines.geometric_error.exchange.tabulate import TablePositions, loss, mer
 from machines.geometric_error.exchange.volume import corners, middle, ranges, samples
 from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.averages import SAME
+from machines.geometric_error.tables.choices import MapDirections
 from machines.geometric_error.tables.csv_table import UNITS, write_csv
 from machines.geometric_error.tables.curves import Polynomial, TableCurve
 from machines.geometric_error.tables.lattice import POINT, ROTARY, ErrorMap
@@ -195,7 +196,7 @@ class MadeMap:
 
 
 def lattice_for(model: ErrorModel, machine: Machine, letters: str, step: GridSteps, at: Mapping[str, float], length: float,
-                directions: str) -> tuple[ErrorMap, Floats]:
+                directions: MapDirections) -> tuple[ErrorMap, Floats]:
     """(an empty lattice, fixed joints (J,)).
 
     Args:

@@ -16,6 +16,7 @@ from machines.geometric_error.exchange.volume import INSIDE, ranges, section
 from machines.geometric_error.tables.csv_table import UNITS
 from machines.machine import Machine
 from toolpaths.arrays import Floats
+from toolpaths.choices import FigureEnding
 from toolpaths.drawing import ADJACENT, image
 from toolpaths.units import DEG
 
@@ -35,7 +36,7 @@ _UNCERTAINTY = 2.0
 """standard deviations of the band round a curve"""
 
 
-def model_figure(model: ErrorModel, machine: Machine, tool_length: float, ending: str) -> bytes:
+def model_figure(model: ErrorModel, machine: Machine, tool_length: float, ending: FigureEnding) -> bytes:
     """An image file of a model on its machine.
 
     Args:

@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from machines.geometric_error.exchange.uncertainty_of_means import with_scatter
 from machines.geometric_error.files.covariance import angular, read_covariance
 from machines.geometric_error.files.implausible_errors import too_large
 from machines.geometric_error.tables.averages import Averaged, averaged
+from machines.geometric_error.tables.choices import MapDirections, TableRule
 from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, UNITS, CsvTable, read_csv, read_text
 from machines.geometric_error.tables.lattice_file import COORDINATES, map_from_csv, zeroed
 from machines.geometric_error.tables.names import DIRECTIONS, OWN, ErrorName, parse
@@ -67,12 +67,12 @@ class ImportOptions:
         near: mm or rad by axis or coordinate: readings no farther apart are of one place
     """
 
-    rule: Literal["linear", "spline"] = "linear"
+    rule: TableRule = "linear"
     periods: Mapping[str, float] = field(default_factory=dict)
     sign: float = 1.0
     kind: int = 0
     tool_length: float = 0.0
-    directions: Literal["table", "machine"] = "table"
+    directions: MapDirections = "table"
     zero: Mapping[str, float] = field(default_factory=dict)
     average: bool = False
     near: Mapping[str, float] = field(default_factory=dict)

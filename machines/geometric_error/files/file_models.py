@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from machines.geometric_error.tables.choices import MapDirections, TableRule
 from machines.geometric_error.tables.names import parse
 from machines.models import Positive, Vector
 from machines.slider_models import Interval
@@ -24,7 +25,7 @@ class CurveModel(UserModel):
     table: str | None = None
     """CSV file next to this one: a column of positions named as the axis, e.g. X [mm], and one of values named as the
     component, EXX [um]; or two for both approach directions, EXX+ and EXX-"""
-    interpolation: Literal["linear", "spline"] = "linear"
+    interpolation: TableRule = "linear"
     """between the rows of the table"""
     repeats: Positive | None = None
     """table or series: mm or degrees after which it repeats; series of a rotary axis: 360 without it"""
@@ -46,7 +47,7 @@ class CurveModel(UserModel):
     """-1 where the numbers say how the part moves relative to the tool"""
 
     @property
-    def kind(self) -> str:
+    def kind(self) -> Literal["table", "polynomial", "series"]:
         """table, polynomial or series."""
         return "table" if self.table is not None else "polynomial" if self.polynomial else "series"
 
@@ -98,7 +99,7 @@ class MapModel(UserModel):
     measured. One row per node of a full lattice, in any order"""
     tool_length: Annotated[float, Field(ge=0)] = 0.0
     """mm: the displacements are those of the tip of a tool this long; 0: of the gauge point"""
-    directions: Literal["table", "machine"] = "table"
+    directions: MapDirections = "table"
     """what dx ... rz are along and about: x, y, z of the table, which turns with the rotary axes under the part, or of the
     machine"""
     sign: Literal[1, -1] = 1

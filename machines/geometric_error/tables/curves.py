@@ -9,10 +9,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from machines.geometric_error.tables.choices import TableRule
 from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
@@ -91,7 +92,7 @@ class TableCurve(Curve):
 
     x: Floats
     values: Floats
-    rule: Literal["linear", "spline"] = "linear"
+    rule: TableRule = "linear"
     both: bool = False
     period: float = 0.0
     range: tuple[float, float] = field(init=False)

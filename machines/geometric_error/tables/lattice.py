@@ -79,8 +79,7 @@ class ErrorMap:
     def most(self) -> tuple[float, float]:
         """Bounds of displacement (mm) and turn (rad) anywhere: values between nodes lie between theirs."""
         parts = self.table.reshape(-1, 6)
-        return tuple(float(np.linalg.norm(part, axis=1).max())
-                     for part in (parts[:, :3], parts[:, 3:]))  # type: ignore[return-value]
+        return float(np.linalg.norm(parts[:, :3], axis=1).max()), float(np.linalg.norm(parts[:, 3:], axis=1).max())
 
     @property
     def steepest(self) -> list[tuple[float, float]]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from machines.geometric_error.tables.choices import TableRule
 from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, UNITS, CsvTable
 from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import ErrorName
@@ -32,7 +33,7 @@ class Fault(NamedTuple):
         return error(self.code, self.message, file=table.file, lines=[self.line or table.head], hint=self.hint)
 
 
-def table_curve(name: ErrorName, table: CsvTable, rule: Literal["linear", "spline"] = "linear", period: float = 0.0,
+def table_curve(name: ErrorName, table: CsvTable, rule: TableRule = "linear", period: float = 0.0,
                 sign: float = 1.0) -> TableCurve | Fault:
     """The curve of a component over the positions of its axis.
 

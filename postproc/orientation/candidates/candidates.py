@@ -11,10 +11,11 @@ from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.free_rotary import best_held
 from postproc.orientation.candidates.initial_axes import aimed_axes, around, reaching_axes
 from postproc.orientation.candidates.ridges import best_on_ridge
-from postproc.orientation.candidates.search import CandidateSearch, PassSearch, RejectionKind
+from postproc.orientation.candidates.search import CandidateSearch, PassSearch
 from postproc.orientation.candidates.travel import nearest_inside
 from postproc.orientation.passes.allowed import SAME, AllowedAxes
 from postproc.orientation.passes.passes import Pass
+from postproc.orientation.passes.reasons import Unaimed
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between, slerp
 from toolpaths.units import DEG
@@ -61,23 +62,17 @@ def tried(one: Pass, machine: Machine, allowed: AllowedAxes, before: PassSearch 
     for step in _SWIFT:
         best = _hastened(search, best, step)
     paper = _least_turned(mean)
-    return search.tried(best_held(search, best), paper, "" if paper is not None else _unaimed(search, aimed))
+    return search.tried(best_held(search, best), paper, None if paper is not None else _unaimed(search, aimed))
 
 
-def _unaimed(search: CandidateSearch, aimed: dict[str, Floats]) -> str:
+def _unaimed(search: CandidateSearch, aimed: dict[str, Floats]) -> Unaimed:
     """Why no vertex is aimed along the mean direction."""
     if "mean" not in aimed:
-        return "the pass has no mean direction" if search.one.longest is None else "the cut's own axis is out of reach"
+        return Unaimed("no direction" if search.one.longest is None else "own axis")
     wanted = search.one.kin.nearest_axis(aimed["mean"])
     lost = [each for each in search.lost.values() if (angle_between(wanted, each.made.axis) < SAME).any()]
     count = Counter(each.kind for each in lost if each.kind in ("limits", "travel", "reach"))
-    if not count:
-        return "no vertex can be turned into the mean direction"
-    return "of the axes that aim a vertex " + ", ".join(f"{number} {WHY[kind]}" for kind, number in count.items())
-
-
-WHY: dict[RejectionKind, str] = {"limits": "are outside the allowed angles", "travel": "are outside travel",
-                                 "reach": "are out of reach"}
+    return Unaimed("lost", tuple(count.items())) if count else Unaimed("no vertex")
 
 
 def _least_turned(made: list[Candidate]) -> Candidate | None:

@@ -7,9 +7,11 @@ takes from rest to rest where only this order is limited. The slowest binds.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from machines.choices import MotionOrder
 from machines.polytope import Polytope, held_axis_polytope
 from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.passes.passes import CuttingStretch
@@ -28,7 +30,7 @@ class Reach:
         seconds: least, from rest to rest straight over the length
     """
 
-    order: str
+    order: MotionOrder | Literal["feed"]
     rate: float
     axis: str
     seconds: float
@@ -96,7 +98,7 @@ def binding(found: tuple[Reach, ...]) -> Reach | None:
     return max(found, key=lambda one: one.seconds, default=None)
 
 
-def least_seconds(order: str, rate: Floats, length: float) -> Floats:
+def least_seconds(order: MotionOrder, rate: Floats, length: float) -> Floats:
     """Seconds (N,) from rest to rest over `length` (mm) where only one order is limited to `rate` (N,).
 
     L / v; 2 sqrt(L / a), half the way speeding up; (32 L / j)^(1/3), jerk +, -, -, + for a quarter of the time each
@@ -115,7 +117,7 @@ def direction_of(stretch: CuttingStretch | None) -> tuple[Floats, float]:
     return mean, float(np.linalg.norm(stretch.tip[-1] - stretch.tip[0]))
 
 
-def polytopes(made: Candidate) -> dict[str, Polytope]:
+def polytopes(made: Candidate) -> dict[MotionOrder, Polytope]:
     """By order, the polytope of tip rates in the middle of the longest stretch, table frame, mm and s.
 
     Empty where the pass cannot be run, has no direction, the machine cannot move the tip alone, or for a slim `Candidate`.

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Iterable
 
 from postproc.orientation.candidates.candidate_times import Candidate
-from postproc.orientation.candidates.search import PassSearch, RejectionKind
+from postproc.orientation.candidates.search import PassSearch
+from postproc.orientation.passes.reasons import RejectionKind
 
 KINDS: dict[RejectionKind, str] = {
     "limits": "outside the allowed angles", "reach": "out of reach", "travel": "travel of an axis",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from postproc.orientation.candidates.candidate_times import Candidate, turned, t
 from postproc.orientation.candidates.ranking import Ranking
 from postproc.orientation.passes.allowed import SAME, AllowedAxes
 from postproc.orientation.passes.passes import Pass
-from postproc.orientation.passes.reasons import Refusal, Touching
+from postproc.orientation.passes.reasons import BoundTooLong, BrokenLimit, Refusal, RejectionKind, Slower, Touching, Unaimed
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -21,11 +21,9 @@ APART = 0.1 * DEG
 """of orientations that are reported as two"""
 _WORTH = 1e-4
 """least part of the time that a candidate must gain to be planned, or to be taken"""
-RejectionKind = Literal["limits", "reach", "travel", "touches", "bound", "slower"]
-"""What a candidate can lose by."""
 
 
-Reason = Refusal | Touching | str
+Reason = Refusal | Touching | BrokenLimit | BoundTooLong | Slower
 
 
 def _kind(refused: Refusal | None) -> RejectionKind:
@@ -51,7 +49,7 @@ class PassSearch:
         gains: seconds as ranked that `best` and `swift` gain over `own`
         rejected: candidates with their reasons, but those that stand where the best does; ranked times are reported next
             to the planned one of the best
-        unaimed: why there is no `aimed`, "" where there is one and where none is looked for
+        unaimed: why there is no `aimed`, None where there is one and where none is looked for
         pruned, planned: how many were discarded by the bound alone, how many timed
     """
 
@@ -63,7 +61,7 @@ class PassSearch:
     rejected: tuple[Rejection, ...]
     pruned: int
     planned: int
-    unaimed: str = ""
+    unaimed: Unaimed | None = None
 
 
 class CandidateSearch:
@@ -105,9 +103,11 @@ class CandidateSearch:
     def _runs(self, made: Candidate) -> bool:
         """Whether a candidate is allowed and inside travel; why not is noted."""
         why = self.allowed.refused(self.one, made.axis)
-        if why or made.refused:
-            self.lose(made, why or made.refused or "", "limits" if why else _kind(made.refused))
-        return not (why or made.refused)
+        if why is not None:
+            self.lose(made, why, "limits")
+        elif made.refused is not None:
+            self.lose(made, made.refused, _kind(made.refused))
+        return why is None and made.refused is None
 
     def lose(self, made: Candidate, why: Reason, kind: RejectionKind) -> None:
         """Note why a candidate is rejected; times are reported at the end."""
@@ -122,11 +122,11 @@ class CandidateSearch:
         least = self.seconds(best) * (1.0 - _WORTH)
         if made.bound >= least and made.bound + made.rapids >= self._least_whole():
             self.pruned += 1
-            self.lose(made, f"takes at least {made.bound:.4f} s", "bound")
+            self.lose(made, BoundTooLong(made.bound), "bound")
             return best
         self._swifter(made)
         if self._ranked(made) >= least:
-            self.lose(made, "", "slower")
+            self.lose(made, Slower(), "slower")
         elif made.touching:
             self.lose(made, made.touching, "touches")
         else:
@@ -157,17 +157,17 @@ class CandidateSearch:
         elif best.touching:
             self.lose(best, best.touching, "touches")
         else:
-            self.lose(best, "", "slower")
+            self.lose(best, Slower(), "slower")
 
     def settled(self, best: Candidate) -> Candidate:
         """The best, unless planned on knots of its own it is slower than the CL's own axis."""
         if best is self.own or best.seconds < self.own.seconds_allowed:
             return best
-        self.lose(best, "", "slower")
+        self.lose(best, Slower(), "slower")
         self.lost.pop(id(self.own), None)
         return self.own
 
-    def tried(self, winner: Candidate, aimed: Candidate | None, unaimed: str = "") -> PassSearch:
+    def tried(self, winner: Candidate, aimed: Candidate | None, unaimed: Unaimed | None = None) -> PassSearch:
         """The result, `winner` being the best as ranked."""
         best = self.settled(winner)
         lost = [made for made in self.known if id(made) in self.lost and made is not best]
@@ -187,10 +187,10 @@ class CandidateSearch:
             return lost
         if made is self.own or made is winner:
             return Rejection(lost.made if made is self.own else replace(lost.made, noted=made.seconds),
-                             f"takes {made.seconds:.4f} s", "slower")
+                             Slower(made.seconds), "slower")
         longer = winner.seconds / self._ranked(winner) if self._ranked(winner) > 0.0 else 1.0
         about = max(longer * self._ranked(made), winner.seconds)
-        return Rejection(replace(lost.made, noted=about), f"takes about {about:.4f} s", "slower")
+        return Rejection(replace(lost.made, noted=about), Slower(about, about=True), "slower")
 
 
 def _gain(before: float, after: float) -> float:

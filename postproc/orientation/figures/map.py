@@ -9,8 +9,9 @@ import numpy as np
 from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import least_under
 from postproc.orientation.candidates.rejections import KINDS
-from postproc.orientation.candidates.search import PassSearch, RejectionKind
+from postproc.orientation.candidates.search import PassSearch
 from postproc.orientation.passes.passes import PassContext
+from postproc.orientation.passes.reasons import RejectionKind
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG

@@ -35,7 +35,7 @@ def box_panel(place: Axes3D, tried: PassSearch, work: PassContext) -> None:
     alone = [(tried.own, COLOURS[order], RAY, "CL axis, best")]
     both = [(tried.own, PALE, PALE, "CL axis"), (tried.best, COLOURS[order], RAY, "best")]
     for made, colour, ray, name in both if tried.best is not tried.own else alone:
-        shape = polytopes(made).get(order)
+        shape = next((shape for known, shape in polytopes(made).items() if known == order), None)
         if shape is None:
             continue
         corners = _corners(shape, work) * SCALE[order]
@@ -60,10 +60,10 @@ def order_panel(place: Axes3D, tried: PassSearch, work: PassContext) -> None:
         _nothing(place, "no orders to compare")
         return
     _, length = direction_of(made.one.longest)
-    size = 0.0
+    size, shapes = 0.0, dict[str, Polytope](polytopes(made).items())
     for order, one in found.items():
         speed, far = length / one.seconds, slowest.seconds > APART * one.seconds
-        corners = np.zeros((0, 3)) if far else _corners(polytopes(made)[order], work) * (speed / one.rate)
+        corners = np.zeros((0, 3)) if far else _corners(shapes[order], work) * (speed / one.rate)
         _solid(place, corners, COLOURS[order], one is slowest, f"{order}: {short(speed)} mm/s"
                + (", beyond the drawing" if far else ""))
         if not far:
@@ -99,7 +99,7 @@ def _ray(place: Axes3D, end: Floats, colour: str, marked: bool = True) -> None:
 
 def _solid(place: Axes3D, corners: Floats, colour: str, filled: bool, label: str) -> None:
     """A convex solid by its edges and, if filled, its faces."""
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # type: ignore[import-untyped]
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection  # type: ignore[import-untyped]  # no stubs
 
     faces, edges = hull(corners)
     if filled and len(faces):

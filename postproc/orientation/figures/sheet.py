@@ -20,6 +20,7 @@ from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.report.figures_of_choice import gain
 from postproc.orientation.report.text import orientation, percent, seconds
+from toolpaths.choices import FigureEnding
 from toolpaths.drawing import image, plain
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ PASS = (0.3, 4.4, 4.4)
 """heights of the headline and the panels of a pass"""
 
 
-def draw(choice: OrientationChoice, plan: Orientation, passes: Sequence[int], ending: str) -> bytes:
+def draw(choice: OrientationChoice, plan: Orientation, passes: Sequence[int], ending: FigureEnding) -> bytes:
     """An image file of the plans, the passes as `plan` has them, and `passes` (numbers) in full.
 
     Without numbers the pass that can gain most is drawn.

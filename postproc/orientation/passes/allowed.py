@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from postproc.orientation.passes.passes import Pass
-from postproc.orientation.passes.reasons import Touching
+from postproc.orientation.passes.reasons import HALF_TURN, BrokenLimit, Touching
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
@@ -61,13 +61,13 @@ class AllowedAxes:
     bodies: CollisionBodies | None = None
     limits: OrientationLimits = NO_LIMITS
 
-    def refused(self, one: Pass, axis: Floats) -> str:
-        """Why an axis (3,) is not allowed in a pass, "" where it is; its own always is."""
-        return "" if angle_between(axis, one.axis) < SAME else self.outside(one, axis)
+    def refused(self, one: Pass, axis: Floats) -> BrokenLimit | None:
+        """Why an axis (3,) is not allowed in a pass, None where it is; its own always is."""
+        return None if angle_between(axis, one.axis) < SAME else self.outside(one, axis)
 
-    def outside(self, one: Pass, axis: Floats) -> str:
-        """Which limit an axis (3,) breaks worst, by the place, the angle there and what is allowed; "" where none."""
-        worst, noted = _SLACK, ""
+    def outside(self, one: Pass, axis: Floats) -> BrokenLimit | None:
+        """Which limit an axis (3,) breaks worst, by the place, the angle there and what is allowed; None where none."""
+        worst, noted = _SLACK, None
         for bound in self._bounds(one, axis[None]):
             over = bound.over()[0]
             k = int(over.argmax())
@@ -144,15 +144,13 @@ def lattice(apart: float) -> Floats:
     return np.column_stack((flat * np.cos(turn), flat * np.sin(turn), z))
 
 
-def _noted(one: Pass, bound: _Bound, k: int) -> str:
-    """A broken limit in words."""
-    where = f" at line {int(one.contact.line[k])}" if len(one.contact) else ""
-    low, high = f"{bound.low / DEG:.3f}", f"{bound.high / DEG:.3f}"
-    between = f"{low} to {high}" if bound.low != 0.0 or not bound.what else high
-    allowed = f"at least {low}" if bound.high >= np.pi else between
-    return f"{bound.name} {bound.values[0, k] / DEG:.3f} degrees{bound.what}{where}, allowed {allowed}"
+def _noted(one: Pass, bound: _Bound, k: int) -> BrokenLimit:
+    """A limit that is broken at place k."""
+    line = int(one.contact.line[k]) if len(one.contact) else None
+    high = HALF_TURN if bound.high >= np.pi else bound.high / DEG
+    return BrokenLimit(bound.name, bound.what, float(bound.values[0, k]) / DEG, bound.low / DEG, high, line)
 
 
-def own_outside(one: Pass, limits: OrientationLimits) -> str:
+def own_outside(one: Pass, limits: OrientationLimits) -> BrokenLimit | None:
     """Which limit of the set-up the CL's own axis of a pass breaks; --max-tilt does not count."""
-    return "" if not len(one.contact) else AllowedAxes(np.pi, None, limits).outside(one, one.axis)
+    return None if not len(one.contact) else AllowedAxes(np.pi, None, limits).outside(one, one.axis)

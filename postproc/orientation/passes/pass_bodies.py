@@ -34,8 +34,8 @@ class PassBodies:
         if not found:
             return None
         worst = min(found, key=lambda touch: touch.distance - touch.limit)
-        return Touching(worst.tool, worst.part, worst.body.name, worst.limit - worst.distance,
-                        f"{worst} (at line {int(self.work.moves.line[worst.place])})")
+        return Touching(worst.tool, worst.part, worst.body.name, worst.distance, worst.limit,
+                        int(self.work.moves.line[worst.place]))
 
     def touches(self, one: Pass, axis: Floats) -> list[Touch]:
         """All pairs that come too near.

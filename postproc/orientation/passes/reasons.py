@@ -5,6 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from postproc.collision.touch_words import touch_words
+
+HALF_TURN = 180.0
+"""degrees: an angle from a direction is never greater"""
+
 
 @dataclass(frozen=True)
 class Refusal:
@@ -59,20 +64,72 @@ class Refusal:
 
 
 @dataclass(frozen=True)
+class BrokenLimit:
+    """The limit of tool axes that one breaks worst.
+
+    Attributes:
+        name, origin: what the angle is called, and what it is measured from where the name does not say it
+        angle, low, high: degrees at the worst place, and what is allowed
+        line: of the CL file, None where only the axis of the pass is known
+    """
+
+    name: str
+    origin: str
+    angle: float
+    low: float
+    high: float
+    line: int | None = None
+
+    def __str__(self) -> str:
+        where = "" if self.line is None else f" at line {self.line}"
+        low, high = f"{self.low:.3f}", f"{self.high:.3f}"
+        between = f"{low} to {high}" if self.low != 0.0 or not self.origin else high
+        allowed = f"at least {low}" if self.high >= HALF_TURN else between
+        return f"{self.name} {self.angle:.3f} degrees{self.origin}{where}, allowed {allowed}"
+
+
+@dataclass(frozen=True)
+class BoundTooLong:
+    """The least time of a candidate, s, which others are below."""
+
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"takes at least {self.seconds:.4f} s"
+
+
+@dataclass(frozen=True)
+class Slower:
+    """Slower than the best: its seconds where they are known, `about` where they are as ranked."""
+
+    seconds: float | None = None
+    about: bool = False
+
+    def __str__(self) -> str:
+        return "" if self.seconds is None else f"takes {'about ' if self.about else ''}{self.seconds:.4f} s"
+
+
+@dataclass(frozen=True)
 class Touching:
     """The pair that comes nearest to being through each other, and at which line.
 
     Attributes:
         tool, part, body: number of the tool, which part of it, name of the body
-        depth: mm that are missing to the distance asked for, inf where the tool is inside altogether
-        text: in words
+        distance, limit: mm between them, -inf where the tool is inside altogether, and what is allowed
+        line: of the CL file
     """
 
     tool: int
     part: int
     body: str
-    depth: float
-    text: str
+    distance: float
+    limit: float
+    line: int
+
+    @property
+    def depth(self) -> float:
+        """mm that are missing to the distance asked for."""
+        return self.limit - self.distance
 
     @property
     def alike(self) -> tuple[object, ...]:
@@ -80,4 +137,24 @@ class Touching:
         return self.tool, self.part, self.body
 
     def __str__(self) -> str:
-        return self.text
+        return f"{touch_words(self.tool, self.part, self.body, self.distance, self.limit)} (at line {self.line})"
+
+
+RejectionKind = Literal["limits", "reach", "travel", "touches", "bound", "slower"]
+"""What a candidate can lose by."""
+_LOST: dict[RejectionKind, str] = {"limits": "are outside the allowed angles", "travel": "are outside travel",
+                                   "reach": "are out of reach"}
+
+
+@dataclass(frozen=True)
+class Unaimed:
+    """Why no vertex is aimed along the mean direction of a pass; `lost`: how many axes that would were rejected, by kind."""
+
+    why: Literal["no direction", "own axis", "no vertex", "lost"]
+    lost: tuple[tuple[RejectionKind, int], ...] = ()
+
+    def __str__(self) -> str:
+        if self.why == "lost":
+            return "of the axes that aim a vertex " + ", ".join(f"{number} {_LOST[kind]}" for kind, number in self.lost)
+        return {"no direction": "the pass has no mean direction", "own axis": "the cut's own axis is out of reach",
+                "no vertex": "no vertex can be turned into the mean direction"}[self.why]

@@ -71,7 +71,7 @@ def mesh_normals(mesh: Trimesh, centres: Floats, radius: float, slack: float) ->
     result = np.full((len(centres), 3), np.nan)
     for first in range(0, len(centres), _CHUNK):
         some = centres[first:first + _CHUNK]
-        near, away, face = closest_point(mesh, some)  # type: ignore[no-untyped-call]
+        near, away, face = closest_point(mesh, some)  # type: ignore[no-untyped-call]  # trimesh states no types here
         gap = some - near
         outside = np.einsum("ni,ni->n", gap, mesh.face_normals[face]) > 0.0
         touching = np.flatnonzero((np.abs(away - radius) <= slack) & (away > 0.0) & outside)

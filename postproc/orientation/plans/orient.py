@@ -19,6 +19,7 @@ from postproc.orientation.passes.limit_checks import limit_faults
 from postproc.orientation.passes.parallel_map import PassFault, Progress, each_pass
 from postproc.orientation.passes.pass_bodies import pass_bodies
 from postproc.orientation.passes.passes import PassContext, work_of
+from postproc.orientation.passes.reasons import Slower
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan, plans_of, table_of
 from postproc.setup.model import SetupFile
@@ -103,7 +104,7 @@ def _best_of(tried: PassSearch, planned: list[Candidate]) -> PassSearch:
     others = tuple(lost for lost in tried.rejected
                    if lost.made is tried.own or not lost.made.same(made.axis, made.held, APART))
     if before is not tried.own:
-        others = (*others, Rejection(before.slim(before.seconds), f"takes {before.seconds:.4f} s", "slower"))
+        others = (*others, Rejection(before.slim(before.seconds), Slower(before.seconds), "slower"))
     return replace(tried, best=made, rejected=others)
 
 

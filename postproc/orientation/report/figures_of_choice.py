@@ -91,7 +91,7 @@ def _pass(tried: PassSearch, made: Candidate, work: PassContext) -> dict[str, An
             "axis": axis_of(made, work), "turned_deg": float(angle_between(made.axis, one.axis)) / DEG,
             "planned": tried.planned, "pruned": tried.pruned, "lost": grouped([tried]),
             "own": _short(tried.own), "best": _short(tried.best), "swift": _short(tried.swift), "paper": _short(tried.aimed),
-            "paper_missing": tried.unaimed,
+            "paper_missing": str(tried.unaimed or ""),
             "next_best": _short(runner_up(tried)),
             "reach": {name: _reach(it) for name, it in (("own", tried.own), ("paper", tried.aimed), ("chosen", made))
                       if it is not None},

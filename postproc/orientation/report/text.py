@@ -10,7 +10,8 @@ from postproc.base.options import Orientation
 from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import binding, feed_of, reaches
 from postproc.orientation.candidates.rejections import KINDS, grouped, listed, runner_up
-from postproc.orientation.candidates.search import PassSearch, Rejection, RejectionKind
+from postproc.orientation.candidates.search import PassSearch, Rejection
+from postproc.orientation.passes.reasons import RejectionKind
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan
 from postproc.orientation.plans.shares import shares_of, turns

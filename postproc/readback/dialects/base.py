@@ -6,11 +6,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import PurePath
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
+from machines.choices import Stop
 from machines.machine import ClampCodes
+from postproc.control.control import InterpolationMode
 from postproc.control.rollover import Rollover
 from postproc.controllers.model import ControllerFile, Stops
 from postproc.readback.text.canonical import (
@@ -19,7 +21,6 @@ from postproc.readback.text.canonical import (
     LOADED,
     STANDS,
     Canonical,
-    InterpolationModeName,
     ProgramText,
     added,
     offset_number,
@@ -77,12 +78,12 @@ class Reader(ABC):
         "motion": "G0 or G1", "plane": "G17, G18 or G19", "distance": "G90 or G91", "feed_mode": "G93, G94 or G95",
         "compensation": "G40", "length": "G49, or G43 with H", "level": "G98 or G99",
         "offset": "the work offset (G54 ...)"}
-    leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {}
-    modes_named: ClassVar[dict[InterpolationModeName, str]] = {"tcp": "the tool-centre-point mode",
+    leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {}
+    modes_named: ClassVar[dict[InterpolationMode, str]] = {"tcp": "the tool-centre-point mode",
                                                                "tilted": "the tilted plane"}
 
     def __init__(self, axes: tuple[str, ...], controller: ControllerFile | None = None, home: Floats | None = None,
-                 stop: str = "", rolls: dict[int, Rollover] | None = None,
+                 stop: Stop | Literal[""] = "", rolls: dict[int, Rollover] | None = None,
                  clamps: Mapping[str, ClampCodes] | None = None) -> None:
         self.clamps = clamps or {}
         self.axes, self.controller, self.home, self.rolls = axes, controller, home, rolls or {}

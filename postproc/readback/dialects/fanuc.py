@@ -11,10 +11,11 @@ G21 stay in force over power off.
 from __future__ import annotations
 
 from pathlib import PurePath
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
+from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import IsoReader, New, motion_of
 from postproc.readback.text.canonical import (
@@ -23,7 +24,6 @@ from postproc.readback.text.canonical import (
     REGISTER,
     SMOOTH,
     Canonical,
-    InterpolationModeName,
     ProgramText,
     WordMeaning,
     offset_number,
@@ -38,6 +38,9 @@ from toolpaths.diagnostics import Diagnostic, error
 MILLISECONDS = 1e-3
 _LAWS = (43.0, 43.4, 49.0, 53.1, 68.2, 69.0)
 
+FanucState = Literal[InterpolationMode, "pending"]
+"""pending: behind G68.2, before G53.1"""
+
 
 class FanucReader(IsoReader):
     """G-code of the Fanuc kind."""
@@ -49,7 +52,7 @@ class FanucReader(IsoReader):
     letters = "GMFSTHDNIJKRPQLO"
     rises_first = False
     stating = Reader.stating
-    leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {"tilted": ("G69",)}
+    leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tilted": ("G69",)}
     laws: ClassVar[tuple[float, ...]] = _LAWS
     tcp_code = 43.4
     extended_offset = 54.1
@@ -207,7 +210,8 @@ class FanucReader(IsoReader):
     def modes(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """The laws, code by code in running order."""
         register = number_of(words, "H")
-        state, begun, length = "axes", -1, -1.0
+        state: FanucState = "axes"
+        begun, length = -1, -1.0
         for b, c in zip(*codes(words, "G", self.laws), strict=True):
             here, code = int(b), f"G{c:g}"
             wrong = self.wrong(float(c), state, length)
@@ -233,7 +237,7 @@ class FanucReader(IsoReader):
                 state = self.hold(new, here, plane, "tilted")
                 self.unmoved(words, begun, here, line, file, found)
 
-    def wrong(self, code: float, state: str, length: float) -> str:
+    def wrong(self, code: float, state: FanucState, length: float) -> str:
         """Why a law's code cannot stand here, "" where it can."""
         if code == 53.1:
             return "" if state == "pending" else "without G68.2 before it"
@@ -245,7 +249,7 @@ class FanucReader(IsoReader):
             return "while a length offset is in force"
         return "between G68.2 and G53.1" if state == "pending" and code != 69 else ""
 
-    def hold(self, new: New, b: int, law: WordMeaning, state: str) -> str:
+    def hold(self, new: New, b: int, law: WordMeaning, state: InterpolationMode) -> InterpolationMode:
         """The law in force from block b on."""
         new.append((b, LAW, float(len(self.held))))
         self.held.append(law)

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.base import M_CODES
 from postproc.readback.dialects.fanuc import MILLISECONDS, FanucReader, block, take
 from postproc.readback.dialects.iso import New
-from postproc.readback.text.canonical import SMOOTH, InterpolationModeName, ProgramText
+from postproc.readback.text.canonical import SMOOTH, ProgramText
 from postproc.readback.text.flow import Call, Structure
 from postproc.readback.text.modal import GROUPS, Groups, codes
 from postproc.readback.text.words import Words
@@ -31,7 +32,7 @@ class HaasReader(FanucReader):
     m_codes = (*M_CODES, 97.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLOE"
     laws = (43.0, 49.0, 234.0, 254.0, 255.0)
-    leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {"tilted": ("G255",)}
+    leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tilted": ("G255",)}
     tcp_code = 234.0
     extended_offset = 154.0
     last_offset = 99

@@ -14,6 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.klartext_run import KlartextRun
@@ -21,7 +22,6 @@ from postproc.readback.text.canonical import (
     STATEMENT,
     Canonical,
     DialectStatement,
-    InterpolationModeName,
     ProgramText,
     added,
 )
@@ -63,7 +63,7 @@ class KlartextReader(Reader):
 
     stating: ClassVar[dict[str, str]] = {
         "compensation": "R0", "offset": "the preset (CYCL DEF 247)", "length": "a tool (TOOL CALL)"}
-    leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {"tcp": ("FUNCTION RESET TCPM", "M129"),
+    leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tcp": ("FUNCTION RESET TCPM", "M129"),
                                                                        "tilted": ("PLANE RESET",)}
     units_codes = "BEGIN PGM ... MM"
     units_from = "nobody knows: the control takes no program without"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from postproc.readback.text.canonical import Drill
+from postproc.readback.text.canonical import Drill, DrillStyle
 from postproc.readback.text.cycles import pecks
 
 RAPID = 99999.0
@@ -85,8 +85,9 @@ def _universal(q: Q, speed: float) -> Made:
     breaks = q.get("Q213", 0.0)
     if 0.0 < breaks < len(bottoms) - 1:
         return None, "with fewer breaks (Q213) than pecks is not executed by this reader"
-    style, relief = ("break", q.get("Q256", APPROACH)) if breaks else ("peck", APPROACH)
-    return Drill(plane, bottom, out, bottoms, style, relief, q.get("Q211", 0.0),  # type: ignore[arg-type]
+    style: DrillStyle = "break" if breaks else "peck"
+    relief = q.get("Q256", APPROACH) if breaks else APPROACH
+    return Drill(plane, bottom, out, bottoms, style, relief, q.get("Q211", 0.0),
                  _feed(q.get("Q206", 0.0)), _feed(q.get("Q208", 0.0))), ""
 
 

@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 
+from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.klartext_cycles import drill_of
 from postproc.readback.dialects.track import AxisPositions
@@ -24,6 +25,7 @@ from postproc.readback.text.canonical import (
     DialectStatement,
     Drill,
     ProgramText,
+    RotaryDirection,
     WordMeaning,
     added,
 )
@@ -38,6 +40,7 @@ _TCPM = {"F", "TCP", "AXIS", "POS", "PATHCTRL", "REFPNT", "TIP-TIP"}
 _UNCOMPENSATED = {"PLANE SPATIAL", "PLANE RESET", "FUNCTION TCPM", "FUNCTION RESET TCPM", "M128", "M129"}
 """before these radius compensation is cancelled (iTNC 530 manual; TOOL CALL, cycles 19 and 32 too)"""
 _PLANE = {"TURN", "MOVE", "STAY", "FMAX", "F", "MAX", "TABLE", "COORD", "ROT", "SYM+", "SYM-", "SEQ+", "SEQ-"}
+_CHOICES: dict[str, RotaryDirection] = {"SYM+": "+", "SYM-": "-", "SEQ+": "+", "SEQ-": "-"}
 
 
 class KlartextRun:
@@ -51,7 +54,8 @@ class KlartextRun:
         self.drills: list[Drill] = []
         self.pole: dict[str, float] = {}
         self.track = AxisPositions(text.words)
-        self.state, self.cycle = "axes", -1
+        self.state: InterpolationMode = "axes"
+        self.cycle = -1
         self.speed = np.array(number_of(text.words, "S"))
         self.side = fill(*codes(text.words, "G", GROUPS["compensation"]), text.words.lines, 40.0)
         self.part = math.nan, math.nan
@@ -285,7 +289,7 @@ class KlartextRun:
 
     # ---- laws ---------------------------------------------------------------------------------------------------
 
-    def enter(self, b: int, state: str, law: WordMeaning) -> None:
+    def enter(self, b: int, state: InterpolationMode, law: WordMeaning) -> None:
         """A law in force from block b on."""
         if state != "axes" and self.state != "axes" and law.name != "axes":
             self.fault("gcode.mode", b, f"{law.code} while another mode is on", "leave the mode that is on first")
@@ -312,8 +316,8 @@ class KlartextRun:
             self.fault("gcode.mode", b, f"PLANE SPATIAL with {what}", "PLANE SPATIAL SPA SPB SPC TURN FMAX TABLE ROT")
             return
         rotation = turned("XYZ", [s.keys[k] for k in ("SPA", "SPB", "SPC")], fixed=True)
-        asked = next((str(a)[3:] for a in s.args if str(a)[:3] in ("SYM", "SEQ")), "nearest")
-        self.enter(b, "tilted", WordMeaning("tilted", s.name, rotation, choice=asked))  # type: ignore[arg-type]
+        asked: RotaryDirection = next((_CHOICES[str(a)] for a in s.args if str(a) in _CHOICES), "nearest")
+        self.enter(b, "tilted", WordMeaning("tilted", s.name, rotation, choice=asked))
 
     def reset(self, b: int, s: DialectStatement) -> None:
         """PLANE RESET STAY: the rotary axes stand."""

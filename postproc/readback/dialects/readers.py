@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Literal
 
+from machines.choices import Stop
 from machines.machine import ClampCodes
 from postproc.control.rollover import Rollover
 from postproc.controllers.model import ControllerFile
@@ -12,7 +14,7 @@ from toolpaths.arrays import Floats
 
 
 def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Floats | None = None,
-               stop: str = "", rolls: dict[int, Rollover] | None = None,
+               stop: Stop | Literal[""] = "", rolls: dict[int, Rollover] | None = None,
                clamps: Mapping[str, ClampCodes] | None = None) -> Reader:
     """The reader of the dialect that the controller file's writer writes; `home` (J,): machine coordinates, mm, degrees;
     `stop`: what stops switch off where the machine file says it; `rolls`: modulo axes by joint; `clamps`: codes of the

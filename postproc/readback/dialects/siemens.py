@@ -15,6 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.base import M_CODES, Reader, as_bytes
 from postproc.readback.dialects.iso import New, relative_words
 from postproc.readback.dialects.siemens_cycles import CYCLES
@@ -30,7 +31,6 @@ from postproc.readback.text.canonical import (
     UNSTATED,
     Canonical,
     DialectStatement,
-    InterpolationModeName,
     ProgramText,
     added,
 )
@@ -71,7 +71,7 @@ class SiemensReader(Reader):
     m_codes = (*M_CODES, 17.0)
     letters = "GMFSTDNIJKRLP?~>"
     stating = {k: v for k, v in Reader.stating.items() if k != "level"} | {"length": "D, or a tool"}
-    leaving: ClassVar[dict[InterpolationModeName, tuple[str, ...]]] = {"tcp": ("TRAFOOF",), "tilted": ("CYCLE800",)}
+    leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tcp": ("TRAFOOF",), "tilted": ("CYCLE800",)}
     neutral: ClassVar[frozenset[str]] = PASSIVE
     units_codes = "G70, G71, G700 or G710"
     units_from = "machine data 20150 and 20152 have the reset position of group 13"

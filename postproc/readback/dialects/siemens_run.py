@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.siemens_cycles import CYCLES, drill_of
-from postproc.readback.text.canonical import CALL, LAW, SMOOTH, STATEMENT, DialectStatement, Drill, ProgramText, WordMeaning
+from postproc.readback.text.canonical import (
+    CALL,
+    LAW,
+    SMOOTH,
+    STATEMENT,
+    DialectStatement,
+    Drill,
+    ProgramText,
+    RotaryDirection,
+    WordMeaning,
+)
 from postproc.readback.text.euler_angles import turned
 from postproc.readback.text.modal import codes, fill, number_of
 from postproc.readback.text.words import Words
@@ -31,7 +42,8 @@ class SiemensRun:
         self.states: list[tuple[int, float]] = []
         self.laws: list[WordMeaning] = []
         self.drills: list[Drill] = []
-        self.state, self.called, self.oriented = "axes", -1, False
+        self.state: InterpolationMode = "axes"
+        self.called, self.oriented = -1, False
 
     def fault(self, code: str, b: int, message: str, hint: str) -> None:
         """An ERROR at a block."""
@@ -82,7 +94,7 @@ class SiemensRun:
             else:
                 self.new.append((b, CALL, float(len(self.drills) - 1)))
 
-    def enter(self, b: int, state: str, law: WordMeaning) -> None:
+    def enter(self, b: int, state: InterpolationMode, law: WordMeaning) -> None:
         """A law in force from block b on."""
         if state != "axes" and self.state != "axes":
             self.fault("gcode.mode", b, f"{law.code} while another mode is on", "leave the mode that is on first")
@@ -147,8 +159,8 @@ class SiemensRun:
         shift = np.array([s.number(k, 0.0) for k in (4, 5, 6)])
         shift = shift + rotation @ np.array([s.number(k, 0.0) for k in (10, 11, 12)])
         direction = s.number(13, 0.0)
-        choice = "+" if direction > 0.0 else "-" if direction < 0.0 else "nearest"
-        self.enter(b, "tilted", WordMeaning("tilted", s.name, rotation, shift, choice))  # type: ignore[arg-type]
+        choice: RotaryDirection = "+" if direction > 0.0 else "-" if direction < 0.0 else "nearest"
+        self.enter(b, "tilted", WordMeaning("tilted", s.name, rotation, shift, choice))
 
     def modal_calls(self, modal: list[tuple[int, int]]) -> None:
         """Each block that moves calls the cycle of the MCALL in force."""

@@ -13,9 +13,9 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.kinematics.frames import tool_x
-from postproc.control.control import Control
+from postproc.control.control import Control, InterpolationMode
 from postproc.control.modes import table_axes
-from postproc.readback.text.canonical import InterpolationModeName, WordMeaning
+from postproc.readback.text.canonical import WordMeaning
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between, whole_turns
@@ -35,7 +35,7 @@ _TURN = 360.0
 class ExecutionFrame:
     """One law in force: its plane, and the kinematics at the tip of the tool that the control reckons with."""
 
-    law: InterpolationModeName
+    law: InterpolationMode
     control: Control | None = None
     kinematics: Kinematics | None = None
     rotation: Floats = field(default_factory=lambda: np.eye(3))

@@ -12,6 +12,7 @@ from typing import Literal
 
 import numpy as np
 
+from postproc.control.control import InterpolationMode
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
@@ -71,8 +72,8 @@ class ProgramText:
 
 
 Files = tuple[tuple[str, int], ...]
-InterpolationModeName = Literal["axes", "tcp", "tilted"]
 RotaryDirection = Literal["nearest", "+", "-"]
+DrillStyle = Literal["drill", "break", "peck", "feed_out"]
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,7 @@ class WordMeaning:
         choice: how the control picks the rotary positions: the nearest, or those with the first tilting axis at + or -
     """
 
-    name: InterpolationModeName
+    name: InterpolationMode
     code: str
     rotation: Floats | None = None
     shift: Floats = field(default_factory=lambda: np.zeros(3))
@@ -112,7 +113,7 @@ class Drill:
     bottom: float
     out: float
     bottoms: tuple[float, ...]
-    style: Literal["drill", "break", "peck", "feed_out"] = "drill"
+    style: DrillStyle = "drill"
     relief: float = 0.0
     dwell: float = 0.0
     feed: float = float("nan")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.readback.text.canonical import Drill
+from postproc.readback.text.canonical import Drill, DrillStyle
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 
@@ -15,6 +15,8 @@ CycleLeg = tuple[int, Floats, float, float]
 EPSILON = 1e-9
 MOST = 10_000
 """pecks of one hole, and holes of one block: more are a typing error"""
+_STYLES: dict[int, DrillStyle] = {73: "break", 83: "peck", 74: "feed_out", 84: "feed_out", 85: "feed_out", 89: "feed_out"}
+"""by the G code; others drill"""
 
 
 def legs(drill: Drill, start: Floats, target: Floats, z: int, first: float | None = None) -> list[CycleLeg]:
@@ -129,7 +131,6 @@ class Sticky:
             bottoms = pecks(plane, bottom, first * scale, np.nan_to_num(less) * scale, np.nan_to_num(least) * scale)
         else:
             bottoms = pecks(plane, bottom, q * scale) if code in (73, 83) else (bottom,)
-        style = {73: "break", 83: "peck", 74: "feed_out", 84: "feed_out", 85: "feed_out", 89: "feed_out"}.get(code, "drill")
         rest = dwell if code not in (81, 85) and np.isfinite(dwell) else 0.0
-        return Drill(plane, bottom, out, bottoms, style,  # type: ignore[arg-type]
+        return Drill(plane, bottom, out, bottoms, _STYLES.get(code, "drill"),
                      self.relief if code in (73, 83) else 0.0, rest)

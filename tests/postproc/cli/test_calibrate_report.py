@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 import machines
 from machines.calibration.calibrate import calibrate
 from machines.calibration.measurement_file import COLUMNS, DIRECTION, JOINT, MeasurementModel
+from machines.calibration.result_figures import CalibrationFigures
 from machines.calibration.result_text import text
 from machines.calibration.run import approach_column
 from machines.geometric_error.actual.model import ErrorModel
@@ -140,8 +141,10 @@ def test_values_of_a_table_say_where_they_are_and_by_which_way(folder: Path) -> 
 
 
 def test_an_infinite_condition_number_is_called_so() -> None:
-    figures = {"rank": 7, "unknowns": 11, "condition_number": None, "readings": 216, "rms_before": 1e5,
-               "rms_instrument": 5.0, "rms_after": 0.99387, "parameters": {}, "kept": 0}
+    figures = CalibrationFigures(
+        parameters={}, kept=0, rank=7, unknowns=11, condition_number=None, readings=216, spare=209, rms_before=1e5,
+        rms_instrument=5.0, rms_after=0.99387, reduced=1.0, chance=0.5, covariance_scale=1.0, converged=True,
+        not_identifiable=[])
     assert text(figures, "nothing written").splitlines() == [
         "nothing written", "rank 7 of 11, condition number infinite, 216 readings",
         "weighted residual 1.000e+05 before, 5.000 with nothing found of the machine, 0.9939 after"]

@@ -18,6 +18,7 @@ from postproc.pipeline.convert import convert
 from postproc.placement.bodies import RESTS, adjacent
 from postproc.placement.figure import margins_at
 from postproc.placement.place import place
+from postproc.placement.reasons import StandsIn
 from postproc.placement.space import ANGLES
 from postproc.placement.write import placed_text
 from postproc.setup.bodies import BodiesModel
@@ -178,15 +179,15 @@ def test_bodies_that_stand_are_kept_clear_of() -> None:
     tool = setup_of().tools["1"].model_copy(update={"flute_length": 40.0})
     setup = setup_of((100.0, 0.0, 0.0), x=(90.0, 300.0)).model_copy(update={"bodies": bodies, "tools": {"1": tool}})
     choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup)
-    assert choice.found.now.refused == "fixture blank stands in fixture post"
+    assert choice.found.now.refused == StandsIn("fixture blank", "fixture post")
     assert choice.best.place[0] >= 170.0 - RESTS
-    assert any("post" in one.refused for one in choice.known)
+    assert any("post" in str(one.refused) for one in choice.known)
     still, found = adjacent(choice.work, "")
     assert still is not None, found
     for z, free in ((0.0, True), (-2 * RESTS, False), (5.0, True)):
         assert (not still.against(Placement(np.eye(3), np.array([250.0, 0.0, z])))) == free
     inside = Placement(np.eye(3), np.array([250.0, 0.0, -60.0]))
-    assert still.against(inside) == "fixture blank stands in the table"
+    assert str(still.against(inside)) == "fixture blank stands in the table"
 
 
 def test_tools_keep_clear_of_what_stands() -> None:
@@ -196,7 +197,7 @@ def test_tools_keep_clear_of_what_stands() -> None:
     tool = setup_of().tools["1"].model_copy(update={"flute_length": 40.0})
     setup = setup_of((0.0, 0.0, 0.0), x=(-60.0, 0.0)).model_copy(update={"bodies": bodies, "tools": {"1": tool}})
     choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup)
-    assert "cutter of T1" in choice.found.now.refused and "clamp" in choice.found.now.refused
+    assert "cutter of T1" in (refused := str(choice.found.now.refused)) and "clamp" in refused
     assert choice.best.place[0] <= 85.0 - 80.0 - 8.0 - 2.0 + 1e-3
 
 

@@ -239,7 +239,7 @@ def test_states_that_touch_are_in_no_plan_but_keep() -> None:
     """Bodies that the upright tool touches: every other plan leans."""
     class Ceiling:
         def touching(self, one: Pass, axis: Floats) -> Touching | None:
-            return Touching(1, 2, "ceiling", 1.0, "holder touches ceiling") if axis[2] > 0.97 else None
+            return Touching(1, 2, "ceiling", -1.0, 0.0, 0) if axis[2] > 0.97 else None
 
     made, allowed = work(strips([0.0, 30.0, 60.0]), machine("mikron-ucp710")), AllowedAxes(60.0 * DEG, Ceiling())
     results = [tried(one, made.machine, allowed) for one in made.passes]

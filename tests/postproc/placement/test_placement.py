@@ -102,7 +102,7 @@ def test_a_part_outside_travel_finds_a_place_inside() -> None:
     """Travel of X is 1000 mm, the pass 80 mm: from 480 it goes beyond 500."""
     setup = setup_of((480.0, 0.0, 0.0), x=(400.0, 480.0))
     choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup)
-    assert "travel: axis X at 560.000 mm" in choice.found.now.refused
+    assert "travel: axis X at 560.000 mm" in str(choice.found.now.refused)
     assert 400.0 <= choice.best.place[0] <= 420.0
     assert choice.best.margins(choice.work.machine)[0] == pytest.approx(420.0 - choice.best.place[0], abs=1e-3)
 
@@ -119,7 +119,7 @@ def test_turning_the_part_finds_the_longer_travel() -> None:
     setup = setup_of((0.0, -400.0, 0.0), x=(-450.0, 450.0), y=(-450.0, 450.0), turns=[0.0, 90.0, -90.0])
     setup = setup.model_copy(update={"clearance": LinkClearance(distance=60.0)})
     choice = placed(passes((0.0, 1.0), length=900.0), machine("mill-3axis"), setup)
-    assert "axis Y" in choice.found.now.refused
+    assert "axis Y" in str(choice.found.now.refused)
     assert abs(choice.best.place[ANGLES]) == pytest.approx(90 * DEG)
     assert (choice.best.margins(choice.work.machine) >= 0.0).all()
 
@@ -141,7 +141,7 @@ def test_a_part_beyond_its_table_is_reported() -> None:
     """It is within travel where it stands now, and still refused; the limits alone would let it stay."""
     table = PlaceBox(low=(-100.0, -60.0, -50.0), high=(100.0, 60.0, 50.0))
     choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup_of((60.0, 0.0, 0.0), x=(-90.0, 90.0), table=table))
-    assert choice.found.now.refused == "the part stands 40.000 mm beyond the table in x"
+    assert str(choice.found.now.refused) == "the part stands 40.000 mm beyond the table in x"
     assert choice.best.place[0] <= 20.0
 
 

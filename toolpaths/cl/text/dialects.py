@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from toolpaths.choices import DialectName, LengthUnit
 from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT, Statement, StatementList
 from toolpaths.units import MM_PER_INCH
 
@@ -41,7 +42,7 @@ class Dialect:
         planes: how cycles state their planes
     """
 
-    name: str
+    name: DialectName
     title: str
     arc_sense: int = 1
     full_circles: bool = True
@@ -56,7 +57,7 @@ class Dialect:
     planes: Planes = Planes.RELATIVE
 
 
-DIALECTS = {d.name: d for d in (
+DIALECTS: dict[DialectName, Dialect] = {d.name: d for d in (
     Dialect("generic", "APT text", six_sizes=True),
     Dialect("nx", "Siemens NX", arc_sense=-1, full_circles=False, depth_sign=-1, axis_reset=True),
     Dialect("makino", "Makino FF/CAM", arc_sense=-1, full_circles=False),
@@ -72,7 +73,7 @@ DIALECTS = {d.name: d for d in (
     Dialect("hsmworks", "HSMWorks Generative Machining APT", planes=Planes.OVER_BOTTOM),
 )}
 
-_MAJORS = (
+_MAJORS: tuple[tuple[DialectName, tuple[str, ...]], ...] = (
     ("camplete", ("MCS",)),
     ("mfgsuite", ("MCSYS",)),
     ("solidworks-clt", ("MOVE_ATTRIB", "OPFEATSTART", "OPFEATEND", "BOX")),
@@ -82,7 +83,7 @@ _MAJORS = (
     ("catia", (COMMENT + "*CATIA0", "TLON,GOFWD", "INDIRV", "AUTOPS", "PSIS", "TOOLNO")),
     ("creo", ("CAMERA", "PPWORD")),
 )
-_TEXTS = (("makino", "MAKINO-FF"), ("makino", "FF/CAM"),
+_TEXTS: tuple[tuple[DialectName, str], ...] = (("makino", "MAKINO-FF"), ("makino", "FF/CAM"),
           ("catia", "CATIA"), ("catia", "TOOLCHANGEBEGINNING"), ("nx", "CENTERLINE DATA"),
           ("ncl", "NCL"), ("ncl", "NCLCAM"), ("creo", "PRO/NC"), ("creo", "PRO/CLFILE"), ("creo", "CREO"))
 OWN = DATA_COMMENT + "TOOLPATH"
@@ -143,9 +144,9 @@ def _autodesk(program: StatementList) -> tuple[Dialect, str] | None:
     return None
 
 
-def _by_text(program: StatementList) -> tuple[str, str] | None:
+def _by_text(program: StatementList) -> tuple[DialectName, str] | None:
     """A system named in a comment, PARTNO, MACHIN or PPRINT; the first of `_TEXTS` that is there."""
-    found: dict[str, tuple[str, str]] = {}
+    found: dict[str, tuple[DialectName, str]] = {}
     for statement, line in program.first.items():
         if statement.major in (COMMENT, "PARTNO", "MACHIN", "PPRINT", "REMARK"):
             body = statement.body.upper()
@@ -164,25 +165,27 @@ def _whole(body: str, text: str) -> bool:
     return (at == 0 or not body[at - 1].isalnum()) and (end == len(body) or not body[end].isalpha())
 
 
-UNIT_WORDS = {"MM": "mm", "INCH": "inch", "INCHES": "inch", "IN": "inch", "MILLIMETER": "mm", "MILLIMETERS": "mm",
-              "METRIC": "mm", "ENGLISH": "inch"}
-_FEED_UNITS = {"MMPM": "mm", "MMPR": "mm", "IPM": "inch", "IPR": "inch", "FPM": "inch", "FPR": "inch"}
-SCALE = {"mm": 1.0, "inch": MM_PER_INCH}
+UNIT_WORDS: dict[str, LengthUnit] = {
+    "MM": "mm", "INCH": "inch", "INCHES": "inch", "IN": "inch", "MILLIMETER": "mm", "MILLIMETERS": "mm", "METRIC": "mm",
+    "ENGLISH": "inch"}
+_FEED_UNITS: dict[str, LengthUnit] = {
+    "MMPM": "mm", "MMPR": "mm", "IPM": "inch", "IPR": "inch", "FPM": "inch", "FPR": "inch"}
+SCALE: dict[LengthUnit, float] = {"mm": 1.0, "inch": MM_PER_INCH}
 
 
 @dataclass(frozen=True)
 class FileUnits:
     """What a file says of its units: by the word UNITS, and by the units of its feeds."""
 
-    words: dict[str, int]
-    feeds: dict[str, int]
+    words: dict[LengthUnit, int]
+    feeds: dict[LengthUnit, int]
     wrong: tuple[tuple[str, int], ...] = ()
 
 
 def units_said(program: StatementList) -> FileUnits:
     """Unit words and feed units with their first lines."""
-    words: dict[str, int] = {}
-    feeds: dict[str, int] = {}
+    words: dict[LengthUnit, int] = {}
+    feeds: dict[LengthUnit, int] = {}
     wrong: list[tuple[str, int]] = []
     for statement, line in program.first.items():
         if statement.major in ("UNITS", "UNIT"):
@@ -196,7 +199,7 @@ def units_said(program: StatementList) -> FileUnits:
     return FileUnits(words, feeds, tuple(wrong))
 
 
-def _note_feed_unit(statement: Statement, line: int, feeds: dict[str, int]) -> None:
+def _note_feed_unit(statement: Statement, line: int, feeds: dict[LengthUnit, int]) -> None:
     for word in statement.words:
         if isinstance(word, str) and word in _FEED_UNITS:
             feeds.setdefault(_FEED_UNITS[word], line)

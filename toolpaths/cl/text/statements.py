@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from toolpaths.arrays import Floats
 from toolpaths.cl.text.feed_lines import FeedLines, feed_lines
@@ -287,7 +288,7 @@ class Lexer:
         return major in BARE_WORDS or _text_statement(text) is not None
 
 
-def _cut(text: str, comment: bool, text_word: bool) -> tuple[str, str, str]:
+def _cut(text: str, comment: bool, text_word: bool) -> tuple[str, Literal["", "certain", "maybe"], str]:
     """(text before a comment or continuation mark, "" | "certain" | "maybe" continued, text that would be lost)."""
     if comment or text_word:
         if not text.rstrip().endswith("$"):

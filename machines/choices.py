@@ -1,0 +1,14 @@
+"""Closed lists of words that machine files choose from, and what they mean."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Stop = Literal["spindle and coolant", "spindle", "nothing"]
+"""what a stop of the program switches off"""
+RolloverRule = Literal["shortest", "sign", "none"]
+"""which path the control takes to a word of a modulo axis"""
+Park = Literal["turn", "home"]
+"""where an axis that turns on and on is parked"""
+MotionOrder = Literal["velocity", "acceleration", "jerk"]
+"""which derivative of a position a limit is of"""

@@ -1,0 +1,20 @@
+"""Closed lists of words about files that are read and drawn. Light: the command line reads it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+LengthUnit = Literal["mm", "inch"]
+"""what the numbers of a file are"""
+GivenUnit = Literal["", "mm", "inch"]
+"""asked for; "" as the file says"""
+DialectName = Literal["generic", "nx", "makino", "creo", "solidworks", "solidworks-clt", "catia", "ncl", "camplete",
+                      "mfgsuite", "autodesk-iso", "hsmworks"]
+GivenDialect = Literal["", DialectName]
+"""asked for; "" as the file is recognised"""
+FigureEnding = Literal[".png", ".svg"]
+FieldEnding = Literal[".csv", FigureEnding]
+"""of a table, or of a figure"""
+CycleKind = Literal["DRILL", "DEEP", "BRKCHP", "TAP", "BORE", "BORE7", "BORE8", "BORE9", "REAM", "FACE", "CSINK", "THRU",
+                    "MILL", "REVERS", "SHIFT", "CIRCUL", "THREAD"]
+"""of drilling cycles, by the word of the CL file that says most"""
