@@ -135,6 +135,16 @@ class Machine:
         return {name: codes for name, codes in zip(self.axis_names, self.clamps, strict=True) if codes.clamp}
 
     @property
+    def clamp_groups(self) -> list[tuple[str, ...]]:
+        """Letters of those axes, the ones that share a code together: what frees one frees the others of its group."""
+        codes, groups = self.clamp_codes, list[tuple[str, ...]]()
+        for name, one in codes.items():
+            linked = [group for group in groups if any({one.clamp, one.unclamp} & {codes[other].clamp, codes[other].unclamp}
+                                                       for other in group)]
+            groups = [group for group in groups if group not in linked] + [(*sum(linked, ()), name)]
+        return groups
+
+    @property
     def endless(self) -> Bools:
         """(J,) rotary joints whose travel has no end."""
         return np.asarray(np.array(self.rotary) & ~np.isfinite(self.limits.upper - self.limits.lower))

@@ -51,6 +51,12 @@ def joined(parts: Sequence[Array]) -> Array:
     return np.concatenate(parts)
 
 
+def runs(which: Bools) -> Ints:
+    """(N, 2) first and one past the last of the stretches where `which` (K,) is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]).astype(np.int8)))
+    return np.asarray(edges.reshape(-1, 2))
+
+
 def as_slice(index: Ints) -> Ints | slice:
     """The same index; one that counts up by one is a slice, which copies nothing."""
     if not len(index) or index[-1] - index[0] != len(index) - 1 or (np.diff(index) != 1).any():

@@ -8,15 +8,15 @@ how they stand.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from machines.machine import ClampCodes
+from machines.machine import Machine
 from postproc.compile.program import Command, Program
-from toolpaths.arrays import Bools, Ints
+from toolpaths.arrays import Bools, runs
 
 ClampCommand = Literal["CLAMP", "UNCLAMP"]
 CLAMP: ClampCommand = "CLAMP"
@@ -35,18 +35,21 @@ class _Switch:
     early: bool
 
 
-def with_clamps(program: Program, clamps: Mapping[str, ClampCodes], plane_turns: bool) -> Program:
-    """The program with the clamps of axes by letter; `plane_turns`: stating a plane may turn rotary axes."""
-    pairs: dict[tuple[str, str], list[int]] = {}
-    for letter, codes in clamps.items():
-        pairs.setdefault((codes.clamp, codes.unclamp), []).append(program.letters.index(letter))
+def with_clamps(program: Program, machine: Machine, plane_turns: bool) -> Program:
+    """The program with the clamps of the machine's axes; `plane_turns`: stating a plane may turn rotary axes.
+
+    Axes that share a code are clamped and released together, by all codes of theirs."""
+    clamps = machine.clamp_codes
     commands = {k: list(group) for k, group in program.commands.items()}
     cut = cutting(program)
-    for (clamp, unclamp), columns in pairs.items():
+    for group in machine.clamp_groups:
+        codes = {CLAMP: dict.fromkeys(clamps[letter].clamp for letter in group),
+                 UNCLAMP: dict.fromkeys(clamps[letter].unclamp for letter in group)}
+        columns = [program.letters.index(letter) for letter in group]
         for switch in _switches(program, turning(program, columns), cut, plane_turns):
-            code = clamp if switch.name == CLAMP else unclamp
             line = int(program.line[min(switch.block, len(program) - 1)])
-            _put(commands.setdefault(switch.block, []), Command(switch.name, (code,), line), switch.early)
+            for code in codes[switch.name]:
+                _put(commands.setdefault(switch.block, []), Command(switch.name, (code,), line), switch.early)
     return replace(program, commands={k: tuple(group) for k, group in commands.items() if group})
 
 
@@ -67,12 +70,6 @@ def cutting(program: Program) -> Bools:
     for hole in program.holes:
         result[hole.first:hole.last + 1] = True
     return result
-
-
-def runs(which: Bools) -> Ints:
-    """(N, 2) first and one past the last of the stretches where `which` (K,) is True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]).astype(np.int8)))
-    return np.asarray(edges.reshape(-1, 2))
 
 
 def _switches(program: Program, turns: Bools, cut: Bools, plane_turns: bool) -> Iterator[_Switch]:

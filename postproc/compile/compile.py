@@ -59,7 +59,7 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                       placed, kept_holes, places, sections, skip[keep], control.rolls,
                       control.machine.home * control.unit)
     found += long_turns(program, toolpath.file)
-    program = with_clamps(program, control.machine.clamp_codes, controller.plane_turns)
+    program = with_clamps(program, control.machine, controller.plane_turns)
     program = with_hooks(program, job.hooks, {tool.number: tool.name for tool in reversed(toolpath.tools)})
     found += standing_unsaid(control.rolls, control.machine.axis_names, job.setup.output.apart, bool(skip.any()),
                              toolpath.file)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from machines.hooks import HooksModel
-from postproc.compile.clamps import CLAMP, FIRST, UNCLAMP, cutting, runs, turning
+from postproc.compile.clamps import CLAMP, FIRST, UNCLAMP, cutting, turning
 from postproc.compile.program import Command, CommandName, Program
-from toolpaths.arrays import Ints
+from toolpaths.arrays import Ints, runs
 
 HOOK: CommandName = "HOOK"
 """command; its arguments are the block, and the tool's number, its name and the operation that it may name"""

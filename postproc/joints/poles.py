@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, runs
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -86,5 +86,4 @@ def passages(pole: Pole, curves: Curves, near: float) -> tuple[Bools, Floats]:
 
 def stretches(rows: Bools) -> list[tuple[int, int]]:
     """(first, last) of each unbroken stretch of True."""
-    edge = np.flatnonzero(np.diff(np.concatenate([[0], rows.astype(np.int8), [0]])))
-    return [(int(a), int(b) - 1) for a, b in zip(edge[::2], edge[1::2], strict=True)]
+    return [(first, end - 1) for first, end in runs(rows).tolist()]

@@ -17,32 +17,53 @@ _STILL = 1e-8
 def check_clamps(case: Case, executed: ExecutedBlocks, cut: Array) -> tuple[list[Finding], int]:
     """Axes that turn while their clamp is closed, or cut unclamped though they stand; how many blocks were compared.
 
+    An axis may be free in a cut where another turns that shares a code with it.
     `cut` (E,): blocks of cuts. A block is held against the last code in the lines before its own.
     """
     last = int(executed.line.max(initial=0))
     if not case.clamps or (np.diff(executed.line) < 0).any() or case.program.count(b"\n") < last:
         return [], 0
-    lines = _REMARK.sub(b"", case.program.upper()).split(b"\n")
+    stated, lines = _codes(case.program, {code for pair in case.clamps.values() for code in pair})
+    turns = {letter: _turned(executed, executed.letters.index(letter)) for letter in case.clamps}
+    stretch = np.cumsum(np.append(True, cut[1:] != cut[:-1])[:len(cut)])
     found, count = list[Finding](), 0
     for letter, pair in case.clamps.items():
-        closed, free = (re.compile(rb"(?<![A-Z])M0*" + code[1:].encode() + rb"(?![\d.])") for code in pair)
-        held, last = np.full(len(lines) + 1, -1), -1
-        for number, text in enumerate(lines, 1):
-            held[number] = last
-            last = 1 if closed.search(text) else 0 if free.search(text) else last
-        j = executed.letters.index(letter)
-        turned = np.abs(np.diff(np.append(executed.start[j], executed.joints[:, j]))) > _STILL
-        state = held[executed.line]
+        own = np.isin(stated, [int(code[1:]) for code in pair])
+        last = np.searchsorted(lines[own], executed.line) - 1
+        closed = np.append(stated[own] == int(pair[0][1:]), False)
+        state = np.where(last < 0, -1, closed[last])
+        turned, any_turned = turns[letter], np.any([turns[other] for other in _sharing(letter, case.clamps)], axis=0)
         bad = np.flatnonzero(turned & (state != 0))
         if len(bad):
             found.append(Finding("clamp", f"{letter} turns before its clamp is released", 0, int(executed.line[bad[0]]),
                                  len(bad)))
-        stretch = np.cumsum(np.append(True, cut[1:] != cut[:-1])[:len(cut)])
-        turning = np.isin(stretch, stretch[turned & cut])
-        ends = np.append(stretch[1:] != stretch[:-1], True)[:len(cut)]
-        loose = np.flatnonzero(cut & ~turning & ends & (state != 1))
+        loose = np.flatnonzero(cut & ~np.isin(stretch, stretch[any_turned & cut]) & (state != 1))
         if len(loose):
             found.append(Finding("clamp", f"{letter} stands in a cut and is not clamped", 0, int(executed.line[loose[0]]),
                                  len(loose)))
         count += int((turned | cut).sum())
     return found, count
+
+
+def _codes(program: bytes, codes: set[str]) -> tuple[Array, Array]:
+    """(N,) numbers of those M codes as the program states them, (N,) their lines; remarks and names state none."""
+    text = _REMARK.sub(b"", program.upper())
+    words = [one for one in re.finditer(rb"M0*(" + b"|".join(code[1:].encode() for code in codes) + rb")(?![\d.])", text)
+             if not text[max(one.start() - 1, 0):one.start()].isalpha()]
+    ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == ord("\n"))
+    starts = np.array([one.start() for one in words], dtype=np.int64)
+    return np.array([int(one[1]) for one in words], dtype=np.int64), np.searchsorted(ends, starts) + 1
+
+
+def _turned(executed: ExecutedBlocks, j: int) -> Array:
+    """(E,) blocks that turn joint j."""
+    return np.asarray(np.abs(np.diff(np.append(executed.start[j], executed.joints[:, j]))) > _STILL)
+
+
+def _sharing(letter: str, clamps: dict[str, tuple[str, str]]) -> set[str]:
+    """An axis and those that share a code with it, or with one that does."""
+    result, codes = {letter}, set(clamps[letter])
+    while more := {other for other, pair in clamps.items() if other not in result and codes & set(pair)}:
+        result |= more
+        codes |= {code for other in more for code in clamps[other]}
+    return result

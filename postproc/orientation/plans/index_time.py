@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from machines.machine import Machine
+from machines.machine import ClampCodes, Machine
 from postproc.control.rollover import parked
 from postproc.feedrate.rest_to_rest import PointToPointMode, rest_seconds
 from postproc.joints.joint_path import nearest_solution
@@ -228,12 +228,17 @@ def _differ(a: Floats, b: Floats) -> Bools:
 
 
 def _indexed(q0: Floats, q1: Floats, machine: Machine) -> Floats:
-    """As `_moved`, with unclamping and clamping where rotary joints turn: at once, but one by one where codes do it."""
+    """As `_moved`, with unclamping and clamping where rotary joints turn: at once, but code by code where codes do it."""
     link = _shortest(q1[None] - q0[:, None], machine.endless)
     turns = np.abs(link[..., np.array(machine.rotary)]) > SAME
-    codes = [one.clamp for one, rotary in zip(machine.clamps, machine.rotary, strict=True) if rotary]
-    clamps = sum(turns[..., [c == code for c in codes]].any(axis=-1).astype(np.float64) for code in dict.fromkeys(codes))
-    return np.asarray(_moved(q0, q1, machine) + clamps * (machine.timing.clamp + machine.timing.unclamp))
+    letters = [name for name, rotary in zip(machine.axis_names, machine.rotary, strict=True) if rotary]
+    codes, seconds = machine.clamp_codes, _moved(q0, q1, machine)
+    for group in (*machine.clamp_groups, tuple(name for name in letters if name not in codes)):
+        own = [codes.get(name, ClampCodes()) for name in group]
+        pause = (len({one.clamp for one in own}) * machine.timing.clamp
+                 + len({one.unclamp for one in own}) * machine.timing.unclamp)
+        seconds = seconds + np.where(turns[..., [name in group for name in letters]].any(axis=-1), pause, 0.0)
+    return np.asarray(seconds)
 
 
 def _moved(q0: Floats, q1: Floats, machine: Machine) -> Floats:

@@ -10,7 +10,7 @@ from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
 from postproc.readback.text.canonical import LAW, Canonical, in_files
 from postproc.readback.text.modal import codes, fill
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, runs
 from toolpaths.diagnostics import Diagnostic
 
 AWAY = 0.01
@@ -20,7 +20,8 @@ TURNS = 1e-6
 
 
 def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults: Faults) -> list[Diagnostic]:
-    """Axes that the program clamps by codes turn only behind the release, and are clamped in cuts through which they stand.
+    """Axes that the program clamps by codes turn only behind the release, and are clamped in cuts through which they stand,
+    before the first row and up to the last; an axis may be free where another turns that shares a code with it.
 
     `owner` (E,): the move that each row serves. What a block states of clamps acts behind its motion: nobody knows better.
     """
@@ -28,11 +29,11 @@ def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults:
     if not machine.clamp_codes:
         return found
     moves, cut = job.moves.without_pecks(), cutting_rows(motion, job, owner)
+    turned = {letter: _turns(motion, machine.axis_names.index(letter)) for letter in machine.clamp_codes}
+    standing = {group: _standing(cut, np.any([turned[letter] for letter in group], axis=0))
+                for group in machine.clamp_groups}
     for letter, one in machine.clamp_codes.items():
-        state = _states(code, one)
-        j = machine.axis_names.index(letter)
-        degrees = np.concatenate([motion.start[j:j + 1], motion.end[:, j]])
-        turns = np.abs(np.diff(degrees)) > TURNS
+        state, turns = _states(code, one), turned[letter]
         before, line = state[motion.block - 1], motion.line
         bad = np.flatnonzero(turns & (before != 1.0))
         if len(bad):
@@ -40,8 +41,8 @@ def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults:
             found.append(faults.error("verify.clamp", f"axis {letter} turns while it is {how}", 0, int(line[bad[0]]),
                                       len(bad), f"{one.unclamp} in a block before it"))
         found += _planes(code, state, letter, one, job, faults)
-        ends = _standing(cut, turns)
-        loose = ends[state[motion.block[ends]] != 0.0]
+        still = next(rows for group, rows in standing.items() if letter in group)
+        loose = np.flatnonzero(still & (before != 0.0))
         if len(loose):
             found.append(faults.error("verify.clamp", f"axis {letter} stands through a cut and is not clamped",
                                       int(moves.line[owner[loose[0]]]), int(line[loose[0]]), len(loose),
@@ -56,10 +57,10 @@ def cutting_rows(motion: Motion, job: Job, owner: Ints) -> Bools:
     return np.asarray((motion.code > 0) & inside & ~moves.link[np.clip(owner, 0, len(moves) - 1)])
 
 
-def stretches(which: Bools) -> Ints:
-    """(N, 2) first and one past the last of the stretches where `which` (E,) is True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]).astype(np.int8)))
-    return np.asarray(edges.reshape(-1, 2))
+def _turns(motion: Motion, j: int) -> Bools:
+    """(E,) rows that turn joint j."""
+    degrees = np.concatenate([motion.start[j:j + 1], motion.end[:, j]])
+    return np.asarray(np.abs(np.diff(degrees)) > TURNS)
 
 
 def _states(code: Canonical, one: ClampCodes) -> Floats:
@@ -83,11 +84,12 @@ def _planes(code: Canonical, state: Floats, letter: str, one: ClampCodes, job: J
                          0, line, len(bad), f"{one.unclamp} in a block before it")]
 
 
-def _standing(cut: Bools, turns: Bools) -> Ints:
-    """The last row of each stretch of cuts through which an axis stands."""
-    edges = stretches(cut)
+def _standing(cut: Bools, turns: Bools) -> Bools:
+    """(E,) rows of the stretches of cuts in which nothing turns."""
+    edges, result = runs(cut), cut.copy()
     total = np.concatenate([[0], np.cumsum(turns)])
-    return np.asarray(edges[total[edges[:, 1]] == total[edges[:, 0]], 1] - 1)
+    result[cut] = np.repeat(total[edges[:, 1]] == total[edges[:, 0]], edges[:, 1] - edges[:, 0])
+    return result
 
 
 def check_index(motion: Motion, job: Job, home: Floats, owner: Ints, faults: Faults) -> list[Diagnostic]:

@@ -8,12 +8,12 @@ from string import Formatter
 import numpy as np
 
 from postproc.job.job import Job
-from postproc.readback.comparison.clamps import cutting_rows, stretches
+from postproc.readback.comparison.clamps import cutting_rows
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
 from postproc.readback.text.canonical import LOADED, Canonical
 from postproc.readback.text.modal import codes
-from toolpaths.arrays import Ints
+from toolpaths.arrays import Ints, runs
 from toolpaths.diagnostics import Diagnostic
 
 Gap = tuple[int, int]
@@ -61,7 +61,7 @@ def _gaps(code: Canonical, motion: Motion, job: Job, owner: Ints, end: int) -> d
     degrees = np.concatenate([motion.start[None], motion.end])[:, rotary]
     cut = cutting_rows(motion, job, owner)
     turns = np.flatnonzero((np.abs(np.diff(degrees, axis=0)) > 1e-6).any(axis=1) & ~cut)
-    cuts = stretches(cut)
+    cuts = runs(cut)
     after = np.searchsorted(cuts[:, 0], turns)
     edges_of = np.concatenate([[0], motion.line[cuts[:, 1] - 1]]), np.append(motion.line[cuts[:, 0]], end + 1)
     result["before_index"], result["after_index"] = [], []

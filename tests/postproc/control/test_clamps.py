@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -149,6 +150,94 @@ def test_the_second_witness_follows_the_codes_by_itself(controller: str, monkeyp
         said, _ = second_witness.second_witness(result.source, result.asked or result.setup, result.options, result.job,
                                                 result.comparison, text)
         assert any(f.code == "clamp" and what in f.message for f in said.findings), lines[n]
+
+
+def witnessed(result: PostResult, text: str) -> set[str]:
+    """What the second witness says of clamps in a text that the reader did not see."""
+    assert result.job is not None and result.comparison is not None and result.source is not None
+    said, _ = second_witness.second_witness(result.source, result.asked or result.setup, result.options, result.job,
+                                            result.comparison, text)
+    return {f.message for f in said.findings if f.code == "clamp"}
+
+
+@pytest.mark.parametrize(("controller", "output"), [("fanuc-30i", "axes"), ("haas-ngc", "auto"), ("siemens-840d", "tcp"),
+                                                    ("heidenhain-tnc640", "auto"), ("linuxcnc", "auto")])
+def test_an_axis_is_clamped_before_the_first_block_of_a_cut_and_up_to_the_last(controller: str, output: str) -> None:
+    """Each clamp code one block later, through the whole cut, and released and clamped again inside it."""
+    axis, along = tilted(40.0, 77.0), np.cross(tilted(40.0, 77.0), [0.0, 0.0, 1.0])
+    path = toolpath("RAPID", point(45 * axis, axis), "FEDRAT/MMPM,500",
+                    *(point(30 * axis + k * along, axis) for k in (0, 8, 4, 6, 1)), "RAPID", point(45 * axis + along, axis))
+    result = postproc.convert(path, clamping(), controller, SETUP, Options(output=output))  # type: ignore[arg-type]
+    assert result.ok, [str(d) for d in result.diagnostics]
+    lines = result.text.splitlines()
+    codes_at = {n: lines[n].split()[-1] for n in switches(result.text)}
+    begin = next(n for n, line in enumerate(lines) if re.search(r"\bF\d", line))
+    before = [n for n, code in codes_at.items() if code in ("M10", "M12") and n < begin]
+    assert {codes_at[n] for n in before[-2:]} == {"M10", "M12"} and not any(begin < n < begin + 5 for n in codes_at)
+    for n in before[-2:]:
+        for at in range(begin, begin + 5):
+            text = "\n".join([*lines[:n], *lines[n + 1:at + 1], lines[n], *lines[at + 1:]]) + "\n"
+            assert "verify.clamp" in verdict(result, text), (lines[n], lines[at])
+            assert any("not clamped" in said for said in witnessed(result, text)), (lines[n], lines[at])
+        release = lines[n].replace("M12", "M15").replace("M10", "M11")
+        text = "\n".join([*lines[:begin + 1], release, lines[begin + 1], lines[n], *lines[begin + 2:]]) + "\n"
+        assert "verify.clamp" in verdict(result, text) and witnessed(result, text)
+
+
+SHARED = {"one pair": {"A": ClampCodes("M10", "M11"), "C": ClampCodes("M10", "M11")},
+          "one release": {"A": ClampCodes("M10", "M11"), "C": ClampCodes("M12", "M11")},
+          "one clamp": {"A": ClampCodes("M10", "M11"), "C": ClampCodes("M10", "M15")}}
+
+
+def sharing(codes_by: dict[str, ClampCodes]) -> Machine:
+    return replace(clamping(), clamps=tuple(codes_by.get(a, ClampCodes()) for a in clamping().axis_names))
+
+
+@cache
+def along_a_cone() -> Toolpath:
+    """A cut in which C turns and A stands, before and behind it one on a plane, through which both stand."""
+    turn, plane = [tilted(30.0, float(t)) for t in np.linspace(0.0, 4.0, 9)], tilted(40.0, -50.0)
+    across = np.cross(plane, [0.0, 0.0, 1.0])
+    side = ["RAPID", point(60 * plane, plane), "FEDRAT/MMPM,400", *(point(30 * plane + k * across, plane) for k in (0, 8)),
+            "RAPID", point(60 * plane + 8 * across, plane)]
+    return toolpath(*side, "RAPID", point(60 * turn[0], turn[0]), "FEDRAT/MMPM,400", *(point(30 * a, a) for a in turn),
+                    "RAPID", point(60 * turn[-1], turn[-1]), *side)
+
+
+@pytest.mark.parametrize(("controller", "output"), [("fanuc-30i", "axes"), ("haas-ngc", "tcp"), ("siemens-840d", "auto"),
+                                                    ("heidenhain-tnc640", "auto"), ("linuxcnc", "auto"),
+                                                    ("generic-iso", "auto")])
+@pytest.mark.parametrize("name", SHARED)
+def test_axes_that_share_a_code_are_freed_and_clamped_together(name: str, controller: str, output: str) -> None:
+    result = postproc.convert(along_a_cone(), sharing(SHARED[name]), controller, SETUP,
+                              Options(output=output))  # type: ignore[arg-type]
+    assert result.ok, [str(d) for d in result.diagnostics]
+    assert result.witness is not None and any(what.endswith("clamps") for what in result.witness.compared)
+    lines = result.text.splitlines()
+    found = [lines[n].split()[-1] for n in switches(result.text)]
+    closing, opening = ({getattr(one, key) for one in SHARED[name].values()} for key in ("clamp", "unclamp"))
+    groups = [(is_open, sorted(group)) for is_open, group in groupby(found, key=opening.__contains__)]
+    assert len(groups) >= 4 and groups[0][0]
+    assert all(group == sorted(opening if is_open else closing) for is_open, group in groups), found
+    places = switches(result.text)
+    last = max(n for n in places if any(re.search(r"\bF\d", line) for line in lines[n:]))
+    assert lines[last].split()[-1] in closing
+    text = "\n".join(lines[:last] + lines[last + 1:]) + "\n"
+    assert "verify.clamp" in verdict(result, text) and witnessed(result, text)  # the cut on the plane
+
+
+@pytest.mark.parametrize("name", SHARED)
+def test_axes_that_share_a_code_index_and_drill(name: str) -> None:
+    for controller in ("fanuc-30i", "siemens-840d", "heidenhain-tnc640"):
+        result = postproc.convert(indexed(), sharing(SHARED[name]), controller, SETUP, Options(output="auto"))
+        assert result.ok, [str(d) for d in result.diagnostics]
+
+
+def test_groups_of_axes_are_joined_by_codes_of_a_third() -> None:
+    four = ClampCodes("M40", "M41"), ClampCodes("M50", "M51"), ClampCodes("M40", "M51"), ClampCodes("M60", "M61")
+    machine = replace(clamping(), clamps=(ClampCodes(), *four))
+    names = clamping().axis_names
+    assert machine.clamp_groups == [names[1:4], names[4:]]
 
 
 def test_an_operation_that_is_taken_up_states_its_clamps() -> None:
