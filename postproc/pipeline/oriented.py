@@ -28,7 +28,10 @@ def oriented(start: PostResult, stages: Stages, progress: Progress | None = None
         begun = replace(start, options=options, diagnostics=(), toolpath=choice.toolpath(plan), choice=choice)
         return stages(begun, progress)
 
-    choice, found = planned_choice(start.toolpath, start.machine, start.setup, start.options, progress)
+    clearance = start.setup.clearance
+    index = clearance.index or start.controller.links.index  # the path between passes counts as the program goes it
+    setup = start.setup.model_copy(update={"clearance": clearance.model_copy(update={"index": index})})
+    choice, found = planned_choice(start.toolpath, start.machine, setup, start.options, progress)
     if choice is None:
         return start.with_found(found), None
     made, more = proved(choice, plan, program_of)

@@ -29,9 +29,9 @@ def check_clamps(case: Case, executed: ExecutedBlocks, cut: Array) -> tuple[list
     found, count = list[Finding](), 0
     for letter, pair in case.clamps.items():
         own = np.isin(stated, [int(code[1:]) for code in pair])
-        last = np.searchsorted(lines[own], executed.line) - 1
+        latest = np.searchsorted(lines[own], executed.line) - 1
         closed = np.append(stated[own] == int(pair[0][1:]), False)
-        state = np.where(last < 0, -1, closed[last])
+        state = np.where(latest < 0, -1, closed[latest])
         turned, any_turned = turns[letter], np.any([turns[other] for other in _sharing(letter, case.clamps)], axis=0)
         bad = np.flatnonzero(turned & (state != 0))
         if len(bad):

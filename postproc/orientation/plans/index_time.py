@@ -127,17 +127,25 @@ def between(before: list[PassEnds] | None, after: list[PassEnds] | None, work: P
         assert before is not None
         return _leaving(before, machine) + _moved(_lifted(before, machine), machine.home[None], machine)
     if before is None or by_home:
-        start = machine.home[None] if before is None else _lifted(before, machine)
-        left = 0.0 if before is None else _leaving(before, machine)
-        return np.asarray(left + _from_home(start, np.stack([e.above_first for e in after]), machine)
-                          + _arriving(after, machine))
+        return _by_home(before, after, machine)
     ups, downs = np.array([e.up for e in before])[:, None], np.array([e.down for e in after])[None]
     above = np.stack([e.above_last for e in before])
     linked = ups + _indexed(above, np.stack([e.above_first for e in after]), machine) + downs
     straight = _indexed(np.stack([e.last for e in before]), np.stack([e.first for e in after]), machine)
     turn = angle_between(np.stack([e.axis for e in before])[:, None], np.stack([e.axis for e in after])[None])
     spun = _differ(np.array([e.held for e in before])[:, None], np.array([e.held for e in after])[None])
-    return np.asarray(np.where((turn > work.setup.clearance.link_angle * DEG) | spun, linked, straight))
+    result = np.where((turn > work.setup.clearance.link_angle * DEG) | spun, linked, straight)
+    if work.setup.clearance.index == "home" and machine.retract_axis >= 0:
+        result = np.where(turn > work.setup.clearance.link_angle * DEG, _by_home(before, after, machine), result)
+    return np.asarray(result)
+
+
+def _by_home(before: list[PassEnds] | None, after: list[PassEnds], machine: Machine) -> Floats:
+    """Seconds (K0, K1) with the retract axis at home between the two, from home itself where `before` is None."""
+    start = machine.home[None] if before is None else _lifted(before, machine)
+    left = 0.0 if before is None else _leaving(before, machine)
+    above = np.stack([each.above_first for each in after])
+    return np.asarray(left + _from_home(start, above, machine) + _arriving(after, machine))
 
 
 def unwinding(picked: list[PassEnds], work: PassContext, spun: bool) -> float:

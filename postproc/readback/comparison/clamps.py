@@ -7,6 +7,7 @@ import numpy as np
 from machines.machine import ClampCodes
 from postproc.job.job import Job
 from postproc.readback.comparison.faults import Faults
+from postproc.readback.comparison.tool_changes import correction
 from postproc.readback.execution.execute import Motion
 from postproc.readback.text.canonical import LAW, Canonical, in_files
 from postproc.readback.text.modal import codes, fill
@@ -96,8 +97,8 @@ def check_index(motion: Motion, job: Job, home: Floats, owner: Ints, faults: Fau
     """Linking moves that turn rotary axes before a move with another tool axis, where the retract axis is to be at home
     (J,) meanwhile: an error where the set-up says so, a warning where the controller file does.
 
-    Moves of a machine with geometric errors are home as far as its correction goes."""
-    if not job.index_at_home or job.control.tip_law or job.corrects:
+    Where errors are corrected, what the correction moves and turns is neither away from home nor a turn."""
+    if not job.index_at_home or job.control.tip_law:
         return []
     moves = job.moves.without_pecks()
     first = np.zeros(len(moves) + 1, dtype=bool)
@@ -105,9 +106,13 @@ def check_index(motion: Motion, job: Job, home: Floats, owner: Ints, faults: Fau
     linking = first[np.clip(owner, 0, len(moves))] & ~cutting_rows(motion, job, owner)
     rotary = np.flatnonzero(np.array(job.machine.rotary))
     before = np.concatenate([motion.start[None], motion.end[:-1]])
-    turns = (np.abs(motion.end - before)[:, rotary] > TURNS).any(axis=1)
-    lift = job.machine.retract_axis
-    bad = np.flatnonzero(linking & turns & (np.abs(before[:, lift] - home[lift]) > AWAY))
+    turned, lift = np.abs(motion.end - before)[:, rotary], job.machine.retract_axis
+    away = np.abs(before[:, lift] - home[lift])
+    bad = np.flatnonzero(linking & (turned > TURNS).any(axis=1) & (away > AWAY))
+    if job.corrects and len(bad):
+        near = [correction(job, place[bad], motion.tool[bad]) for place in (before, motion.end)]
+        explained = (near[0] + near[1])[:, rotary]
+        bad = bad[(turned[bad] > TURNS + explained).any(axis=1) & (away[bad] > AWAY + near[0][:, lift])]
     if not len(bad):
         return []
     name, k = job.machine.axis_names[lift], int(bad[0])

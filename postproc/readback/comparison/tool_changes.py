@@ -33,7 +33,7 @@ def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, fault
     away = np.where(np.isfinite(away), away, np.inf)
     spindle, coolant = _on(code, (3, 4, 5), 5.0, changes), _on(code, (7, 8, 9), 9.0, changes)
     lines = in_files(code.line[changes], code.files)
-    result, near = _others(code, job, faults), AWAY + _corrected(job, place, motion.tool[np.maximum(before, 0)])[:, axes]
+    result, near = _others(code, job, faults), AWAY + correction(job, place, motion.tool[np.maximum(before, 0)])[:, axes]
     for bad, what, hint in (
             ((away > near).any(axis=1), "the tool is changed away from home", "the retract to home before it is missing"),
             (spindle != 5.0, "the tool is changed while the spindle turns", "M5 before it"),
@@ -45,7 +45,7 @@ def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, fault
     return result
 
 
-def _corrected(job: Job, place: Floats, tool: Ints) -> Floats:
+def correction(job: Job, place: Floats, tool: Ints) -> Floats:
     """(N, J) mm or degrees next to home that the correction of geometric errors explains.
 
     A retract as high as home is corrected, home itself is not. It is what the machine with errors needs at the places

@@ -16,6 +16,7 @@ import postproc
 from machines.machine import ClampCodes, Machine
 from postproc.base.options import Options
 from postproc.cycle_time.conversion import estimate_of
+from postproc.orientation.plans import index_time
 from postproc.pipeline.result import PostResult
 from postproc.verification import second_witness
 from postproc.verification.read_back import read_back
@@ -260,6 +261,17 @@ def test_clamps_take_the_time_that_the_machine_file_says() -> None:
     closing, opening = count["M10"] + count["M12"], count["M11"] + count["M15"]
     more = closing * (2.0 - still.timing.clamp) + opening * (3.0 - still.timing.unclamp)
     assert times[1] - times[0] == pytest.approx(more, rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "closing", "opening"), [("one pair", 1, 1), ("one release", 2, 1), ("one clamp", 1, 2)])
+def test_plans_count_each_code_of_axes_that_share_one(name: str, closing: int, opening: int) -> None:
+    """C alone turns: the codes of both axes are stated; without codes the machine clamps at once."""
+    q = np.zeros((2, 5))
+    q[1, clamping().axis_names.index("C")] = 1.0
+    timing = replace(clamping().timing, clamp=2.0, unclamp=3.0)
+    shared, still, own = (index_time._indexed(q[:1], q[1:], replace(m, timing=timing))[0, 0]
+                          for m in (sharing(SHARED[name]), clamping(False), clamping()))
+    assert (shared - own, still - own) == pytest.approx((2.0 * closing + 3.0 * opening - 5.0, 0.0))
 
 
 # ---- machine files ---------------------------------------------------------------------------------------------------

@@ -65,6 +65,19 @@ def test_a_plan_takes_as_long_as_its_program(name: str, counts: dict[str, Any]) 
     assert (wound["keep"] > 0.5) == (counts == {"park": "home"})
 
 
+def test_a_plan_counts_the_way_by_home_where_the_tool_waits_there_to_index() -> None:
+    """A Haas retracts to home before rotary axes turn; `orient` without a controller goes by the set-up alone."""
+    options = Options(setup=str(SAMPLES / "tools.setup.toml"), orient="auto", feed="planned", max_tilt=5.0)
+    setup, m = load_setup(SAMPLES / "tools.setup.toml")[0], machine("mikron-ucp710")
+    assert setup is not None
+    program = convert(strips(), m, "haas-ngc", setup, options)
+    assert program.ok and program.choice is not None, [str(d) for d in program.diagnostics]
+    counted = program.choice.plans["auto"].seconds
+    assert counted == pytest.approx(program_seconds(program), rel=0.025)
+    low, _ = orient(strips(), m, setup, options)
+    assert low is not None and counted > low.plans["auto"].seconds + 1.0
+
+
 def drilled(*cycles: str) -> Toolpath:
     """Two holes by each cycle from above, two on a face at 30 degrees."""
     lines = list(HEAD)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -135,6 +136,22 @@ def test_the_tool_is_home_while_rotary_axes_are_turned(controller: str, output: 
     home = re.compile(r"(?:G53 G0|SUPA G0|L) Z\+?250\.?|SUPA G0 D0 Z250")
     assert len(home.findall(result.text)) > len(home.findall(low.text))
     assert not verdict(result, result.text) and "verify.index" in verdict(result, low.text)
+
+
+@pytest.mark.parametrize(("controller", "output"), [("fanuc-30i", "axes"), ("heidenhain-tnc640", "auto")])
+def test_the_tool_is_home_there_in_corrected_programs_too(controller: str, output: str, tmp_path: Path) -> None:
+    """The head nods by 40 arcsec along Z and is 0.1 mm off at its end: a retract that is corrected is as high as home."""
+    (tmp_path / "z.csv").write_text("Z [mm],EZZ [um],EAZ [arcsec],EBZ [arcsec]\n-250,0,0,0\n250,100,40,-40\n")
+    (tmp_path / "errors.toml").write_text('machine = "mikron-ucp710"\n' + "".join(
+        f'[components.{name}]\ntable = "z.csv"\ninterpolation = "linear"\n' for name in ("EZZ", "EAZ", "EBZ")))
+    options = Options(output=output, error_model=str(tmp_path / "errors.toml"))  # type: ignore[arg-type]
+    result, low = (postproc.convert(indexed(), machines.load("mikron-ucp710"), controller, at_home(index), options)
+                   for index in ("home", "plane"))
+    assert result.ok and low.ok, [str(d) for d in result.diagnostics]
+    assert not verdict(result, result.text) and "verify.index" in verdict(result, low.text)
+    for z, said in ((249.95, False), (249.5, True)):
+        text = re.sub(r"Z(\+?)250\b\.?", rf"Z\g<1>{z}", result.text)
+        assert ("verify.index" in verdict(result, text)) == said
 
 
 def test_haas_indexes_at_home_unless_the_set_up_says_otherwise() -> None:
