@@ -334,7 +334,7 @@ SOURCES = [
     ("both and one", {"a.csv": "X [mm],EXX+ [um],EXX- [um],EXX [um]\n0,1,2,3\n1,1,2,3\n"}, "error-model.column",
      "next to"),
     ("twice", {"a.csv": AXIS, "b.csv": AXIS}, "error-import.twice", "is in"),
-    ("map and tables", {"a.csv": AXIS, "b.csv": "X [mm],dx [um],dy [um],dz [um]\n0,1,2,3\n"}, "error-import.map", "alone"),
+    ("map and tables", {"a.csv": AXIS, "b.csv": "X [mm],dx [um],dy [um],dz [um]\n0,1,2,3\n"}, "error-import.map", "combined"),
     ("location rows", {"a.csv": "EC0Y [arcsec]\n1\n2\n"}, "error-import.rows", "2 rows"),
     ("location unit", {"a.csv": "EC0Y [um]\n1\n"}, "error-model.unit", "'um'"),
     ("neither", {"a.csv": "foo [um]\n1\n"}, "error-import.columns", "'foo'"),
