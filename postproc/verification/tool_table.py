@@ -140,10 +140,10 @@ def measured_lengths(table: ToolTable, job: Job, file: str) -> tuple[list[Measur
     if apart:
         faults.append(error("tool-table.apart", f"registers of one tool hold different lengths: T{apart[0]}", file=file,
                             hint="give each length a tool number of its own in the CL file"))
-    return found, faults if has_errors(faults) else _doubtful(found, job, file)
+    return found, faults if has_errors(faults) else _questionable(found, job, file)
 
 
-def _doubtful(found: list[MeasuredLength], job: Job, file: str) -> list[Diagnostic]:
+def _questionable(found: list[MeasuredLength], job: Job, file: str) -> list[Diagnostic]:
     """Lengths that may be in other units, or of another tool; bodies that the lengths do not reach."""
     far = [one for one in found if one.gauge and abs(one.measured - one.gauge) > FAR]
     result = [warning("tool-table.far", f"{one.line()}: is that this tool, and are the numbers mm?", file=file,
