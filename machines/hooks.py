@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from string import Formatter
 from typing import Annotated
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from machines.user_file import UserModel
 from machines.value_words import AdvisedError
@@ -71,31 +71,39 @@ def _valued(name: str, value: str, form: str) -> str:
     return format(int(number[0]), form)
 
 
+def _listed(value: object) -> object:
+    if not isinstance(value, list | tuple):
+        raise AdvisedError(f"{value!r} is no list", 'write a list in brackets: ["M31", "M32"]')
+    return tuple(value)
+
+
 HookBlock = Annotated[str, AfterValidator(_one_block)]
+HookBlocks = Annotated[tuple[HookBlock, ...], BeforeValidator(_listed)]
 PassiveWord = Annotated[str, Field(pattern=PASSIVE)]
+PassiveWords = Annotated[tuple[PassiveWord, ...], BeforeValidator(_listed)]
 
 
 class HooksModel(UserModel):
     """Blocks that the shop wants at certain places; {tool_number}, {tool_name}, {operation} and {work_offset} stand for what
     holds there."""
 
-    before_tool: tuple[HookBlock, ...] = ()
+    before_tool: HookBlocks = ()
     """before each tool change, spindle and coolant being off; {tool_number} is that of the new tool"""
-    after_tool: tuple[HookBlock, ...] = ()
+    after_tool: HookBlocks = ()
     """behind it"""
-    before_index: tuple[HookBlock, ...] = ()
+    before_index: HookBlocks = ()
     """before rotary axes are turned between two cuts, clamps still closed"""
-    after_index: tuple[HookBlock, ...] = ()
+    after_index: HookBlocks = ()
     """behind that, clamps closed again"""
-    before_operation: tuple[HookBlock, ...] = ()
+    before_operation: HookBlocks = ()
     """where an operation begins"""
-    after_operation: tuple[HookBlock, ...] = ()
+    after_operation: HookBlocks = ()
     """where it has ended"""
-    before_stop: tuple[HookBlock, ...] = ()
+    before_stop: HookBlocks = ()
     """before M0 and M1"""
-    after_stop: tuple[HookBlock, ...] = ()
+    after_stop: HookBlocks = ()
     """behind them"""
-    passive: tuple[PassiveWord, ...] = ()
+    passive: PassiveWords = ()
     """codes of these blocks, e.g. "M31", "G65", "CYCLE977", "TCH PROBE", "L9000": G and M with a number, L with one
     (Siemens), or words that a statement begins with. They come back to where they began and change no state of the
     control; read back without being executed"""

@@ -42,8 +42,6 @@ def advice(kind: str, value: object) -> str:
         return "write it in quotes"
     if kind == "string_type":
         return "write text in quotes"
-    if kind == "tuple_type":
-        return "write a list in brackets: [..., ...]"
     if kind == "too_long" and isinstance(value, list) and all(isinstance(v, int) for v in value):
         return "numbers have decimal points: a comma begins the next"
     return ""

@@ -92,8 +92,8 @@ def test_operations_without_a_name_have_their_blocks_too() -> None:
 
 
 def test_a_long_name_is_cut_to_the_line() -> None:
-    path = toolpath("UNITS/MM", f"TOOL PATH/{'N' * 150},TOOL,T1", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW",
-                    "RAPID", "GOTO/0,0,40", "FEDRAT/MMPM,500", "GOTO/0,0,30", "END-OF-PATH", head=[])
+    path = toolpath("UNITS/MM", f"TOOL PATH/{'N' * 150},TOOL,T1", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1",
+                    "SPINDL/RPM,1000,CLW", "RAPID", "GOTO/0,0,40", "FEDRAT/MMPM,500", "GOTO/0,0,30", "END-OF-PATH", head=[])
     setup = SETUP.model_copy(update={"hooks": HooksModel(before_operation=("(BEGIN {operation})",))})
     result = postproc.convert(path, clamping(), "fanuc-30i", setup, Options(output="axes"))
     assert result.ok, [str(d) for d in result.diagnostics]
