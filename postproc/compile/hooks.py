@@ -43,7 +43,7 @@ class _Walk:
             self.tool = float(command.args[0])
             self.put("before_tool", line)
         elif command.name == "OPERATION_START":
-            if self.begun:
+            if self.operation:
                 self.put("after_operation", line)
             self.operation = str(command.args[0])
         elif command.name in STOPS:
@@ -75,7 +75,7 @@ def with_hooks(program: Program, hooks: HooksModel, names: Mapping[int, str]) ->
                 walk.put("before_index", begins[block])
             if command is not None:
                 walk.one(command)
-        if block == len(program) and walk.begun:
+        if block == len(program) and walk.operation:
             walk.put("after_operation", 0)
         if walk.out:
             result[block] = tuple(walk.out)

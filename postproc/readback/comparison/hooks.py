@@ -34,16 +34,16 @@ def check_hooks(data: bytes, code: Canonical, motion: Motion, job: Job, owner: I
         said = faults.warning("verify.hook", "the blocks of [hooks] are not looked for: the program has subprograms", 0, 1,
                               hint="write it without subprograms to have them looked for")
         return [replace(said, severity=Severity.INFO)]
-    text = lines_of(data)
+    text = lines_of(data).upper()
     gaps, found = _gaps(code, motion, job, owner, text.count(b"\n")), list[Diagnostic]()
     ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == 10)
     offset = job.controller.program.offset_name(job.setup.work_offset_code)
-    asked: dict[str, list[tuple[Gap, str, str]]] = {}
+    asked: dict[bytes, list[tuple[Gap, str, str]]] = {}
     for place, blocks in places.items():
         for block in blocks:
             asked.setdefault(_pattern(block, offset), []).extend((gap, place, block) for gap in gaps[place])
     for pattern, wanted in asked.items():
-        starts = [m.start(1) for m in re.finditer(pattern.encode(), text)]
+        starts = [m.start() for m in re.finditer(pattern, text) if _begins(text, m.start())]
         left = unmatched(np.searchsorted(ends, np.array(starts, dtype=np.int64)) + 1, [gap for gap, _, _ in wanted])
         missing = dict[tuple[str, str], list[Gap]]()
         for k in left:
@@ -55,14 +55,21 @@ def check_hooks(data: bytes, code: Canonical, motion: Motion, job: Job, owner: I
     return found
 
 
+_NUMBER = re.compile(rb"[ \t]*/?(?:N?\d+[ \t]+)?")
 _VALUES = {"tool_number": "[0-9]+", "tool_name": "[A-Z0-9 ._-]*", "operation": "[A-Z0-9 ._-]*"}
 
 
-def _pattern(block: str, offset: str) -> str:
-    """Lines that hold the block, whatever its values are, but with the work offset; group 1 is where it begins."""
-    parts = [re.escape(text) + ("" if name is None else "[0-9]+" if form else _VALUES.get(name, re.escape(offset)))
+def _pattern(block: str, offset: str) -> bytes:
+    """The block in capitals to the end of its line, whatever its values are, but with the work offset."""
+    values = _VALUES | {"work_offset": re.escape(offset.upper())}
+    parts = [re.escape(text.upper()) + ("" if name is None else "[0-9]+" if form else values[name])
              for text, name, form, _ in Formatter().parse(block.strip())]
-    return r"(?mi)^[ \t]*/?(?:N?\d+[ \t]+)?(" + "".join(parts) + r")[ \t]*$"
+    return (r"(?m)" + "".join(parts) + r"[ \t]*$").encode()
+
+
+def _begins(text: bytes, start: int) -> bool:
+    """True where nothing but a block number stands before `start` in its line."""
+    return _NUMBER.fullmatch(text, text.rfind(b"\n", 0, start) + 1, start) is not None
 
 
 def unmatched(lines: Ints, gaps: list[Gap]) -> list[int]:

@@ -84,7 +84,7 @@ def test_a_program_with_subprograms_says_that_nothing_was_looked_for() -> None:
     assert [d.severity for d in said] == [Severity.INFO] and said[0].hint
 
 
-def test_operations_without_a_name_have_their_blocks_too() -> None:
+def test_operations_that_the_file_does_not_name_have_their_blocks_too() -> None:
     path = toolpath("RAPID", "GOTO/0,0,40", "GOTO/0,0,30")
     setup = SETUP.model_copy(update={"hooks": HooksModel(before_operation=("(A)",), after_operation=("(B)",))})
     result = postproc.convert(path, clamping(), "fanuc-30i", setup, Options(output="axes"))
