@@ -41,7 +41,7 @@ FAULTS = (
     Fault("peck of twice the depth", "writer of fanuc", "peck_of", "return cycle.steps[0] if",
           "return 2.0 * cycle.steps[0] if"),
     Fault("coolant code for all kinds", "writer of fanuc", "Writer.coolant",
-          "yield switching(self.controller.codes)[command.name][0]", "yield self.controller.codes.flood"),
+          "yield switching(self.controller.codes)[asked][0]", "yield self.controller.codes.flood"),
     Fault("cycle not called off", "writer of siemens", "Writer.end_cycle", "yield self.controller.cycles.cancel",
           "yield from ()"),
     Fault("depth of cycles from the clearance", "writer of siemens", "WriterState.cycle_values",

@@ -98,7 +98,7 @@ def body(text: str) -> list[str]:
     """The blocks between the first tool change and the end, without comments."""
     lines = [n for n in text.splitlines() if not n.startswith(("(", "%"))]
     first = next(i for i, n in enumerate(lines) if "M6" in n)
-    last = max(i for i, n in enumerate(lines) if n in ("M5 M9", "M5"))
+    last = max(i for i, n in enumerate(lines) if n in ("M5 M9", "M5", "M9"))
     return lines[first:last]
 
 

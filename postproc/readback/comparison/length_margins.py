@@ -21,7 +21,7 @@ from postproc.readback.execution.offsets import Offsets
 from postproc.readback.execution.poses import BlockPoses
 from postproc.readback.text.canonical import Canonical
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import angle_between, lengths
 from toolpaths.shapes import arrays
 
@@ -31,7 +31,7 @@ MUCH = 50.0
 """mm that no length is wrong by"""
 LEAST = 1e-6
 """mm or rad per mm: less is arithmetic"""
-_SHARES = 0.25, 0.5, 0.75, 1.0
+_SHARES = 0.0, 0.25, 0.5, 0.75, 1.0
 """where blocks are looked at"""
 
 
@@ -44,12 +44,14 @@ class LengthMargin:
     longer: float
     ends_shorter: str
     ends_longer: str
+    bodies: bool = False
+    """bodies of the set-up are not looked at"""
 
     def line(self) -> str:
         """For the head of the program and the summary; margins are rounded down."""
         ends = (f"by {sign}{_down(mm)} mm, then {what}" if mm < MUCH else f"by {sign}{MUCH:g} mm and more"
                 for sign, mm, what in (("-", self.shorter, self.ends_shorter), ("+", self.longer, self.ends_longer)))
-        return f"T{self.number}: length may differ {'; '.join(ends)}"
+        return f"T{self.number}: length may differ {'; '.join(ends)}{'; bodies apart' if self.bodies else ''}"
 
 
 def _down(mm: float) -> str:
@@ -126,12 +128,13 @@ class _Rates:
         rows, moves = np.arange(len(motion)), job.moves.without_pecks()
         link = (owner >= len(moves)) | moves.link[np.minimum(owner, len(moves) - 1)]
         tip, axis, clear = np.zeros(len(rows)), np.zeros(len(rows)), np.full(len(rows), np.inf)
+        near = job.options.tolerance + executed.corrected_between(motion, np.flatnonzero(link))
         for t in _SHARES:
             (here, along), (there, turned) = executed.poses(motion, rows, t), longer.poses(again, rows, t)
             moved = np.nan_to_num(lengths(there - here) / STEP)
             tip = np.maximum(tip, np.where(link, 0.0, moved))
             axis = np.maximum(axis, np.where(link, 0.0, np.nan_to_num(angle_between(turned, along) / STEP)))
-            room = _room(job, moves, owner, link, here, along)
+            room = _room(job, moves, owner, np.flatnonzero(link), here, along, near)
             clear = np.minimum(clear, np.where(moved > LEAST, room / np.maximum(moved, LEAST), np.inf))
         q = executed.joints(motion, rows, 1.0)
         return cls(job, np.asarray(motion.tool), tip, axis, q, (longer.joints(again, rows, 1.0) - q) / STEP, clear,
@@ -151,19 +154,21 @@ class _Rates:
                     for j in range(len(names))]
             found.append(min([*both, *ends], key=lambda one: one[0]))
         (shorter, why), (longer, so) = found
-        return LengthMargin(number, shorter, longer, why, so)
+        whole = self.job.length_of(number)
+        if shorter >= whole > 0.0:
+            shorter, why = whole, "length 0"
+        return LengthMargin(number, shorter, longer, why, so, self.job.setup.bodies is not None)
 
 
-def _room(job: Job, moves: Moves, owner: Ints, link: Bools, tip: Floats, axis: Floats) -> Floats:
-    """(E,) mm that tips of linking moves may go: clear of what is cut, or on the line of an approach or a retract, whichever
-    is more (as `check_links` has it); infinite in cuts."""
-    k, tolerance = np.flatnonzero(link), job.options.tolerance
-    clear = job.space.room(tip[k], axis[k]) + tolerance
+def _room(job: Job, moves: Moves, owner: Ints, k: Ints, tip: Floats, axis: Floats, near: Floats) -> Floats:
+    """(E,) mm that tips of linking moves k (K,) may go: clear of what is cut, or within `near` (K,) on the line of an
+    approach or a retract, whichever is more (as `check_links` has it); infinite in cuts."""
+    clear = job.space.room(tip[k], axis[k]) + job.options.tolerance
     to, before = (np.clip(owner[k] + behind, 0, len(moves) - 1) for behind in (0, -1))
-    on = [np.where(there, tolerance - off_line(tip[k], moves.tip[at], moves.axis[at]), 0.0)
+    on = [np.where(there, near - off_line(tip[k], moves.tip[at], moves.axis[at]), 0.0)
           for at, there in ((to, owner[k] < len(moves)), (before, owner[k] > 0))]
-    room, result = np.maximum.reduce([clear, *on]), np.full(len(owner), np.inf)
-    result[k] = np.where(room > 0.0, room, np.inf)
+    result = np.full(len(owner), np.inf)
+    result[k] = np.maximum(np.maximum.reduce([clear, *on]), 0.0)
     return result
 
 

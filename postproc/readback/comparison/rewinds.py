@@ -54,7 +54,7 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angl
 
     The tool comes back in one run of feed blocks: the next rapid behind them ends the search. On the path it stands in other
     poses twice too. The innermost that is a position of the CL file counts, for what lies outside it is motion of the CL
-    file; without any the outermost.
+    file; without any the outermost that leaves a cut: high above the part a tool stands in one pose twice as well.
     """
     low, high = max(k - _REACH, 1), min(k + _REACH, len(tip))
     stop = np.flatnonzero(~rapid[low:k])
@@ -71,7 +71,8 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angl
     for first, last in pairs[np.lexsort((pairs[:, 1], -pairs[:, 0]))]:
         if (np.linalg.norm(stops - tip[begin[first]], axis=1) <= grain[0]).any():
             return int(begin[first]) + 1, int(end[last])
-    return int(begin[pairs[0, 0]]) + 1, int(end[pairs[0, 1]])
+    cuts = pairs[~rapid[begin[pairs[:, 0]]]]
+    return (int(begin[cuts[0, 0]]) + 1, int(end[cuts[0, 1]])) if len(cuts) else None
 
 
 def check_rewinds(motion: Motion, executed: BlockPoses, number: Ints, tip: Floats, axis: Floats, space: SafeSpace,

@@ -239,7 +239,7 @@ def test_help_says_what_each_option_takes(words: tuple[str, ...]) -> None:
             assert one.metavar, one.name
     page = " ".join(run(*words, "--help").stdout.split())
     if "--dialect" in page:
-        assert re.search(f"instead of the recognised one: {', '.join(DIALECTS)}", page)
+        assert f"{{{','.join(DIALECTS)}}}" in page.replace(" ", "").replace("│", "")
 
 
 def test_same_input_same_output(tmp_path: Path) -> None:

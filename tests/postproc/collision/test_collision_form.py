@@ -141,7 +141,7 @@ def test_a_cutter_has_a_height_where_nobody_states_its_flutes() -> None:
 
 def test_the_point_of_a_mill_counts_as_flat_and_is_reported() -> None:
     made, found = form(Tool(7, shape="MILL", diameter=10.0, corner_radius=0.0, tip_angle=np.radians(45.0)))
-    assert made.of(CUTTER).tolist() == [[5.0, 0.0, 5.0, 20.0, 0.0]] and len(found) == 1 and "counts as flat" in found[0]
+    assert made.of(CUTTER).tolist() == [[5.0, 0.0, 5.0, 20.0, 0.0]] and len(found) == 1 and "taken as flat" in found[0]
 
 
 def test_a_drill_without_point_angle_is_flat() -> None:

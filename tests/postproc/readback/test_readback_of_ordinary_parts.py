@@ -9,7 +9,7 @@ import pytest
 
 import toolpaths
 from postproc.readback.comparison import compare
-from tests.postproc.kit import convert, good
+from tests.postproc.kit import SAMPLES, convert, good, setup_of
 from toolpaths.diagnostics import Diagnostic, Severity, warning
 from toolpaths.shape import Curves
 from toolpaths.toolpath import Toolpath
@@ -40,9 +40,12 @@ def read(lines: list[str]) -> Toolpath:
 
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "haas-ngc", "fanuc-30i", "heidenhain-tnc640"])
-def test_a_ring_of_tilted_holes_is_no_rewind(controller: str) -> None:
-    """Home and the retract are the same pose with C half a turn on, the whole program between them."""
-    result = good(convert(ring(), "mikron-ucp710", controller))
+@pytest.mark.parametrize("index", ["plane", "home"])
+def test_a_ring_of_tilted_holes_is_no_rewind(controller: str, index: str) -> None:
+    """Home and the retract are the same pose with C half a turn on, the whole program between them; so is Z home, where
+    axes are indexed there."""
+    setup = setup_of((SAMPLES / "tools.setup.toml").read_text() + f'\n[clearance]\nindex = "{index}"\n')
+    result = good(convert(ring(), "mikron-ucp710", controller, setup=setup))
     assert result.comparison is not None
 
 

@@ -109,7 +109,7 @@ def test_without_a_field_nothing_is_written(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("more", "noted"), [
-    (["--residuals", "r.csv"], "without --error-model"),
+    (["--residuals", "r.csv"], "residuals need --error-model"),
     (["--error-model", "samples/errors/uranesx.toml", "--residuals", "r.csv", "--residuals", "r.txt"], "neither")])
 def test_wrong_use(more: list[str], noted: str) -> None:
     run = CliRunner().invoke(app, ["convert", "samples/pocket.cls", "-m", "uranesx", "-c", "linuxcnc", "-o", "a.ngc", *more])

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from postproc.cli.app import app
 from postproc.controllers.model import load_controller
-from postproc.verification.tool_table import lengths_of
+from postproc.verification.tool_table import ToolTable, table_of
 from tests.postproc.kit import SAMPLES
 from toolpaths.diagnostics import DiagnosticError
 
@@ -17,7 +17,7 @@ CL = Path(__file__).parents[2] / "golden" / "short_five_axis.apt"
 TABLES = {
     "linuxcnc": "; table\nT1 P1 Z+120.031 D6.0 ;T9 Z1 in a remark\nT2 P2 D10 Z95.5\nT3 P3 D1\n",
     "generic-iso": "T1 P1 Z120.031\nT2 P2 Z95.5\n",
-    "fanuc-30i": "%\nG10 L10 P1 R110.\nG10 L10 P1 R120.\nG10 L11 P1 R0.031\nG10L10P2R95.5\nG10 L12 P1 R5.\n%\n",
+    "fanuc-30i": "%\nN1 G90 G10 L10. P1 R120.\nG10 L10 P1 R120.\nG10 L11 P1 R0.031\nG10L10P2R95.5\nG10 L12 P1 R5.\n%\n",
     "haas-ngc": "%\nO01234\nG10 L10 P1 R120.031 (T9)\nG10 L10 P2 R95.5\nM30\n%\n",
     "siemens-840d": "N10 $TC_DP1[1,1]=120\nN20 $TC_DP3[1,1]=120 $TC_DP12[1,1]=0.031\n$TC_DP3[2,1]=90\n$TC_DP21[2,1]=5.5\n"
                     "$TC_DP3[2,2]=7\n",
@@ -26,35 +26,56 @@ TABLES = {
                          "1     D6 L9       +120.0     +3      +0.031\n2                 +95.5      +5\n[END]\n"}
 
 
+def read(table: str, name: str = "linuxcnc") -> ToolTable:
+    controller, _ = load_controller(name)
+    assert controller is not None
+    return table_of(table, controller, "tools")
+
+
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_are_read_as_the_control_writes_them(name: str) -> None:
-    controller, _ = load_controller(name)
-    assert controller is not None
-    found = lengths_of(TABLES[name], controller, "tools")
+    found = read(TABLES[name], name).lengths
     assert {k: found[k] for k in (1, 2)} == pytest.approx({1: 120.031, 2: 95.5})
-    assert lengths_of("register;length\n1;120.031\n\n2;95.5\n", controller, "t.csv") == {1: 120.031, 2: 95.5}
 
 
-def test_inches_of_klartext_are_inches() -> None:
-    controller, _ = load_controller("heidenhain-tnc640")
-    assert controller is not None
-    table = TABLES["heidenhain-tnc640"].replace(".T MM", ".T INCH").replace("+120.0 ", "+4.0   ").replace("+0.031", "+0")
-    table = table.replace("+95.5", "+3.75")
-    assert lengths_of(table, controller, "TOOL.T")[1] == pytest.approx(101.6)
+def test_tables_of_text() -> None:
+    assert read("register;length\n1;120.031\n\n2;95.5\n", "siemens-840d") == ToolTable({1: 120.031, 2: 95.5})
+    found = read("tool\tlength\twear\n1\t120.0\t0.031\n2\t95.5\t\n")
+    assert found.by == "tool" and found.lengths == pytest.approx({1: 120.031, 2: 95.5})
+    assert read("tool,register,length\n1,2,95.5\n") == ToolTable({2: 95.5})
 
 
-@pytest.mark.parametrize(("name", "table", "code", "line"), [
-    ("fanuc-30i", "G10 L10 P1 R120\n", "tool-table.point", 1), ("fanuc-30i", "\nG10 L10 R120.\n", "tool-table.words", 2),
-    ("heidenhain-tnc640", TABLES["heidenhain-tnc640"].replace("+120.0", "+12O.0"), "tool-table.number", 4),
-    ("linuxcnc", "tool,length\n1,120,0.3\n2,x\n", "tool-table.number", 3),
-    ("siemens-840d", "T1 P1 Z120\n", "tool-table.empty", 0), ("linuxcnc", "T1 Z120000\n", "tool-table.length", 1)])
+def test_inches_are_inches() -> None:
+    table = TABLES["heidenhain-tnc640"].replace(".T MM", ".T INCH").replace("+120.0 ", "+4.0   ")
+    table = table.replace("+0.031", "+0").replace("+95.5", "+3.75")
+    assert read(table, "heidenhain-tnc640").lengths[1] == pytest.approx(101.6)
+    assert read("G20\nG10 L10 P1 R4.\nG21\nG10 L10 P2 R4.\n", "haas-ngc").lengths == pytest.approx({1: 101.6, 2: 4.0})
+
+
+REFUSED = [
+    ("fanuc-30i", "G10 L10 P1 R120\n", "point", 1), ("fanuc-30i", "\nG10 L10 R120.\n", "words", 2),
+    ("fanuc-30i", "G10 L10 P1 R1.2.3\n", "number", 1), ("fanuc-30i", "G10 L11 P1 R0.01\n", "wear", 1),
+    ("fanuc-30i", "G91\nG10 L10 P1 R1.\n", "increments", 1), ("fanuc-30i", "/G10 L10 P1 R1.\n", "number", 1),
+    ("fanuc-30i", "G10 L10 P1 R1. G10 L10 P2 R2.\n", "words", 1), ("fanuc-30i", "G10 L10 P1.5 R1.\n", "register", 1),
+    ("haas-ngc", "G10 L10 P1 R10.\nG10 L10 P1 R11.\n", "twice", 2), ("haas-ngc", "G10 L10 P1 R-90.\n", "length", 1),
+    ("heidenhain-tnc640", TABLES["heidenhain-tnc640"].replace("+120.0", "+12O.0"), "number", 4),
+    ("heidenhain-tnc640", TABLES["heidenhain-tnc640"].replace("+120.0", "+120,0"), "number", 4),
+    ("linuxcnc", "T1 P1 Z120,03\n", "number", 1), ("linuxcnc", "T1 P1 Z1.2e2\n", "number", 1),
+    ("linuxcnc", "T1 P1 Z120\nT1 P2 Z95\n", "twice", 2), ("linuxcnc", "T1 Z120000\n", "length", 1),
+    ("linuxcnc", "T1 Z0\n", "length", 1), ("linuxcnc", "tool,length\n1,120,3\n2,5\n", "cells", 2),
+    ("linuxcnc", "register;length\n1;90,9\n", "number", 2), ("linuxcnc", "register;length\n1;90+0.9\n", "number", 2),
+    ("linuxcnc", "register;length;radius\n1;90;3\n", "columns", 1), ("linuxcnc", "register;length\n-1;90\n", "register", 2),
+    ("siemens-840d", "$TC_DP3[1,1]=90,9\n", "number", 1), ("siemens-840d", "$TC_DP3[1,1]=1.2.3\n", "number", 1),
+    ("siemens-840d", "$TC_DP3[1,1]=.\n", "number", 1), ("siemens-840d", "$TC_DP12[1,1]=0.03\n", "wear", 1),
+    ("siemens-840d", "G70\n$TC_DP3[1,1]=4.0\n", "inches", 1), ("siemens-840d", "T1 P1 Z120\n", "empty", 0)]
+
+
+@pytest.mark.parametrize(("name", "table", "code", "line"), REFUSED)
 def test_what_is_no_table_is_refused(name: str, table: str, code: str, line: int) -> None:
-    controller, _ = load_controller(name)
-    assert controller is not None
     with pytest.raises(DiagnosticError) as caught:
-        lengths_of(table, controller, "tools")
+        read(table, name)
     fault = caught.value.diagnostics[0]
-    assert fault.code == code and fault.hint and list(fault.lines) == ([line] if line else [])
+    assert fault.code == f"tool-table.{code}" and fault.hint and list(fault.lines) == ([line] if line else [])
 
 
 def run(*args: str) -> tuple[int, str]:
@@ -76,7 +97,7 @@ def test_verify_takes_the_lengths_of_the_table(tmp_path: Path) -> None:
         assert ("NOT proved" in text) == (not right) and ("second witness agrees" in text) == right
     table.write_text("T7 P1 Z120\n")
     code, text = run(*verify)
-    assert code == 1 and "tool-table.missing" in text and "no length in register 1 (T1)" in text
+    assert code == 1 and "tool-table.missing" in text and "no length of register 1 (T1)" in text
     code, text = run(*verify[:-1], str(tmp_path / "none.tbl"))
     assert code == 1 and "tool-table.open" in text
 
@@ -90,3 +111,19 @@ def test_a_table_turning_machine_takes_any_length_up(tmp_path: Path) -> None:
     table.write_text("T1 P1 Z390\n")
     code, text = run("verify", str(program), str(CL), *given, "--tool-table", str(table))
     assert code == 1 and "verify.travel" in text
+
+
+def test_a_length_far_off_and_bodies_that_it_does_not_reach_are_noted(tmp_path: Path) -> None:
+    setup, table, program = tmp_path / "shop.toml", tmp_path / "tools.csv", tmp_path / "part.ngc"
+    setup.write_text('[tools.1]\ngauge_length = 101.6\nflute_length = 20.0\nshank = [{ diameter = 6, length = 30 }]\n'
+                     'holder = [{ diameter = 40, length = 51.6 }]\n[[bodies.fixtures]]\nname = "block"\n'
+                     'box = {low = [200.0, 200.0, 0.0], high = [220.0, 220.0, 20.0]}\n')
+    given = ("-m", "mikron-ucp710", "-c", "linuxcnc", "--setup", str(setup))
+    code, text = run("convert", str(CL), *given, "-o", str(program))
+    assert code == 0, text
+    table.write_text("tool,length\n1,4.0\n")
+    _, text = run("verify", str(program), str(CL), *given, "--tool-table", str(table))
+    assert "tool-table.far" in text and "tool-table.bodies" in text and "97.6000 mm" in text
+    table.write_text("tool,length\n1,101.7\n")
+    code, text = run("verify", str(program), str(CL), *given, "--tool-table", str(table))
+    assert code == 0 and "tool-table." not in text
