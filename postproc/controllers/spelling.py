@@ -71,7 +71,7 @@ class FurtherOffsets(UserModel):
     """what the control must have for it: a comment at the head of programs with one; {name} is its name"""
 
 
-CarriedOut = Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?-[GM][0-9]+(\.[0-9]+)?$|^[A-Z]$|" + PASSIVE)]
+CarriedOutName = Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?-[GM][0-9]+(\.[0-9]+)?$|^[A-Z]$|" + PASSIVE)]
 
 
 class ProgramBlocks(UserModel):
@@ -96,7 +96,7 @@ class ProgramBlocks(UserModel):
     passive: tuple[PassiveWord, ...] = ()
     """codes of the shop's own blocks that move nothing and change no state, or the words that such a statement begins with
     ("CYCLE977", "TCH PROBE"): read back without being executed"""
-    carried_out: tuple[CarriedOut, ...] = ("G0-G64.9", "G66-G199", "M0-M9", "M13-M14", "M29-M30", "M98-M99", "L")
+    carried_out: tuple[CarriedOutName, ...] = ("G0-G64.9", "G66-G199", "M0-M9", "M13-M14", "M29-M30", "M98-M99", "L")
     """what the control itself carries out, so that it never is passive: G and M numbers ("G52"), stretches of them
     ("G0-G64.9"), and the first words of statements ("TRANS", "CYCL DEF"), next to what the read-back knows"""
     path_tolerance: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...] = ()
