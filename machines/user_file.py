@@ -279,7 +279,8 @@ def _faults(values: Values, model: type[BaseModel], found: ValidationError) -> l
             kind, context, path = "too_short", {"min_length": path[-1] + 1}, path[:-1]
         words = allowed(kind, context)
         message = f"allowed: {words}" if words else message[:1].lower() + message[1:]
-        fault, said = _Fault(path, kind, message, detail["input"], advice(kind, detail["input"])), by_key.get(path)
+        hint = getattr(context.get("error"), "hint", "") or advice(kind, detail["input"])
+        fault, said = _Fault(path, kind, message, detail["input"], hint), by_key.get(path)
         by_key[path] = replace(said, message=f"{said.message}, or {message.removeprefix('allowed: ')}", hint="") if said \
             else fault
     misspelt = {(*f.path[:-1], _nearest_key(f.path, model)) for f in by_key.values() if f.kind == "extra_forbidden"}
@@ -313,7 +314,7 @@ def _diagnostic(file: UserFile, model: type[BaseModel], fault: _Fault) -> Diagno
         where = f"to [{dotted(path[:-1])}]" if path[1:] else "at the top"
         return file.problem("file.missing-key", path, f"key {key!r} is missing", f"add {path[-1]} = ... {where}")
     if code:
-        return file.problem(code, path, f"{key}: {fault.message}" if key else fault.message)
+        return file.problem(code, path, f"{key}: {fault.message}" if key else fault.message, fault.hint)
     code = "file.range" if any(word in fault.kind for word in _RANGE) else "file.type"
     hint = _described(model, path) if fault.kind == "string_pattern_mismatch" else fault.hint
     return file.problem(code, path, f"{key} = {_shown(fault.value)}: {fault.message}", hint)

@@ -26,12 +26,22 @@ def allowed(kind: str, context: Mapping[str, Any]) -> str:
     return _ALLOWED.get(kind, "").format(**context)
 
 
+class AdvisedError(ValueError):
+    """A value that a model refuses, with what to do about it."""
+
+    def __init__(self, message: str, hint: str) -> None:
+        super().__init__(message)
+        self.hint = hint
+
+
 def advice(kind: str, value: object) -> str:
     """What to do where a value was meant to be what is allowed; "" where the allowed says it."""
     if kind in ("float_type", "int_type") and isinstance(value, str) and _NUMBER.match(value):
         return "write the number without quotes" + (", with a decimal point" if "," in value else "")
     if kind == "string_type" and isinstance(value, int | float):
         return "write it in quotes"
+    if kind == "string_type":
+        return "write text in quotes"
     if kind == "too_long" and isinstance(value, list) and all(isinstance(v, int) for v in value):
         return "numbers have decimal points: a comma begins the next"
     return ""

@@ -17,9 +17,11 @@ READERS = {
 FILES = {
     "toolpaths.interrupted_runs": "names of temporary files", "toolpaths.shapes": "tables of shapes",
     "machines.toml_lines": "lines of TOML files", "machines.value_words": "values in TOML files",
+    "machines.hooks": "blocks of the shop in machine files and set-ups",
     "machines.serial_models": "structures of machines (ISO 10791-6)",
     "machines.calibration.folded_names": "names of parameters",
     "machines.geometric_error.exchange.imports": "tables of others",
+    "postproc.pipeline.hooks": "blocks of controller files",
     "postproc.reference.records": "blocks of INSERT records",
     "postproc.base.header_words": "heads of programs: written and read in one place",
     "postproc.cycle_time.source": "whether a file is a CL file or a program",

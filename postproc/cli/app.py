@@ -73,8 +73,8 @@ app.command(epilog=PLACES)(place)
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
                                      "corrected, and proved on the machine with them")]
-ToolTableOption = Annotated[str, typer.Option("--tool-table", metavar="FILE", help="the control's tool table: verify with the "
-                                        "lengths of tools at the machine")]
+ToolTableOption = Annotated[str, typer.Option("--tool-table", metavar="FILE", help="the control's tool table: verify with "
+                                              "the lengths of tools at the machine")]
 ErrorsOfProgram = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric "
                                               "errors that the program corrects")]
 OutputModeOption = Annotated[OutputMode, word_option("--output-mode", OutputMode, (
@@ -160,7 +160,8 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            axis_tolerance: AxisToleranceOption = 0.05, units: UnitsOption = "", dialect: DialectOption = "",
            allow_unknown: Allow = None,
            error_model: ErrorsOfProgram = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-           require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTableOption = "", json: Json = "") -> None:
+           require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTableOption = "",
+           json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
                       error_model=error_model, orient=orient, max_tilt=max_tilt,

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from machines.hooks import PassiveWord
+from machines.hooks import PASSIVE, PassiveWord
 from machines.user_file import UserModel
 from postproc.controllers.texts import (
     WORK_OFFSETS,
@@ -71,6 +71,9 @@ class FurtherOffsets(UserModel):
     """what the control must have for it: a comment at the head of programs with one; {name} is its name"""
 
 
+CarriedOutName = Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?-[GM][0-9]+(\.[0-9]+)?$|^[A-Z]$|" + PASSIVE)]
+
+
 class ProgramBlocks(UserModel):
     """Blocks that stand around every program."""
 
@@ -93,6 +96,9 @@ class ProgramBlocks(UserModel):
     passive: tuple[PassiveWord, ...] = ()
     """codes of the shop's own blocks that move nothing and change no state, or the words that such a statement begins with
     ("CYCLE977", "TCH PROBE"): read back without being executed"""
+    carried_out: tuple[CarriedOutName, ...] = ("G0-G64.9", "G66-G199", "M0-M9", "M13-M14", "M29-M30", "M98-M99", "L")
+    """what the control itself carries out, so that it never is passive: G and M numbers ("G52"), stretches of them
+    ("G0-G64.9"), and the first words of statements ("TRANS", "CYCL DEF"), next to what the read-back knows"""
     path_tolerance: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...] = ()
     """blocks that set the control's own smoothing; {tolerance} and {chain} in mm, {axis} in degrees"""
     relies_on_turns: Annotated[str, placeholders("axes")] = ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -82,11 +83,14 @@ def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
 
 
 def stops_between(toolpath: Toolpath) -> list[ToolChange]:
-    """The tool changes, but for the first, before which the file itself does not stop: where `stop_between_tools` does."""
-    changes = tool_changes(toolpath)
-    stops = [(e.index, e.line) for e in toolpath.events if e.word in ("STOP", "OPSTOP")]
-    before = {(c.index, c.line) for c in changes[1:] if not any(i == c.index and line <= c.line for i, line in stops)}
-    return [c for c in changes if (c.index, c.line) in before]
+    """The tool changes, but for the first, before which the file itself does not stop since the last cut: where
+    `stop_between_tools` does."""
+    changes = tool_changes(toolpath)[1:]
+    stops = sorted((e.index, e.line) for e in toolpath.events if e.word in ("STOP", "OPSTOP"))
+    cuts = np.flatnonzero(cutting(toolpath))
+    last = [int(cuts[k - 1]) if k else -1 for k in np.searchsorted(cuts, [c.index for c in changes]).tolist()]
+    before = [bisect(stops, (c.index, c.line)) for c in changes]
+    return [c for c, cut, k in zip(changes, last, before, strict=True) if k == 0 or stops[k - 1][0] <= cut]
 
 
 def register_changes(toolpath: Toolpath) -> list[ToolChange]:

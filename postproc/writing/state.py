@@ -184,6 +184,10 @@ _ZEROS = re.compile(r"0+ ")
 _MINUS_ZERO = re.compile(r"-0(?=\.?0* )")
 
 
+NUMBER_ROOM = 12
+"""characters that a block number may take"""
+
+
 def peck_of(cycle: Cycle) -> float:
     """Depth of a peck, mm: the whole depth where the cycle names none."""
     return cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance
@@ -191,7 +195,7 @@ def peck_of(cycle: Cycle) -> float:
 def comment_room(controller: ControllerFile) -> int:
     """Characters that a comment block holds, a block number before it counted."""
     style = controller.comment
-    return controller.format.line_length - len(style.open) - len(style.close) - 12
+    return controller.format.line_length - len(style.open) - len(style.close) - NUMBER_ROOM
 
 
 def clean(controller: ControllerFile, text: str) -> str:

@@ -9,6 +9,7 @@ from itertools import chain
 
 import numpy as np
 
+from machines.hooks import filled
 from postproc.compile.clamps import CLAMP, UNCLAMP
 from postproc.compile.hooks import HOOK
 from postproc.compile.program import PER_MINUTE, Command, Hole
@@ -16,7 +17,7 @@ from postproc.control.rollover import HALF
 from postproc.controllers.model import Mode
 from postproc.controllers.texts import blocks_of
 from postproc.reference.coolant import COMMANDS, switching
-from postproc.writing.state import WriterState, plain_name
+from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name
 from toolpaths.arrays import Ints
 
 _LABEL = re.compile(r"%|[NO]\d")
@@ -297,8 +298,9 @@ class Writer(WriterState, ABC):
         text, number, name, operation = (str(arg) for arg in command.args)
         self.turning = self.cooling = None
         self.forget()
-        return text.format(tool_number=self.plain(max(float(number), 0.0)), tool_name=plain_name(name),
-                           operation=plain_name(operation), work_offset=self.offset_name)
+        values = {"tool_number": self.plain(max(float(number), 0.0)), "tool_name": plain_name(name),
+                  "operation": plain_name(operation), "work_offset": self.offset_name}
+        return filled(text, values, self.controller.format.line_length - NUMBER_ROOM)
 
     def operation(self, name: str, restart: bool) -> Iterator[str]:
         """The start of an operation: its blocks, and every modal code stated again behind them.

@@ -52,6 +52,7 @@ class Reader(ABC):
         arc_slack: mm by which the radius may differ between the ends of an arc
         sides, smoothing_hint: what the control calls cutter compensation and its own smoothing
         neutral: statements that change nothing of what is read back
+        statements: first words of those that it knows
         units_codes, units_from: what states mm or inches, and what says them where nothing does
         units_stay: that is a setting of the control, which no program changes
         stating: by group, the words that state it; a block that relies on one that nothing states is an error in `verify`
@@ -71,6 +72,7 @@ class Reader(ABC):
     sides: ClassVar[dict[int, str]] = {40: "off (G40)", 41: "left (G41)", 42: "right (G42)"}
     smoothing_hint = "G64 P Q as the post writes it, or G61"
     neutral: ClassVar[frozenset[str]] = frozenset()
+    statements: ClassVar[frozenset[str]] = frozenset()
     units_codes = "G20 or G21"
     units_from = "the program before left them"
     units_stay = False

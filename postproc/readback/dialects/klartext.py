@@ -43,6 +43,8 @@ _QWORD = re.compile(rf"Q(\d+)\s*=\s*({_NUMBER})")
 _KEYED = re.compile(rf"(SP[ABC]|DIST|ABST|T|TA|HSC-MODE:|S|F|DL|DR|DR2)\s*({_NUMBER})")
 _SIDES = {"R0": 40.0, "RL": 41.0, "RR": 42.0}
 _PASSIVE = ("BLK FORM", "TOOL DEF", "* -", "*")
+_WORKS = re.compile(r"(?<![A-Z0-9])M ?\d")
+"""an M function, which no statement of the shop hides"""
 _CONTOURS = ("CC", "CP", "CR", "C", "LP", "L")
 _FAST = ((b"F MAX", b"G0"), (b"FMAX", b"G0"), (b" R0", b" G40"), (b" RL", b" G41"), (b" RR", b" G42"))
 _HINT = "allowed are L, C, CR, CP, LP, CC, TOOL CALL, CYCL DEF, CYCL CALL, PLANE SPATIAL, FUNCTION TCPM, LBL, CALL"
@@ -54,6 +56,9 @@ class KlartextReader(Reader):
     groups: Groups = GROUPS | {"offset": (), "length": (), "level": (), "path": (), "once": (), "arc_distance": (),
                                "distance": (), "units": (), "feed_mode": (), "plane": ()}
     turn_codes = True
+    statements = frozenset({*_CONTOURS, "BLK FORM", "TOOL DEF", "BEGIN PGM", "END PGM", "TOOL CALL", "CYCL DEF", "CYCL CALL",
+                            "LBL", "CALL LBL", "CALL PGM", "PLANE SPATIAL", "PLANE RESET", "FUNCTION TCPM",
+                            "FUNCTION RESET TCPM", "STOP"})
     m_codes = (*M_CODES, 13.0, 14.0, 91.0, 99.0, 126.0, 127.0, 128.0, 129.0)
     letters = "GMFSR?"
     sides: ClassVar[dict[int, str]] = {40: "off (R0)", 41: "left (RL)", 42: "right (RR)"}
@@ -98,8 +103,8 @@ class KlartextReader(Reader):
         """One block that is no plain L."""
         body = re.sub(r"^\s*\d+\s+", "", row.strip() + " ").strip() if not row.strip().isdigit() else ""
         own = self.controller.program.passive if self.controller is not None else ()
-        if not body or body.startswith(_PASSIVE) or any(re.match(rf"{re.escape(p)}(?![A-Z0-9])", body) for p in own
-                                                        if p[1:2].isalpha()):
+        if not body or body.startswith(_PASSIVE) or (not _WORKS.search(body) and any(
+                re.match(rf"{re.escape(p)}(?![A-Z0-9])", body) for p in own if p[1:2].isalpha())):
             return []
         made = _named(body)
         if made is None:

@@ -73,6 +73,7 @@ class SiemensReader(Reader):
     stating = {k: v for k, v in Reader.stating.items() if k != "level"} | {"length": "D, or a tool"}
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tcp": ("TRAFOOF",), "tilted": ("CYCLE800",)}
     neutral: ClassVar[frozenset[str]] = PASSIVE
+    statements = KNOWN
     units_codes = "G70, G71, G700 or G710"
     units_from = "machine data 20150 and 20152 have the reset position of group 13"
     smoothing_hint = "CYCLE832 as the post writes it, or G60"

@@ -22,9 +22,10 @@ GROUPS: Groups = {
     "compensation": (40, 41, 42), "path": (61, 61.1, 64), "once": (4, 53), "arc_distance": (90.1, 91.1),
 }
 """of NIST RS274/NGC and LinuxCNC; a dialect adds its own"""
-MACROS = ("G65", "G66")
-"""calls of a macro, whose arguments may be any words"""
-_ARGUMENTS = [ord(a) for a in "PQRLHDE"]
+MACROS = ("G65",)
+"""calls of a macro, whose arguments may be any words but G"""
+_ARGUMENTS = {"G": [ord(a) for a in "PQRLEIJK"], "M": [ord(a) for a in "PQRLE"], "L": [ord("P")]}
+"""words that belong to a code which is no macro call: no axis, feed, speed, tool or register"""
 _PART = 200_000
 """words that are looked at together"""
 
@@ -134,19 +135,18 @@ def modal_state(words: Words) -> Modal:
 
 def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
     """Words without codes that the controller file calls passive, and what stands behind them in their blocks: all words of
-    a macro call, up to the next G or M code those of other G codes, of M codes those that are no axis, feed or speed."""
+    a macro call up to the next G code, of others up to the next code those that are no axis, feed, speed, tool, register."""
     drop = np.zeros(len(words.letter), dtype=bool)
-    ends = (words.letter == ord("G")) | (words.letter == ord("M"))
     for code in passive:
         if not code[1:2].isdigit():
             continue
         value = float(code[1:])
         for k in np.flatnonzero((words.letter == ord(code[0])) & (words.value == value)).tolist():
             stop = int(np.searchsorted(words.line, words.line[k], side="right"))
-            if code not in MACROS:
-                stop = next((i for i in range(k + 1, stop) if ends[i]), stop)
+            ends = np.isin(words.letter[k + 1:stop], [ord("G")] if code in MACROS else [ord("G"), ord("M")])
+            stop = k + 1 + int(np.flatnonzero(ends)[0]) if ends.any() else stop
             drop[k] = True
-            drop[k + 1:stop] = True if code[0] == "G" else np.isin(words.letter[k + 1:stop], _ARGUMENTS)
+            drop[k + 1:stop] |= True if code in MACROS else np.isin(words.letter[k + 1:stop], _ARGUMENTS[code[0]])
     return words.take(~drop)
 
 

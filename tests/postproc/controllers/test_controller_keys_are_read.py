@@ -23,14 +23,14 @@ ONE_VALUE = {"kinematics.linear"}
 OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "modes.tilted", "arcs.helix_planes",
           "cutter_compensation.begins_on_arc", "cutter_compensation.ends_on_arc", "cutter_compensation.modal_register",
           "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload",
-          "tools.length_automatic", "program.operation", "program.relies_on_turns", "program.stock",
+          "tools.length_automatic", "program.operation", "program.carried_out", "program.relies_on_turns", "program.stock",
           "subprograms.call", "subprograms.begin", "subprograms.end",
           "subprograms.place", "subprograms.file", "subprogram_files.call", "subprogram_files.begin", "subprogram_files.end",
           "subprogram_files.place", "subprogram_files.file",
           *(f"rollover.{key}" for key in ("default", "rules", "shortest", "positive", "negative", "zero_negative", "on",
                                           "needs"))}
 """keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py, test_compensated_arcs.py,
-test_parts.py, test_rollover.py, test_output_quality.py and test_output_modes*.py show what they do"""
+test_parts.py, test_rollover.py, test_hooks_refused.py, test_output_quality.py and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states"""
 OTHER: dict[str, Any] = {
