@@ -84,8 +84,8 @@ PassiveWords = Annotated[tuple[PassiveWord, ...], BeforeValidator(_listed)]
 
 
 class HooksModel(UserModel):
-    """Blocks that the shop wants at certain places; {tool_number}, {tool_name}, {operation} and {work_offset} stand for what
-    holds there."""
+    """Blocks that the shop wants at certain places; {tool_number}, {tool_name}, {operation} and {work_offset}
+    stand for what holds there."""
 
     before_tool: HookBlocks = ()
     """before each tool change, spindle and coolant being off; {tool_number} is that of the new tool"""
@@ -104,9 +104,9 @@ class HooksModel(UserModel):
     after_stop: HookBlocks = ()
     """behind them"""
     passive: PassiveWords = ()
-    """codes of these blocks, e.g. "M31", "G65", "CYCLE977", "TCH PROBE", "L9000": G and M with a number, L with one
-    (Siemens), or words that a statement begins with. They come back to where they began and change no state of the
-    control; read back without being executed"""
+    """codes of these blocks, e.g. "M31", "G65", "CYCLE977", "TCH PROBE", "L9000": G and M with a number, L
+    with one (Siemens), or words that a statement begins with. They come back to where they began and change
+    no state of the control; read back without being executed"""
 
     @property
     def places(self) -> dict[str, tuple[str, ...]]:

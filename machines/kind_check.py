@@ -45,7 +45,8 @@ def contract_faults(kinematics: Kinematics, limits: Limits, home: Floats) -> Ite
 
 
 def _problem(what: str) -> KeyProblem:
-    return KeyProblem("machine.contract", _PATH, what, "correct the kind: machines/kinematics/base.py says what it promises")
+    return KeyProblem("machine.contract", _PATH, what,
+                      "correct the kind: machines/kinematics/base.py says what it promises")
 
 
 def _letters(kin: Kinematics) -> Iterator[KeyProblem]:

@@ -95,12 +95,12 @@ class Machine:
         home: (J,) joints where programs start and tool changes happen
         retract_axis: index of the linear joint that lifts the tool at home (approach goes there last), or -1
         control_kinematics: set where the control owns the kinematics (programs in tip coordinates)
-        stop: what a stop of the program switches off: "spindle and coolant", "spindle", "nothing", or "" where the machine
-            file does not say
+        stop: what a stop of the program switches off: "spindle and coolant", "spindle", "nothing", or ""
+            where the machine file does not say
         turns: per joint, how it counts its turns; () as by `Turns()`
         clamps: per joint, the codes that clamp and release it; () as by `ClampCodes()`
-        length_register, radius_register: what H and D of a tool are more than its number where the CL file names none; None:
-            D is no rule of its own
+        length_register, radius_register: what H and D of a tool are more than its number where the CL file
+            names none; None: D is no rule of its own
         hooks: blocks of the shop at certain places of a program
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """

@@ -2,9 +2,9 @@
 
 A pair of parallel rods AB with its joints along b stops the platform's turn about AB x b. Three pairs (Delta) must stop
 all turns: their (AB x b) span space. In the H4a two pairs leave one turn, about (A1B1 x b1) x (A2B2 x b2): it has the
-fixed direction x only where b1 and b2 are along x, and exists only where that product is not 0 (Company 2000, V-1 to
-V-5 and V.4.2, where "u_i" stands for b_i). The other condition is det Jx, which with it makes the determinant of the
-full constraint matrix. None may vanish or change its sign anywhere in the workspace.
+fixed direction x only where b1 and b2 are along x, and exists only where that product is not 0 (Company 2000,
+V-1 to V-5 and V.4.2, where "u_i" stands for b_i). The other condition is det Jx, which with it makes the
+determinant of the full constraint matrix. None may vanish or change its sign anywhere in the workspace.
 """
 
 from __future__ import annotations
@@ -105,7 +105,8 @@ def _direction_faults(rods: Sequence[Sequence[Vector]], names: Sequence[str]) ->
                              "does not", "shift single rods along x only")
 
 
-def _out_of_reach(legs: Legs, ends: Floats, place: Floats, tilt: Floats, names: Sequence[str]) -> Iterator[KeyProblem]:
+def _out_of_reach(legs: Legs, ends: Floats, place: Floats, tilt: Floats,
+                  names: Sequence[str]) -> Iterator[KeyProblem]:
     _, half = legs.solve(ends)
     for k, name in enumerate(names[: len(legs.lengths)]):
         bad = np.flatnonzero(~(half[:, k] > 0.0))
@@ -115,7 +116,8 @@ def _out_of_reach(legs: Legs, ends: Floats, place: Floats, tilt: Floats, names: 
                              "make the workspace smaller or the rod longer")
 
 
-def _sign_fault(code: str, what: str, value: Floats, place: Floats, tilt: Floats, hint: str) -> Iterator[KeyProblem]:
+def _sign_fault(code: str, what: str, value: Floats, place: Floats, tilt: Floats,
+                hint: str) -> Iterator[KeyProblem]:
     mostly = value if np.median(value) > 0.0 else -value
     worst, best = int(np.argmin(mostly)), int(np.argmax(mostly))
     if mostly[worst] < LEAST:

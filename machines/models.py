@@ -91,19 +91,20 @@ class AxisModel(UserModel):
     home: float
     """position for tool change and programme start, mm or degrees"""
     modulo: bool = False
-    """the control counts this rotary axis modulo 360 degrees (roll-over): its words stay inside one turn. Fanuc: parameter
-    1008#0 ROA = 1 and 1260 = 360; Siemens: MD30310 $MA_ROT_IS_MODULO; LinuxCNC: WRAPPED_ROTARY = 1"""
+    """the control counts this rotary axis modulo 360 degrees (roll-over): its words stay inside one turn.
+    Fanuc: parameter 1008#0 ROA = 1 and 1260 = 360; Siemens: MD30310 $MA_ROT_IS_MODULO; LinuxCNC: WRAPPED_ROTARY = 1"""
     modulo_range: Turn = (0.0, 360.0)
     """degrees, the turn that words of a modulo axis are written in"""
     rollover: RolloverRule | None = None
-    """which path the control takes to a word of a modulo axis: the shorter one (Fanuc 1008#1 RAB = 0, Heidenhain M126), that
-    of the word's sign (Fanuc RAB = 1, LinuxCNC), or none: it counts the turns after all. Default: that of the controller"""
+    """which path the control takes to a word of a modulo axis: the shorter one (Fanuc 1008#1 RAB = 0,
+    Heidenhain M126), that of the word's sign (Fanuc RAB = 1, LinuxCNC), or none: it counts the turns after
+    all. Default: that of the controller"""
     park: Park = "turn"
-    """where an axis that turns on and on is parked: at the whole turn that is nearest to home, or at home itself, all turns
-    unwound; a modulo axis that rolls over has no turns to unwind"""
+    """where an axis that turns on and on is parked: at the whole turn that is nearest to home, or at home
+    itself, all turns unwound; a modulo axis that rolls over has no turns to unwind"""
     clamp: MCode = ""
-    """M code that clamps this rotary axis, e.g. "M10", where the program has to say it; the builder's manual has it. Empty:
-    the machine clamps by itself"""
+    """M code that clamps this rotary axis, e.g. "M10", where the program has to say it; the builder's manual
+    has it. Empty: the machine clamps by itself"""
     unclamp: MCode = ""
     """M code that releases it, before every block that turns it, e.g. "M11" """
     assumed: tuple[Literal["travel", "velocity", "acceleration", "jerk"], ...] = ()
@@ -140,11 +141,11 @@ class ControlModel(UserModel):
 
 
     length_register: Register = "T"
-    """the length register H of a tool for which the CL file names none or the tool's number T: "T", or "T + 20"; of controls
-    that name registers"""
+    """the length register H of a tool for which the CL file names none or the tool's number T: "T", or "T +
+    20"; of controls that name registers"""
     radius_register: Register | None = None
-    """the register D of a CUTCOM that names none or the tool's number, by the same rule, e.g. "T + 30"; default: that
-    of the length where D is modal, else the tool's own"""
+    """the register D of a CUTCOM that names none or the tool's number, by the same rule, e.g. "T + 30";
+    default: that of the length where D is modal, else the tool's own"""
 
 
 class MachineModel(UserModel):
@@ -240,7 +241,8 @@ def _clamp_problem(name: str, axis: AxisModel, rotary: bool) -> KeyProblem | Non
     if not axis.clamp and not axis.unclamp:
         return None
     if not rotary:
-        return KeyProblem("machine.clamp", ("axes", name, used), f"linear axis {name} has {used}", f"take {used} out")
+        return KeyProblem("machine.clamp", ("axes", name, used), f"linear axis {name} has {used}",
+                          f"take {used} out")
     if not axis.clamp or not axis.unclamp or axis.clamp == axis.unclamp:
         return KeyProblem("machine.clamp", ("axes", name, used), f"axis {name} has clamp = {axis.clamp!r} and unclamp = "
                           f"{axis.unclamp!r}", 'write both, two codes, e.g. clamp = "M10", unclamp = "M11"')

@@ -46,7 +46,8 @@ class LinearDeltaModel(SliderModel):
 
     def mobility_problems(self) -> Iterator[KeyProblem]:
         """Workspace out of reach or singular; pairs of rods that leave the platform a turn."""
-        yield from reach_faults(self.build_legs(), self.platform_joints(), self.workspace.build(), self.axis_names)
+        yield from reach_faults(self.build_legs(), self.platform_joints(), self.workspace.build(),
+                                self.axis_names)
         pairs = [leg.rods for leg in self.legs.values()]
         if all(len(pair) == 2 for pair in pairs):
             across = np.array([np.subtract(pair[0], pair[1]) for pair in pairs])
@@ -115,7 +116,8 @@ class H4LinearModel(SliderModel):
         sense, names, clearance = float(self.rotary.positive), self.axis_names, self.build_clearance()
         if self.rotary.carries == "part":
             return H4TableAxis(platform, self.gauge, sense, names, clearance=clearance)
-        return H4SpindleAxis(platform, self.gauge, sense, names, clearance=clearance, pivot=np.array(self.rotary.pivot))
+        return H4SpindleAxis(platform, self.gauge, sense, names, clearance=clearance,
+                             pivot=np.array(self.rotary.pivot))
 
     def _leg_problems(self) -> Iterator[KeyProblem]:
         yield from super()._leg_problems()

@@ -1,8 +1,8 @@
 """What the joints allow at the tip: polytopes of velocity, acceleration and jerk.
 
-In positioned (3+2) machining the rotary joints stand and the tool axis is kept, so that joint rates follow the tip's
-linearly, dq = G v, and each limit |dq_j| <= l_j is a pair of half-spaces of the tip's rate v (Grandguillaume, Lavernhe,
-Tournier 2017, equations 1, 2 and 6). The same G serves velocity, acceleration and jerk.
+In positioned (3+2) machining the rotary joints stand and the tool axis is kept, so that joint rates follow
+the tip's linearly, dq = G v, and each limit |dq_j| <= l_j is a pair of half-spaces of the tip's rate v
+(Grandguillaume, Lavernhe, Tournier 2017, equations 1, 2 and 6). The same G serves velocity, acceleration and jerk.
 """
 
 from __future__ import annotations

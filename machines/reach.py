@@ -75,9 +75,9 @@ def reach(kinematics: Kinematics, q: Floats, near: Floats | None = None) -> Marg
 def reach_between(kinematics: Kinematics, q: Floats, depth: int = 6) -> Margins:
     """Least margins (N-1, M) on the straight joint moves between consecutive q (N, J), their ends included.
 
-    A move is halved until it cannot hide a negative margin, `depth` times at most. The test for that: a margin
-    changes along a move by no more than the fastest of its changes seen at ends and middle, doubled; where that could
-    bring it below 0 the halves are looked at.
+    A move is halved until it cannot hide a negative margin, `depth` times at most. The test for that: a
+    margin changes along a move by no more than the fastest of its changes seen at ends and middle, doubled;
+    where that could bring it below 0 the halves are looked at.
     """
     checks = _Checks(kinematics)
     ends = reach(kinematics, q).values
@@ -132,7 +132,8 @@ class _Checks:
         return np.minimum(rig.tilt - low, high - rig.tilt)
 
     def _stops(self) -> Iterator[MarginColumn]:
-        stops = (("slide", False, self.clearance.carriage_angle), ("platform", True, self.clearance.platform_angle))
+        stops = (("slide", False, self.clearance.carriage_angle),
+                 ("platform", True, self.clearance.platform_angle))
         for k, letter in enumerate(self.letters[: len(self.legs.lengths)]):
             for where, carried, most in stops:
                 if most is not None:

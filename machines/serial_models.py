@@ -73,7 +73,8 @@ class SerialModel(KinematicsModel):
 
     def build(self) -> Serial:
         """The kinematics at the gauge point."""
-        return Serial(tuple(self._joint(name) for name in self.letters), self.axis_names, np.array(self.tool_axis))
+        return Serial(tuple(self._joint(name) for name in self.letters), self.axis_names,
+                      np.array(self.tool_axis))
 
     def _joint(self, name: str) -> Joint:
         axis = self.axes.get(name, SerialAxisModel())
@@ -94,7 +95,8 @@ class SerialModel(KinematicsModel):
                 yield KeyProblem("machine.axis-unknown", path, f"structure {self.structure!r} has no axis {name!r}",
                                  f"its axes are {', '.join(self.axis_names)}")
             elif name not in "ABC" and axis.point is not None:
-                yield KeyProblem("machine.geometry", (*path, "point"), f"linear axis {name} has no point", "take it out")
+                yield KeyProblem("machine.geometry", (*path, "point"), f"linear axis {name} has no point",
+                                 "take it out")
             if axis.direction is not None:
                 yield from _unit_problems((*path, "direction"), axis.direction)
         for name in self.letters:

@@ -141,7 +141,8 @@ class SliderModel(KinematicsModel):
                 yield KeyProblem("machine.axis-letter", ("legs", name), f"{name!r} is not a letter of a linear axis",
                                  "choose from X Y Z U V W P Q R")
             if len(leg.rods) > 2:
-                yield KeyProblem("machine.geometry", ("legs", name, "rods"), f"{len(leg.rods)} rods; a leg has one or two")
+                yield KeyProblem("machine.geometry", ("legs", name, "rods"),
+                                 f"{len(leg.rods)} rods; a leg has one or two")
 
     @abstractmethod
     def mobility_problems(self) -> Iterator[KeyProblem]:

@@ -1,7 +1,7 @@
 """Files that a user writes (machine, controller, set-up, error model): TOML in, a checked model or diagnostics out.
 
-A file may begin with `base = "name"`: the values of that built-in file (or of a .toml file next to it) are taken
-first, tables are merged key by key, everything else is replaced. Every problem names the file and line of the value.
+A file may begin with `base = "name"`: the values of that built-in file (or of a .toml file next to it) are
+taken first, tables are merged key by key, everything else is replaced. Every problem names the file and line of the value.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def _nearest(word: str, known: Sequence[str]) -> str | None:
     return next((k for k in known if close and k.lower() == close[0]), None)
 
 
-# ---- reading and merging ----------------------------------------------------------------------------------------
+# ---- reading and merging -----------------------------------------------------------------------------------
 
 def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: UserFile | None,
           above: tuple[str, ...]) -> tuple[UserFile | None, list[Diagnostic]]:
@@ -196,7 +196,8 @@ def _text(path: FilePath, source: str, builtin: Mapping[str, FilePath], kind: st
         return read_input(path).decode("utf-8-sig").replace("\r\n", "\n"), None
     except FileNotFoundError:
         what = f"no {kind} is called {source!r}" + ("" if source in builtin else " and there is no such file")
-        return None, error("file.not-found", what, file=file, lines=lines, hint=nearest(source, sorted(builtin)))
+        return None, error("file.not-found", what, file=file, lines=lines,
+                           hint=nearest(source, sorted(builtin)))
     except OSError as fault:
         return None, error("file.unreadable", f"cannot read {shown(path)}: {reason(fault)}", file=file, lines=lines,
                            hint=remedy(fault, f"name a TOML file of a {kind}"))
@@ -249,7 +250,7 @@ def _merge(under: Values, over: Values, under_at: Mapping[KeyPath, ValueSource],
     return values, origins
 
 
-# ---- faults of the values ---------------------------------------------------------------------------------------
+# ---- faults of the values ----------------------------------------------------------------------------------
 
 _CODES = {"value_error": "file.value", "assertion_error": "file.value"}
 _RANGE = ("greater_than", "less_than", "too_short", "too_long", "multiple_of", "finite_number", "literal_error", "enum",
@@ -312,7 +313,8 @@ def _diagnostic(file: UserFile, model: type[BaseModel], fault: _Fault) -> Diagno
                             nearest(str(path[-1]), _known_keys(model, path[:-1])))
     if fault.kind == "missing":
         where = f"to [{dotted(path[:-1])}]" if path[1:] else "at the top"
-        return file.problem("file.missing-key", path, f"key {key!r} is missing", f"add {path[-1]} = ... {where}")
+        return file.problem("file.missing-key", path, f"key {key!r} is missing",
+                            f"add {path[-1]} = ... {where}")
     if code:
         return file.problem(code, path, f"{key}: {fault.message}" if key else fault.message, fault.hint)
     code = "file.range" if any(word in fault.kind for word in _RANGE) else "file.type"

@@ -52,7 +52,8 @@ def write(count: int, out: TextIO, five_axis: bool) -> None:
 
 def main() -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("count", type=int, metavar="N", help=f"points, at least {PASS}")
     parser.add_argument("out", type=Path, metavar="OUT.cls")
     parser.add_argument("--five-axis", action="store_true", help="tool axis 20 to 40 degrees from z, turning")

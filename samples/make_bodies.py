@@ -84,8 +84,8 @@ def off(triangles: Floats) -> bytes:
 
 
 def part() -> Floats:
-    """The bicubic surface of the test part over its 60 mm square, down to LOW; in nm, as last bits differ between
-    processors."""
+    """The bicubic surface of the test part over its 60 mm square, down to LOW; in nm, as last bits differ
+    between processors."""
     x, y = np.meshgrid(np.linspace(0.0, 60.0, STEPS + 1), np.linspace(0.0, 60.0, STEPS + 1), indexing="ij")
     return prism(x, y, np.round(bicubic_surface(x, y)[0][..., 2], 6), LOW)
 

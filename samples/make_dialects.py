@@ -1,8 +1,8 @@
 """Write one path as six systems spell it, in mm and in inches: python samples/make_dialects.py [FOLDER].
 
-Pocket with arcs of both senses, a helix of a quarter and one of a whole turn; holes drilled and pecked with a second
-tool; a tilted face in a frame of its own; a cut that turns the tool axis. The inch files hold what a 3-axis machine can
-take (the first two operations).
+Pocket with arcs of both senses, a helix of a quarter and one of a whole turn; holes drilled and pecked with a
+second tool; a tilted face in a frame of its own; a cut that turns the tool axis. The inch files hold what a
+3-axis machine can take (the first two operations).
 """
 
 from __future__ import annotations

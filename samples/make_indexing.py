@@ -1,7 +1,7 @@
 """Write indexing/: a round part on a fourth axis, indexed by Creo. python samples/make_indexing.py [FOLDER].
 
-Fourteen slots in seats 56.66 mm off the rotation axis, by a subroutine between TRANS +h and -h, and fourteen holes between
-them, by a subroutine about the rotation axis; steps of 360/14 degrees, written as 25.714, from 45 degrees on.
+Fourteen slots in seats 56.66 mm off the rotation axis, by a subroutine between TRANS +h and -h, and fourteen
+holes between them, by a subroutine about the rotation axis; steps of 360/14 degrees, written as 25.714, from 45 degrees on.
 """
 
 from __future__ import annotations

@@ -95,7 +95,8 @@ class Spelling(ABC):
         """One GOTO."""
 
     @abstractmethod
-    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats, turns: int) -> None:
+    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats,
+               turns: int) -> None:
         """The records of an arc with its end; centre at the height of start and end, right-hand normal."""
 
     @abstractmethod
@@ -163,7 +164,8 @@ class Nx(Spelling):
     def feed(self, rate: float) -> None:
         self.lines += ["PAINT/COLOR,31", f"FEDRAT/{self.feed_unit},{self.text_of((rate,))}"]
 
-    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats, turns: int) -> None:
+    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats,
+               turns: int) -> None:
         times = f",TIMES,{turns}" if turns else ""
         self.lines += [f"CIRCLE/{self.text_of(self.local(at_end))},{numbers(self.direction(-normal), 7)},"
                        f"{self.text_of((radius, 0.03))},0.5000,{self.text_of((10.0, 0.0))}{times}",
@@ -215,7 +217,8 @@ class Creo(Spelling):
     def feed(self, rate: float) -> None:
         self.lines.append(f"FEDRAT / {self.text_of((rate,), 6)},  {self.feed_unit}")
 
-    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats, turns: int) -> None:
+    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats,
+               turns: int) -> None:
         self.lines += [f"CIRCLE / {self.text_of(at_start).replace(',', ', ')}, $\n"
                        f"{numbers(normal, 10).replace(',', ', ')}, {self.text_of((radius,))}", self.goto(end, self.axis)]
 

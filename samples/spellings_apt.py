@@ -53,7 +53,8 @@ class SolidWorks(Spelling):
     def feed(self, rate: float) -> None:
         self.lines.append(f"FEDRAT/{self.text_of((rate,))},{self.feed_unit}")
 
-    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats, turns: int) -> None:
+    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats,
+               turns: int) -> None:
         self.lines += [f"CIRCLE/{self.text_of(at_start)},{self.vector(normal)}", self.goto(end, self.axis)]
 
     def cycle(self, depth: float, clear: float, back: float, rate: float, step: float = 0.0) -> None:
@@ -102,7 +103,8 @@ class Clt(Spelling):
     def feed(self, rate: float) -> None:
         self.lines.append(f"FEDRAT/ {self.feed_unit},{self.text_of((rate,))}")
 
-    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats, turns: int) -> None:
+    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats,
+               turns: int) -> None:
         word = "COUNTERCLOCKWISE" if normal @ np.asarray(self.axis, float) > 0 else "CLOCKWISE"
         self.lines += [f"CIRCLE/ {self.text_of(self.local(at_start))},0.0000,0.0000,1.0000,{self.text_of((radius,))},"
                        f"{word}", self.goto(end, self.axis)]
@@ -150,7 +152,8 @@ class Catia(Spelling):
     def feed(self, rate: float) -> None:
         self.lines.append(f"FEDRAT/ {self.text_of((rate,), 4)},{self.feed_unit}")
 
-    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats, turns: int) -> None:
+    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats,
+               turns: int) -> None:
         tangent = np.cross(normal, self.position - at_start) / radius
         direction = ",".join(f"{v + 0.0:11.7f}" for v in np.round(tangent, 9))
         self.lines += ["AUTOPS", f"INDIRV/{direction}"]
@@ -204,7 +207,8 @@ class Ncl(Spelling):
     def feed(self, rate: float) -> None:
         self.lines.append(f"FEDRAT/{self.feed_unit},{self.wide((rate,))}")
 
-    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats, turns: int) -> None:
+    def circle(self, at_start: Floats, at_end: Floats, normal: Floats, radius: float, end: Floats,
+               turns: int) -> None:
         sense = ",".join(f"{v + 0.0:10.7f}" for v in normal)
         self.lines += [f"CIRCLE/{self.wide(at_start)},{sense},{self.wide((radius,))}", self.goto(end, self.axis)]
 

@@ -7,7 +7,7 @@ from cltext import APPROACH_COLOR, ENGAGE_COLOR, RETRACT_COLOR, UP, Cutter, Floa
 
 Sample = tuple[str, dict[str, object]]
 
-# --- blade --------------------------------------------------------------------------------------------------------
+# --- blade --------------------------------------------------------------------------------------------------
 
 FOOT, HEIGHT, TWIST = 14.0, 42.0, np.radians(30)
 
@@ -26,7 +26,8 @@ def blade_surface(phi: Floats, h: Floats) -> tuple[Floats, Floats]:
     ux, uy = turned(da * np.cos(phi), db * np.sin(phi), TWIST * h)
     upward = np.column_stack((ux - TWIST * y, uy + TWIST * x, np.full_like(phi, HEIGHT)))
     normal = np.cross(along, upward)
-    return (np.column_stack((x, y, FOOT + HEIGHT * h)), normal / np.linalg.norm(normal, axis=1, keepdims=True))
+    return (np.column_stack((x, y, FOOT + HEIGHT * h)),
+            normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
 def one_turn(count: int) -> Floats:
@@ -96,7 +97,7 @@ def flank(nx: NxFile) -> None:
     follow(nx, np.concatenate(tips), np.concatenate(axes), 1800)
 
 
-# --- bicubic test part --------------------------------------------------------------------------------------------
+# --- bicubic test part --------------------------------------------------------------------------------------
 
 CONTROL_HEIGHTS = np.array([[0, 0, 10, 10], [0, 0, 10, 10], [10, 10, 0, 0], [10, 10, 0, 0]], dtype=float)
 """z of the control points (Grandguillaume, Lavernhe, Tournier 2017, eq. 8): rows x = 0, 20, 40, 60, columns y alike."""
@@ -149,7 +150,7 @@ def bicubic() -> Sample:
     return nx.text(), nx.expected()
 
 
-# --- tour of tool directions --------------------------------------------------------------------------------------
+# --- tour of tool directions --------------------------------------------------------------------------------
 
 
 def leg(start: tuple[float, float], end: tuple[float, float], count: int) -> Floats:

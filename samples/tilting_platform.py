@@ -6,7 +6,7 @@ import numpy as np
 from cltext import ENGAGE_COLOR, RETRACT_COLOR, WORLD, Cutter, Floats, Frame, NxFile, face_frame
 from surfaces import Sample, ball_tip, follow
 
-# --- dome ---------------------------------------------------------------------------------------------------------
+# --- dome ---------------------------------------------------------------------------------------------------
 
 TOP = 14.0
 CURVATURE = np.array([1 / 48.0, 1 / 75.0])
@@ -55,7 +55,7 @@ def h4a_dome() -> Sample:
     return nx.text(), nx.expected()
 
 
-# --- sloping faces ------------------------------------------------------------------------------------------------
+# --- sloping faces ------------------------------------------------------------------------------------------
 
 SLOPES = {"XPLUS": (0, 20), "YPLUS": (90, 25), "XMINUS": (180, 30), "YMINUS": (270, 25)}
 """direction and tilt of each face, degrees"""
@@ -64,7 +64,8 @@ SLOPES = {"XPLUS": (0, 20), "YPLUS": (90, 25), "XMINUS": (180, 30), "YMINUS": (2
 def sloping_face(direction: float, tilt: float) -> Frame:
     """Face 26 mm from the middle, 18 mm high."""
     a, b = np.radians((direction, tilt))
-    return face_frame((26 * np.cos(a), 26 * np.sin(a), 18), (np.sin(b) * np.cos(a), np.sin(b) * np.sin(a), np.cos(b)))
+    return face_frame((26 * np.cos(a), 26 * np.sin(a), 18),
+                      (np.sin(b) * np.cos(a), np.sin(b) * np.sin(a), np.cos(b)))
 
 
 def small_pocket(nx: NxFile) -> None:

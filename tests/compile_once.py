@@ -54,7 +54,8 @@ class _Locking(Loader):
 class Finder(MetaPathFinder):
     """Waits for the compiler to be imported: no test imports it sooner for that."""
 
-    def find_spec(self, name: str, path: Sequence[str] | None, target: types.ModuleType | None = None) -> ModuleSpec | None:
+    def find_spec(self, name: str, path: Sequence[str] | None,
+                  target: types.ModuleType | None = None) -> ModuleSpec | None:
         if name != MODULE:
             return None
         spec = PathFinder.find_spec(name, path)

@@ -28,8 +28,8 @@ rewrite_once.install()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`, the files of the quick tier with `-m quick`; the cases
-    that a test marked `covering` can do without with `-m slow`."""
+    """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`, the files of the quick tier with `-m
+    quick`; the cases that a test marked `covering` can do without with `-m slow`."""
     cover.mark_slow(items)
     for item in items:
         if item.nodeid.split("::")[0] in QUICK:

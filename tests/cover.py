@@ -33,8 +33,8 @@ def mark_slow(items: Sequence[pytest.Item]) -> None:
 
 
 def chosen(cases: Sequence[Case], together: int = 1, count: int = 0, of: Sequence[str] = ()) -> set[int]:
-    """Numbers of the cases to run: `count` evenly, or the greedy choice that shows each combination of `together` values;
-    of cases that show as much the one whose values have been shown least."""
+    """Numbers of the cases to run: `count` evenly, or the greedy choice that shows each combination of
+    `together` values; of cases that show as much the one whose values have been shown least."""
     if count:
         return {round(k * (len(cases) - 1) / max(count - 1, 1)) for k in range(count)}
     cases = [{name: case[name] for name in of or case} for case in cases]

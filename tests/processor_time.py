@@ -21,7 +21,8 @@ def seconds() -> float:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--cpu", action="store_true", help="processor seconds by file and by test, commands included")
+    parser.addoption("--cpu", action="store_true",
+                     help="processor seconds by file and by test, commands included")
 
 
 @pytest.hookimpl(wrapper=True)

@@ -1,7 +1,7 @@
 """Kinds of processor for which the compiled loops are tested; `python -m tests.processors` prints those that run here.
 
-Names as of `NUMBA_CPU_NAME`, with `NUMBA_CPU_FEATURES` empty: without it numba takes the features of the processor that it
-runs on, whatever the name. Generic has neither wide vectors nor fused products and sums.
+Names as of `NUMBA_CPU_NAME`, with `NUMBA_CPU_FEATURES` empty: without it numba takes the features of the
+processor that it runs on, whatever the name. Generic has neither wide vectors nor fused products and sums.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""CONTRIBUTING, ARCHITECTURE and the README of the tests: files that they name are there, numbers are those of the
-program."""
+"""CONTRIBUTING, ARCHITECTURE and the README of the tests: files that they name are there, numbers are those
+of the program."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ ROOT = Path(__file__).parents[1]
 @pytest.mark.parametrize("page", ["CONTRIBUTING.md", "tests/README.md"])
 def test_files_that_are_named_are_there(page: str) -> None:
     here = (ROOT / page).parent
-    named = re.findall(r"`([\w./-]+(?:\.py|\.md|\.toml|\.yaml)|[\w]+(?:/[\w]+)+)`", (ROOT / page).read_text("utf-8"))
+    named = re.findall(r"`([\w./-]+(?:\.py|\.md|\.toml|\.yaml)|[\w]+(?:/[\w]+)+)`",
+                       (ROOT / page).read_text("utf-8"))
     assert len(named) > 8
     assert [name for name in named if not ((ROOT / name).exists() or (here / name).exists())] == []
 

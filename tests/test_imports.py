@@ -31,8 +31,8 @@ class Text:
     """What is looked at of a file."""
 
     imports: frozenset[str]
-    """all modules and names that it imports, wherever the import stands (in a function, for the type checker alone);
-    `from a import b` gives a and a.b"""
+    """all modules and names that it imports, wherever the import stands (in a function, for the type checker
+    alone); `from a import b` gives a and a.b"""
     lines: int
     functions: dict[str, int]
     """lines by name"""

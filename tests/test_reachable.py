@@ -1,5 +1,5 @@
-"""Reachable or gone: what the packages define is used by the packages, by the samples' scripts or by an example of a README,
-not by tests alone, but for what is listed."""
+"""Reachable or gone: what the packages define is used by the packages, by the samples' scripts or by an
+example of a README, not by tests alone, but for what is listed."""
 
 from __future__ import annotations
 

@@ -11,7 +11,8 @@ from _pytest.assertion import rewrite
 from tests import rewrite_once
 
 
-@pytest.mark.skipif(pytest.version_tuple[0] != rewrite_once.KNOWN, reason="another pytest prepares its files as it does")
+@pytest.mark.skipif(pytest.version_tuple[0] != rewrite_once.KNOWN,
+                    reason="another pytest prepares its files as it does")
 def test_the_second_worker_finds_what_the_first_has_kept(tmp_path: Path, pytestconfig: pytest.Config) -> None:
     file, calls = tmp_path / "test_x.py", []
     file.write_text("def test() -> None:\n    assert True\n")

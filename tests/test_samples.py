@@ -157,7 +157,8 @@ def test_reader_puts_the_points_where_the_script_had_them(name: str) -> None:
     assert abs(tilt - want["largest_tilt_deg"]) < 2e-3
     straight = (path.kind == 1) & (path.role == 0)
     length = np.linalg.norm(np.diff(path.tip, axis=0, prepend=path.tip[:1]), axis=1)[straight].sum()
-    rise = np.einsum("ni,ni->n", np.diff(path.tip, axis=0, prepend=path.tip[:1])[path.arc >= 0], path.arcs.normal)
+    rise = np.einsum("ni,ni->n", np.diff(path.tip, axis=0, prepend=path.tip[:1])[path.arc >= 0],
+                     path.arcs.normal)
     length += np.hypot(path.arcs.radius * path.arcs.sweep, rise).sum()
     assert abs(length - want["feed_length_mm"]) < 0.02
 

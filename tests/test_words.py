@@ -1,5 +1,5 @@
-"""Words of the trade: what a reader cannot search for does not come back, in texts, names and documents; the glossary is
-kept."""
+"""Words of the trade: what a reader cannot search for does not come back, in texts, names and documents; the
+glossary is kept."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ INSTEAD = {
     "goes to:": "time by activity:", "held by the feed": "limited by programmed feed", "lost by": "rejected:",
     "sense of the arcs": "arc direction", "best alone": "fastest for this pass",
 }
-WORDS = re.compile(r"(?<![\w.-])(" + "|".join(sorted(INSTEAD, key=len, reverse=True)) + r")(?![\w-])", re.IGNORECASE)
+WORDS = re.compile(r"(?<![\w.-])(" + "|".join(sorted(INSTEAD, key=len, reverse=True)) + r")(?![\w-])",
+                   re.IGNORECASE)
 PLACES = {
     ("machines/calibration/README.md", "X way"): "column of measurement tables that shops have",
     ("machines/calibration/measurement_file.py", "X way"): "that column",
@@ -56,8 +57,8 @@ def texts(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def found(name: str, line: str) -> list[str]:
-    """Banned words of a line that no place excuses; `this way` and `half the way` are English that is searched for by
-    nobody."""
+    """Banned words of a line that no place excuses; `this way` and `half the way` are English that is
+    searched for by nobody."""
     line = re.sub(r"(?:this|half the|six) ways?\b|`[^`]*`", "", line)
     for (file, text), _ in PLACES.items():
         if file == name and (text == line.strip() or len(text) > 4):

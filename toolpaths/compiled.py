@@ -31,12 +31,12 @@ _shared: list[str] = []
 class Loop:
     """How a loop is compiled.
 
-    Each operation is rounded by itself and in the order of the text, so that a loop gives the same bits on every processor,
-    and those of the interpreter.
+    Each operation is rounded by itself and in the order of the text, so that a loop gives the same bits on
+    every processor, and those of the interpreter.
 
     Attributes:
-        fused: lets the compiler join a product and a sum: faster, and the last bits depend on the processor; only where
-            results need to agree within a tolerance
+        fused: lets the compiler join a product and a sum: faster, and the last bits depend on the processor;
+            only where results need to agree within a tolerance
         alone: other loops do not follow once this one is compiled (`wanted`)
         takes: one compiled form for arrays of any layout; without it one for each kind of arguments that comes
     """
@@ -51,7 +51,8 @@ def loop(function: Function) -> Function: ...
 
 
 @overload
-def loop(*, fused: bool = False, alone: bool = False, takes: Takes = ()) -> Callable[[Function], Function]: ...
+def loop(*, fused: bool = False, alone: bool = False,
+         takes: Takes = ()) -> Callable[[Function], Function]: ...
 
 
 def loop(function: Function | None = None, *, fused: bool = False, alone: bool = False,

@@ -1,7 +1,7 @@
 """Problems as data: severity, stable code, message, place, hint.
 
-Nothing in the project prints or raises for a fault of the input: it returns diagnostics. An ERROR means that no
-output file may be written.
+Nothing in the project prints or raises for a fault of the input: it returns diagnostics. An ERROR means that
+no output file may be written.
 """
 
 from __future__ import annotations

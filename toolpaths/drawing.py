@@ -27,7 +27,8 @@ _RULES: Any = {"svg.hashsalt": "postproc", "font.family": "DejaVu Sans", "axes.g
                "axes.formatter.use_mathtext": False, "text.parse_math": False}
 
 
-def image(size: tuple[float, float], title: str, fill: Callable[[Figure], None], ending: FigureEnding) -> bytes:
+def image(size: tuple[float, float], title: str, fill: Callable[[Figure], None],
+          ending: FigureEnding) -> bytes:
     """An image file of a sheet.
 
     Args:

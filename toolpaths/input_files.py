@@ -51,8 +51,8 @@ def read_input(path: str | Path, *, standard_input: bool = False) -> bytes:
     """The bytes of a regular file, or of standard input where it may be piped in and is named so.
 
     Raises:
-        OSError: where the file is not read (FileNotFoundError where there is none); `strerror` says why. `unreadable` makes
-            a diagnostic of it.
+        OSError: where the file is not read (FileNotFoundError where there is none); `strerror` says why.
+            `unreadable` makes a diagnostic of it.
     """
     if standard_input and str(path) in STANDARD_INPUT:
         return _piped()
@@ -76,7 +76,8 @@ def check_input(path: str | Path) -> os.stat_result:
     if "\0" in name:
         raise InputFault("its name holds a NUL character", "name a regular file")
     if len(name) > _LONGEST:
-        raise InputFault(f"its name has {len(name)} characters, at most {_LONGEST} are possible", "name a regular file")
+        raise InputFault(f"its name has {len(name)} characters, at most {_LONGEST} are possible",
+                         "name a regular file")
     try:
         found = Path(path).stat()
     except ValueError as fault:  # a name that no file system can hold

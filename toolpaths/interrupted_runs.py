@@ -1,8 +1,9 @@
 """What a run that was killed while writing left behind: temporary files of its own, distinguished by their names.
 
-A temporary file is called `.NAME.postproc-WHERE-PID-START-RANDOM.KIND`: WHERE is the computer (and its space of process
-numbers), PID and START name the process beyond the reuse of its number. `new` is an output not yet in its place, `old` what
-stood in that place before, `journal` says which files a run was replacing, `pointer` where the journal of another folder is.
+A temporary file is called `.NAME.postproc-WHERE-PID-START-RANDOM.KIND`: WHERE is the computer (and its space
+of process numbers), PID and START name the process beyond the reuse of its number. `new` is an output not yet
+in its place, `old` what stood in that place before, `journal` says which files a run was replacing, `pointer`
+where the journal of another folder is.
 """
 
 from __future__ import annotations

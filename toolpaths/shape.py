@@ -124,12 +124,13 @@ class Curves:
         result: Floats = angle / sweep
         return result
 
-    def deviation(self, tip: Floats, axis: Floats, guess: Floats, within: float = 0.0) -> tuple[Floats, Floats, Floats]:
+    def deviation(self, tip: Floats, axis: Floats, guess: Floats,
+                  within: float = 0.0) -> tuple[Floats, Floats, Floats]:
         """How far poses are off their curves: (tip (N,) mm, axis (N,) rad, u (N,)).
 
-        The tip is measured to the nearest point of the curve. The axis is measured against the great circle at the place
-        where it fits best among those whose tip is within `within` mm: a pose is inside the tolerances where one pose of the
-        curve has both near. With 0 that is the nearest point.
+        The tip is measured to the nearest point of the curve. The axis is measured against the great circle
+        at the place where it fits best among those whose tip is within `within` mm: a pose is inside the
+        tolerances where one pose of the curve has both near. With 0 that is the nearest point.
         """
         u = self.project(tip, guess)
         off = lengths(tip - self.tip_at(u))

@@ -9,10 +9,10 @@
         ends: Floats
         kind: Array
 
-Letters are lengths that the fields share, numbers are lengths, `N+1` counts from a letter that another field always gives,
-`#names` is `len(self.names)`, `##nodes` the length of each item of `nodes`, `_` any length and `...` any shape. Fields that
-are None are passed over; a tuple of arrays is `*` and the shape of each. Where some are None, the others still share their
-letters, and so do the arrays of a tuple.
+Letters are lengths that the fields share, numbers are lengths, `N+1` counts from a letter that another field
+always gives, `#names` is `len(self.names)`, `##nodes` the length of each item of `nodes`, `_` any length and
+`...` any shape. Fields that are None are passed over; a tuple of arrays is `*` and the shape of each. Where
+some are None, the others still share their letters, and so do the arrays of a tuple.
 The type is that of the annotation (`Floats`, `Ints`, `Bools`), or stands before a colon.
 The check is compiled once for each class, when its first value is made.
 """

@@ -8,7 +8,8 @@ _WIDE = 100_000
 """characters: nothing is ever wrapped or cut"""
 
 
-def table_text(rows: Sequence[Sequence[object]], heads: Sequence[str] = (), align: str = "", indent: int = 0) -> list[str]:
+def table_text(rows: Sequence[Sequence[object]], heads: Sequence[str] = (), align: str = "",
+               indent: int = 0) -> list[str]:
     """Lines of a table.
 
     Args:

@@ -162,7 +162,8 @@ class Arcs:
         return Arcs(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
 
 
-_SHARED = ("tip", "axis", "feed", "feed_mode", "kind", "role", "arc", "cycle", "tool", "operation", "pass_", "line")
+_SHARED = ("tip", "axis", "feed", "feed_mode", "kind", "role", "arc", "cycle", "tool", "operation",
+           "pass_", "line")
 """columns that are kept once where all rows are the same"""
 
 
@@ -197,8 +198,8 @@ class Toolpath:
         line (N,): 1-based line of the file
         normal (N, 3) or None: unit surface normal, NaN where a point has none
         contact (N, 3) or None: contact point, NaN where a point has none
-        spin (N,) or None: rad about the tool axis from the x direction that the least rotation taking z to the axis carries
-            along to the tool's own x direction; NaN where any will do. No CL file says it.
+        spin (N,) or None: rad about the tool axis from the x direction that the least rotation taking z to
+            the axis carries along to the tool's own x direction; NaN where any will do. No CL file says it.
         units: "mm" or "inch": what the file was written in (the arrays are mm)
     """
 

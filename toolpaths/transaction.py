@@ -1,7 +1,8 @@
 """Output files, all of one command together: every one is replaced, or none is.
 
-All texts are written next to their places and synced, then renamed one after another, the last one given (the program)
-last. A fault at any step puts back what stood there. A run that is killed between the first rename and the last leaves a
+All texts are written next to their places and synced, then renamed one after another, the last one given (the
+program) last. A fault at any step puts back what stood there. A run that is killed between the first rename
+and the last leaves a
 journal: the next run that writes into one of its folders puts everything back before it begins. One output alone is one
 rename, so that at any moment the old or the new file stands there, whole.
 """

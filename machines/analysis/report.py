@@ -31,8 +31,8 @@ def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, 
     """Figures of a machine; a serial one, whose slides pass their speed on as it is, has no transmission.
 
     Args:
-        singular_above: mm; of a Delta with slides along z also the step of a grid that proves all singular values of a slice
-            to be above it
+        singular_above: mm; of a Delta with slides along z also the step of a grid that proves all singular
+            values of a slice to be above it
 
     Raises:
         DiagnosticError: where that proof is asked for and the machine is of another kind.

@@ -1,7 +1,8 @@
 """Proof that a slice of a Delta's workspace holds no singular point, from the smallest singular value on a grid.
 
-For slides along z. The smallest singular values of Jx and Jq change by at most sqrt(3) (2A + 1) |dx| between two points
-of a horizontal slice (III-23 to III-42; III-29 with |sqrt(1+u) - 1| <= |u|, for the printed bound fails for u < 0).
+For slides along z. The smallest singular values of Jx and Jq change by at most sqrt(3) (2A + 1) |dx| between
+two points of a horizontal slice (III-23 to III-42; III-29 with |sqrt(1+u) - 1| <= |u|, for the printed bound
+fails for u < 0).
 """
 
 from __future__ import annotations

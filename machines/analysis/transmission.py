@@ -71,8 +71,8 @@ def force_transmission(kinematics: RodPlatform, place: Floats, tilt: Floats) -> 
 def speed_acceleration(kinematics: RodPlatform, place: Floats, tilt: Floats) -> Floats:
     """eta_av (N,) 1/mm: slide acceleration at unit speed of a Delta's platform in the worst direction (III.6.5).
 
-    With j a row of J^-1 the rod's equation, differentiated twice, gives (AB.u) qdd = AB.a + |v - u (j.v)|^2; over unit
-    v that square is at most the squared norm of I - u j.
+    With j a row of J^-1 the rod's equation, differentiated twice, gives (AB.u) qdd = AB.a + |v - u (j.v)|^2;
+    over unit v that square is at most the squared norm of I - u j.
     """
     _, along = _jx(kinematics, place, tilt)
     inverse = _inverse(kinematics, place, tilt)
@@ -82,7 +82,8 @@ def speed_acceleration(kinematics: RodPlatform, place: Floats, tilt: Floats) -> 
     return result
 
 
-def worst(measure: Measure, space: Workspace, counts: tuple[int, int, int, int] = (11, 11, 11, 7)) -> WorstValue:
+def worst(measure: Measure, space: Workspace,
+          counts: tuple[int, int, int, int] = (11, 11, 11, 7)) -> WorstValue:
     """The largest value of `measure` over the closed workspace: an even grid, then a finer one around its largest."""
     place, tilt = space.grid(counts)
     value = measure(place, tilt)

@@ -17,8 +17,8 @@ from toolpaths.input_files import there_is
 
 
 def calibrate(source: str | Path, accept_residual: bool = False) -> tuple[CalibrationOutcome | None, list[Diagnostic]]:
-    """Identify what a measurement file asks for; None and what is wrong where it cannot be read. Where the data do not
-    support a model, or only one that cannot be, the figures come without it.
+    """Identify what a measurement file asks for; None and what is wrong where it cannot be read. Where the
+    data do not support a model, or only one that cannot be, the figures come without it.
 
     Args:
         accept_residual: as in the file; one of them is enough

@@ -60,7 +60,8 @@ def _signatures(place: Axes, curves: dict[str, Signature]) -> None:
     for name, curve in curves.items():
         x, y, sigma = _floats(curve["degrees"]), _floats(curve["values"]), _floats(curve["sigma"])
         line, = place.plot(x, y, marker="." if len(x) < MANY else "", label=plain(name))
-        place.fill_between(x, y - BOUND * sigma, y + BOUND * sigma, color=line.get_color(), alpha=0.2, linewidth=0.0)
+        place.fill_between(x, y - BOUND * sigma, y + BOUND * sigma, color=line.get_color(), alpha=0.2,
+                           linewidth=0.0)
     _labelled(place, "position [deg]", f"signature [{next(iter(curves.values()))['unit']}], 95 % bounds")
     place.legend(**ADJACENT)
 

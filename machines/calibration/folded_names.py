@@ -30,5 +30,6 @@ def folded(names: Sequence[str]) -> str:
 def near(name: str, known: Sequence[str]) -> str:
     """Which of the known names, or of their stems, are nearest to one that is none of them, and what there is."""
     stems = list(dict.fromkeys(stem(k) for k in known))
-    close = difflib.get_close_matches(name, [*stems, *(k for k in known if k not in stems)], n=NEAR, cutoff=0.6)
+    close = difflib.get_close_matches(name, [*stems, *(k for k in known if k not in stems)],
+                                      n=NEAR, cutoff=0.6)
     return (f"near it are {', '.join(close)}; " if close else "") + f"the model has {folded(known) or 'none'}"

@@ -1,5 +1,5 @@
-"""Errors of a whole machine from what was measured on it: poses (probe on ball, R-test, tracker), distances (ball-bar),
-displacements along a direction (laser).
+"""Errors of a whole machine from what was measured on it: poses (probe on ball, R-test, tracker), distances
+(ball-bar), displacements along a direction (laser).
 
 The readings are predicted exactly, by the machine with errors; their rates by its first-order sensitivity. What belongs to
 the instrument is identified along: where the ball stands on the table, how far the tool's ball is from where it is thought.
@@ -32,8 +32,8 @@ class Measurements:
     """N poses of the machine with what was read there.
 
     Attributes:
-        kind: "position": tip less nominal tip, (N, 3) mm in the table frame; "distance": tip to `centre`, (N,) mm;
-            "along": tip less nominal tip along `toward`, (N,) mm
+        kind: "position": tip less nominal tip, (N, 3) mm in the table frame; "distance": tip to `centre`,
+            (N,) mm; "along": tip less nominal tip along `toward`, (N,) mm
         q: (N, J) commanded joints
         read: (N, 3) or (N,)
         sigma: mm, one or per reading
@@ -131,8 +131,8 @@ class MachineFit:
     """The identified model, with its covariance, and the fit that gave it.
 
     Attributes:
-        setup: values of the instrument, mm: how far the ball is from its place (of the readings), what the bar's readings
-            are too short by, what the laser reads at 0 with the sign turned round
+        setup: values of the instrument, mm: how far the ball is from its place (of the readings), what the
+            bar's readings are too short by, what the laser reads at 0 with the sign turned round
         cost_instrument: sum of squared weighted residuals where nothing but those is found
     """
 

@@ -56,14 +56,17 @@ def machine_errors(run: CalibrationRun, given: PosesModel | BarModel | LaserMode
     return _judged(run, given, start, kinematics, measured, fitted, table)
 
 
-def _measured(given: PosesModel | BarModel | LaserModel, q: Floats, read: Floats, approaches: Floats) -> Measurements:
+def _measured(given: PosesModel | BarModel | LaserModel, q: Floats, read: Floats,
+              approaches: Floats) -> Measurements:
     sigma = given.sigma_um * 1e-3
     if isinstance(given, PosesModel):
         return Measurements("position", q, read, sigma, zeroed=given.zeroed, approaches=approaches)
     if isinstance(given, BarModel):
-        return Measurements("distance", q, read[:, 0], sigma, centre=np.array(given.centre), approaches=approaches)
+        return Measurements("distance", q, read[:, 0], sigma, centre=np.array(given.centre),
+                            approaches=approaches)
     toward = np.array(given.toward) / np.linalg.norm(given.toward)
-    return Measurements("along", q, read[:, 0], sigma, toward=toward, zeroed=given.zeroed, approaches=approaches)
+    return Measurements("along", q, read[:, 0], sigma, toward=toward, zeroed=given.zeroed,
+                        approaches=approaches)
 
 
 def _start(run: CalibrationRun) -> ErrorModel | None:
@@ -77,7 +80,7 @@ def _start(run: CalibrationRun) -> ErrorModel | None:
     return model
 
 
-# ---- before the fit ------------------------------------------------------------------------------------------------------
+# ---- before the fit ----------------------------------------------------------------------------------------
 
 def _known(run: CalibrationRun, start: ErrorModel) -> bool:
     """False where a parameter is asked for that the start model has not."""
@@ -133,10 +136,11 @@ def _gap(start: ErrorModel, axis: str) -> float:
     """mm, the most that a displacement of an axis differs by its approach direction."""
     both = [c.curve for c in start.axes.components
             if c.name.axis == axis and not c.name.angular and isinstance(c.curve, TableCurve) and c.curve.both]
-    return max((float(np.abs(np.diff(curve.values.reshape(2, -1), axis=0)).max()) for curve in both), default=0.0)
+    return max((float(np.abs(np.diff(curve.values.reshape(2, -1), axis=0)).max()) for curve in both),
+               default=0.0)
 
 
-# ---- after the fit -------------------------------------------------------------------------------------------------------
+# ---- after the fit -----------------------------------------------------------------------------------------
 
 def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, start: ErrorModel, kinematics: Kinematics,
             measured: Measurements, fitted: MachineFit, table: CsvTable) -> CalibrationOutcome:
@@ -151,7 +155,8 @@ def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, star
     if isinstance(given, BarModel):
         figures["centre_mm"] = [c + fitted.setup[name] for c, name in zip(given.centre, SETUP["distance"], strict=False)]
     if not result.converged:
-        run.problem("calibrate.converged", "the fit does not come to an end", "check units and signs of the table")
+        run.problem("calibrate.converged", "the fit does not come to an end",
+                    "check units and signs of the table")
     _untold(run, result.not_identifiable)
     if has_errors(run.found):
         return CalibrationOutcome(None, figures)

@@ -56,8 +56,8 @@ class ReversalModel(UserModel):
     sigma_arcsec: Sigma
     """standard deviation of a reading"""
     shifts: tuple[Annotated[int, Field(ge=0)], ...] = ()
-    """increments by which the indexer was turned in each set-up: step i then meets its increment i + shift; default 0, 1,
-    2, ..."""
+    """increments by which the indexer was turned in each set-up: step i then meets its increment i + shift;
+    default 0, 1, 2, ..."""
     zeroed: bool = True
     """the instrument was zeroed again at each set-up"""
 
@@ -68,8 +68,8 @@ class RotaryMeasurementModel(UserModel):
     table: str
     """CSV file next to this one; empty cells are not allowed, leave whole rows out"""
     axis: Literal["A", "B", "C"]
-    """rotary axis that was measured. Readings are of what it moves, tool or part: z where that turns to at positive
-    commands, x along the machine's X (axis C), Y (A) or Z (B)"""
+    """rotary axis that was measured. Readings are of what it moves, tool or part: z where that turns to at
+    positive commands, x along the machine's X (axis C), Y (A) or Z (B)"""
     steps: StepCount
     """n, steps of a turn"""
     harmonics: Annotated[int, Field(ge=1)]
@@ -107,8 +107,8 @@ class BarModel(UserModel):
     sigma_um: Sigma
     """standard deviation of a distance"""
     centre: tuple[Coordinate, Coordinate, Coordinate]
-    """mm, where the ball on the table is thought to be, in the table frame; where it really is, and how much the readings
-    are too short, are found along"""
+    """mm, where the ball on the table is thought to be, in the table frame; where it really is, and how much
+    the readings are too short, are found along"""
     tool_length: NotNegative = 0.0
     """mm from the gauge point to the point that was measured"""
 
@@ -147,13 +147,13 @@ class MeasurementModel(UserModel):
     parameters: tuple[str, ...] = ()
     """names, or beginnings of names, of the parameters to find; all of the model without"""
     large: bool = False
-    """true: errors above 1 mm or 0.5 degrees, and a ball or a bar as far from what the file says, are meant; they are
-    warnings then"""
+    """true: errors above 1 mm or 0.5 degrees, and a ball or a bar as far from what the file says, are meant;
+    they are warnings then"""
     robust: bool = False
     """let readings count less that do not fit (Huber)"""
     accept_residual: bool = False
-    """true: take a fit that leaves more of the readings than their stated standard deviation explains; its covariance is
-    scaled by what is left"""
+    """true: take a fit that leaves more of the readings than their stated standard deviation explains; its
+    covariance is scaled by what is left"""
     minutes_per_reading: Positive = 0.5
     """machine time, for what another set-up would cost"""
     minutes_per_setup: NotNegative = 20.0

@@ -1,8 +1,9 @@
 """What a fit leaves of its readings against what is stated of their noise: chi-square, and the scale of the covariance.
 
-Sums of squared weighted residuals of readings at their stated noise follow a chi-square of as many degrees of freedom as
-there are readings to spare; both tails are looked at (JCGM 100, annexes G and H; Birge 1932 for the scale). Robust fits are
-judged by the median of the residuals, which outliers do not move, with the degrees of freedom that it is worth.
+Sums of squared weighted residuals of readings at their stated noise follow a chi-square of as many degrees of
+freedom as there are readings to spare; both tails are looked at (JCGM 100, annexes G and H; Birge 1932 for
+the scale). Robust fits are judged by the median of the residuals, which outliers do not move, with the
+degrees of freedom that it is worth.
 """
 
 from __future__ import annotations
@@ -61,9 +62,10 @@ class Noise:
 
     @property
     def scale(self) -> float:
-        """Factor on a covariance made from the stated noise: 1 where no more than that is left, else what is left, squared,
-        so that NORMAL standard deviations hold 95 % as Student's t has it for few degrees of freedom. A robust fit has the
-        variance of Huber's at the stated noise, and comes to that of least absolute values where the noise is larger."""
+        """Factor on a covariance made from the stated noise: 1 where no more than that is left, else what is
+        left, squared, so that NORMAL standard deviations hold 95 % as Student's t has it for few degrees of
+        freedom. A robust fit has the variance of Huber's at the stated noise, and comes to that of least
+        absolute values where the noise is larger."""
         more = max(self.left, 1.0)
         lost = HUBER_LOSS + (MEDIAN_LOSS - HUBER_LOSS) * (1.0 - 1.0 / more) if self.robust else 1.0
         if self.left <= 1.0:

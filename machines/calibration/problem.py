@@ -1,8 +1,8 @@
-"""One form for every identification: what is guessed, what is free, how well it is measured; what comes out, with its
-uncertainty.
+"""One form for every identification: what is guessed, what is free, how well it is measured; what comes out,
+with its uncertainty.
 
-Weighted least squares by Gauss-Newton steps; for linear models one step is the answer. Columns are scaled to one length
-before ranks are taken, so that mm and rad count alike.
+Weighted least squares by Gauss-Newton steps; for linear models one step is the answer. Columns are scaled to
+one length before ranks are taken, so that mm and rad count alike.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ class CalibrationResult:
 
     Attributes:
         values, sigma: (P,) parameters and their standard deviations; sigma is 0 for fixed ones, inf where it is not known
-        covariance: (P, P) of those that are identified, rows of the others 0; `scale` times what the stated noise makes it,
-            where more than that noise is left of the readings
+        covariance: (P, P) of those that are identified, rows of the others 0; `scale` times what the stated
+            noise makes it, where more than that noise is left of the readings
         noise: what is left against the stated noise; None where no reading is to spare
         converged: False where the steps did not end
         cost_before, cost_after: sum of squared weighted residuals
@@ -92,8 +92,8 @@ class CalibrationResult:
 
 
 def solve(problem: CalibrationProblem, robust: bool = False) -> CalibrationResult:
-    """Least squares; where the data do not determine all, the smallest change from the guess, and the groups that they
-    leave."""
+    """Least squares; where the data do not determine all, the smallest change from the guess, and the groups
+    that they leave."""
     values, weights = np.array(problem.guess), np.ones(len(problem.observed))
     start = problem.observed - problem.predict(values)
     residual, converged = start, False

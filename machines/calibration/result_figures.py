@@ -82,10 +82,11 @@ class CalibrationFigures(TypedDict):
 
 def account(result: CalibrationResult, rank: int, number: float, unknowns: int,
             cost_instrument: float) -> CalibrationFigures:
-    """Of every fit: rank of so many unknowns, condition number (None where it is infinite), weighted residual (root mean
-    square) before, with nothing found but what belongs to the instrument, and after; `reduced` is that after, by readings
-    less unknowns (None where there are no more readings than that), `chance` that readings at their stated noise leave as
-    much, `covariance_scale` what the covariance of the stated noise was multiplied by."""
+    """Of every fit: rank of so many unknowns, condition number (None where it is infinite), weighted residual
+    (root mean square) before, with nothing found but what belongs to the instrument, and after; `reduced` is
+    that after, by readings less unknowns (None where there are no more readings than that), `chance` that
+    readings at their stated noise leave as much, `covariance_scale` what the covariance of the stated noise
+    was multiplied by."""
     count, spare, noise = max(len(result.residuals), 1), len(result.residuals) - result.rank, result.noise
     return {"parameters": {}, "kept": 0, "rank": rank, "unknowns": unknowns, "condition_number": finite(number),
             "readings": len(result.residuals), "spare": spare, "rms_before": float(np.sqrt(result.cost_before / count)),

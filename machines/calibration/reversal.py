@@ -1,11 +1,12 @@
 """Reversal: a rotary axis and the indexer on it distinguished by turning one against the other.
 
-n steps of a full turn, m set-ups. In set-up k the indexer's zero is turned by k increments, so that step i of the axis meets
-increment i + k of the indexer: reading = axis_i - indexer_(i+k) + constant of the set-up. Steps are 0 .. n - 1.
+n steps of a full turn, m set-ups. In set-up k the indexer's zero is turned by k increments, so that step i of
+the axis meets increment i + k of the indexer: reading = axis_i - indexer_(i+k) + constant of the set-up.
+Steps are 0 .. n - 1.
 
-Each of the two signatures sums to 0 over the turn: that is set (closure), not measured, and so is the constant of every
-set-up when the instrument is zeroed again. Source: Oueslati 2004 ("C"), 1.36 to 1.56, with 1.45 put right: the rows of
-set-up k are those of the identity, shifted by k.
+Each of the two signatures sums to 0 over the turn: that is set (closure), not measured, and so is the
+constant of every set-up when the instrument is zeroed again. Source: Oueslati 2004 ("C"), 1.36 to 1.56, with
+1.45 put right: the rows of set-up k are those of the identity, shifted by k.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ class Conditioning:
     condition_number: float
 
 
-def conditioning(n: int, m: int, measured: Bools | None = None, shifts: Sequence[int] | None = None) -> Conditioning:
+def conditioning(n: int, m: int, measured: Bools | None = None,
+                 shifts: Sequence[int] | None = None) -> Conditioning:
     """Of M as it is written, C 2.2: rank 13 for m = 1 and 24 from m = 2 on where n = 12."""
     values = np.linalg.svd(reversal_matrix(n, m, measured, shifts=shifts), compute_uv=False)
     rank = int(np.sum(values > 1e-10 * values[0]))
@@ -56,7 +58,8 @@ def conditioning(n: int, m: int, measured: Bools | None = None, shifts: Sequence
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(axis="n", indexer="n", axis_sigma="n", indexer_sigma="n", offsets="m", residuals="m n", covariance="2*n 2*n")
+@arrays(axis="n", indexer="n", axis_sigma="n", indexer_sigma="n", offsets="m", residuals="m n",
+        covariance="2*n 2*n")
 class Reversal:
     """Signatures of axis and indexer, in the unit of the readings.
 
@@ -117,7 +120,8 @@ def reversal_span(readings: Floats, offsets: bool = True, shifts: Sequence[int] 
     return np.asarray(u[:, s > 1e-9 * s.max(initial=0.0)])
 
 
-def _problem(readings: Floats, sigma: float | Floats, offsets: bool, shifts: Sequence[int] | None) -> CalibrationProblem:
+def _problem(readings: Floats, sigma: float | Floats, offsets: bool,
+             shifts: Sequence[int] | None) -> CalibrationProblem:
     """In parameters that keep the closures: axis (n - 1), indexer (n - 1), constants of the set-ups (m)."""
     m, n = readings.shape
     measured = np.isfinite(readings)
@@ -126,7 +130,8 @@ def _problem(readings: Floats, sigma: float | Floats, offsets: bool, shifts: Seq
     setup = np.repeat(np.arange(m), n)[measured.ravel()]
     columns = np.eye(m)[setup] if offsets else np.zeros((len(setup), m))
     design = np.concatenate([matrix @ basis, columns], axis=1)
-    names = (*(f"axis.{k}" for k in range(1, n)), *(f"indexer.{k}" for k in range(1, n)), *(f"offset.{k}" for k in range(m)))
+    names = (*(f"axis.{k}" for k in range(1, n)), *(f"indexer.{k}" for k in range(1, n)),
+             *(f"offset.{k}" for k in range(m)))
     free = np.ones(len(names), dtype=np.bool_)
     free[2 * n - 2:] = offsets
     weights = np.broadcast_to(sigma, readings.shape)[measured]
@@ -154,7 +159,8 @@ def statistics(values: Floats) -> Statistics:
     """Of values of any shape; NaN are left out."""
     known = values[np.isfinite(values)]
     deviation = float(known.std(ddof=1)) if len(known) > 1 else float("nan")
-    return Statistics(float(known.mean()), deviation, float(np.sqrt(np.mean(known**2))), float(np.abs(known).max()))
+    return Statistics(float(known.mean()), deviation, float(np.sqrt(np.mean(known**2))),
+                      float(np.abs(known).max()))
 
 
 @dataclass(frozen=True)
@@ -169,8 +175,8 @@ class Campaign:
 
 def plan(n: int, sigma: float, minutes_per_reading: float, minutes_per_setup: float, most: int | None = None,
          offsets: bool = True) -> list[Campaign]:
-    """Campaigns of 2 set-ups and more: expected uncertainty against machine time; sigma is infinite where it cannot be
-    determined."""
+    """Campaigns of 2 set-ups and more: expected uncertainty against machine time; sigma is infinite where it
+    cannot be determined."""
     found = []
     for m in range(2, (most or n) + 1):
         noted = identify(np.zeros((m, n)), sigma, offsets)

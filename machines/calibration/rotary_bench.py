@@ -1,8 +1,9 @@
 """The bench on which a rotary axis is measured: axis, indexer on it turning back, reflector on the indexer.
 
-The chain of C 1.11 in homogeneous transforms: C0 (mounting of the axis), nominal turn, errors of the axis, RX0 (mounting of
-the indexer), its turn back, its errors, RL (mounting of the reflector). What the instrument reads is the displacement of the
-reflector from where it is without errors: three displacements and the rotation vector, in the axes of the bed.
+The chain of C 1.11 in homogeneous transforms: C0 (mounting of the axis), nominal turn, errors of the axis,
+RX0 (mounting of the indexer), its turn back, its errors, RL (mounting of the reflector). What the instrument
+reads is the displacement of the reflector from where it is without errors: three displacements and the
+rotation vector, in the axes of the bed.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """All six errors of a rotary axis from reversal readings, as an error model for the post-processor.
 
-Each error is a Fourier series of the axis's position (C annex A.1, which offers polynomials; a turn is periodic), the
-indexer's are free at every increment, the mounting's eighteen are free in each set-up. The readings are linear in all of
-them (transport matrices, C 1.25). What mounting and indexer can pretend as well is found by rank and left out: it is listed,
-never divided by.
+Each error is a Fourier series of the axis's position (C annex A.1, which offers polynomials; a turn is
+periodic), the indexer's are free at every increment, the mounting's eighteen are free in each set-up. The
+readings are linear in all of them (transport matrices, C 1.25). What mounting and indexer can pretend as well
+is found by rank and left out: it is listed, never divided by.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class RotaryFit:
         lost: names of the amplitudes that mounting or indexer can pretend as well
         result: of the fit; the smallest one where the readings leave it open
         residuals: (m, n, 6)
-        noted, condition_number: how many amplitudes the readings determine, and how far apart (2-norm, columns of length 1),
-            with mounting and indexer taken out
+        noted, condition_number: how many amplitudes the readings determine, and how far apart (2-norm,
+            columns of length 1), with mounting and indexer taken out
         cost_instrument: sum of squared weighted residuals where nothing but indexer and mounting is found
     """
 
@@ -56,7 +56,8 @@ class RotaryFit:
     cost_instrument: float
 
 
-def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, robust: bool = False) -> RotaryFit:
+def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int,
+               robust: bool = False) -> RotaryFit:
     """From readings (m, n, 6), NaN where one is missing; `sigma` (6,) of displacements and turns.
 
     Raises:
@@ -86,8 +87,8 @@ def fit_rotary(bench: Bench, readings: Floats, sigma: Floats, harmonics: int, ro
 
 
 def rotary_span(bench: Bench, readings: Floats, sigma: Floats, harmonics: int) -> tuple[Floats, Floats]:
-    """What `fit_rotary` can explain of the known readings (K,) in order, divided by their standard deviations: orthonormal
-    columns (K, rank); and those standard deviations (K,)."""
+    """What `fit_rotary` can explain of the known readings (K,) in order, divided by their standard
+    deviations: orthonormal columns (K, rank); and those standard deviations (K,)."""
     known, weights = np.isfinite(readings).ravel(), np.tile(sigma, readings.size // 6)
     columns = _design(bench, len(readings), harmonics)[0][known]
     u, s, _ = np.linalg.svd(columns / weights[known][:, None], full_matrices=False)
@@ -123,8 +124,8 @@ def hidden(bench: Bench, sigma: Floats, harmonics: int) -> tuple[str, ...]:
 
 
 def distinguishable(bench: Bench, m: int, sigma: Floats, harmonics: int) -> float:
-    """Condition number (2-norm, columns of length 1) of the amplitudes that m set-ups determine, mounting and indexer taken
-    out; inf where they determine none."""
+    """Condition number (2-norm, columns of length 1) of the amplitudes that m set-ups determine, mounting and
+    indexer taken out; inf where they determine none."""
     rows = _design(bench, m, harmonics)[0] / np.tile(sigma, m * bench.steps)[:, None]
     return _condition(_noted(_left(rows, 12 * harmonics))[1])
 
@@ -143,8 +144,8 @@ def _left(rows: Floats, count: int) -> Floats:
 
 
 def _noted(left: Floats) -> tuple[Bools, Floats]:
-    """Of what mounting and indexer leave of the wanted columns (K, P): True (P,) for those that they or lost ones can make
-    up, and the singular values of what is determined."""
+    """Of what mounting and indexer leave of the wanted columns (K, P): True (P,) for those that they or lost
+    ones can make up, and the singular values of what is determined."""
     square, count = np.linalg.qr(left, mode="r"), left.shape[1]
     _, values, vt = np.linalg.svd(np.concatenate([square, np.zeros((count - len(square), count))]))
     return np.asarray(np.sum(vt[values <= NOTED] ** 2, axis=0) > 1e-6), values[values > NOTED]
@@ -168,7 +169,8 @@ def error_model(fitted: RotaryFit, axis: str, machine: str = "", name: str = "",
     components = [Component(ErrorName(part, False, axis), Fourier(np.concatenate([[0.0], *amplitudes[part]])))
                   for part in range(len(DIRECTIONS))]
     frame: ErrorFrame = "fixed" if carries_part else "moving"
-    model = ErrorModel(SerialErrors(tuple(components), frame={axis: frame}), name=name or axis, machine=machine)
+    model = ErrorModel(SerialErrors(tuple(components), frame={axis: frame}), name=name or axis,
+                       machine=machine)
     at = np.concatenate([1 + part * (1 + 2 * harmonics) + np.arange(2 * harmonics) for part in range(len(DIRECTIONS))])
     covariance, spread = np.zeros((len(model.names), len(model.names))), np.kron(turn, np.eye(2 * harmonics))
     covariance[np.ix_(at, at)] = spread @ fitted.covariance @ spread.T

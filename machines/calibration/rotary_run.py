@@ -41,7 +41,8 @@ def reversal(run: CalibrationRun, given: ReversalModel, table: CsvTable) -> Cali
         return None
     setup, step, m = places
     if given.shifts and len(given.shifts) != m:
-        run.problem("calibrate.shifts", f"{len(given.shifts)} shifts for {m} set-ups", "write one per set-up", "shifts")
+        run.problem("calibrate.shifts", f"{len(given.shifts)} shifts for {m} set-ups",
+                    "write one per set-up", "shifts")
         return None
     readings = np.full((m, given.steps), np.nan)
     readings[setup, step] = table.columns["reading"]
@@ -111,7 +112,8 @@ def rotary(run: CalibrationRun, given: RotaryMeasurementModel, table: CsvTable) 
                 lambda: rotary_table_fault(bench, readings, sigma, given.harmonics, [table.unit[p] for p in PARTS]))
 
 
-def _rotary_figures(given: RotaryMeasurementModel, bench: Bench, fitted: RotaryFit, sigma: Floats) -> CalibrationFigures:
+def _rotary_figures(given: RotaryMeasurementModel, bench: Bench, fitted: RotaryFit,
+                    sigma: Floats) -> CalibrationFigures:
     planned = _planned(given.steps, SETUPS, 216)
     return {**account(fitted.result, fitted.noted, fitted.condition_number, fitted.amplitudes.size, fitted.cost_instrument),
         "not_identifiable": [[name] for name in fitted.lost], "signatures": series_signatures(fitted),

@@ -67,7 +67,8 @@ class CalibrationRun:
             large = np.abs(table.columns.get(name, np.zeros(1))) > LARGEST
             if large.any():
                 row = int(np.argmax(large))
-                self.row(table, row, f"{name} is {table.columns[name][row]:.3g} mm or rad", f"allowed are up to {LARGEST:g}")
+                self.row(table, row, f"{name} is {table.columns[name][row]:.3g} mm or rad",
+                         f"allowed are up to {LARGEST:g}")
 
     def _missing(self, table: CsvTable, names: Sequence[str]) -> None:
         """Columns that are not there; errors by their names (EXX) are another kind of table."""
@@ -92,7 +93,8 @@ class CalibrationRun:
         bad = (setup != np.round(setup)) | (setup < 0) | (step != np.round(step)) | (step < 0) | (step >= steps)
         twice = np.ones(len(setup), dtype=np.bool_)
         twice[np.unique(setup * steps + step, return_index=True)[1]] = False
-        for where, what in ((bad, f"is not a set-up 0, 1, ... and a step 0 .. {steps - 1}"), (twice, "was measured before")):
+        for where, what in ((bad, f"is not a set-up 0, 1, ... and a step 0 .. {steps - 1}"),
+                            (twice, "was measured before")):
             if where.any():
                 row = int(np.argmax(where))
                 self.row(table, row, f"set-up {setup[row]:g}, step {step[row]:g} {what}")

@@ -1,7 +1,8 @@
 """Faults of a measurement table that the readings themselves show: a wrong unit or sign, two columns changed over.
 
-Where a fit does not leave the noise that is stated, the same fit is made with each fault put right; one that brings what is
-left to the stated noise, or far nearer to it, is named. What all readings share (one sign, a turn of the zero) cannot be
+Where a fit does not leave the noise that is stated, the same fit is made with each fault put right; one that
+brings what is left to the stated noise, or far nearer to it, is named. What all readings share (one sign, a
+turn of the zero) cannot be
 seen: the errors found only have it too.
 """
 
@@ -46,8 +47,8 @@ TENFOLD = {"ten times as large": 10.0, "a tenth as large": 0.1}
 
 @dataclass(frozen=True)
 class TableFault:
-    """What explains the readings: `words` with the remedy; `size` True where it is their unit, for which the noise alone may
-    speak."""
+    """What explains the readings: `words` with the remedy; `size` True where it is their unit, for which the
+    noise alone may speak."""
 
     words: str
     size: bool
@@ -157,7 +158,8 @@ def _readings(problem: CalibrationProblem, read: Floats, columns: Sequence[str],
         yield TriedRemedy(words, noise_of(y - span @ (span.T @ y), span.shape[1]), size)
 
 
-def _changed(table: Floats, columns: Sequence[str], units: Sequence[str]) -> Iterable[tuple[str, Floats, bool]]:
+def _changed(table: Floats, columns: Sequence[str],
+             units: Sequence[str]) -> Iterable[tuple[str, Floats, bool]]:
     """Readings (..., C) with each fault put right, in words; True where they have another size."""
     count = len(columns)
     kinds = [k for k in ({0, 1, 2}, {3, 4, 5}) if max(k) < count] if count > 1 else []
@@ -226,7 +228,8 @@ def _rearranged(readings: Floats) -> Iterable[tuple[str, Floats]]:
     return ((words, other) for words, other in others if (np.isfinite(other) == np.isfinite(readings)).all())
 
 
-def reversal_table_fault(readings: Floats, sigma: float, given: ReversalModel, unit: str) -> TableFault | None:
+def reversal_table_fault(readings: Floats, sigma: float, given: ReversalModel,
+                         unit: str) -> TableFault | None:
     """The fault of a table of angular readings (m, n), None where there is none."""
     m, n = readings.shape
     shifts = given.shifts or tuple(range(m))
@@ -264,8 +267,8 @@ def _swapped(count: int, a: int, b: int) -> list[int]:
 
 
 def _best(now: Noise | None, tried: Callable[[], Iterable[TriedRemedy]]) -> TableFault | None:
-    """The faults that come to the stated noise where `now` does not; without any those that leave least, where that is far
-    less than is left now."""
+    """The faults that come to the stated noise where `now` does not; without any those that leave least,
+    where that is far less than is left now."""
     if now is None or now.meets:
         return None
     known = [(one, one.noise) for one in tried() if one.noise is not None and one.noise.left > 0.0]

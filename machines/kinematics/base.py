@@ -1,11 +1,11 @@
 """What every kinematics promises. Points first, xyz last; mm and rad; NaN where there is no solution.
 
-Kinematics work in the table frame (the frame that carries the part, at the machine origin when q = 0), at the gauge
-point of the spindle unless `with_tool(length)` was asked for. The tool axis points from the tip to the spindle.
+Kinematics work in the table frame (the frame that carries the part, at the machine origin when q = 0), at the
+gauge point of the spindle unless `with_tool(length)` was asked for. The tool axis points from the tip to the spindle.
 
-A kind of machine gives `inverse` and `forward`; everything else has a default that is safe: rates by differences,
-blocks looked at in places instead of bounded (`jets_proved` is False: programs are checked, not proved), no clearances, no
-geometric errors. A kind that knows more overrides more.
+A kind of machine gives `inverse` and `forward`; everything else has a default that is safe: rates by
+differences, blocks looked at in places instead of bounded (`jets_proved` is False: programs are checked, not
+proved), no clearances, no geometric errors. A kind that knows more overrides more.
 """
 
 from __future__ import annotations
@@ -57,15 +57,15 @@ class Kinematics(ABC):
     tool_axis: Floats = UP
     """(3,) from the tip to the spindle when all joints are 0"""
     straight_slides: bool = False
-    """True where, at fixed rotary joints, the tip is an affine function of the linear joints, which turn no tool: slides
-    move it along straight lines, evenly, whatever the others do"""
+    """True where, at fixed rotary joints, the tip is an affine function of the linear joints, which turn no
+    tool: slides move it along straight lines, evenly, whatever the others do"""
     slides_square: bool = False
     """True where the slides besides are square to each other and no turning axis lies between them"""
     jets_proved: bool = False
     """True where `jets` bounds the third derivative, False where it only looks at places: then no block has a bound"""
     chain: tuple[Joint, ...] = ()
-    """the axes from the workpiece to the tool of a machine whose poses are their motions one after the other (product of
-    exponentials, see `Serial`); () of any other"""
+    """the axes from the workpiece to the tool of a machine whose poses are their motions one after the other
+    (product of exponentials, see `Serial`); () of any other"""
     on_rods: RodPlatform | None = None
     """the platform and its rods, where rods carry the tool"""
     workspace: Workspace | None = None
@@ -73,15 +73,15 @@ class Kinematics(ABC):
     singular_names: tuple[str, ...] = ()
     """what `singular_distance` measures; () where it measures nothing"""
 
-    # ---- what a kind gives ---------------------------------------------------------------------------------------------
+    # ---- what a kind gives ---------------------------------------------------------------------------------
 
     @abstractmethod
     def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0,
                 near: Floats | None = None) -> Floats:
         """Joints (B, N, J) that put the tip and axis (N, 3) there; NaN rows where a branch has no solution.
 
-        Rotary joints come as principal values (-pi, pi], branches in a fixed order. Where the solution is a family
-        (`singular`), the free joint takes the value in `near` (N, J) or (J,), 0 without it.
+        Rotary joints come as principal values (-pi, pi], branches in a fixed order. Where the solution is a
+        family (`singular`), the free joint takes the value in `near` (N, J) or (J,), 0 without it.
         `spin` only matters to machines that can turn the tool about itself under command.
         """
 
@@ -89,14 +89,14 @@ class Kinematics(ABC):
     def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
         """(tip (N, 3), axis (N, 3)) of joints q (N, J); see `pose` for `near`."""
 
-    # ---- poses ---------------------------------------------------------------------------------------------------------
+    # ---- poses ---------------------------------------------------------------------------------------------
 
     def pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """(tip (N, 3), axis (N, 3), spin (N,)) of joints q (N, J).
 
-        Spin is the angle about the axis from the reference (the x direction carried by the least rotation that
-        takes z to the axis) to the tool's own x direction; NaN of a kind that does not say it. Parallel machines take the
-        assembly mode nearest `near`, a pose (N, 6) or (6,) as (tip, axis); without it the home mode.
+        Spin is the angle about the axis from the reference (the x direction carried by the least rotation
+        that takes z to the axis) to the tool's own x direction; NaN of a kind that does not say it. Parallel
+        machines take the assembly mode nearest `near`, a pose (N, 6) or (6,) as (tip, axis); without it the home mode.
         """
         tip, axis = self.forward(q, near)
         return tip, axis, np.full(len(tip), np.nan)
@@ -115,21 +115,21 @@ class Kinematics(ABC):
         return as_points(axis, 3, "axis")
 
     def singular(self, q: Floats) -> Bools:
-        """True (N,) where joints may turn while the tool stands, so that the inverse is a family: mostly where the tool lies
-        along a rotary axis."""
+        """True (N,) where joints may turn while the tool stands, so that the inverse is a family: mostly
+        where the tool lies along a rotary axis."""
         return by_samples.free(self.jacobian(q), self.rotary)
 
     def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:
-        """The pose (N, 6) at joints q0 (N, J) as the rotary joints outside the closed loops turn it on the path to q1 (N,
-        J).
+        """The pose (N, 6) at joints q0 (N, J) as the rotary joints outside the closed loops turn it on the
+        path to q1 (N, J).
 
         On parallel machines it is what `forward` at q1 takes as `near`: what is left between the two is the slides' part.
         """
         return pose
 
     def at_tip(self, tip: Floats, q: Floats, solved: Ints) -> Floats:
-        """q (N, J) with the joints `solved` (3,) as they bring the tip (N, 3) there, the others as they are: what a control
-        does that runs the kinematics. NaN where there are none near q."""
+        """q (N, J) with the joints `solved` (3,) as they bring the tip (N, 3) there, the others as they are:
+        what a control does that runs the kinematics. NaN where there are none near q."""
         if not self.straight_slides:
             return by_samples.at_tip(self.forward, self.jacobian, tip, q, solved)
         result = q.copy()
@@ -139,7 +139,7 @@ class Kinematics(ABC):
         result[:, solved] = np.linalg.solve(columns, (tip - at_zero)[..., None])[..., 0]
         return result
 
-    # ---- rates, motion along straight joint moves ------------------------------------------------------------------------
+    # ---- rates, motion along straight joint moves ----------------------------------------------------------
 
     @property
     def turns_tool(self) -> tuple[bool, ...]:
@@ -165,15 +165,15 @@ class Kinematics(ABC):
     def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """(tip in mm, tool axis) in the table frame along the straight moves q0 -> q1 (N, J).
 
-        Machines of several assembly modes are taken in their home mode. Where `jets_proved` the third derivative is a bound
-        over the whole move (`rod_loops.UNBOUNDED` where none was found), else what was seen of it.
+        Machines of several assembly modes are taken in their home mode. Where `jets_proved` the third
+        derivative is a bound over the whole move (`rod_loops.UNBOUNDED` where none was found), else what was seen of it.
         """
         return by_samples.jets(self.forward, q0, q1)
 
     def tip_jets(self, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats,
                  solved: Ints) -> tuple[TaylorVector, TaylorVector]:
-        """(tip, tool axis) where the control runs the kinematics: tips straight from `tip0` to `tip1` (N, 3), the joints
-        but those it solves for (`solved`) even from q0 to q1 (N, J). A bound where `tip_jets_proved`."""
+        """(tip, tool axis) where the control runs the kinematics: tips straight from `tip0` to `tip1` (N, 3),
+        the joints but those it solves for (`solved`) even from q0 to q1 (N, J). A bound where `tip_jets_proved`."""
         tip = straight(list(tip0.T), list(tip1.T))
         turning = np.array(self.turns_tool)
         if not turning.any():
@@ -190,11 +190,11 @@ class Kinematics(ABC):
         """Whether `tip_jets` bounds the third derivative: not where the joints that the control solves for turn the tool."""
         return self.jets_proved and not np.array(self.turns_tool)[solved].any()
 
-    # ---- singular positions, clearances ------------------------------------------------------------------------------
+    # ---- singular positions, clearances --------------------------------------------------------------------
 
     def singular_distance(self, q: Floats) -> Floats:
-        """(N, S) how far joints q (N, J) stand from the singular positions of `singular_names`, between 0 and 1, home mode;
-        NaN without a pose."""
+        """(N, S) how far joints q (N, J) stand from the singular positions of `singular_names`, between 0 and
+        1, home mode; NaN without a pose."""
         return np.zeros((len(q), 0))
 
     def singular_distance_between(self, q: Floats) -> Floats:
@@ -202,8 +202,8 @@ class Kinematics(ABC):
         return np.zeros((max(len(q) - 1, 0), 0))
 
     def places_apart(self) -> Floats | None:
-        """(2, J) joints in reach, rotary ones apart, by which the axis is found that turns the tool about one direction
-        everywhere (`postproc/joints/poles.py`); None of a kind that knows of none."""
+        """(2, J) joints in reach, rotary ones apart, by which the axis is found that turns the tool about one
+        direction everywhere (`postproc/joints/poles.py`); None of a kind that knows of none."""
         return None
 
     def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
@@ -213,7 +213,7 @@ class Kinematics(ABC):
         none = np.zeros((len(q), 0, 3))
         return ClearanceGeometry(gauge, np.zeros(len(q)), none, none, gauge, axis)
 
-    # ---- geometric errors, pivots --------------------------------------------------------------------------------------
+    # ---- geometric errors, pivots --------------------------------------------------------------------------
 
     @property
     def axes_with_errors(self) -> tuple[str, ...]:
@@ -229,8 +229,8 @@ class Kinematics(ABC):
         raise ValueError(f"errors of {type(self).__name__} machines cannot be modelled")
 
     def axis_line(self, letter: str) -> tuple[Floats, Floats]:
-        """(direction (3,), point (3,) in mm) of the line of an axis when all joints are 0, in the frame that carries it; the
-        point of a slide is 0.
+        """(direction (3,), point (3,) in mm) of the line of an axis when all joints are 0, in the frame that
+        carries it; the point of a slide is 0.
 
         Raises:
             ValueError: where the kind does not know it.

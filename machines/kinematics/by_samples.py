@@ -41,8 +41,8 @@ def rates(forward: Forward, q: Floats, rotary: tuple[bool, ...]) -> Floats:
 
 
 def twists(rate: Floats, axis: Floats) -> Floats:
-    """(v, omega) (N, 6, J) of rates (N, 6, J) at tool axes (N, 3); omega about the tool axis, which no pose shows, counts as
-    none."""
+    """(v, omega) (N, 6, J) of rates (N, 6, J) at tool axes (N, 3); omega about the tool axis, which no pose
+    shows, counts as none."""
     return np.concatenate([rate[:, :3], np.cross(axis[:, :, None], rate[:, 3:], axis=1)], axis=1)
 
 
@@ -58,8 +58,8 @@ def free(rate: Floats, rotary: tuple[bool, ...]) -> Bools:
 def jets(forward: Forward, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
     """(tip, axis) along the straight moves q0 -> q1 (N, J).
 
-    Value and derivatives in the middle by differences of fourth order; the third over the whole move is SAFETY times the
-    largest third difference seen, which is no bound.
+    Value and derivatives in the middle by differences of fourth order; the third over the whole move is
+    SAFETY times the largest third difference seen, which is no bound.
     """
     n = len(q0)
     value, first, second, third = np.empty((n, 6)), np.empty((n, 6)), np.empty((n, 6)), np.empty((n, 2))
@@ -88,9 +88,10 @@ def differences(seen: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return seen[k], first, second, SAFETY * sizes
 
 
-def at_tip(forward: Forward, jacobian: Callable[[Floats], Floats], tip: Floats, q: Floats, solved: Ints) -> Floats:
-    """q (N, J) with the joints `solved` (3,) such that the tip (N, 3) is there: Newton from q; NaN where it does not come
-    there."""
+def at_tip(forward: Forward, jacobian: Callable[[Floats], Floats], tip: Floats, q: Floats,
+           solved: Ints) -> Floats:
+    """q (N, J) with the joints `solved` (3,) such that the tip (N, 3) is there: Newton from q; NaN where it
+    does not come there."""
     result = np.array(q, dtype=np.float64)
     live = np.flatnonzero(np.isfinite(result).all(axis=1) & np.isfinite(tip).all(axis=1))
     closed = np.zeros(len(q), dtype=np.bool_)
@@ -118,7 +119,8 @@ Followed = Callable[[Floats, Floats, Ints], Floats]
 """tool axis (N, 3) at tips (N, 3), from joints (N, J) of which those named are solved for"""
 
 
-def axis_jet(followed: Followed, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats, solved: Ints) -> TaylorVector:
+def axis_jet(followed: Followed, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats,
+             solved: Ints) -> TaylorVector:
     """The tool axis along moves of straight tips tip0 -> tip1 (N, 3), joints that are not `solved` even from q0 to q1.
 
     The third derivative is what was seen, as in `jets`.

@@ -22,8 +22,8 @@ class ClearanceSizes:
         rail_radius: mm, the fixed part of a slide as a round bar
         rail_offset: (K, 3) mm from the line of the carriage joint to the bar's axis
         rail_ends: (K, 2) mm of q, the ends of the bar
-        carriage_angle, platform_angle: rad, largest swing of a rod's joint at either end from its direction in the
-            middle of the workspace
+        carriage_angle, platform_angle: rad, largest swing of a rod's joint at either end from its direction
+            in the middle of the workspace
     """
 
     leg: Ints

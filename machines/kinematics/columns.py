@@ -1,7 +1,7 @@
 """3-vectors as three columns x, y, z, each an array over points or a number: what a long batch is computed with fast.
 
-A row-wise (N, 3) layout makes numpy walk in steps of three and copy for every product; columns of a few thousand points
-stay in the processor's cache. Only the kinematics use this inside; their interfaces are points first.
+A row-wise (N, 3) layout makes numpy walk in steps of three and copy for every product; columns of a few
+thousand points stay in the processor's cache. Only the kinematics use this inside; their interfaces are points first.
 """
 
 from __future__ import annotations

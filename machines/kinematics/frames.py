@@ -16,7 +16,8 @@ def reference_x(axis: Floats) -> Floats:
     below = z < 0.0
     square = x * x + y * y
     # 1 / (1 + z) without cancellation near z = -1
-    grow = np.where(below, (1.0 - z) / np.where(square > 0.0, square, 1.0), 1.0 / np.where(below, 1.0, 1.0 + z))
+    grow = np.where(below, (1.0 - z) / np.where(square > 0.0, square, 1.0),
+                    1.0 / np.where(below, 1.0, 1.0 + z))
     return np.stack([1.0 - grow * x * x, -grow * x * y, -x], axis=1)
 
 

@@ -24,8 +24,8 @@ X, UP = (1.0, 0.0, 0.0), [0.0, 0.0, 1.0]
 class H4TableAxis(H4Linear):
     """The part on a C table about z through the machine origin; seen from it, +C turns the tool by +C.
 
-    Directions are axis = (sin(theta) sin(C), -sin(theta) cos(C), cos(theta)). Two pairs: theta >= 0, then theta <= 0.
-    Where the tool is along the table's axis C is free.
+    Directions are axis = (sin(theta) sin(C), -sin(theta) cos(C), cos(theta)). Two pairs: theta >= 0, then
+    theta <= 0. Where the tool is along the table's axis C is free.
     """
 
     pairs = 2
@@ -41,7 +41,8 @@ class H4TableAxis(H4Linear):
             return super().axis_line(letter)
         return np.array([0.0, 0.0, self.sense]), np.zeros(3)
 
-    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle, turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
+    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle,
+                   turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
         about, down = (0.0, 0.0, self.sense), -(self.gauge + self.tool_length)
         tip = (TaylorVector((0.0, 0.0, down)).turned(X, ZERO, tilt) + place).turned(about, ZERO, turn)
         return tip, TaylorVector(list(UP)).turned(X, ZERO, tilt).turned(about, ZERO, turn)
@@ -79,7 +80,8 @@ class H4TableAxis(H4Linear):
         v = unit(as_points(axis, 3, "axis"))
         most = max(abs(t) for t in self.workspace.tilt)
         flat = np.hypot(v[:, 0], v[:, 1])
-        side = np.where((flat > 0.0)[:, None], v[:, :2] / np.where(flat > 0.0, flat, 1.0)[:, None], [0.0, -1.0])
+        side = np.where((flat > 0.0)[:, None], v[:, :2] / np.where(flat > 0.0, flat, 1.0)[:, None],
+                        [0.0, -1.0])
         edge = np.column_stack([np.sin(most) * side, np.full(len(v), np.cos(most))])
         inside = np.arctan2(flat, v[:, 2]) <= most + ROUND_OFF
         result: Floats = np.where(inside[:, None], axis, edge)
@@ -91,8 +93,8 @@ class H4TableAxis(H4Linear):
 class H4SpindleAxis(H4Linear):
     """The spindle on a B axis that the platform carries: about the platform's y through C + pivot.
 
-    Directions are axis = (sin(B), -sin(theta) cos(B), cos(theta) cos(B)). One pair, B within +-90 degrees: the other,
-    theta and B over 180 degrees, turns the platform upside down, which its tilt range never allows.
+    Directions are axis = (sin(B), -sin(theta) cos(B), cos(theta) cos(B)). One pair, B within +-90 degrees:
+    the other, theta and B over 180 degrees, turns the platform upside down, which its tilt range never allows.
     """
 
     pairs = 1
@@ -106,7 +108,8 @@ class H4SpindleAxis(H4Linear):
             return super().axis_line(letter)
         return np.array([0.0, self.sense, 0.0]), self.pivot
 
-    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle, turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
+    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle,
+                   turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
         about, down = (0.0, self.sense, 0.0), -(self.gauge + self.tool_length)
         reach = TaylorVector((0.0, 0.0, down)).turned(about, ZERO, turn) + TaylorVector(of_one(self.pivot))
         axis = TaylorVector(list(UP)).turned(about, ZERO, turn)

@@ -1,9 +1,9 @@
 """Five-axis machines on the asymmetric H4: what those with a C table and with a B axis at the spindle share.
 
-The machines themselves are in `h4_axes`. The platform tilts about x by theta, which no axis shows: it follows from the
-four slides. The machine frame is that of the slides. At theta = 0 and rotary axis = 0 the gauge point is `gauge` below
-the platform's reference point C (h1 of the thesis); a tool lengthens it. Source: Company 2000, V.5.2 (both machines),
-V.7 (model).
+The machines themselves are in `h4_axes`. The platform tilts about x by theta, which no axis shows: it follows
+from the four slides. The machine frame is that of the slides. At theta = 0 and rotary axis = 0 the gauge
+point is `gauge` below the platform's reference point C (h1 of the thesis); a tool lengthens it. Source:
+Company 2000, V.5.2 (both machines), V.7 (model).
 """
 
 from __future__ import annotations
@@ -36,9 +36,10 @@ Pair = tuple[Floats, Floats]
 class H4Linear(OnSlides):
     """What both machines share. Joints: four slides, then the rotary axis.
 
-    `inverse` gives the machine's own leg roots for each pair of tilt and rotary axis (`pairs`). With `all_roots` it
-    gives every choice of the four leg roots for each pair: the own ones first, then in the order of
-    `Legs.root_choices`. A leg cannot change its root without passing the position where the rod is square to its slide.
+    `inverse` gives the machine's own leg roots for each pair of tilt and rotary axis (`pairs`). With
+    `all_roots` it gives every choice of the four leg roots for each pair: the own ones first, then in the
+    order of `Legs.root_choices`. A leg cannot change its root without passing the position where the rod is
+    square to its slide.
     """
 
     platform: H4Platform
@@ -78,7 +79,7 @@ class H4Linear(OnSlides):
         """of the platform"""
         return self.platform.legs
 
-    # ---- what differs ----------------------------------------------------------------------------------------------
+    # ---- what differs --------------------------------------------------------------------------------------
 
     @abstractmethod
     def _pairs(self, axis: Floats, free: Floats) -> tuple[Pair, ...]:
@@ -97,16 +98,18 @@ class H4Linear(OnSlides):
         """(direction, point), each (N, 3), of the axis that the tool turns about, seen from the part."""
 
     @abstractmethod
-    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle, turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
+    def _tool_jets(self, place: TaylorVector, tilt: TaylorAngle,
+                   turn: TaylorAngle) -> tuple[TaylorVector, TaylorVector]:
         """(tip, axis) of a platform that moves, in the table frame."""
 
-    # ---- inverse and forward ---------------------------------------------------------------------------------------
+    # ---- inverse and forward -------------------------------------------------------------------------------
 
     def with_tool(self, length: float) -> Self:
         """The same machine at the tip of a tool of that length (mm)."""
         return replace(self, tool_length=float(length))
 
-    def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0, near: Floats | None = None) -> Floats:
+    def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0,
+                near: Floats | None = None) -> Floats:
         """Joints (B, N, 5), V-22; NaN where a rod does not reach or the tilt leaves the workspace's range."""
         tip, axis = as_points(tip, 3, "tip"), unit(as_points(axis, 3, "axis"))
         free = np.zeros(len(tip)) if near is None else np.broadcast_to(near, (len(tip), 5))[:, 4]
@@ -185,7 +188,7 @@ class H4Linear(OnSlides):
         """The same in the middle of the workspace, rotary axis at 0."""
         return self.rig(np.column_stack([self.platform.inverse(self.platform.home[None]), [0.0]]))
 
-    # ---- platform ------------------------------------------------------------------------------------------------
+    # ---- platform ------------------------------------------------------------------------------------------
 
     @property
     def platform_joints(self) -> Floats:
@@ -219,7 +222,7 @@ class H4Linear(OnSlides):
         slides = self.platform.inverse(self.platform.home[None])
         return np.column_stack([np.repeat(slides, 2, axis=0), [0.0, 0.7]])
 
-    # ---- errors --------------------------------------------------------------------------------------------------
+    # ---- errors --------------------------------------------------------------------------------------------
 
     @property
     def axes_with_errors(self) -> tuple[str, ...]:
@@ -230,7 +233,7 @@ class H4Linear(OnSlides):
         """See the base class."""
         return forms.tilting_rods(self)
 
-    # ---- rates -----------------------------------------------------------------------------------------------------
+    # ---- rates ---------------------------------------------------------------------------------------------
 
     def twist_jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
         """(v at the tip, omega) of the tool relative to the part per joint rate, (N, 6, 5), in the table frame."""

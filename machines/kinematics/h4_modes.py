@@ -1,10 +1,10 @@
 """All real assembly modes of a platform on four rods that moves by three translations and a turn about x.
 
 For a given tilt the platform's reference point C lies on four spheres around e_k = A_k - Rx(theta) b_k. The
-differences of the sphere equations are linear in C, M(theta) C = r(theta); with C = adj(M) r / det M put into the first
-sphere, |adj(M) r - det M e_1|^2 - (L_1 det M)^2 = 0 is a trigonometric polynomial in theta. Its coefficients come
-from equally spaced samples, its roots from the eigenvalues of the companion matrix in w = exp(i theta); real tilts are
-the roots on the unit circle.
+differences of the sphere equations are linear in C, M(theta) C = r(theta); with C = adj(M) r / det M put into
+the first sphere, |adj(M) r - det M e_1|^2 - (L_1 det M)^2 = 0 is a trigonometric polynomial in theta. Its
+coefficients come from equally spaced samples, its roots from the eigenvalues of the companion matrix in w =
+exp(i theta); real tilts are the roots on the unit circle.
 """
 
 from __future__ import annotations
@@ -82,7 +82,8 @@ def _real_tilts(coefficients: Complex) -> Floats:
     return result
 
 
-def _points(carriages: Floats, joints: Floats, lengths: Floats, tilt: Floats, legs: tuple[int, int, int]) -> Floats:
+def _points(carriages: Floats, joints: Floats, lengths: Floats, tilt: Floats,
+            legs: tuple[int, int, int]) -> Floats:
     """Both meeting points (2, N, 4) of three of the spheres at tilts (N,), with the tilt; on a near miss their foot."""
     e = _centres(carriages, joints, tilt[:, None])[:, 0]
     foot, out = three_spheres(e[:, legs], lengths[list(legs)])

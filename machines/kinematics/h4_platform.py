@@ -1,7 +1,7 @@
 """Platform of the asymmetric H4 on linear slides: three translations and a tilt about the fixed direction x.
 
-Legs 1 and 2 are pairs of parallel rods with the joints of a pair along x, which leaves the platform only the turn about
-x; legs 3 and 4 are single rods. With C the platform's reference point, theta its tilt and b_k the joints in the
+Legs 1 and 2 are pairs of parallel rods with the joints of a pair along x, which leaves the platform only the
+turn about x; legs 3 and 4 are single rods. With C the platform's reference point, theta its tilt and b_k the joints in the
 platform: B_k = C + Rx(theta) b_k. Source: Company 2000, V.4.2, V.7 (V-22, V-23). Platform coordinates are (x, y, z of
 C in mm, theta in rad), called `p` (N, 4).
 """
@@ -74,14 +74,14 @@ class H4Platform:
         jx = self.jx(p, q)
         return platform_rates(jx, self.legs.along(jx[:, :, :3]))
 
-    # ---- forward -------------------------------------------------------------------------------------------------
+    # ---- forward -------------------------------------------------------------------------------------------
 
     def forward(self, q: Floats, near: Floats | None = None) -> Floats:
         """Platform (N, 4) of slides (N, 4) in the mode nearest `near` (4,) or (N, 4), without it in the home mode.
 
         Home mode: the machine's own leg roots, the sign of det Jx and the tilt range as in the home pose; where more
-        than one solution is such, the one nearest the home pose. Newton from `near` (home), checked; where it leads
-        elsewhere, all modes are computed and the one asked for is taken.
+        than one solution is such, the one nearest the home pose. Newton from `near` (home), checked; where it
+        leads elsewhere, all modes are computed and the one asked for is taken.
         """
         start = np.broadcast_to(self.home if near is None else near, (len(q), 4))
         parts = [self._forward(q[part], start[part], near is None) for part in blocks(len(q))]
@@ -99,8 +99,8 @@ class H4Platform:
     def modes(self, q: Floats) -> Floats:
         """All real assembly modes (8, N, 4) of slides (N, 4): the home mode first, then by distance from it, NaN after.
 
-        The elimination of C leaves a polynomial of degree 8 in exp(i theta) (`h4_modes`), which gives the 8 solutions
-        counted for such machines (V.7.1.2); each root is refined on the four rod equations.
+        The elimination of C leaves a polynomial of degree 8 in exp(i theta) (`h4_modes`), which gives the 8
+        solutions counted for such machines (V.7.1.2); each root is refined on the four rod equations.
         """
         seeds = candidates(self.legs.carriages(q), self.joints, self.legs.lengths)
         count, n = seeds.shape[:2]

@@ -1,7 +1,7 @@
 """Linear Delta: three slides, three pairs of parallel rods, a platform that only translates.
 
-Any place and direction of the slides. The table frame is the frame in which the slides are given; the gauge point is
-the platform's reference point E. Source: Company 2000, chapter III (III-1 to III-5, III-10, III-11 corrected).
+Any place and direction of the slides. The table frame is the frame in which the slides are given; the gauge
+point is the platform's reference point E. Source: Company 2000, chapter III (III-1 to III-5, III-10, III-11 corrected).
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ ROUND_OFF = 1e-12
 class LinearDelta(OnSlides):
     """Three legs whose platform joints are E + platform[k].
 
-    `inverse` gives the machine's own roots (branches = 1): a leg cannot change its root without passing the position
-    where the rod stands square to its slide. With `all_roots` it gives all 8 choices, the own one first, in the
-    order of `Legs.root_choices`.
+    `inverse` gives the machine's own roots (branches = 1): a leg cannot change its root without passing the
+    position where the rod stands square to its slide. With `all_roots` it gives all 8 choices, the own one
+    first, in the order of `Legs.root_choices`.
     """
 
     legs: Legs
@@ -77,9 +77,9 @@ class LinearDelta(OnSlides):
     def assembly_modes(self, q: Floats) -> tuple[Floats, Floats]:
         """Both poses (tip, axis), each (2, N, 3), of slides q (N, 3): the home mode first.
 
-        The centres q u + P - b of three spheres of the rods' lengths: their planes of intersection give the two
-        points, which for slides parallel to z is III-11 as corrected. Mode by the sign of det Jx, which can only
-        change where the platform is singular.
+        The centres q u + P - b of three spheres of the rods' lengths: their planes of intersection give the
+        two points, which for slides parallel to z is III-11 as corrected. Mode by the sign of det Jx, which
+        can only change where the platform is singular.
         """
         q = as_points(q, 3, "q")
         foot, out = three_spheres(self.legs.carriages(q) - self.platform, self.legs.lengths)
@@ -126,7 +126,7 @@ class LinearDelta(OnSlides):
         """See the base class."""
         return forms.translating_rods(self)
 
-    # ---- platform ------------------------------------------------------------------------------------------------
+    # ---- platform ------------------------------------------------------------------------------------------
 
     @property
     def platform_joints(self) -> Floats:

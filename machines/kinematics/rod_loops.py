@@ -1,7 +1,7 @@
 """A platform on rods along straight slide moves, with a bound of its third derivative over the whole move.
 
-The platform follows from the rods' fixed lengths, differentiated three times; that Jx stays regular all along the move is
-proved with it, and where it cannot be, there is no bound.
+The platform follows from the rods' fixed lengths, differentiated three times; that Jx stays regular all along
+the move is proved with it, and where it cannot be, there is no bound.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ Jets = tuple[TaylorVector, TaylorVector]
 
 
 def by_parts(jets: Callable[[Floats, Floats], Jets], q0: Floats, q1: Floats) -> Jets:
-    """`jets` of the moves q0 -> q1 (N, J); where a whole move is too long for a bound, the largest of the bounds of its
-    parts, each over a shorter time."""
+    """`jets` of the moves q0 -> q1 (N, J); where a whole move is too long for a bound, the largest of the
+    bounds of its parts, each over a shorter time."""
     whole = jets(q0, q1)
     third = [np.array(np.broadcast_to(jet.third, len(q0)), dtype=np.float64) for jet in whole]
     rows = np.flatnonzero(np.maximum(*third) >= UNBOUNDED)
@@ -46,16 +46,18 @@ def by_parts(jets: Callable[[Floats, Floats], Jets], q0: Floats, q1: Floats) -> 
 class RodLoop:
     """The closed loops of a platform along straight slide moves.
 
-    With r_k the rods (from carriage to platform joint), b_k the arms (from the reference point C to the joint, turned),
-    e_k = x x b_k and the tilt T about x, the rods' lengths stay: r.r = L^2, with r = C + b - A and the carriages A
-    moving evenly. Differentiated once, twice and three times (II-15 to II-18 and V-23 of Company 2000 carried on):
+    With r_k the rods (from carriage to platform joint), b_k the arms (from the reference point C to the
+    joint, turned), e_k = x x b_k and the tilt T about x, the rods' lengths stay: r.r = L^2, with r = C + b -
+    A and the carriages A moving evenly. Differentiated once, twice and three times (II-15 to II-18 and V-23
+    of Company 2000 carried on):
 
         r.r' = 0,   r.r'' = -r'^2,   r.r''' = -3 r'.r'',
         r' = C' + T'e - A',   r'' = C'' + T''e - T'^2 f,   r''' = C''' + T'''e - 3 T'T''f - T'^3 e,   f = b across x,
 
-    linear systems with the matrix Jx = (r, r.e) for C and T at each order. Over the whole move everything on the right
-    is bounded by norms; Jx differs from its value in the middle by at most what its rows can change in half the move,
-    which bounds its least singular value from below. The bounds assume a largest |r'| and a largest T', and hold if
+    linear systems with the matrix Jx = (r, r.e) for C and T at each order. Over the whole move everything on
+    the right is bounded by norms; Jx differs from its value in the middle by at most what its rows can change
+    in half the move, which bounds its least singular value from below. The bounds assume a largest |r'| and a
+    largest T', and hold if
     they come out smaller: by continuity no rod can then leave them (as in Kantorovich's theorem).
 
     Attributes:

@@ -51,5 +51,5 @@ class RodPlatform(Protocol):
         """Joints (N, J) of places and tilts of the platform (N, 4) and rotary axes (N, R)."""
 
     def loop_matrices(self, place: Floats, tilt: Floats) -> Floats:
-        """Jx (N, K, K) at places (N, 3) and tilts (N,): rods in mm and, of a platform that tilts, their moments about its
-        reference point in mm^2."""
+        """Jx (N, K, K) at places (N, 3) and tilts (N,): rods in mm and, of a platform that tilts, their
+        moments about its reference point in mm^2."""

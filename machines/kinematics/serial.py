@@ -1,14 +1,14 @@
 """Serial machines: three linear and up to two rotary axes in any order, on the part's or the tool's side.
 
-The machine is one chain from the workpiece to the tool in the order of its ISO 10791-6 code. Every axis moves what is
-on its tool side relative to what is on its workpiece side in the positive sense of ISO 841, so that primed axes (which
-carry the part) and unprimed ones obey one formula. With the motion M_i of axis i (a shift along its direction, or a
-turn about the line through its point, both as they stand at q = 0)
+The machine is one chain from the workpiece to the tool in the order of its ISO 10791-6 code. Every axis moves
+what is on its tool side relative to what is on its workpiece side in the positive sense of ISO 841, so that
+primed axes (which carry the part) and unprimed ones obey one formula. With the motion M_i of axis i (a shift
+along its direction, or a turn about the line through its point, both as they stand at q = 0)
 
     tip = M_1(q_1) M_2(q_2) ... M_J(q_J) tip_0,      axis = R_1 R_2 a_0 (turns only),
 
-the product of exponentials (Brockett 1984; Murray, Li, Sastry, A Mathematical Introduction to Robotic Manipulation,
-1994, equation 3.4), seen from the part. The gauge point is at the machine origin at q = 0.
+the product of exponentials (Brockett 1984; Murray, Li, Sastry, A Mathematical Introduction to Robotic
+Manipulation, 1994, equation 3.4), seen from the part. The gauge point is at the machine origin at q = 0.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class Serial(Kinematics):
         """The same machine at the tip: tip = gauge point - length * axis."""
         return replace(self, tool_length=float(length))
 
-    # ---- forward -------------------------------------------------------------------------------------------------
+    # ---- forward -------------------------------------------------------------------------------------------
 
     def pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """(tip (N, 3), axis (N, 3), spin (N,)) of joints q (N, J); there is one assembly, so `near` is not used."""
@@ -156,7 +156,7 @@ class Serial(Kinematics):
                 point = [x if d == 0.0 else x + value * d for x, d in zip(point, joint.direction.tolist(), strict=True)]
         return [point, *vectors]
 
-    # ---- rates ---------------------------------------------------------------------------------------------------
+    # ---- rates ---------------------------------------------------------------------------------------------
 
     def jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
         """d(tip, axis)/dq as (N, 6, J): a rotary axis w moves the tip by w x (tip - point), the axis by w x axis."""
@@ -203,7 +203,7 @@ class Serial(Kinematics):
                 tip = tip.slid(direction, by)
         return tip, axis
 
-    # ---- errors, pivots ------------------------------------------------------------------------------------------
+    # ---- errors, pivots ------------------------------------------------------------------------------------
 
     @property
     def axes_with_errors(self) -> tuple[str, ...]:
@@ -228,9 +228,10 @@ class Serial(Kinematics):
         axis = self.nearest_axis(np.array([[0.1, 0.2, 1.0], [-0.3, 0.15, 1.0]]))
         return np.asarray(self.inverse(np.zeros((2, 3)), axis)[0])
 
-    # ---- inverse -------------------------------------------------------------------------------------------------
+    # ---- inverse -------------------------------------------------------------------------------------------
 
-    def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0, near: Floats | None = None) -> Floats:
+    def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0,
+                near: Floats | None = None) -> Floats:
         """Joints (B, N, J) for the tip (N, 3) and the direction of `axis` (N, 3), NaN where it cannot be taken.
 
         A free rotary joint (tool along it) takes its value from `near` as it is, windings included. `spin` is not
@@ -240,7 +241,8 @@ class Serial(Kinematics):
         wanted = np.broadcast_to(0.0 if near is None else np.asarray(near, dtype=np.float64), (len(tip), self.joints))
         q = np.empty((self.branches, len(tip), self.joints))
         for part in columns.blocks(len(tip)):
-            self._solve(columns.of_rows(tip[part]), columns.unit(columns.of_rows(axis[part])), wanted[part], q[:, part])
+            self._solve(columns.of_rows(tip[part]), columns.unit(columns.of_rows(axis[part])),
+                        wanted[part], q[:, part])
         return q
 
     def _solve(self, tip: Columns, axis: Columns, wanted: Floats, q: Floats) -> None:
@@ -277,7 +279,8 @@ class Serial(Kinematics):
             return
         second = turns[1]
         for tilt in meet(first.direction, second.direction, self.tool_axis, from_pole):
-            carried = columns.turn(second.direction, np.cos(tilt), np.sin(tilt), columns.of_one(self.tool_axis))
+            carried = columns.turn(second.direction, np.cos(tilt), np.sin(tilt),
+                                   columns.of_one(self.tool_axis))
             turned = wrap(heading - azimuth(first.direction, carried))
             yield np.where(free, value, turned), tilt
 
@@ -316,13 +319,13 @@ class Serial(Kinematics):
                 vector = columns.turn(joint.direction, *turning[joint.name], vector)
         return vector
 
-    # ---- what directions there are ---------------------------------------------------------------------------------
+    # ---- what directions there are -------------------------------------------------------------------------
 
     def reach(self) -> tuple[float, float]:
         """Least and greatest angle (rad) of the tool from the rotary axis nearest the part; (0, 0) without one.
 
-        With two rotary axes at the angle a1 to each other and the tool at a2 to the second: |a1 - a2| to a1 + a2
-        (or 2 pi less that).
+        With two rotary axes at the angle a1 to each other and the tool at a2 to the second: |a1 - a2| to a1 +
+        a2 (or 2 pi less that).
         """
         turns = self._turns
         if len(turns) < 2:
@@ -345,8 +348,8 @@ class Serial(Kinematics):
     def nearest_axis(self, axis: Floats) -> Floats:
         """Tool directions (N, 3) nearest to `axis` (N, 3), unchanged where the machine can take them.
 
-        The directions in reach are a zone about the first rotary axis, so the nearest one lies on the great circle
-        through that axis. Where `axis` lies along it, the direction at its zero angle is taken.
+        The directions in reach are a zone about the first rotary axis, so the nearest one lies on the great
+        circle through that axis. Where `axis` lies along it, the direction at its zero angle is taken.
         """
         unit, pole = _unit(as_points(axis, 3, "axis")), self._pole()
         low, high = self.reach()

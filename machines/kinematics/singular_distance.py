@@ -1,8 +1,9 @@
 """How far a parallel machine stands from its singular positions, as numbers without unit between 0 and 1.
 
-Inverse singularity (a rod square to its slide, which then cannot be reported or moved): |cos| of the angle between rod and
-slide. Direct singularity (the platform yields with the slides held): the least singular value of Jx, rods as unit
-vectors, moments about the platform's reference point by the largest arm. Source: Company 2000, II-16, III.7, V-23.
+Inverse singularity (a rod square to its slide, which then cannot be reported or moved): |cos| of the angle
+between rod and slide. Direct singularity (the platform yields with the slides held): the least singular value
+of Jx, rods as unit vectors, moments about the platform's reference point by the largest arm. Source: Company
+2000, II-16, III.7, V-23.
 """
 
 from __future__ import annotations
@@ -32,8 +33,9 @@ def distance(matrices: Matrices, legs: Legs, q: Floats) -> Floats:
 def distance_between(matrices: Matrices, legs: Legs, q: Floats) -> Floats:
     """(N - 1, 2) the same at least on the straight joint moves between consecutive q (N, J).
 
-    A least singular value changes by no more than the matrix does (Weyl), a cosine by no more than its rod's direction:
-    what either does in a quarter of a move, taken as three quarters of its change over a half, is taken off the values
+    A least singular value changes by no more than the matrix does (Weyl), a cosine by no more than its rod's
+    direction: what either does in a quarter of a move, taken as three quarters of its change over a half, is
+        taken off the values
     at the ends and in the middle. Moves over which that is much are cut into parts.
     """
     result, change = _between(matrices, legs, q[:-1], q[1:])
@@ -49,7 +51,8 @@ def _between(matrices: Matrices, legs: Legs, q0: Floats, q1: Floats) -> tuple[Fl
     """(distances (N, 2), what was taken off (N,)) of the moves q0 -> q1 (N, J)."""
     places = (q0, 0.5 * (q0 + q1), q1)
     first, middle, last = (matrices(x)[0] for x in places)
-    change = 0.75 * np.maximum(np.linalg.norm(middle - first, axis=(1, 2)), np.linalg.norm(last - middle, axis=(1, 2)))
+    change = 0.75 * np.maximum(np.linalg.norm(middle - first, axis=(1, 2)),
+                               np.linalg.norm(last - middle, axis=(1, 2)))
     least = np.stack([distance(matrices, legs, x) for x in places]).min(axis=0)
     return np.asarray(least - change[:, None]), np.asarray(change)
 

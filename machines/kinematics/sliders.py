@@ -42,8 +42,8 @@ class Legs:
     def solve(self, joints: Floats) -> tuple[Floats, Floats]:
         """(middle, half), each (N, K) mm: q = middle + root * half for platform joints (N, K, 3).
 
-        II-7 with the root taken of L^2 less the square of the distance of B from the slide, which cancels less than
-        the printed form. `half` is NaN where the rod is too short, 0 where the leg is singular.
+        II-7 with the root taken of L^2 less the square of the distance of B from the slide, which cancels
+        less than the printed form. `half` is NaN where the rod is too short, 0 where the leg is singular.
         """
         middle = np.empty(joints.shape[:2])
         half = np.empty(joints.shape[:2])

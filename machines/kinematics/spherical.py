@@ -15,9 +15,9 @@ from toolpaths.rotations import angle_between, wrap
 def meet(first: Floats, second: Floats, tool: Floats, from_pole: Floats) -> tuple[Floats, Floats]:
     """Both angles (N,) about `second` that bring `tool` to the angle `from_pole` (N,) from `first`.
 
-    Second subproblem of Paden (1986) and Kahan as a spherical triangle with the sides a1 = first-second, a2 = second-
-    tool and phi = first-axis; its angle psi at `second` by the half-angle formula, which keeps its digits near the
-    singular direction (phi = |a1 - a2|) and near the edge of reach (phi = a1 + a2):
+    Second subproblem of Paden (1986) and Kahan as a spherical triangle with the sides a1 = first-second, a2 =
+    second- tool and phi = first-axis; its angle psi at `second` by the half-angle formula, which keeps its
+    digits near the singular direction (phi = |a1 - a2|) and near the edge of reach (phi = a1 + a2):
     tan^2(psi/2) = sin((phi+d)/2) sin((phi-d)/2) / (sin((s+phi)/2) sin((s-phi)/2)), d = a1 - a2, s = a1 + a2.
     """
     (a1, a2, nearest), phi = _triangle(*(tuple(v.tolist()) for v in (first, second, tool))), from_pole
@@ -28,7 +28,8 @@ def meet(first: Floats, second: Floats, tool: Floats, from_pole: Floats) -> tupl
 
 
 @lru_cache(maxsize=256)
-def _triangle(first: tuple[float, ...], second: tuple[float, ...], tool: tuple[float, ...]) -> tuple[float, float, float]:
+def _triangle(first: tuple[float, ...], second: tuple[float, ...],
+              tool: tuple[float, ...]) -> tuple[float, float, float]:
     """The sides a1, a2, and by how much `first` stands about `second` from `tool`: the same for all poses of a machine."""
     one, two, three = np.array(first), np.array(second), np.array(tool)
     return angle(one, two), angle(two, three), float(azimuth(two, columns.of_one(one)) - azimuth(two, columns.of_one(three)))

@@ -61,8 +61,8 @@ class TaylorVector:
     def turned(self, direction: Columns, point: Columns, by: TaylorAngle) -> TaylorVector:
         """Turned about the line through `point` along the unit `direction` by an angle that moves.
 
-        With W = direction x, r = R(angle) s: r' = R (a'W s + s'), r'' = R ((a''W + a'^2 W^2) s + 2 a'W s' + s''), and
-        |r'''| <= (a''' + 3 a'a'' + a'^3)|W s| + 3 (a'' + a'^2)|W s'| + 3 a'|W s''| + |s'''|, each at its largest.
+        With W = direction x, r = R(angle) s: r' = R (a'W s + s'), r'' = R ((a''W + a'^2 W^2) s + 2 a'W s' +
+        s''), and |r'''| <= (a''' + 3 a'a'' + a'^3)|W s| + 3 (a'' + a'^2)|W s'| + 3 a'|W s''| + |s'''|, each at its largest.
         """
         arm = columns.minus(self.value, point)
         around = [columns.cross(direction, v) for v in (arm, self.first, self.second)]

@@ -31,8 +31,8 @@ _COMMENT = re.compile(rb"(?i)[ \t]*(?:N?\d+[ \t]*)?(?:\([^()\n]*\)|;[^\n]*)?[ \t
 
 
 def head_of(data: bytes) -> bytes:
-    """The comments at the head of a program, from the one that names postproc to the first block; comments of the CL file
-    stand behind that. Where nothing names postproc, the first characters as they are."""
+    """The comments at the head of a program, from the one that names postproc to the first block; comments of
+    the CL file stand behind that. Where nothing names postproc, the first characters as they are."""
     text = data[:HEADER].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     first = _FIRST.search(text)
     if first is None:

@@ -177,7 +177,8 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
         path, found = _read(file, options, progress)
-        result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress, tool_table=tool_table)
+        result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress,
+                     tool_table=tool_table)
         kept, more = command.compared_with(result, machine, controller, proof)
     text = summary.verify_text(result) + (f"\n{kept.line()}" if kept else "")
     found = [*result.diagnostics, *more]
@@ -244,7 +245,8 @@ def _residual_files(files: list[Path], error_model: str) -> list[Path]:
 
 
 def _field_ending(file: Path) -> FieldEnding:
-    ending: FieldEnding = ending_of(file, FieldEnding, "--residuals", "ends neither in .csv nor in .png or .svg")
+    ending: FieldEnding = ending_of(file, FieldEnding, "--residuals",
+                                    "ends neither in .csv nor in .png or .svg")
     return ending
 
 

@@ -31,7 +31,8 @@ def calibrate(file: Annotated[Path, typer.Argument(metavar="MEASUREMENTS.toml", 
                                                    "of a measurement file, with the columns of its table")] = False,
               json: Json = "") -> None:
     """Identify a machine's errors from measurements, each with its uncertainty; what the data cannot identify is refused."""
-    refuse_overwriting({"-o": str(output), "--figure": str(figure or ""), "--json": json}, {"the measurements": str(file)})
+    refuse_overwriting({"-o": str(output), "--figure": str(figure or ""), "--json": json},
+                       {"the measurements": str(file)})
     ending = figure_ending(figure)
     from dataclasses import replace
 

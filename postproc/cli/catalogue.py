@@ -42,8 +42,9 @@ def machine_dict(machine: Machine) -> dict[str, Any]:
 
 
 def rotary_lines(machine: Machine) -> list[dict[str, Any]]:
-    """Where the rotary axes lie with all rotary joints at zero (a serial machine's slides too): `point` (mm) and `direction`
-    of each in the table frame, which then is the machine's; the point is that of the line nearest to the origin."""
+    """Where the rotary axes lie with all rotary joints at zero (a serial machine's slides too): `point` (mm)
+    and `direction` of each in the table frame, which then is the machine's; the point is that of the line
+    nearest to the origin."""
     kin = machine.kinematics
     q = np.where(np.array(machine.rotary) | kin.straight_slides, 0.0, machine.home)[None]
     (tip,), rates = kin.forward(q)[0], kin.twist_jacobian(q)[0]

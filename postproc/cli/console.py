@@ -93,8 +93,8 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
            outputs: Mapping[Path, str | bytes] | None = None) -> None:
     """Messages to standard error, the figures where they were asked for; exit code 1 where there are errors.
 
-    `outputs` (path -> content, the one that needs the others last) and the file of the figures are written together: all,
-    or where one fails none.
+    `outputs` (path -> content, the one that needs the others last) and the file of the figures are written
+    together: all, or where one fails none.
     """
     from toolpaths.diagnostics import has_errors
 
@@ -117,7 +117,8 @@ def _headed(values: dict[str, Any], ok: bool) -> dict[str, Any]:
     return {"schema_version": SCHEMA_VERSION, "ok": ok} | values
 
 
-def _written(target: str, values: dict[str, Any], outputs: dict[Path, str | bytes]) -> tuple[list[Diagnostic], bool]:
+def _written(target: str, values: dict[str, Any],
+             outputs: dict[Path, str | bytes]) -> tuple[list[Diagnostic], bool]:
     """Write the figures, where they go to a file, and the outputs; diagnostics, and True where that failed."""
     import json
 
@@ -145,8 +146,8 @@ def rounded(value: Any) -> Any:
 
 
 def refuse_overwriting(outputs: dict[str, str], inputs: dict[str, str]) -> None:
-    """Wrong use where an output would replace an input, a file that a TOML input names, or another output, or is no regular
-    file."""
+    """Wrong use where an output would replace an input, a file that a TOML input names, or another output, or
+    is no regular file."""
     from toolpaths.input_files import place
 
     known = _places(inputs)

@@ -97,8 +97,8 @@ def table_figures(model: Any, lost: dict[str, float]) -> tuple[dict[str, Any], l
 
 def screw_figures(model: Any, screws: Any, names: dict[str, str], lost: dict[str, float], worst: list[tuple[float, float]],
                   tool_length: float) -> tuple[dict[str, Any], list[str]]:
-    """(figures, text) of `Screws` of a model in files of these names; `worst` tip (um) and axis (arcsec) before and after,
-    with a tool of that length (mm)."""
+    """(figures, text) of `Screws` of a model in files of these names; `worst` tip (um) and axis (arcsec)
+    before and after, with a tool of that length (mm)."""
     before, left = worst
     both = any(table.both for table in screws.tables.values())
     noted = [f"{name}: {len(screws.tables[letter].x)} rows" + (", both directions" if screws.tables[letter].both else "")

@@ -55,7 +55,8 @@ MapDirectionsOption = Annotated[MapDirections, word_option("--directions", MapDi
 def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0, figure: FigureOption = None,
           json: Json = "") -> None:
     """Check an error model: what it holds, how far it reaches, worst tip and axis over the work volume, uncertainty."""
-    refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the error model": str(file), **own_files(machine)})
+    refuse_overwriting({"--figure": str(figure or ""), "--json": json},
+                       {"the error model": str(file), **own_files(machine)})
     ending = figure_ending(figure)
     from machines.geometric_error.exchange.survey import beyond_travel, survey, unmeasured
     from postproc.cli.error_text import check_text
@@ -100,7 +101,8 @@ def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step 
 def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Rest = None, step: Step = None,
                 loss: Loss = 0.1, angle_loss: AngleLoss = 0.1, tool_length: ToolLength = 100.0, json: Json = "") -> None:
     """Write positioning errors as LinuxCNC's screw compensation, one file per joint, and report what remains."""
-    refuse_overwriting({"--rest": str(rest or ""), "--json": json}, {"the error model": str(file), **own_files(machine)})
+    refuse_overwriting({"--rest": str(rest or ""), "--json": json},
+                       {"the error model": str(file), **own_files(machine)})
     from machines.geometric_error.exchange import exports
     from machines.geometric_error.tables.csv_table import UNITS
     from postproc.cli.error_text import screw_figures, screw_warning
@@ -127,7 +129,8 @@ def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = 
            at: At = None, tool_length: MapToolLengthOption = 0.0, directions: MapDirectionsOption = "machine",
            json: Json = "") -> None:
     """Write an error map of a model, as controls hold it, and report its interpolation error."""
-    refuse_overwriting({"-o": str(output), "--json": json}, {"the error model": str(file), **own_files(machine)})
+    refuse_overwriting({"-o": str(output), "--json": json},
+                       {"the error model": str(file), **own_files(machine)})
     from machines.geometric_error.exchange import exports
     from machines.geometric_error.tables.csv_table import UNITS
     from postproc.cli.error_text import map_figures
@@ -136,7 +139,8 @@ def to_map(file: ModelFile, machine: MachineName, output: MapFile, over: Over = 
         m = machine_of(machine)
         known = (*m.axis_names, *"xyz")
         if not set(over) <= set(known) or len(set(over)) < len(over):
-            raise typer.BadParameter(f"{over!r}: coordinates are {', '.join(known)}, each once", param_hint="--over")
+            raise typer.BadParameter(f"{over!r}: coordinates are {', '.join(known)}, each once",
+                                     param_hint="--over")
         model, found = loaded(file, m)
         steps = exports.in_units(pairs("--step", step, known))
         stands = exports.in_units(pairs("--at", at, m.axis_names))

@@ -26,8 +26,8 @@ _PARTS = ("numpy", "scipy", "numba", "pydantic", "tomlkit", "typer", "ruckig", "
 def guarded(command: Callable[[], object]) -> int:
     """Run a command; its exit code.
 
-    An unexpected exception writes a report file and is shown as `internal error [code]`; Ctrl-C and a closed pipe end
-    quietly.
+    An unexpected exception writes a report file and is shown as `internal error [code]`; Ctrl-C and a closed
+    pipe end quietly.
     """
     try:
         try:
@@ -46,8 +46,8 @@ def guarded(command: Callable[[], object]) -> int:
 
 
 def fingerprint(fault: BaseException) -> str:
-    """Eight hexadecimal digits that stand for the kind of an exception and the place of our own code that raised it: file
-    and function, not the line, so that one fault keeps its code from version to version."""
+    """Eight hexadecimal digits that stand for the kind of an exception and the place of our own code that
+    raised it: file and function, not the line, so that one fault keeps its code from version to version."""
     import hashlib
 
     places = [f"{file}:{name}" for file, name in _own_places(fault)] or ["outside"]

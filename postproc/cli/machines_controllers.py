@@ -21,8 +21,10 @@ from toolpaths.table_text import table_text
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                           help="Machines: list, show, check, analyse, schema.")
-controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, help="Controllers: list, show, schema.")
-setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None, help="Set-up files: check, schema.")
+controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
+                             help="Controllers: list, show, schema.")
+setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
+                        help="Set-up files: check, schema.")
 
 
 @machine_app.command("list")

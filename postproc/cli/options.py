@@ -18,7 +18,8 @@ def word_option(option: str, words: Any, said: str) -> Any:
 
     def taken(value: object) -> Any:
         if str(value) not in known:
-            raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(shown)}", param_hint=option)
+            raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(shown)}",
+                                     param_hint=option)
         return known[str(value)]
 
     return typer.Option(option, parser=taken, metavar=f"{{{','.join(shown)}}}", help=said)

@@ -101,7 +101,8 @@ def _check(setup: Path) -> None:
     from toolpaths.input_files import is_regular, there_is
 
     if there_is(setup) and not is_regular(setup):
-        raise typer.BadParameter(f"{setup} is not a regular file: its text is read twice", param_hint="--setup")
+        raise typer.BadParameter(f"{setup} is not a regular file: its text is read twice",
+                                 param_hint="--setup")
 
 
 def _chosen(file: Path, machine: Machine, controller: str, options: Options,

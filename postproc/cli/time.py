@@ -83,12 +83,14 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
             e = estimate(blocks, m, planner, times=times)
             values = figures.as_dict(e) | {"feed_override_percent": override} | values
             text = figures.as_text(e, file.name, share)
-    report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
+    report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]},
+           text, outputs)
 
 
 def _check(output: str, calibrate: str) -> None:
     if output and not calibrate:
-        raise typer.BadParameter("it writes the model that --calibrate fits: give --calibrate too", param_hint="-o")
+        raise typer.BadParameter("it writes the model that --calibrate fits: give --calibrate too",
+                                 param_hint="-o")
 
 
 def _blocks(file: Path, machine: Machine, controller: str, model: str, options: Options, override: float,
@@ -116,7 +118,8 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     import toolpaths
     from postproc.pipeline.convert import convert
 
-    path, found = toolpaths.read_bytes(data, file=str(file), units=options.units or None, dialect=options.dialect or None)
+    path, found = toolpaths.read_bytes(data, file=str(file), units=options.units or None,
+                                       dialect=options.dialect or None)
     del data
     result = convert(path, machine, controller, options=options, diagnostics=found, progress=progress)
     if not result.ok or planner is None:

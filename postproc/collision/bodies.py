@@ -42,8 +42,8 @@ class Body:
 
 @dataclass(frozen=True)
 class Scene:
-    """All bodies of a set-up, with what tools keep from them: `clearance`, and `gouge` that a cutter may reach into the
-    part, mm."""
+    """All bodies of a set-up, with what tools keep from them: `clearance`, and `gouge` that a cutter may
+    reach into the part, mm."""
 
     bodies: tuple[Body, ...]
     clearance: float

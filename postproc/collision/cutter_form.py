@@ -1,8 +1,8 @@
 """The form of a cutter as CL file and set-up say it: point, corner and side, as pieces of revolution.
 
-Its lower line rises from the tip at an angle to the tip plane, its side leans by the taper against the axis; both meet at
-half the diameter, and the corner touches both (APT, CUTTER/d, r, e, f, a, b, h: centre of the corner e next to the axis and
-f over the tip, angles a and b, height h; ISO 4343).
+Its lower line rises from the tip at an angle to the tip plane, its side leans by the taper against the axis;
+both meet at half the diameter, and the corner touches both (APT, CUTTER/d, r, e, f, a, b, h: centre of the
+corner e next to the axis and f over the tip, angles a and b, height h; ISO 4343).
 """
 
 from __future__ import annotations
@@ -94,8 +94,8 @@ def _point(tool: Tool, given: ToolBody, drill: bool, stated: float) -> float:
 def _centre(cutter: Cutter, params: tuple[float, ...], ball: bool) -> tuple[float, float] | None:
     """Of the corner, mm; None where the sizes fit no form, as those of barrels and lenses.
 
-    e = d/2 - r (cos a - sin b) / cos(a + b), f = (r + e sin a) / cos a. A file may state e and f itself, and count the
-    diameter of a tapered cutter next to the centre: e = d/2 - r.
+    e = d/2 - r (cos a - sin b) / cos(a + b), f = (r + e sin a) / cos a. A file may state e and f itself, and
+    count the diameter of a tapered cutter next to the centre: e = d/2 - r.
     """
     if cutter.diameter is None or abs(cutter.taper) >= _STEEP or cutter.point + cutter.taper >= _STEEP:
         return None
@@ -113,8 +113,8 @@ def _centre(cutter: Cutter, params: tuple[float, ...], ball: bool) -> tuple[floa
 
 
 def cutter_pieces(cutter: Cutter) -> Floats:
-    """Pieces (P, 5) of the cutter, see `revolution`: its point, its corner, and the side above; a cylinder or cone round it
-    where its sizes fit no form."""
+    """Pieces (P, 5) of the cutter, see `revolution`: its point, its corner, and the side above; a cylinder or
+    cone round it where its sizes fit no form."""
     if cutter.diameter is None:
         return np.zeros((0, 5))
     slope = float(np.tan(cutter.taper)) if abs(cutter.taper) < _STEEP else 0.0

@@ -1,5 +1,5 @@
-"""The path of a tool through the blocks of a program, as the control runs them, in pieces with a bound between their
-ends."""
+"""The path of a tool through the blocks of a program, as the control runs them, in pieces with a bound
+between their ends."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.units import DEG
 
 _FEW, _MOST = 4.0, 500
-"""pieces of a part: where more seem to be needed, shorter parts are bounded first; where there are too many, there is no
-bound"""
+"""pieces of a part: where more seem to be needed, shorter parts are bounded first; where there are too many,
+there is no bound"""
 Parts = tuple[Ints, Floats, Floats]
 """(block, from, to) of parts of blocks, (N,) each, in order"""
 
 
-def path_of(motion: Motion, executed: BlockPoses, kin: Kinematics, rows: Ints, reach: float) -> tuple[Swept, Ints]:
+def path_of(motion: Motion, executed: BlockPoses, kin: Kinematics, rows: Ints,
+            reach: float) -> tuple[Swept, Ints]:
     """The path of one tool through its blocks, and those of them for which the pieces are no proof.
 
     Args:
@@ -81,7 +82,8 @@ def _shorter(motion: Motion, executed: BlockPoses, kin: Kinematics, parts: Parts
     """The long ones in steps of a few degrees, over which derivatives change little."""
     row, t0, t1 = parts
     count = np.ones(len(row), dtype=np.int64)
-    count[long] = steps(kin, executed.joints(motion, row[long], t0[long]), executed.joints(motion, row[long], t1[long]))
+    count[long] = steps(kin, executed.joints(motion, row[long], t0[long]),
+                        executed.joints(motion, row[long], t1[long]))
     return _cut(parts, count)
 
 
@@ -97,8 +99,8 @@ def _needed(motion: Motion, executed: BlockPoses, kin: Kinematics, parts: Parts,
 def _bends(motion: Motion, executed: BlockPoses, kin: Kinematics, parts: Parts, reach: float) -> Floats:
     """(N,) mm: bound of the second derivative of any point of the tool within `reach` of its tip, over each part.
 
-    The tip's is that of the joints, 0 where the control keeps it straight; the pieces' great circles bend too, by the
-    square of the turn.
+    The tip's is that of the joints, 0 where the control keeps it straight; the pieces' great circles bend
+    too, by the square of the turn.
     """
     row = parts[0]
     q0, q1 = executed.joints(motion, row, parts[1]), executed.joints(motion, row, parts[2])

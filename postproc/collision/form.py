@@ -43,7 +43,8 @@ class ToolForm:
         return np.asarray(self.pieces[self.part == part])
 
 
-def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, file: str) -> tuple[ToolForm, list[Diagnostic]]:
+def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None,
+              file: str) -> tuple[ToolForm, list[Diagnostic]]:
     """What is known of a tool's form; what is not is reported, for it is not checked.
 
     Args:
@@ -59,7 +60,8 @@ def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None, file: str
     pieces[SHANK], at = _sections(given.shank if placed else [], cutter.flutes or 0.0)
     pieces[HOLDER], top = _sections(given.holder if placed else [], at)
     if given.holder_mesh is not None:
-        mesh, more = load_mesh(Path(file).parent / given.holder_mesh, given.holder_units, f"tools.{number}.holder_mesh")
+        mesh, more = load_mesh(Path(file).parent / given.holder_mesh, given.holder_units,
+                               f"tools.{number}.holder_mesh")
         found += more
         if mesh is not None:
             pieces[HOLDER] = spun(np.asarray(mesh.vertices), np.asarray(mesh.edges_unique))

@@ -17,9 +17,9 @@ _SAME = 1e-3
 def spun(vertices: Floats, edges: Array) -> Floats:
     """Pieces (P, 5) round the body that vertices (V, 3) mm with edges (E, 2) sweep when turned about z.
 
-    Along an edge the distance from the axis is convex in height, so that its largest value within a slab is at one of the
-    slab's sides, and a cone through both sides' largest values holds all edges that pass through the whole slab.
-    Where an edge ends within a slab the slab becomes a cylinder.
+    Along an edge the distance from the axis is convex in height, so that its largest value within a slab is
+    at one of the slab's sides, and a cone through both sides' largest values holds all edges that pass
+    through the whole slab. Where an edge ends within a slab the slab becomes a cylinder.
     """
     levels = _levels(vertices[:, 2])
     start, end = vertices[edges[:, 0]], vertices[edges[:, 1]]

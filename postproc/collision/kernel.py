@@ -96,7 +96,8 @@ def _look(piece: Any, size: Any, cell: Any, normal: Any, place: Any, limit: Any,
         out[0], out[1], out[2], out[3], out[4] = distance, place, mx, my, mz
     chord = (cell[18] - cell[15]) ** 2 + (cell[19] - cell[16]) ** 2 + (cell[20] - cell[17]) ** 2
     turn = 2.5 * size[1] * chord / 8.0
-    return max(_apart(piece, cell, nx, ny, nz, turn), _apart(piece, cell, -normal[0], -normal[1], -normal[2], turn))
+    return max(_apart(piece, cell, nx, ny, nz, turn),
+               _apart(piece, cell, -normal[0], -normal[1], -normal[2], turn))
 
 
 @loop
@@ -187,8 +188,8 @@ def search(piece: Any, high: Any, size: Any, body: Any, corners: Any, normals: A
         body (2 L - 1, 11), path (2 M - 1, 10): the trees
         corners (T, 9), normals (T, 3), pieces (N, 12): their leaves
     """
-    # Depth first on a stack: of two children the nearer is on top, so that `out` falls soon and cuts off the rest. Each
-    # pair leaves at most one other below it, so that the depth of both trees together bounds the stack.
+    # Depth first on a stack: of two children the nearer is on top, so that `out` falls soon and cuts off the
+    # rest. Each pair leaves at most one other below it, so that the depth of both trees together bounds the stack.
     pairs, bounds = np.empty((_DEPTH, 2), dtype=np.int64), np.empty(_DEPTH)
     cells, inner = np.empty((_DEPTH, 21)), np.empty(_DEPTH)
     body_first, path_first = (len(body) + 1) // 2 - 1, (len(travel) + 1) // 2 - 1

@@ -24,7 +24,8 @@ _SMALL, _LARGE = 1.0, 20000.0
 """mm: a solid whose largest side is outside is likely in another unit"""
 
 
-def load_mesh(path: str | FilePath, units: LengthUnit = "mm", key: str = "") -> tuple[Trimesh | None, list[Diagnostic]]:
+def load_mesh(path: str | FilePath, units: LengthUnit = "mm",
+              key: str = "") -> tuple[Trimesh | None, list[Diagnostic]]:
     """A closed triangle mesh in mm; None and why where the file holds none.
 
     Args:
@@ -47,7 +48,8 @@ def load_mesh(path: str | FilePath, units: LengthUnit = "mm", key: str = "") -> 
 
 
 @lru_cache(maxsize=32)
-def _loaded(path: str, _changed: int, _size: int, units: LengthUnit) -> tuple[Trimesh | None, tuple[Diagnostic, ...]]:
+def _loaded(path: str, _changed: int, _size: int,
+            units: LengthUnit) -> tuple[Trimesh | None, tuple[Diagnostic, ...]]:
     """The mesh of a file as it was at a moment."""
     import trimesh
 

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from postproc.job.job import Job
 
 
-def check_bodies(motion: Motion, executed: BlockPoses, job: Job, owner: Ints, faults: Faults) -> list[Diagnostic]:
+def check_bodies(motion: Motion, executed: BlockPoses, job: Job, owner: Ints,
+                 faults: Faults) -> list[Diagnostic]:
     """Errors where a tool comes nearer to part, table or fixture than the set-up allows; nothing without [bodies].
 
     Args:
@@ -37,7 +38,8 @@ def check_bodies(motion: Motion, executed: BlockPoses, job: Job, owner: Ints, fa
     return found
 
 
-def touching_parts(motion: Motion, executed: BlockPoses, job: Job, owner: Ints, part: Ints) -> dict[int, Touch]:
+def touching_parts(motion: Motion, executed: BlockPoses, job: Job, owner: Ints,
+                   part: Ints) -> dict[int, Touch]:
     """What tools come nearest to being through in each part of a program; parts where they keep clear are not in it.
 
     Args:
@@ -78,7 +80,8 @@ class _ToolMotion:
         return touches(self.bodies, self.form, travel, travel.take(np.flatnonzero(~drilling)) if drilling.any() else None)
 
 
-def _travels(motion: Motion, executed: BlockPoses, job: Job, owner: Ints) -> tuple[list[_ToolMotion], list[Diagnostic]]:
+def _travels(motion: Motion, executed: BlockPoses, job: Job,
+             owner: Ints) -> tuple[list[_ToolMotion], list[Diagnostic]]:
     """The path of each tool whose form is known; none without [bodies]."""
     if job.setup.bodies is None:
         return [], []
@@ -152,7 +155,8 @@ def _clear(bodies: Scene, form: ToolForm, faults: Faults) -> Diagnostic:
         kept = f"keeps {limit:g} mm from" if limit >= 0.0 else f"is at most {-limit:g} mm in"
         said.setdefault(f"{PARTS[part]} {kept}", []).append(body.name)
     text = "; ".join(f"{kept} {', '.join(names)}" for kept, names in said.items())
-    return info("collision.clear", f"T{form.number}, everywhere on its path: {text}", file=faults.gcode or faults.cl)
+    return info("collision.clear", f"T{form.number}, everywhere on its path: {text}",
+                file=faults.gcode or faults.cl)
 
 
 def _hint(touch: Touch, motion: Motion) -> str:

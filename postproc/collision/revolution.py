@@ -1,12 +1,12 @@
 """Signed distance to a body of revolution, and planes that part it from what lies next to it.
 
-A piece is a frustum of a cone about the tool axis, rounded by a ball: (r0, z0, r1, z1, c), radius r0 at height z0 and r1
-at z1 >= z0 over the tip, all grown by c. Cylinder, cone, disc (z0 = z1), torus bottom (disc with c), ball (r0 = r1 = 0,
-z0 = z1) are such pieces; each is convex.
+A piece is a frustum of a cone about the tool axis, rounded by a ball: (r0, z0, r1, z1, c), radius r0 at
+height z0 and r1 at z1 >= z0 over the tip, all grown by c. Cylinder, cone, disc (z0 = z1), torus bottom (disc
+with c), ball (r0 = r1 = 0, z0 = z1) are such pieces; each is convex.
 
-The signed distance of a convex body is the largest of n . p - h(n) over all unit directions n, with its support function
-h (Rockafellar, Convex Analysis, section 13; inside as well as outside): every n gives a lower bound, and the n that is
-the body's normal at the point nearest to p gives the distance itself.
+The signed distance of a convex body is the largest of n . p - h(n) over all unit directions n, with its
+support function h (Rockafellar, Convex Analysis, section 13; inside as well as outside): every n gives a
+lower bound, and the n that is the body's normal at the point nearest to p gives the distance itself.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """How near a moving tool comes to a solid: least signed distance over the whole path, by proved lower bounds.
 
-Two trees of boxes, round the triangles and round the pieces of the path, are gone through together. Over a pair of boxes
-the body's normal n at their middles bounds the distance from below (see `revolution`); so does the mean normal of the
-surface in the box, or the triangle's own. A pair whose bound is not below the least distance found so far is done with;
-others are split, in the end the triangle and the piece themselves. What is left over is proved, not sampled: where
-nothing is found, the distance is nowhere on the path, between its points and between the corners of the mesh too, less
+Two trees of boxes, round the triangles and round the pieces of the path, are gone through together. Over a
+pair of boxes the body's normal n at their middles bounds the distance from below (see `revolution`); so does
+the mean normal of the surface in the box, or the triangle's own. A pair whose bound is not below the least
+distance found so far is done with; others are split, in the end the triangle and the piece themselves. What
+is left over is proved, not sampled: where nothing is found, the distance is nowhere on the path, between its
+    points and between the corners of the mesh too, less
 than the limit by more than `EXACT`.
 """
 
@@ -115,8 +116,8 @@ class _Search:
         return self.best
 
     def _bound(self, pairs: Ints) -> Floats:
-        """Bounds (N,) over pairs (N, 2) of nodes of the solid and of the path: by the tool's normal between the middles, and
-        by the mean normal of the solid's surface there."""
+        """Bounds (N,) over pairs (N, 2) of nodes of the solid and of the path: by the tool's normal between
+        the middles, and by the mean normal of the solid's surface there."""
         axes, chord = self.travel.axes
         body, travel, (k, m) = self.body.tree, self.nodes, pairs.T
         flat, low, high = (of_node[k] for of_node in self.body.slabs)
@@ -215,8 +216,8 @@ class _Cells:
     def apart(self, n: Floats, piece: Floats) -> Floats:
         """Bounds (N,) mm by planes with the normals n (N, 3): the triangle's corners on one side, the tool on the other.
 
-        How far the tool reaches along n, tip and axis moving evenly, is nowhere more than at the ends of the path by more
-        than `bend` theta^2 / 8: its second derivative is no less than -bend theta^2 (|n x a|'' >= -|n x a|).
+        How far the tool reaches along n, tip and axis moving evenly, is nowhere more than at the ends of the
+        path by more than `bend` theta^2 / 8: its second derivative is no less than -bend theta^2 (|n x a|'' >= -|n x a|).
         """
         corner = np.einsum("nki,ni->nk", self.corners, n).min(axis=1)
         reach = np.stack([np.einsum("ni,ni->n", self.tip[:, k], n)

@@ -48,7 +48,8 @@ class TriangleSolid:
         they lie: how flat a surface is does not show in boxes along x, y and z."""
         leaves, count = self.tree.leaves, len(self)
         area = np.zeros((leaves, 3))
-        area[:count] = np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
+        area[:count] = np.cross(self.corners[:, 1] - self.corners[:, 0],
+                                self.corners[:, 2] - self.corners[:, 0])
         normals, lows, highs = [], [], []
         for size in 2 ** np.arange(leaves.bit_length()):
             total = area.reshape(-1, size, 3).sum(axis=1)

@@ -1,7 +1,7 @@
 """OPSKIP: blocks that a switch at the control leaves out ("/").
 
-What follows them must not depend on the switch, so that it states every axis and every modal code again; modes, tools and
-compensation must not change inside.
+What follows them must not depend on the switch, so that it states every axis and every modal code again;
+modes, tools and compensation must not change inside.
 """
 
 from __future__ import annotations

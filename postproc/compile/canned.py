@@ -22,18 +22,18 @@ STATES_RETRACT = ("{retract}", "{second}")
 
 
 _BACK_TO_THE_FIRST = ("linuxcnc", "iso")
-"""writers for controls that, before a hole which ends at the first level of its sequence, bring a tool that stands at the
-plane of the hole to that level on the path there (see `readback.cycles.legs`)"""
+"""writers for controls that, before a hole which ends at the first level of its sequence, bring a tool that
+stands at the plane of the hole to that level on the path there (see `readback.cycles.legs`)"""
 
 
 def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows, control: Control,
              controller: ControllerFile, skip: Bools) -> tuple[Bools, list[Hole]]:
     """Blocks of holes that the controller can drill by itself, and the holes; not among blocks that a switch may `skip`.
 
-    Native where the tool stands along Z of the words, the kind is in the controller's table and the retract ends at
-    the clearance plane, at the level that the tool came from, or at one that the cycle states. Cycles that feed out and then
-    rise higher end at the clearance plane, the rest is a rapid behind them. Controls of `_BACK_TO_THE_FIRST` go back to the
-    first level of a sequence only from there.
+    Native where the tool stands along Z of the words, the kind is in the controller's table and the retract
+    ends at the clearance plane, at the level that the tool came from, or at one that the cycle states. Cycles
+    that feed out and then rise higher end at the clearance plane, the rest is a rapid behind them. Controls
+    of `_BACK_TO_THE_FIRST` go back to the first level of a sequence only from there.
     """
     native = np.zeros(len(path), dtype=bool)
     holes: list[Hole] = []
@@ -63,11 +63,13 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows,
         low = level < initial - 1e-9
         cut = previous_last == first - 1 and (cut or (low and int(moves.row[path.move[first]]) in switched))
         low = cut or (low and controller.writer in _BACK_TO_THE_FIRST)
-        key = cycle_key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind, int(turning[moves.row[path.move[first]]]))
+        key = cycle_key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind,
+                        int(turning[moves.row[path.move[first]]]))
         if not _states_retract(controller, key):
             slack = _slack(path, controller, first)
             last -= _rises_beyond(moves, path, words, z, first, last, -np.inf if low else initial + slack)
-        found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial, key, placed > 0)
+        found = _hole(toolpath, moves, path, words, control, controller, int(first), int(last), initial,
+                      key, placed > 0)
         if low and found is not None and found.retract > found.plane_level and not _states_retract(controller, key):
             continue
         if found is not None and allowed[first:last + 1].all():
@@ -106,8 +108,8 @@ def _before_own_level(moves: Moves, path: JointPath, words: WordRows, z: int, fi
 
 
 def _points_between(moves: Moves, path: JointPath, first: int, last: int) -> int:
-    """How many blocks keep the tip straight over to a hole where the slides do not: they stay blocks of their own, for
-    a cycle goes there in one block."""
+    """How many blocks keep the tip straight over to a hole where the slides do not: they stay blocks of their
+    own, for a cycle goes there in one block."""
     straight = np.array([f.control.tips_straight for f in path.frames])[path.frame[first:last + 1]]
     placing = moves.phase[path.move[first:last + 1]] <= Phase.APPROACH
     found = np.flatnonzero(placing & ~straight & (path.u[first:last + 1] < 1.0))
@@ -120,7 +122,8 @@ def _placed_before(moves: Moves, path: JointPath, allowed: Bools, first: int, la
     return int(inside[0]) if len(inside) else 0
 
 
-def _rises_beyond(moves: Moves, path: JointPath, words: WordRows, z: int, first: int, last: int, initial: float) -> bool:
+def _rises_beyond(moves: Moves, path: JointPath, words: WordRows, z: int, first: int, last: int,
+                  initial: float) -> bool:
     """True where block `last` goes on in rapid, from the plane that the cycle feeds out to, to above its initial level.
 
     No code of a cycle goes there: it stays a block of its own behind the cycle.
@@ -158,8 +161,8 @@ def feeding_rapid(moves: Moves, path: JointPath, blocks: Ints) -> Bools:
 
 def _hole(toolpath: Toolpath, moves: Moves, path: JointPath, rows: WordRows, control: Control, controller: ControllerFile,
           first: int, last: int, initial: float, key: CycleKey, placed: bool) -> Hole | None:
-    """The hole of blocks `first` to `last`; the tool goes to the very place at the plane where blocks of their own have
-    `placed` it there."""
+    """The hole of blocks `first` to `last`; the tool goes to the very place at the plane where blocks of
+    their own have `placed` it there."""
     cycle = toolpath.cycles[int(moves.cycle[path.move[first]])]
     spec = controller.cycles.with_dwell if cycle.dwell > 0.0 else controller.cycles.table
     phases = moves.phase[path.move[first:last + 1]]

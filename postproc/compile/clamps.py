@@ -1,9 +1,9 @@
 """Clamps of rotary axes: released before the block that turns an axis, closed behind the last one, before the cut.
 
-Which codes they are is the builder's (`[axes.A] clamp`, `unclamp` of the machine file). An axis that stands through a
-stretch of cuts is clamped in it, one that turns in it is free through all of it. A control that turns the axes itself
-where a plane is stated (G53.1, CYCLE800, PLANE ... TURN) finds them free. Where a program may be taken up, nobody knows
-how they stand.
+Which codes they are is the builder's (`[axes.A] clamp`, `unclamp` of the machine file). An axis that stands
+through a stretch of cuts is clamped in it, one that turns in it is free through all of it. A control that
+turns the axes itself where a plane is stated (G53.1, CYCLE800, PLANE ... TURN) finds them free. Where a
+program may be taken up, nobody knows how they stand.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def with_clamps(program: Program, machine: Machine, plane_turns: bool) -> Progra
 
 
 def turning(program: Program, columns: list[int]) -> Bools:
-    """(K,) blocks that turn one of the axes, or may: the first word of each, and words of linking blocks that state again
-    where it stands, since it may stand elsewhere where a program is taken up there."""
+    """(K,) blocks that turn one of the axes, or may: the first word of each, and words of linking blocks that
+    state again where it stands, since it may stand elsewhere where a program is taken up there."""
     result = np.asarray(program.write[:, columns].any(axis=1) & program.link)
     for j in columns:
         rows = np.flatnonzero(program.write[:, j])
@@ -102,8 +102,8 @@ def _switches(program: Program, turns: Bools, cut: Bools, plane_turns: bool) -> 
 
 
 def _put(group: list[Command], command: Command, early: bool) -> None:
-    """A clamp as early as it can stand, behind what enters a plane or begins an operation; a release as late, before a
-    plane is stated."""
+    """A clamp as early as it can stand, behind what enters a plane or begins an operation; a release as late,
+    before a plane is stated."""
     names = [c.name for c in group]
     if early:
         after = [i + 1 for i, c in enumerate(group) if c.name in ("ENTER_SECTION", UNCLAMP)

@@ -39,9 +39,9 @@ _STOPS = frozenset({"STOP", "OPSTOP"})
 
 def commands_of(toolpath: Toolpath, moves: Moves, path: JointPath, controller: ControllerFile, native: Bools,
                 restart: bool = False, tool_call: bool = True, stops: bool = False) -> tuple[Commands, list[Diagnostic]]:
-    """Commands by block, and what could not be carried out; with `restart` every operation restates its tool; without
-    `tool_call` no length register may be left in force by what ran before; with `stops` the program stops optionally
-    between tools."""
+    """Commands by block, and what could not be carried out; with `restart` every operation restates its tool;
+    without `tool_call` no length register may be left in force by what ran before; with `stops` the program
+    stops optionally between tools."""
     writing = _Writing(toolpath, moves, path, controller, restart, stops)
     for at, event in enumerate(toolpath.events):
         writing.operations(event)
@@ -80,7 +80,8 @@ class _Writing:
         self.selects = controller.tools.preload and not any(e.word == "SELECT" for e in toolpath.events)
         self.loaded: ToolChange | None = None
         self.spindle, self.state = Spindle(), SpindleCoolantState()
-        self.compensation = RadiusCompensation(moves, path, self.result, controller, loaded_registers(toolpath))
+        self.compensation = RadiusCompensation(moves, path, self.result, controller,
+                                               loaded_registers(toolpath))
         self.starts = operation_starts(toolpath, moves)
         self.lost: dict[str, list[int]] = {}
         self.skipping = False
@@ -110,8 +111,8 @@ class _Writing:
                 self._restate(self.at(int(self.path.begin[move])), move, named.line)
 
     def _label(self, move: int) -> int:
-        """The block that an operation begins with: the travel home, where it leads there, so that a program taken up at the
-        operation goes home from wherever the tool is."""
+        """The block that an operation begins with: the travel home, where it leads there, so that a program
+        taken up at the operation goes home from wherever the tool is."""
         block = int(self.path.begin[move])
         return block - 1 if block > 0 and self.path.home[block - 1] else block
 

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 def compile_program(job: Job, moves: Moves, path: JointPath,
                     planned: PlannedTimes | None = None,
                     apart: Bools | None = None) -> tuple[Program, Feeds, list[Diagnostic]]:
-    """The canonical program of a path along `moves`; `planned` are the feeds that the plan allows, blocks that are `apart`
-    (K,) no part of canned cycles."""
+    """The canonical program of a path along `moves`; `planned` are the feeds that the plan allows, blocks
+    that are `apart` (K,) no part of canned cycles."""
     toolpath, control, controller = job.toolpath, job.control, job.controller
     places = decimals(control, controller)
     skip = skipped(toolpath, moves, path)
@@ -52,7 +52,8 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
     kept_holes = tuple(Hole(int(new[h.first]), int(new[h.last + 1]) - 1, h.cycle, h.plane_level, h.bottom, h.retract,
                             h.initial, h.key, int(new[h.drill])) for h in holes)
     line = moves.line[path.move[keep]]
-    placed, found = with_skips(with_sections(_moved(commands, new), sections), skip[keep], line, toolpath.file)
+    placed, found = with_skips(with_sections(_moved(commands, new), sections), skip[keep], line,
+                               toolpath.file)
     program = Program(control.machine.axis_names, end[keep], write[keep], path.code[keep], feeds.feed[keep],
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], path.center[keep], path.home[keep],
                       np.isnan(path.u[keep]), moves.row[path.move[keep]], line,
@@ -83,7 +84,8 @@ def writing_of(job: Job, moves: Moves) -> Writing:
         return joints_of(path, words, rows, block_tools(path, moves), job.kinematics, job.offset_length)
 
     def turned(path: JointPath, q: Floats, rows: Ints) -> Floats:
-        return with_turns(q, path.q[rows], path, rows, block_tools(path, moves), job.kinematics, job.rounding.made_up)
+        return with_turns(q, path.q[rows], path, rows, block_tools(path, moves), job.kinematics,
+                          job.rounding.made_up)
 
     grain = np.asarray(10.0 ** -decimals(job.control, job.controller).astype(np.float64))
     return Writing(lambda path: words_of(job, moves, path).end, joints, turned, grain)

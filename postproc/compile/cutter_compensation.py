@@ -28,8 +28,9 @@ _SWITCH: dict[CompensationSide, CommandName] = {
 class RadiusCompensation:
     """CUTCOM as the control's cutter compensation: stated when it changes, off before linking moves, holes, tool changes.
 
-    The points are written as the file has them; what the control adds depends on its register. It adds it in the plane of
-    the words (Fanuc B-63944EN-2, cutter compensation: in the plane that G17 to G19 select), so that plane must be square
+    The points are written as the file has them; what the control adds depends on its register. It adds it in
+    the plane of the words (Fanuc B-63944EN-2, cutter compensation: in the plane that G17 to G19 select), so
+    that plane must be square
     to the tool all the while: a tilted plane, or the tool along Z and no rotary axis turning. Where D is modal and CUTCOM
     names none, that of the tool's length register is written: `registers` (N,) by row of the Toolpath, -1 for none.
     """

@@ -22,8 +22,8 @@ _OTHER = ("the tool does not stand along Z of the words, or the retract ends at 
 
 def not_native(toolpath: Toolpath, moves: Moves, path: JointPath, native: Bools, controller: ControllerFile,
                skip: Bools) -> list[Diagnostic]:
-    """Cycles that single moves do not replace and that could not be written as canned cycles, each with its reason;
-    `native` and `skip` (K,) as in `holes_of`."""
+    """Cycles that single moves do not replace and that could not be written as canned cycles, each with its
+    reason; `native` and `skip` (K,) as in `holes_of`."""
     rows = _rows(toolpath, moves, path, native, controller)
     turning = spindle_states(toolpath)[0][moves.row[rows]]
     found: dict[tuple[str, str, str], list[int]] = {}
@@ -44,7 +44,8 @@ def only_canned(toolpath: Toolpath, controller: ControllerFile) -> Bools:
                     dtype=bool)
 
 
-def _rows(toolpath: Toolpath, moves: Moves, path: JointPath, native: Bools, controller: ControllerFile) -> Ints:
+def _rows(toolpath: Toolpath, moves: Moves, path: JointPath, native: Bools,
+          controller: ControllerFile) -> Ints:
     """The moves down such holes."""
     only = only_canned(toolpath, controller)
     rows = np.flatnonzero((moves.phase == Phase.DRILL) & (moves.cycle >= 0))

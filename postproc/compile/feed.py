@@ -57,7 +57,8 @@ def plan_feeds(path: JointPath, control: Control, step: Floats, asked: Floats, p
     open_to_it = (feeds.mode == PER_MINUTE) & (path.code != 0) & ~native & (feeds.seconds > 0.0) & (feeds.feed > 0.0)
     feed = merged(feeds.feed, open_to_it, passes, planned.merge)
     factor = np.where(open_to_it, feeds.feed / np.where(open_to_it, feed, 1.0), 1.0)
-    return replace(feeds, feed=feed, seconds=feeds.seconds * factor, slowed=feeds.slowed | (factor > 1.0 + 1e-9))
+    return replace(feeds, feed=feed, seconds=feeds.seconds * factor,
+                   slowed=feeds.slowed | (factor > 1.0 + 1e-9))
 
 
 def least_seconds(path: JointPath, control: Control, asked: Floats, step: Floats) -> Floats:
@@ -82,8 +83,9 @@ def _control_bends(path: JointPath) -> Bools:
 
 def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, needed: Floats, mode: Array,
                rules: FeedRules) -> Feeds:
-    """The words of blocks that take the time asked for, or the time (K,) s needed where that is longer, in the feed mode
-    (K,) and under the law of each. Blocks without a time of their own, retracts in feed motion, have no feed asked for."""
+    """The words of blocks that take the time asked for, or the time (K,) s needed where that is longer, in
+    the feed mode (K,) and under the law of each. Blocks without a time of their own, retracts in feed motion,
+    have no feed asked for."""
     cutting, arc = path.code != 0, path.code == ARC
     wanted = np.where(cutting, np.nan_to_num(path.seconds), np.nan)
     seconds = np.fmax(wanted, needed)
@@ -107,7 +109,8 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
             same[k] |= cutting[k] & own[k] & near & (needed[k] <= (1.0 - _ROUNDING) * wanted[k]) & _moves_tip(step[k], law)
     per_minute = np.where(same, 60.0 * asked, per_minute)
     if rules.least_inverse_rate > 0.0:
-        mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < rules.least_inverse_rate), PER_MINUTE, mode)
+        mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < rules.least_inverse_rate),
+                        PER_MINUTE, mode)
     inverse = np.where(arc, by_radius, inverse)
     feed = np.where(cutting, np.where(mode == INVERSE, inverse, per_minute), np.nan)
     return Feeds(feed, mode.astype(np.int8), np.where(cutting, seconds, np.nan), slowed)

@@ -13,8 +13,9 @@ from toolpaths.diagnostics import Diagnostic, error
 def without_standing(write: Bools, positions: Floats, rolls: dict[int, Rollover]) -> Bools:
     """(K, J) the words that blocks state, without those of axes that stand, where the sign of a word is the direction.
 
-    LinuxCNC takes a word that is less than its own position by the last bit of a number for one that lies a whole turn ahead
-    (`unwrap_rotary` of its interpreter). The first word of an axis stays: nobody knows where it stands before.
+    LinuxCNC takes a word that is less than its own position by the last bit of a number for one that lies a
+    whole turn ahead (`unwrap_rotary` of its interpreter). The first word of an axis stays: nobody knows where
+    it stands before.
     """
     for axis, roll in rolls.items():
         rows = np.flatnonzero(write[:, axis])
@@ -39,8 +40,8 @@ def standing_unsaid(rolls: dict[int, Rollover], letters: tuple[str, ...], restar
 
 
 def long_turns(program: Program, file: str) -> list[Diagnostic]:
-    """Blocks that turn a modulo axis by half a turn or more where the control takes the shorter path, else by a whole
-    one."""
+    """Blocks that turn a modulo axis by half a turn or more where the control takes the shorter path, else by
+    a whole one."""
     found = []
     for axis, roll in program.rolls.items():
         most = TURN / 2.0 if roll.undirected else TURN

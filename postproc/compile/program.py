@@ -35,8 +35,9 @@ CommandName = Literal[
 class Command:
     """A canonical function without motion, e.g. ("START_SPINDLE_CLOCKWISE", (1200.0,)); `line` is its CL line.
 
-    ("ENTER_SECTION", (i,)) and ("LEAVE_SECTION", (i,)) stand where a section that needs codes begins and ends,
-    ("OPERATION_START", (name,)) or (name, 1.0) where the program can be taken up, with 1.0 from home, ("RESTATE",) behind
+    ("ENTER_SECTION", (i,)) and ("LEAVE_SECTION", (i,)) stand where a section that needs codes begins and
+    ends, ("OPERATION_START", (name,)) or (name, 1.0) where the program can be taken up, with 1.0 from home,
+    ("RESTATE",) behind
     blocks that a switch may leave out: modal codes are stated again. `skip`: the block switch leaves it out.
     """
 
@@ -97,8 +98,8 @@ class Program:
 
     Attributes:
         letters: the axis words, the order of the columns of `words`
-        words (K, J): end positions, mm and degrees, already rounded to the controller's decimals; positions of
-            `home` (K,) blocks are machine coordinates
+        words (K, J): end positions, mm and degrees, already rounded to the controller's decimals; positions
+            of `home` (K,) blocks are machine coordinates
         write (K, J): words that the block states
         code (K,): 0 STRAIGHT_TRAVERSE, 1 STRAIGHT_FEED, 2 ARC_FEED
         feed (K,): mm/min or deg/min, or 1/min where mode is INVERSE; NaN for traverses

@@ -33,9 +33,9 @@ class WordRows:
 def word_rows(path: JointPath, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
               lengths: Callable[[int], float], places: Ints, again: Ints, made_up: bool = False,
               bidirectional: Sequence[int] = (), exact: bool = False) -> WordRows:
-    """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the decimals,
-    `again` the blocks that state every axis, `made_up` as in `Rounding`; `bidirectional` joints lose motion, see
-    `_held`; `exact` ends of CL moves keep the last decimals of their words."""
+    """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the
+    decimals, `again` the blocks that state every axis, `made_up` as in `Rounding`; `bidirectional` joints
+    lose motion, see `_held`; `exact` ends of CL moves keep the last decimals of their words."""
     begins = np.flatnonzero(np.diff(path.frame)) + 1
     tool = block_tools(path, moves)
     rounds = places if made_up else None
@@ -63,8 +63,8 @@ def _words(path: JointPath, q: Floats, rows: Ints, tool: Ints, kinematics: Calla
            lengths: Callable[[int], float], rounds: Ints | None) -> Floats:
     """Unrounded words of joints q (K, J) under the law and with the tool of the blocks `rows` (K,).
 
-    With `rounds` (decimals) rotary words are rounded first where words are axis positions, and the slides are those that
-    then bring the tip to its place.
+    With `rounds` (decimals) rotary words are rounded first where words are axis positions, and the slides are
+    those that then bring the tip to its place.
     """
     words = np.empty_like(q)
     for k in groups(path.frame[rows], tool[rows]):
@@ -81,7 +81,8 @@ def joints_of(path: JointPath, words: Floats, rows: Ints, tool: Ints, kinematics
     q = np.empty_like(words)
     for k in groups(path.frame[rows], tool[rows]):
         index = int(tool[rows[k[0]]])
-        q[k] = path.frames[int(path.frame[rows[k[0]]])].control.joints(words[k], kinematics(index), lengths(index))
+        q[k] = path.frames[int(path.frame[rows[k[0]]])].control.joints(words[k], kinematics(index),
+                                                                       lengths(index))
     return q
 
 
@@ -108,9 +109,9 @@ def _made_up(q: Floats, law: Control, kin: Kinematics, places: Ints) -> Floats:
 def _snapped(words: Floats, path: JointPath, control: Control, places: Ints, exact: bool) -> Floats:
     """Words (rounded) without tiny X, Y, Z residues next to a rotary move.
 
-    Under inverse time LinuxCNC takes the length of X, Y, Z alone where any of them moves, so that a residue of
-    rounding would set the speed of the whole block. What is left out is at most SNAP last decimals, and never adds up:
-    each block is compared with the last written position. Ends of CL moves that must be `exact` keep them.
+    Under inverse time LinuxCNC takes the length of X, Y, Z alone where any of them moves, so that a residue
+    of rounding would set the speed of the whole block. What is left out is at most SNAP last decimals, and
+    never adds up: each block is compared with the last written position. Ends of CL moves that must be `exact` keep them.
     """
     slides, rotary = control.slides, control.rotary
     if not len(rotary) or len(words) < 2:
@@ -134,7 +135,8 @@ def _snapped(words: Floats, path: JointPath, control: Control, places: Ints, exa
     return words
 
 
-def _held(words: Floats, path: JointPath, control: Control, tool: Ints, places: Ints, joints: Sequence[int]) -> Floats:
+def _held(words: Floats, path: JointPath, control: Control, tool: Ints, places: Ints,
+          joints: Sequence[int]) -> Floats:
     """Words (rounded) in which rotary axes among `joints` never turn back by one last decimal: the word before stays.
 
     An axis that loses motion would have another error there, more than the decimal is worth. What is left out never adds

@@ -1,8 +1,8 @@
 """What the words of a program mean on one machine: joints or tip, offsets, and the motion between two blocks.
 
-Three laws. "axes": words are joint positions, straight in joints between blocks. "tcp": the control runs the kinematics;
-X, Y, Z are the tip in the work offset, straight, rotary words linear. "tilted": rotary axes stand still, X, Y, Z are the
-tip in the frame of a plane.
+Three laws. "axes": words are joint positions, straight in joints between blocks. "tcp": the control runs the
+kinematics; X, Y, Z are the tip in the work offset, straight, rotary words linear. "tilted": rotary axes stand
+still, X, Y, Z are the tip in the frame of a plane.
 """
 
 from __future__ import annotations
@@ -105,8 +105,8 @@ class Control:
     def has_tip_modes(self) -> bool:
         """True where a controller's own tip and plane modes can be used on the machine.
 
-        Three slides X, Y, Z along the axes of the machine frame, one rotary axis at least, tool along Z at q = 0: then one
-        work offset serves every law.
+        Three slides X, Y, Z along the axes of the machine frame, one rotary axis at least, tool along Z at q
+        = 0: then one work offset serves every law.
         """
         kin = self.machine.kinematics
         if not kin.straight_slides or not any(kin.rotary) or (self.xyz < 0).any() or len(self.slides) != 3:
@@ -149,9 +149,9 @@ class Control:
         """(K,) the length of word steps (K, J) that a feed per minute refers to, mm or degrees.
 
         "xyz-first": that of X, Y, Z where any of them moves, else of U, V, W, else of A, B, C (LinuxCNC,
-        `find_straight_length`; NIST RS274/NGC 2.1.2.5 for X, Y, Z and A, B, C). "geometry": that of X, Y, Z where any
-        of them moves, else of all other axes (Siemens, FGROUP of the geometry axes). "all": root of the squares of all
-        mm and degrees. Where X, Y, Z are the tip the feed is that of the tip, by every rule.
+        `find_straight_length`; NIST RS274/NGC 2.1.2.5 for X, Y, Z and A, B, C). "geometry": that of X, Y, Z
+        where any of them moves, else of all other axes (Siemens, FGROUP of the geometry axes). "all": root of
+        the squares of all mm and degrees. Where X, Y, Z are the tip the feed is that of the tip, by every rule.
         """
         names = self.machine.axis_names
         if self.law == "axes" and self.feed_rule == "all":
@@ -173,8 +173,8 @@ class Control:
 
     @cached_property
     def length_on_z(self) -> bool:
-        """True where a tool length offset on Z moves the controlled point from gauge point to tip: at q = 0, and where the
-        slides do not move the tip straight, wherever the machine is looked at."""
+        """True where a tool length offset on Z moves the controlled point from gauge point to tip: at q = 0,
+        and where the slides do not move the tip straight, wherever the machine is looked at."""
         kin, z = self.machine.kinematics, self.xyz[2]
         if self.base == "tcp":
             return True

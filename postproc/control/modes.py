@@ -131,7 +131,8 @@ class OutputModes:
         rotary = tuple((control.machine.axis_names[j], float(words[j])) for j in control.rotary)
         if rotary in self._planes:
             return self._planes[rotary], at
-        angles, rotation = stated(mode.angles, tool_frames(kin, at[None])[0], tuple(v for _, v in rotary), mode.decimals)
+        angles, rotation = stated(mode.angles, tool_frames(kin, at[None])[0], tuple(v for _, v in rotary),
+                                  mode.decimals)
         tilted = control.under("tilted", Plane(rotation, control.origin))
         frame = WordFrame(_with_arcs(tilted, mode), angles, rotary)
         self._planes[rotary] = frame

@@ -1,10 +1,12 @@
 """Tilted working planes: their frame, and the angles by which a controller names it.
 
-A convention names the letters of three turns about the axes of the moving frame, one after another (intrinsic), so that
-R = R_1(angle 1) R_2(angle 2) R_3(angle 3). "ZXZ" are Euler angles (Fanuc B-64484EN, G68.2 with I, J, K: turns about Z,
-the new X, the new Z); "ZYX" is the same as turns about the fixed X, then Y, then Z (Heidenhain, PLANE SPATIAL: SPA,
-SPB, SPC are fixed; Siemens, CYCLE800 with _MODE 27); "XYZ" turns about X, the new Y, the new Z (CYCLE800 with _MODE 57):
-there the direction of a small tilt hangs on the last decimals of two angles. "rotary" has no angles of its own: the frame
+A convention names the letters of three turns about the axes of the moving frame, one after another
+(intrinsic), so that R = R_1(angle 1) R_2(angle 2) R_3(angle 3). "ZXZ" are Euler angles (Fanuc B-64484EN,
+G68.2 with I, J, K: turns about Z, the new X, the new Z); "ZYX" is the same as turns about the fixed X, then
+    Y, then Z (Heidenhain, PLANE SPATIAL: SPA,
+SPB, SPC are fixed; Siemens, CYCLE800 with _MODE 27); "XYZ" turns about X, the new Y, the new Z (CYCLE800 with
+_MODE 57): there the direction of a small tilt hangs on the last decimals of two angles. "rotary" has no
+    angles of its own: the frame
 is what the rotary axes make of it.
 """
 
@@ -76,8 +78,8 @@ def rotation_of(convention: TurnOrder, angles: tuple[float, ...]) -> Floats:
 def angles_of(convention: TurnOrder, rotation: Floats) -> tuple[float, float, float]:
     """The three angles (degrees) of a rotation (3, 3) under a convention of turns; the inverse of `rotation_of`.
 
-    Middle angles are in 0..180 (ZXZ) or -90..90 (the others). Where first and third turn are about one axis, the third
-    is 0.
+    Middle angles are in 0..180 (ZXZ) or -90..90 (the others). Where first and third turn are about one axis,
+    the third is 0.
     """
     if convention == "ZXZ":
         first, middle, third = _euler(rotation)

@@ -1,8 +1,9 @@
 """Modulo (roll-over) rotary axes: what their words mean, how long a turn one block may make, words in one turn.
 
-Joints count every turn, in planning and in the read-back alike; only the words of a modulo axis stay inside one turn. From
-word to word the control goes the shorter path ("shortest": Fanuc ROA = 1, RAB = 0, B-63534EN 20.2; Heidenhain M126), the
-path of the word's sign ("sign": RAB = 1; LinuxCNC WRAPPED_ROTARY), or as the word itself says (Siemens DC, ACP, ACN).
+Joints count every turn, in planning and in the read-back alike; only the words of a modulo axis stay inside
+one turn. From word to word the control goes the shorter path ("shortest": Fanuc ROA = 1, RAB = 0, B-63534EN
+20.2; Heidenhain M126), the path of the word's sign ("sign": RAB = 1; LinuxCNC WRAPPED_ROTARY), or as the word
+itself says (Siemens DC, ACP, ACN).
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ Rule = Literal["shortest", "sign"]
 
 @dataclass(frozen=True)
 class Rollover:
-    """A modulo axis: the path that the control takes, where its turn begins (degrees), `stated` where words say their path,
-    `whole` where -360 is a word."""
+    """A modulo axis: the path that the control takes, where its turn begins (degrees), `stated` where words
+    say their path, `whole` where -360 is a word."""
 
     rule: Rule
     low: float = 0.0
@@ -50,8 +51,8 @@ class Rollover:
         return HALF if self.undirected else WHOLE
 
     def words(self, degrees: Floats, before: Floats) -> tuple[Floats, Bools]:
-        """(words (N,) in one turn, under "sign" negative where the axis turns that path; (N,) True where it does) of
-        positions (N,), degrees, of an axis that stands at `before` (N,)."""
+        """(words (N,) in one turn, under "sign" negative where the axis turns that path; (N,) True where it
+        does) of positions (N,), degrees, of an axis that stands at `before` (N,)."""
         step = degrees - before
         inside = np.mod(degrees - self.low, TURN) + self.low
         inside = np.where(inside >= self.low + TURN - LEAST, inside - TURN, inside) + 0.0
@@ -84,8 +85,8 @@ def rollovers(machine: Machine, controller: ControllerFile) -> tuple[dict[int, R
 
 
 def parked(machine: Machine, rolls: Collection[int], q: Floats) -> Floats:
-    """Home (J,) or (N, J) as axes stand there that come from joints q: at the nearest whole turn, but for those that are to
-    unwind all their turns; `rolls`: the modulo axes by joint."""
+    """Home (J,) or (N, J) as axes stand there that come from joints q: at the nearest whole turn, but for
+    those that are to unwind all their turns; `rolls`: the modulo axes by joint."""
     home = np.broadcast_to(machine.home, q.shape).copy()
     for j in parking(machine, rolls):
         home[..., j] += whole_turns(q[..., j] - home[..., j])

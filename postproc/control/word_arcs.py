@@ -28,9 +28,9 @@ _RADIUS_SLACK = 0.002
 @dataclass(frozen=True)
 @arrays(keep="N", plane="int8: N", ccw="N", center="N 3", parts="N")
 class WordArcs:
-    """For N curves: `keep` (N,) True where the words describe the same arc; then `plane` (17, 18, 19), `ccw` as seen
-    from the positive end of the third axis, `center` (N, 3) in the words X, Y, Z relative to the start point, and
-    `parts` (N,) equal blocks of at most one turn each."""
+    """For N curves: `keep` (N,) True where the words describe the same arc; then `plane` (17, 18, 19), `ccw`
+    as seen from the positive end of the third axis, `center` (N, 3) in the words X, Y, Z relative to the
+    start point, and `parts` (N,) equal blocks of at most one turn each."""
 
     keep: Bools
     plane: Array
@@ -60,7 +60,8 @@ def word_arcs(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
         along = np.take_along_axis(normal, third[:, None], axis=1)[:, 0]
         radius = np.linalg.norm(arc.start - arc.center, axis=1)
         off = np.linalg.norm(normal - along[:, None] * np.eye(3)[third], axis=1)
-        allowed = _SQUARE if control.law != "tilted" else np.maximum(_SQUARE, np.minimum(1e-4, _FLAT / radius))
+        allowed = _SQUARE if control.law != "tilted" else np.maximum(_SQUARE,
+                                                                     np.minimum(1e-4, _FLAT / radius))
         keep[rows] = fixed & square & (off <= allowed) & _well_shaped(arc)
         plane[rows] = np.array([19, 18, 17], dtype=np.int8)[third]
         ccw[rows] = along > 0.0

@@ -48,8 +48,8 @@ class CannedCycle(UserModel):
 class Cycles(UserModel):
     """Canned cycles by the kind of the CL file.
 
-    Where a kind is missing, DRILL, THRU, CSINK, FACE, DEEP, BRKCHP, BORE and REAM become single moves; others are refused.
-    TAP_LEFT stands for taps that turn anti-clockwise.
+    Where a kind is missing, DRILL, THRU, CSINK, FACE, DEEP, BRKCHP, BORE and REAM become single moves; others
+    are refused. TAP_LEFT stands for taps that turn anti-clockwise.
     """
 
     enabled: bool = True
@@ -86,8 +86,8 @@ class FeedRules(UserModel):
     least_inverse_rate: float = Field(default=0.0, ge=0.0)
     """mm/min below which inverse time runs X, Y, Z faster than asked (LinuxCNC 0.1)"""
     length: Literal["xyz-first", "all", "geometry"] = "xyz-first"
-    """what a feed per minute refers to where X, Y, Z are axis positions: X, Y, Z before rotary axes, all axes alike, or
-    the geometry axes before all others"""
+    """what a feed per minute refers to where X, Y, Z are axis positions: X, Y, Z before rotary axes, all axes
+    alike, or the geometry axes before all others"""
     arc_inverse: Literal["length", "radius", "refuse"] = "length"
     """inverse time in arcs: speed by length, speed by radius, or not allowed"""
 
@@ -100,8 +100,8 @@ class CutterCompensation(UserModel):
     ends_on_arc: bool = False
     """the first move behind G40 may be an arc"""
     modal_register: bool = False
-    """D holds until another is stated, whatever tool is loaded: where CUTCOM names none, the number of the tool's length
-    register is written"""
+    """D holds until another is stated, whatever tool is loaded: where CUTCOM names none, the number of the
+    tool's length register is written"""
 
 
 class InterpolationRules(UserModel):
@@ -135,13 +135,13 @@ class RolloverRules(UserModel):
     negative: Worded = ""
     """the same for the negative one"""
     zero_negative: Literal["-0", "-360"] = "-360"
-    """the word of 0 degrees that is reached in the negative direction, where the sign is the direction; "-0" only where the
-    control is known to heed the sign of zero"""
+    """the word of 0 degrees that is reached in the negative direction, where the sign is the direction; "-0"
+    only where the control is known to heed the sign of zero"""
     on: tuple[str, ...] = ()
     """blocks of the safe start that put the shorter path in force, in programs for machines with modulo axes"""
     needs: dict[Literal["shortest", "sign"], Annotated[str, placeholders("axes")]] = Field(default_factory=dict)
-    """settings that each rule needs: a comment at the head of programs for machines with modulo axes; {axes} are their
-    letters"""
+    """settings that each rule needs: a comment at the head of programs for machines with modulo axes; {axes}
+    are their letters"""
 
 
 class Start(UserModel):
@@ -183,10 +183,10 @@ class TcpMode(Mode):
     leave: tuple[Annotated[str, placeholders("register", "work_offset")], ...]
     """blocks that switch it off"""
     frame: Literal["table", "entry", "either"] = "table"
-    """what X, Y, Z are the tip in, where a rotary table stands turned when the mode is switched on: "table", the part's
-    frame, turned with the table by its scale; "entry", the frame of the work offset as it lies unturned in the machine,
-    which then goes with the table; "either": not known, so that the mode is entered with the tables at zero, where both
-    are one, and `verify` proves the program under both"""
+    """what X, Y, Z are the tip in, where a rotary table stands turned when the mode is switched on: "table",
+    the part's frame, turned with the table by its scale; "entry", the frame of the work offset as it lies
+    unturned in the machine, which then goes with the table; "either": not known, so that the mode is entered
+    with the tables at zero, where both are one, and `verify` proves the program under both"""
     cycles: bool = False
     """canned cycles may stand in it"""
     compensation: bool = False
@@ -197,8 +197,8 @@ class TiltedMode(Mode):
     """Tilted working plane: rotary axes stand still, X, Y, Z are the tip in a turned frame at the work offset's zero."""
 
     enter: tuple[Annotated[str, placeholders("first", "second", "third", "direction", "work_offset")], ...]
-    """blocks that state the plane; {first}, {second}, {third} are the angles in the order of `angles`, {direction} is 1,
-    or -1 where the first rotary axis that tilts the tool stands at a negative angle"""
+    """blocks that state the plane; {first}, {second}, {third} are the angles in the order of `angles`,
+    {direction} is 1, or -1 where the first rotary axis that tilts the tool stands at a negative angle"""
     leave: tuple[Annotated[str, placeholders("work_offset")], ...]
     """blocks that end it"""
     angles: Literal["ZXZ", "ZYX", "XYZ", "rotary"]
@@ -206,8 +206,8 @@ class TiltedMode(Mode):
     decimals: int = Field(default=4, ge=0, le=9)
     """of the angles"""
     turns_axes: bool = True
-    """the control may turn rotary axes where the plane is stated, if only by what its angles are rounded by: axes whose
-    clamps the program works are free there"""
+    """the control may turn rotary axes where the plane is stated, if only by what its angles are rounded by:
+    axes whose clamps the program works are free there"""
     tables_only: bool = False
     """only for machines whose rotary axes all carry the part"""
 
@@ -225,8 +225,8 @@ class Stops(UserModel):
     """What the control does at M0, and at M1 where its switch is on."""
 
     switch_off: Stop = "spindle and coolant"
-    """what they switch off by themselves, where the machine file does not say ([control] stop): the read-back counts it as
-    standing from there on. Programs restate spindle and coolant behind every stop, whatever stands here"""
+    """what they switch off by themselves, where the machine file does not say ([control] stop): the read-back
+    counts it as standing from there on. Programs restate spindle and coolant behind every stop, whatever stands here"""
     tool_change: Stop = "spindle and coolant"
     """what a tool change switches off by itself"""
 
@@ -235,8 +235,8 @@ class LinkRules(UserModel):
     """Linking moves as the control's maker wants them."""
 
     index: Literal["plane", "home"] = "plane"
-    """where the tool waits while a link turns rotary axes, where the set-up does not say: on the safe plane, or with the
-    retract axis at home"""
+    """where the tool waits while a link turns rotary axes, where the set-up does not say: on the safe plane,
+    or with the retract axis at home"""
 
 
 class ControllerFile(UserModel):

@@ -82,8 +82,8 @@ class ProgramBlocks(UserModel):
     number: int = Field(default=1, ge=1, le=9999)
     """of the program, where the controller has numbers"""
     stock: tuple[Annotated[str, placeholders("x0", "y0", "z0", "x1", "y1", "z1")], ...] = ()
-    """blocks behind `begin` that state the stock for the control's graphics, where the set-up has one ([rewind.stock]): its
-    least and greatest X, Y, Z, mm in the work offset with all rotary axes at 0"""
+    """blocks behind `begin` that state the stock for the control's graphics, where the set-up has one
+    ([rewind.stock]): its least and greatest X, Y, Z, mm in the work offset with all rotary axes at 0"""
     preamble: tuple[Annotated[str, placeholders("work_offset")], ...] = ()
     """safe start: units, modes and planes that the program relies on; {work_offset} is the set-up's code"""
     work_offsets: WorkOffsets = Field(default_factory=dict)
@@ -91,27 +91,28 @@ class ProgramBlocks(UserModel):
     more_offsets: dict[Numbered, FurtherOffsets] = Field(default_factory=dict)
     """further work offsets by the name that a set-up states for one, with {number}"""
     operation: tuple[Annotated[str, placeholders("comment", "name", "number")], ...] = ()
-    """blocks at the start of each operation, from where a program can be taken up: {name} of the operation, {comment} with
-    it, {number} 100, 200, ..."""
+    """blocks at the start of each operation, from where a program can be taken up: {name} of the operation,
+    {comment} with it, {number} 100, 200, ..."""
     passive: tuple[PassiveWord, ...] = ()
-    """codes of the shop's own blocks that move nothing and change no state, or the words that such a statement begins with
-    ("CYCLE977", "TCH PROBE"): read back without being executed"""
-    carried_out: tuple[CarriedOutName, ...] = ("G0-G64.9", "G66-G199", "M0-M9", "M13-M14", "M29-M30", "M98-M99", "L")
-    """what the control itself carries out, so that it never is passive: G and M numbers ("G52"), stretches of them
-    ("G0-G64.9"), and the first words of statements ("TRANS", "CYCL DEF"), next to what the read-back knows"""
+    """codes of the shop's own blocks that move nothing and change no state, or the words that such a
+    statement begins with ("CYCLE977", "TCH PROBE"): read back without being executed"""
+    carried_out: tuple[CarriedOutName, ...] = ("G0-G64.9", "G66-G199", "M0-M9", "M13-M14", "M29-M30",
+                                               "M98-M99", "L")
+    """what the control itself carries out, so that it never is passive: G and M numbers ("G52"), stretches of
+    them ("G0-G64.9"), and the first words of statements ("TRANS", "CYCL DEF"), next to what the read-back knows"""
     path_tolerance: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...] = ()
     """blocks that set the control's own smoothing; {tolerance} and {chain} in mm, {axis} in degrees"""
     relies_on_turns: Annotated[str, placeholders("axes")] = ""
-    """setting of the control that rotary words of 360 degrees and more need: a comment at the head of programs with such;
-    {axes} are their letters"""
+    """setting of the control that rotary words of 360 degrees and more need: a comment at the head of
+    programs with such; {axes} are their letters"""
     ending: tuple[str, ...] = ("M30",)
     """blocks that end every program"""
     end: tuple[Named, ...] = ("%",)
     """{name} and {number} as in `begin`"""
 
     def offset_block(self, code: str) -> str | None:
-        """The block of a work offset as the set-up names it: one of the nine, or a further one by the control's own name;
-        None where the control has none of that name."""
+        """The block of a work offset as the set-up names it: one of the nine, or a further one by the
+        control's own name; None where the control has none of that name."""
         if code in self.work_offsets or (code in WORK_OFFSETS and not self.work_offsets):
             return self.work_offsets.get(code, code)
         for name, more in self.more_offsets.items():

@@ -12,8 +12,9 @@ WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59
 """the codes that a set-up may name"""
 CYCLE_VALUES = ("retract", "surface", "clearance", "bottom", "depth", "level", "step", "breaks", "dwell", "feed", "pitch",
                 "speed", "second")
-"""what a cycle's text may name: retract level, surface and bottom (mm on the tool's axis), clearance above the surface,
-depth below it, level of the bottom seen from it (negative), peck, number of pecks, dwell in s, feed in mm/min, pitch in mm
+"""what a cycle's text may name: retract level, surface and bottom (mm on the tool's axis), clearance above
+the surface, depth below it, level of the bottom seen from it (negative), peck, number of pecks, dwell in s,
+feed in mm/min, pitch in mm
 (negative: left-hand), speed in 1/min, second: the retract level above the surface"""
 
 

@@ -21,8 +21,9 @@ LOOKS = (0.25, 0.5, 0.75)
 
 def fitted_arcs(path: JointPath, nominal: JointPath, work: ErrorContext, start: Floats, allowed: float,
                 grain: float) -> tuple[JointPath, Bools]:
-    """The path with arcs through their corrected ends, and which of them become lines: those that leave the nominal arc by
-    more than `allowed` mm, or rise by more than half a `grain` across a plane in which the control has no helix."""
+    """The path with arcs through their corrected ends, and which of them become lines: those that leave the
+    nominal arc by more than `allowed` mm, or rise by more than half a `grain` across a plane in which the
+    control has no helix."""
     resolved, center = np.zeros(len(path), dtype=bool), path.center.copy()
     arcs = np.flatnonzero(path.code == ARC)
     for rows in groups(path.frame[arcs], work.tools[arcs]):
@@ -49,7 +50,8 @@ def fitted_arcs(path: JointPath, nominal: JointPath, work: ErrorContext, start: 
 def _changes(work: ErrorContext, k: Ints) -> Ints:
     """(N,) stretches of arcs k (N,) in which errors rise or fall."""
     places = [work.nominal(k, np.full(len(k), t)) for t in (0.0, *LOOKS, 1.0)]
-    return changes(sum((np.abs(two - one) for one, two in pairwise(places)), np.zeros_like(places[0])), work.detail)
+    return changes(sum((np.abs(two - one) for one, two in pairwise(places)), np.zeros_like(places[0])),
+                   work.detail)
 
 
 def new_centers(path: JointPath, k: Ints, n0: Floats, n1: Floats, c0: Floats, c1: Floats) -> Floats:

@@ -21,15 +21,15 @@ OFF, RATES, INVERSE, FREE = 0, 1, 4, 7
 def walk_all(off: Any, by_approach: Any, tip_rates: Any, back: Any, gap: Any, bend: Any, last: Any, later: Any, goes_on: Any,
              weight: Any, plain: Any, near: Any, enough: Any, free: Any, like: Any, weights: Any, rests: Any, nearer: Any,
              reach: Any) -> Any:
-    """Steps (K, 3) and approach directions (K, T) for the attributes of `Ends`; `weights` are (PLAIN, BETWEEN), then RESTS,
-    NEARER, REACH of `walk`."""
+    """Steps (K, 3) and approach directions (K, T) for the attributes of `Ends`; `weights` are (PLAIN,
+    BETWEEN), then RESTS, NEARER, REACH of `walk`."""
     blocks, lossy = gap.shape
     result, approaches = np.zeros((blocks, 3)), np.zeros((blocks, lossy))
     joint, space, approach, shifted = np.zeros((lossy, 13)), np.zeros((3, 8)), np.zeros(lossy), np.zeros(lossy)
     n, other, still = np.zeros(3), np.zeros(3), np.zeros(3)
     for k in range(blocks):
-        # Play operator: the approach direction of a joint moves by two over its lost motion and stays in [-1, 1]; the words
-        # chosen before
+        # Play operator: the approach direction of a joint moves by two over its lost motion and stays in [-1,
+        # 1]; the words chosen before
         # have moved it by `shifted`.
         for t in range(lossy):
             start = approach[t] - 2.0 * shifted[t] / gap[k, t] + bend[0, k, t]
@@ -96,8 +96,8 @@ def _invert(space: Any) -> None:
 
 @loop(alone=True)
 def _cost(joint: Any, space: Any, n: Any, weight: Any, weighed: Any, rests: Any) -> Any:
-    """mm that the tip is off by after steps n (3,), and the weighted parts of what the next block begins off by and of a
-    plain reading."""
+    """mm that the tip is off by after steps n (3,), and the weighted parts of what the next block begins off
+    by and of a plain reading."""
     x = space[0, OFF] + n[0] * space[0, RATES] + n[1] * space[0, RATES + 1] + n[2] * space[0, RATES + 2]
     y = space[1, OFF] + n[0] * space[1, RATES] + n[1] * space[1, RATES + 1] + n[2] * space[1, RATES + 2]
     z = space[2, OFF] + n[0] * space[2, RATES] + n[1] * space[2, RATES + 1] + n[2] * space[2, RATES + 2]
@@ -126,9 +126,10 @@ def _nearest(space: Any, other: Any, x: Any, y: Any, z: Any) -> None:
 
 
 @loop(alone=True)
-def _toward(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any, rests: Any) -> Any:
-    """The nearest steps for the approach directions that the steps n (3,) make, those of the next, as long as it comes
-    nearer."""
+def _toward(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any,
+            rests: Any) -> Any:
+    """The nearest steps for the approach directions that the steps n (3,) make, those of the next, as long as
+    it comes nearer."""
     while True:
         x, y, z = space[0, OFF], space[1, OFF], space[2, OFF]
         for i in range(3):
@@ -150,9 +151,10 @@ def _toward(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, 
 
 
 @loop(alone=True)
-def _by_approach(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any, rests: Any) -> Any:
-    """The nearest steps for every approach direction that is one of both or that before, where that comes nearer than n
-    (3,)."""
+def _by_approach(joint: Any, space: Any, n: Any, other: Any, cost: Any, weight: Any, weighed: Any,
+                 rests: Any) -> Any:
+    """The nearest steps for every approach direction that is one of both or that before, where that comes
+    nearer than n (3,)."""
     for number in range(3 ** len(joint)):
         x, y, z, rest = space[0, OFF], space[1, OFF], space[2, OFF], number
         for t in range(len(joint)):

@@ -26,8 +26,8 @@ PARTS = 16
 NOISE = 1e-3
 """of the approach directions: turning back by less is none"""
 QUARTERS, NEAR = (0.25, 0.5, 0.75), 16.0
-"""where joints are looked at, and the part of their approach direction off the straight one within which none turns back:
-bows of second and third order do where they leave it there by a fourth and by an eleventh"""
+"""where joints are looked at, and the part of their approach direction off the straight one within which none
+turns back: bows of second and third order do where they leave it there by a fourth and by an eleventh"""
 BEGINS = 0.01
 """weight of what the beginning of a block is off by next to what the end before it is, but where lost motion is taken up"""
 CLOSED = 0.05
@@ -53,14 +53,16 @@ class Writing:
     grain: Floats
 
 
-def settled(made: Divided, work: ErrorContext, writing: Writing, allowed: float) -> tuple[JointPath, float, Floats]:
-    """The path made of the blocks of `work`, with words by which axes that lose motion stand where they should; rad, the
-    worst that is left of the axis at ends of CL moves where they do; and the approach directions (K, T) by which they do.
+def settled(made: Divided, work: ErrorContext, writing: Writing,
+            allowed: float) -> tuple[JointPath, float, Floats]:
+    """The path made of the blocks of `work`, with words by which axes that lose motion stand where they
+    should; rad, the worst that is left of the axis at ends of CL moves where they do; and the approach
+    directions (K, T) by which they do.
 
-    Blocks keep their words where these bring the tip as near as rounding lets them. Closed circles, linking moves and blocks
-    that name their axes keep them anyway, points between ends and rapids where they are off by no more than `allowed` mm.
-    A hole that is corrected as a whole is moved as a whole, so that its bottom is where it should be; centres of arcs go
-    with their ends.
+    Blocks keep their words where these bring the tip as near as rounding lets them. Closed circles, linking
+    moves and blocks that name their axes keep them anyway, points between ends and rapids where they are off
+    by no more than `allowed` mm. A hole that is corrected as a whole is moved as a whole, so that its bottom
+    is where it should be; centres of arcs go with their ends.
     """
     path = made.path
     if not work.bidirectional or len(_columns(path)) != 3:
@@ -130,7 +132,8 @@ class _Written:
             return 0.0
         approach, owner = np.zeros((len(k), self.q.shape[1])), self.made.owner[k]
         approach[:, self.work.bidirectional] = approaches[k]
-        residual = self.work.residual(self.work.nominal(owner, np.ones(len(k))), self.path.q[k], owner, approach)
+        residual = self.work.residual(self.work.nominal(owner, np.ones(len(k))), self.path.q[k],
+                                      owner, approach)
         return float(np.linalg.norm(residual[:, 3:], axis=1).max())
 
     def _like(self, first: Ints) -> Ints:
@@ -149,8 +152,8 @@ class _Written:
         return runs.begin, runs.rows[runs.least(depth[runs.rows])]
 
     def _free(self) -> Floats:
-        """(K, 3) words that may be others; not those of closed circles, of arcs and before them those of their planes alone
-        where the control has no helix there."""
+        """(K, 3) words that may be others; not those of closed circles, of arcs and before them those of
+        their planes alone where the control has no helix there."""
         path, words = self.path, self.words
         fixed = path.home | np.isnan(path.u) | path.state.any(axis=1) | (self.work.whole[self.made.owner] != ALONE)
         result = np.where(fixed | ~np.isfinite(self.q).all(axis=1), 0.0, 1.0)[:, None] * np.ones(3)
@@ -167,8 +170,8 @@ class _Written:
         return result
 
     def _motion(self) -> tuple[Floats, Floats, Floats]:
-        """`bend` and `last` of `BlockEnds`, by pieces on arcs and where the words are the tip that turns; and the approach
-        directions (K, T) by which blocks begin, 0 for joints that move by less than they lose."""
+        """`bend` and `last` of `BlockEnds`, by pieces on arcs and where the words are the tip that turns; and
+        the approach directions (K, T) by which blocks begin, 0 for joints that move by less than they lose."""
         t = self.work.bidirectional
         last = 2.0 * np.nan_to_num(np.diff(self.q, axis=0, prepend=self.q[:1]))[:, t] / self.gap
         bend, begin = _none(3, *self.gap.shape), np.where(np.abs(last) >= 2.0, np.sign(last), 0.0)
@@ -194,7 +197,8 @@ class _Written:
         result = work.straight(path, self.q[rows - 1], self.q[rows], rows, at, owner)
         arcs = np.flatnonzero(path.code[rows] == ARC)
         block = rows[arcs]
-        start = np.where((path.frame[block - 1] == path.frame[block])[:, None], words[block - 1], words[block])
+        start = np.where((path.frame[block - 1] == path.frame[block])[:, None], words[block - 1],
+                         words[block])
         here = on_arc(path.plane[block], path.ccw[block], path.center[block], start, words[block], at[arcs],
                       path.frames[0].control.xyz)
         result[arcs] = self.writing.joints(path, here, block)
@@ -239,9 +243,9 @@ class _Written:
 
 
 def _runs(pieces: Iterable[Floats]) -> tuple[Floats, Floats, Floats]:
-    """(3, N, T), (N, T), (N, T) of motion in pieces (N, T), 2 being what a joint loses: shift, low and high of all but the
-    last run in one direction, that run, and the direction of the first run, 0 where it is shorter than what the joint
-    loses."""
+    """(3, N, T), (N, T), (N, T) of motion in pieces (N, T), 2 being what a joint loses: shift, low and high
+    of all but the last run in one direction, that run, and the direction of the first run, 0 where it is
+    shorter than what the joint loses."""
     first, *rest = pieces
     whole, run, gone, most = PlaySteps(*_none(3, *first.shape)), first, first, np.abs(first)
     for piece in rest:

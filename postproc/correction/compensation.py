@@ -1,10 +1,10 @@
 """Geometric errors of the machine corrected in the blocks of a path.
 
-Every block end gets the joints at which the machine with errors has its tool where the nominal one would have it. What the
-nominal control makes of those joints (axis positions, tip, tilted plane) is written. Blocks at one orientation (3+2, arcs,
-cycles, lines at standing rotary axes) keep one, corrected as a whole. Points are added, and arcs split into lines, only
-where the motion between corrected ends would leave the nominal motion by more than the share of the tolerance that it gets.
-Home positions are the machine's own and stay.
+Every block end gets the joints at which the machine with errors has its tool where the nominal one would have
+it. What the nominal control makes of those joints (axis positions, tip, tilted plane) is written. Blocks at
+one orientation (3+2, arcs, cycles, lines at standing rotary axes) keep one, corrected as a whole. Points are
+added, and arcs split into lines, only where the motion between corrected ends would leave the nominal motion
+by more than the share of the tolerance that it gets. Home positions are the machine's own and stay.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ UNCERTAINTY_DIGITS = 500
 SHARE = 0.1
 """of the tolerances: what the correction may be off between corrected points"""
 MOVED = 2
-"""how often points are put between ends: words may take ends farther by other approach directions, and blocks begin by those
-then"""
+"""how often points are put between ends: words may take ends farther by other approach directions, and blocks
+begin by those then"""
 SETTLED = 5
-"""how often the approach directions of the axes are looked for: a correction by new approach directions may turn other axes
-back"""
+"""how often the approach directions of the axes are looked for: a correction by new approach directions may
+turn other axes back"""
 
 
 @dataclass(frozen=True)
@@ -52,16 +52,16 @@ class ErrorCorrection:
     """What the correction did to the blocks that it corrects, mm and rad.
 
     Attributes:
-        tip_before, axis_before: worst deviation of the machine with errors at nominal ends of blocks of CL moves, and in
-            long ones wherever errors may turn
+        tip_before, axis_before: worst deviation of the machine with errors at nominal ends of blocks of CL
+            moves, and in long ones wherever errors may turn
         tip_after, axis_after: worst deviation at their corrected ends: the residual
         added: points added; resolved: arcs that became lines
         partial: blocks near a pole, whose axis is corrected in part
         moved: (J,) largest correction of each joint
         apart: (K,) True for blocks that no canned cycle may stand for: each has its own correction
         owner, part: block of the nominal path that each block is of, and part of its time
-        uncertainty_tip, uncertainty_axis: largest standard deviation that the model's covariance gives; None where it has
-            none
+        uncertainty_tip, uncertainty_axis: largest standard deviation that the model's covariance gives; None
+            where it has none
     """
 
     tip_before: float
@@ -147,8 +147,8 @@ def compensate(path: JointPath, moves: Moves, tools: Ints, kinematics: Callable[
 
 def _written_out(corrected: JointPath, path: JointPath, work: ErrorContext, writing: Writing,
                  allowed: float) -> tuple[Divided, JointPath, Bools, float]:
-    """The blocks with points between them, their path in words that stand where they should, arcs that became lines, and rad
-    left of the axis; again where words take ends farther."""
+    """The blocks with points between them, their path in words that stand where they should, arcs that became
+    lines, and rad left of the axis; again where words take ends farther."""
     again = MOVED
     while True:
         starts = starts_of(corrected, path, work, allowed)
@@ -180,8 +180,8 @@ def _before_inside(path: JointPath, work: ErrorContext, where: Bools) -> Floats:
 
 def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: ErrorContext, allowed: float,
                     always: Bools) -> Divided:
-    """The nominal path with the points that the correction by mean approach directions needs, so that the approach
-    directions are those of all points."""
+    """The nominal path with the points that the correction by mean approach directions needs, so that the
+    approach directions are those of all points."""
     corrected, _ = _at_ends(cut.path, moves, modes, work, allowed, always)
     starts = starts_of(corrected, cut.path, work, allowed)
     block, share, _ = between(corrected, work, starts, allowed)
@@ -190,8 +190,8 @@ def _points_by_mean(cut: Divided, moves: Moves, modes: OutputModes, work: ErrorC
 
 def _at_ends(path: JointPath, moves: Moves, modes: OutputModes, work: ErrorContext, allowed: float,
              always: Bools) -> tuple[JointPath, CorrectedEnds]:
-    """The path with its block ends corrected by the approach directions of `work`, holes as a whole; and what the correction
-    said."""
+    """The path with its block ends corrected by the approach directions of `work`, holes as a whole; and what
+    the correction said."""
     found = _turned_in_travel(work.ends(), path, modes.control, work)
     corrected = framed(replace(path, q=found.q), path, modes, work)
     corrected = replace(corrected, q=unstated(kept_in_travel(corrected.q, path, modes.control), path))
@@ -199,9 +199,10 @@ def _at_ends(path: JointPath, moves: Moves, modes: OutputModes, work: ErrorConte
     return corrected, found
 
 
-def _turned_in_travel(found: CorrectedEnds, path: JointPath, control: Control, work: ErrorContext) -> CorrectedEnds:
-    """The ends with no rotary joint beyond travel that the nominal one keeps: it stands at the end of travel, and what the
-    axis is then off by is residual."""
+def _turned_in_travel(found: CorrectedEnds, path: JointPath, control: Control,
+                      work: ErrorContext) -> CorrectedEnds:
+    """The ends with no rotary joint beyond travel that the nominal one keeps: it stands at the end of travel,
+    and what the axis is then off by is residual."""
     limits = control.machine.limits
     inside = np.clip(found.q, limits.lower, limits.upper)
     inside = np.where((path.q >= limits.lower) & (path.q <= limits.upper), inside, found.q)
@@ -230,8 +231,8 @@ def kept_in_travel(q: Floats, path: JointPath, control: Control) -> Floats:
 def unstated(q: Floats, path: JointPath) -> Floats:
     """The joints (K, J), those that a block does not state being those of the block before.
 
-    Blocks that name their axes (after tool changes and home) write no others: the correction of an axis that the block
-    after the next moves no more is written where it is stated.
+    Blocks that name their axes (after tool changes and home) write no others: the correction of an axis that
+    the block after the next moves no more is written where it is stated.
     """
     result = q.copy()
     law = np.array([f.control.law == "axes" for f in path.frames])[path.frame]
@@ -258,11 +259,13 @@ def framed(path: JointPath, nominal: JointPath, modes: OutputModes, work: ErrorC
         if new not in frames:
             frames.append(new)
         frame[k] = frames.index(new)
-        q[whole] = work.at(nominal.q[whole], whole, work.approach[whole], np.tile(at[work.rotary], (len(whole), 1)))
+        q[whole] = work.at(nominal.q[whole], whole, work.approach[whole],
+                           np.tile(at[work.rotary], (len(whole), 1)))
     return replace(path, q=q, frame=frame, frames=tuple(frames))
 
 
-def _uncertainty(path: JointPath, live: Bools, work: ErrorContext, model: ErrorModel) -> tuple[float | None, float | None]:
+def _uncertainty(path: JointPath, live: Bools, work: ErrorContext,
+                 model: ErrorModel) -> tuple[float | None, float | None]:
     """Largest standard deviations at up to Uncertainties blocks spread over the path."""
     if model.covariance is None or not live.any():
         return None, None
@@ -278,12 +281,13 @@ def _uncertainty(path: JointPath, live: Bools, work: ErrorContext, model: ErrorM
     return tip, axis
 
 
-# ---- what cannot be done ----------------------------------------------------------------------------------------------
+# ---- what cannot be done -----------------------------------------------------------------------------------
 
 def _unmeasured(path: JointPath, moves: Moves, control: Control, where: Bools, reached: tuple[Floats, Floats],
                 known: dict[str, tuple[float, float]], severity: Severity, file: str) -> list[Diagnostic]:
-    """One of each axis that goes where its errors were not measured, `where` (K, J), from and to `reached` (K, J); `known`:
-    what was measured of it. Those that are no errors get the error at the end of the range: linking moves are INFO."""
+    """One of each axis that goes where its errors were not measured, `where` (K, J), from and to `reached`
+    (K, J); `known`: what was measured of it. Those that are no errors get the error at the end of the range:
+    linking moves are INFO."""
     noted, linking = [], " in linking moves" if severity == Severity.INFO else ""
     for j in np.flatnonzero(where.any(axis=0)).tolist():
         rows = np.flatnonzero(where[:, j])

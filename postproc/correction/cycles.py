@@ -30,13 +30,13 @@ def whole_holes(path: JointPath, nominal: JointPath, moves: Moves, work: ErrorCo
                 always: Bools) -> tuple[JointPath, Ints]:
     """The path with holes corrected as a whole, and for each block (K,) its hole or ALONE or LIFTS; sets `work.level`.
 
-    Every block of a hole is corrected as its bottom is, but along the tool: the planes that drilling begins at get the
-    least correction of the bottoms of the holes that follow each other, so that one plane serves all of them and no peck is
-    added, levels above them that of the block that the tool comes from to the first. A block that lifts the tool to the
-    plane of the next hole goes with the hole that it lifts it from; those that bring it to the first from afar are
-    corrected alone. Holes that this takes farther than LOOSE times `allowed` mm from where they belong keep the corrections
-    of their blocks and are written out, but for those of cycles that `always` (C,) stay cycles: these have planes of their
-    own where one does not serve them.
+    Every block of a hole is corrected as its bottom is, but along the tool: the planes that drilling begins
+    at get the least correction of the bottoms of the holes that follow each other, so that one plane serves
+    all of them and no peck is added, levels above them that of the block that the tool comes from to the
+    first. A block that lifts the tool to the plane of the next hole goes with the hole that it lifts it from;
+    those that bring it to the first from afar are corrected alone. Holes that this takes farther than LOOSE
+    times `allowed` mm from where they belong keep the corrections of their blocks and are written out, but
+    for those of cycles that `always` (C,) stay cycles: these have planes of their own where one does not serve them.
     """
     hole = np.where(np.isnan(path.u) | path.home, -1, moves.hole[path.move])
     feeds = moves.kind[path.move] != Kind.RAPID
@@ -63,8 +63,9 @@ def whole_holes(path: JointPath, nominal: JointPath, moves: Moves, work: ErrorCo
 
 def _sequences(path: JointPath, nominal: JointPath, hole: Ints, feeds: Bools,
                work: ErrorContext) -> tuple[RowRuns, Ints, Ints]:
-    """Holes at one orientation with one tool in one frame, as runs of blocks; for each (H,) the first block of all that
-    follow each other so; and blocks that lift the tool to the plane of the next, none of this but of the one before."""
+    """Holes at one orientation with one tool in one frame, as runs of blocks; for each (H,) the first block
+    of all that follow each other so; and blocks that lift the tool to the plane of the next, none of this but
+    of the one before."""
     runs, turns = RowRuns.of(hole), path.q[:, work.rotary]
     same = np.append(False, (np.diff(path.frame) == 0) & (np.diff(work.tools) == 0) & (turns[1:] == turns[:-1]).all(axis=1))
     drills = np.logical_or.reduceat(feeds, runs.begin)
@@ -88,7 +89,8 @@ def _lifting(path: JointPath, work: ErrorContext, block: Ints) -> Bools:
 
 def _lifted(path: JointPath, q: Floats, work: ErrorContext, block: Ints) -> Floats:
     """Joints (N, J) of blocks (N,) that go up from where the block before ends at joints (K, J), along Z of the words."""
-    xyz = np.append(_words(path, work, block, q[block - 1])[:, :2], _words(path, work, block, q[block])[:, 2:], axis=1)
+    xyz = np.append(_words(path, work, block, q[block - 1])[:, :2],
+                    _words(path, work, block, q[block])[:, 2:], axis=1)
     return _joints(path, work, block, q[block], xyz)
 
 
@@ -206,11 +208,13 @@ class _Holes:
                       self.plane[keep], self.apart[keep])
 
 
-def _along_tool(path: JointPath, nominal: JointPath, work: ErrorContext, runs: RowRuns, owner: Ints, feeds: Bools) -> _Holes:
+def _along_tool(path: JointPath, nominal: JointPath, work: ErrorContext, runs: RowRuns, owner: Ints,
+                feeds: Bools) -> _Holes:
     """The holes of some runs that are drilled along Z of the words."""
     rows, frames = runs.rows, np.repeat(owner, runs.size)
     wanted, found = (_words(p, work, frames, p.q[rows]) for p in (nominal, path))
-    holes = _Holes(runs, owner, wanted, found, feeds[rows], np.zeros(len(runs)), np.zeros(len(runs), dtype=np.bool_))
+    holes = _Holes(runs, owner, wanted, found, feeds[rows], np.zeros(len(runs)),
+                   np.zeros(len(runs), dtype=np.bool_))
     return replace(holes, plane=wanted[holes.start, 2]).some(holes.along_z) if len(runs) else holes
 
 
@@ -234,9 +238,10 @@ def _joints(path: JointPath, work: ErrorContext, owner: Ints, q: Floats, xyz: Fl
     return result
 
 
-def _leads(path: JointPath, nominal: JointPath, work: ErrorContext, holes: _Holes) -> tuple[Ints, Floats, Floats]:
-    """Blocks (N,) before holes that come to planes of these, their joints (N, J) at the correction of planes, and what the
-    blocks before holes are corrected by along the tool (S,)."""
+def _leads(path: JointPath, nominal: JointPath, work: ErrorContext,
+           holes: _Holes) -> tuple[Ints, Floats, Floats]:
+    """Blocks (N,) before holes that come to planes of these, their joints (N, J) at the correction of planes,
+    and what the blocks before holes are corrected by along the tool (S,)."""
     first = holes.sequences.begin
     owner, plane = holes.owner[first], holes.plane[first]
     lead = owner - 1
@@ -248,8 +253,8 @@ def _leads(path: JointPath, nominal: JointPath, work: ErrorContext, holes: _Hole
 
 
 def _near(nominal: JointPath, work: ErrorContext, holes: _Holes, joints: Floats, share: Floats) -> Bools:
-    """(H,) holes that joints (M, J) leave within LOOSE times `share` (M,) mm of where they belong by the approach directions
-    at their bottoms, and within IN_AIR times that by the approach directions of their blocks."""
+    """(H,) holes that joints (M, J) leave within LOOSE times `share` (M,) mm of where they belong by the
+    approach directions at their bottoms, and within IN_AIR times that by the approach directions of their blocks."""
     rows = holes.rows
     bottom = work.approach[rows[holes.bottom]][holes.hole]
     fine = work.off(nominal.q[rows], joints, rows, bottom) <= LOOSE * share
@@ -258,13 +263,14 @@ def _near(nominal: JointPath, work: ErrorContext, holes: _Holes, joints: Floats,
 
 def _approached(path: JointPath, work: ErrorContext, holes: _Holes, joints: Floats, share: Floats, near: Bools,
                 lead: Ints) -> Bools:
-    """(H,) those of the holes that are `near` (H,) whose approach is near enough: from the hole before at its joints
-    (M, J) where that stays whole, else from where `path` is; blocks `lead` (N,) stand."""
+    """(H,) those of the holes that are `near` (H,) whose approach is near enough: from the hole before at its
+    joints (M, J) where that stays whole, else from where `path` is; blocks `lead` (N,) stand."""
     row, limit = holes.runs.begin, IN_AIR * share[holes.first]
     follows = np.append(False, holes.runs.last[:-1] + 1 == row[1:]) & ~np.isin(row - 1, lead)
     both = np.flatnonzero(near & follows & np.append(False, near[:-1]))
     result, behind = near.copy(), np.zeros(len(near), dtype=np.bool_)
-    for k, q, noted in ((np.flatnonzero(near), path.q[row - 1], result), (both, joints[holes.first - 1], behind)):
+    for k, q, noted in ((np.flatnonzero(near), path.q[row - 1], result),
+                        (both, joints[holes.first - 1], behind)):
         noted[k] = _approach_off(path, work, q[k], joints[holes.first[k]], row[k], share[holes.first[k]]) <= limit[k]
     for h in both.tolist():
         if result[h - 1]:
@@ -272,10 +278,11 @@ def _approached(path: JointPath, work: ErrorContext, holes: _Holes, joints: Floa
     return result
 
 
-def _approach_off(path: JointPath, work: ErrorContext, q0: Floats, q1: Floats, row: Ints, share: Floats) -> Floats:
+def _approach_off(path: JointPath, work: ErrorContext, q0: Floats, q1: Floats, row: Ints,
+                  share: Floats) -> Floats:
     """(N,) mm, largest distance from the nominal motion on the path from q0 to q1 (N, J), to holes (blocks
-    `row`), which get no points; 0 where the correction changes by no more than `share` (N,) mm over one stretch of the
-    errors."""
+    `row`), which get no points; 0 where the correction changes by no more than `share` (N,) mm over one
+    stretch of the errors."""
     change = q1 - q0 - (work.path.q[row] - work.path.q[row - 1])
     near = (work.changes(q0, q1) == 1) & (np.abs(change).max(axis=1, initial=0.0) <= share)
     far, looks = np.flatnonzero(~near), len(LOOKS)

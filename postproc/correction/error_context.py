@@ -1,5 +1,5 @@
-"""The machine with errors along a path: nominal and corrected joints anywhere in its blocks, and the approach directions of
-its axes."""
+"""The machine with errors along a path: nominal and corrected joints anywhere in its blocks, and the approach
+directions of its axes."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from toolpaths.shapes import arrays
 MOMENT = 1e-3
 """of a block: how far back its direction at a place is looked at"""
 LAST, LAST_OF_ARC = 1.0 / 16.0, 1.0 / 256.0
-"""of a block: the same at its ends; turning back later than that counts as none. Joints of blocks by the tip bow a little at
-every end, by less than they lose; those of arcs turn back for good"""
+"""of a block: the same at its ends; turning back later than that counts as none. Joints of blocks by the tip
+bow a little at every end, by less than they lose; those of arcs turn back for good"""
 EDGES = tuple(k / 16.0 for k in range(17))
 """where the directions of the axes in a block are looked at"""
 ALONE, LIFTS = -1, -2
@@ -50,9 +50,9 @@ class ErrorContext:
     """What is needed throughout: the machine with errors by tool, groups of one orientation.
 
     `whole`: (K,) the hole that a block is of where it is corrected as a whole, else ALONE or LIFTS; `level`: (K,) blocks
-    that end at the plane of such holes, whose Z stands; `approach`: (K, J) sign of each joint's last motion at the ends of
-    the blocks, 0 for the mean of both; `drift`: (K, J) of the correction over each block; `beyond`, `beyond_inside`: (K,)
-    blocks that may end, or run, where errors were not measured.
+    that end at the plane of such holes, whose Z stands; `approach`: (K, J) sign of each joint's last motion
+    at the ends of the blocks, 0 for the mean of both; `drift`: (K, J) of the correction over each block;
+    `beyond`, `beyond_inside`: (K,) blocks that may end, or run, where errors were not measured.
     """
 
     def __init__(self, path: JointPath, tools: Ints, kinematics: Callable[[int], Kinematics], model: ErrorModel,
@@ -87,13 +87,13 @@ class ErrorContext:
         return self.kinematics(int(self.tools[0])).axis_names
 
     def take_approaches(self, path: JointPath, words: Floats, drift: bool = True) -> None:
-        """Find `approach` from the corrected `path` and its words (K, J) at block ends, and `drift` where that is by mean
-        approach directions.
+        """Find `approach` from the corrected `path` and its words (K, J) at block ends, and `drift` where
+        that is by mean approach directions.
 
         Where words are axis positions their last change says.
-        A joint that the correction alone moves turns back too: what it loses is more than what it moves by; inside a
-        hole, which is moved as a whole, it does so by shares. Where joints do not run straight it is the sign of the last
-        moment.
+        A joint that the correction alone moves turns back too: what it loses is more than what it moves by;
+        inside a hole, which is moved as a whole, it does so by shares. Where joints do not run straight it is
+        the sign of the last moment.
         """
         q = path.q
         step, change = (np.nan_to_num(np.diff(x, axis=0, prepend=x[:1])) for x in (q, q - self.path.q))
@@ -107,13 +107,14 @@ class ErrorContext:
         step[bent] = np.where(last != 0.0, last, step[bent])
         inside = np.flatnonzero((self.whole[1:] != ALONE) & (self.whole[1:] == self.whole[:-1])) + 1
         lateral = step[inside[:, None], self.bidirectional]
-        step[inside[:, None], self.bidirectional] = np.where(np.abs(lateral) >= self.gaps(q[inside]), lateral, 0.0)
+        step[inside[:, None], self.bidirectional] = np.where(np.abs(lateral) >= self.gaps(q[inside]),
+                                                             lateral, 0.0)
         self.approach = turning_sign(step, self.rotary)
         self._approaches_inside(inside, q)
 
     def _approaches_inside(self, inside: Ints, q: Floats) -> None:
-        """Take up by shares in blocks `inside` (N,) of holes, which go to joints q (K, J), from the approach directions
-        before them."""
+        """Take up by shares in blocks `inside` (N,) of holes, which go to joints q (K, J), from the approach
+        directions before them."""
         if not len(inside):
             return
         before = np.setdiff1d(inside - 1, inside)
@@ -157,8 +158,8 @@ class ErrorContext:
     def begin_approach(self, block: Ints) -> Floats:
         """(N, J) sign of each joint's first motion in blocks (N,).
 
-        That of the block before for one that rests, or that the correction alone moves: it has the whole block to take up
-        what it loses.
+        That of the block before for one that rests, or that the correction alone moves: it has the whole
+        block to take up what it loses.
         """
         first = np.zeros((len(block), self.path.q.shape[1]))
         if not self.bidirectional:
@@ -168,7 +169,8 @@ class ErrorContext:
             for t in edges[::-1] if len(rows) else ():
                 last = self.last(block[rows])
                 step, drift = self._step(block[rows], np.full(len(rows), t), last), last[:, None] * self.drift[block[rows]]
-                first[rows] = np.where(np.abs(step) > np.abs(drift), moving_sign(step + drift, self.rotary), first[rows])
+                first[rows] = np.where(np.abs(step) > np.abs(drift), moving_sign(step + drift, self.rotary),
+                                       first[rows])
         return np.asarray(np.where(first != 0.0, first, self.approach[np.maximum(block - 1, 0)]))
 
     def played(self, approach: Floats, q0: Floats, q: Floats) -> Floats:
@@ -194,15 +196,17 @@ class ErrorContext:
                 kin = self.kinematics(int(self.tools[block[k[0]]]))
                 start, end = (control.words(path.q[at], kin, 0.0) for at in (block[k] - 1, block[k]))
                 arc = block[k]
-                words = on_arc(path.plane[arc], path.ccw[arc], path.center[arc], start, end, t[k], control.xyz)
+                words = on_arc(path.plane[arc], path.ccw[arc], path.center[arc], start, end, t[k],
+                               control.xyz)
                 result[k] = control.joints(words, kin, 0.0)
         return result
 
-    def straight(self, path: JointPath, q0: Floats, q1: Floats, block: Ints, t: Floats, owner: Ints | None = None) -> Floats:
+    def straight(self, path: JointPath, q0: Floats, q1: Floats, block: Ints, t: Floats,
+                 owner: Ints | None = None) -> Floats:
         """Joints (N, J) at fraction t (N,) of straight blocks from q0 to q1 (N, J), under the law of each in `path`.
 
-        Rapids are dog-legs where the control makes them that: what the correction adds to one axis comes at once. In a
-        path made of others `owner` (N,) are the blocks here that its blocks are of.
+        Rapids are dog-legs where the control makes them that: what the correction adds to one axis comes at
+        once. In a path made of others `owner` (N,) are the blocks here that its blocks are of.
         """
         result, rapid = np.empty_like(q0), path.code[block] == TRAVERSE
         tools = self.tools[block if owner is None else owner]
@@ -222,8 +226,8 @@ class ErrorContext:
         return changes(q1 - q0, self.detail)
 
     def reached(self) -> tuple[Floats, Floats]:
-        """(K, J) least and greatest joints of blocks: at the end; where joints do not run straight on the approach
-        direction; where cuts begin that a linking move leads to."""
+        """(K, J) least and greatest joints of blocks: at the end; where joints do not run straight on the
+        approach direction; where cuts begin that a linking move leads to."""
         low, high = self.path.q.copy(), self.path.q.copy()
         cuts = np.flatnonzero((self.path.code[1:] != TRAVERSE) & np.isnan(self.path.u[:-1]) & ~self.path.home[:-1]) + 1
         low[cuts], high[cuts] = (f(low[cuts], self.path.q[cuts - 1]) for f in (np.fmin, np.fmax))
@@ -346,7 +350,8 @@ def one_orientation(turns: Floats, tools: Ints, home: Bools) -> Ints:
     return result
 
 
-def on_arc(plane: Ints, ccw: Bools, center: Floats, start: Floats, end: Floats, t: Floats, xyz: Ints) -> Floats:
+def on_arc(plane: Ints, ccw: Bools, center: Floats, start: Floats, end: Floats, t: Floats,
+           xyz: Ints) -> Floats:
     """Words (N, J) at fraction t (N,) of arc blocks from `start` to `end` (N, J); the third axis rises evenly."""
     result = start + t[:, None] * (end - start)
     for number, (i, j) in PLANE_COLUMNS.items():
@@ -355,7 +360,8 @@ def on_arc(plane: Ints, ccw: Bools, center: Floats, start: Floats, end: Floats, 
         middle = start[k][:, (a, b)] + center[k][:, (i, j)]
         first, last = start[k][:, (a, b)] - middle, end[k][:, (a, b)] - middle
         sense = np.where(ccw[k], 1.0, -1.0)
-        swept = np.mod(sense * (np.arctan2(last[:, 1], last[:, 0]) - np.arctan2(first[:, 1], first[:, 0])), 2.0 * np.pi)
+        swept = np.mod(sense * (np.arctan2(last[:, 1], last[:, 0]) - np.arctan2(first[:, 1], first[:, 0])),
+                       2.0 * np.pi)
         swept = np.where(swept < 1e-9, 2.0 * np.pi, swept) * sense * t[k]
         cos, sin = np.cos(swept), np.sin(swept)
         result[k, a] = middle[:, 0] + cos * first[:, 0] - sin * first[:, 1]

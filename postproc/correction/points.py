@@ -28,7 +28,8 @@ def divided(path: JointPath, work: ErrorContext, starts: Starts, allowed: float)
     return inserted(path, *between(path, work, starts, allowed))
 
 
-def between(path: JointPath, work: ErrorContext, starts: Starts, allowed: float) -> tuple[Ints, Floats, Floats]:
+def between(path: JointPath, work: ErrorContext, starts: Starts,
+            allowed: float) -> tuple[Ints, Floats, Floats]:
     """(block (M,), fraction (M,), joints (M, J)) of the points that `divided` inserts."""
     block = np.flatnonzero(stretches(path))
     block = block[~path.home[block - 1] & (work.whole[block] == ALONE)]
@@ -50,8 +51,8 @@ def between(path: JointPath, work: ErrorContext, starts: Starts, allowed: float)
 @dataclass(frozen=True)
 @arrays(block="N", t0="N", t1="N", q0="N J", q1="N J", approach="N J", behind="N")
 class BlockPieces:
-    """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends, and the approach directions (N, J) at
-    t0; mm (N,)
+    """Parts t0..t1 (N,) of blocks (N,) with the corrected joints (N, J) at their ends, and the approach
+    directions (N, J) at t0; mm (N,)
     that the tip is off at t0 of rapids behind holes that are corrected as a whole: no point between fixes that."""
 
     block: Ints
@@ -78,8 +79,8 @@ def _taken_up(path: JointPath, work: ErrorContext, starts: Starts, block: Ints,
               allowed: float) -> tuple[BlockPieces, list[tuple[Ints, Floats, Floats]]]:
     """The blocks as pieces, cut where an axis turns back, and the points that take up what it loses by that.
 
-    At a block's start that is one point, inside a block two at one place: corrected by the old approach direction and by the
-    new one.
+    At a block's start that is one point, inside a block two at one place: corrected by the old approach
+    direction and by the new one.
     """
     zero = np.zeros(len(block))
     turning, at = reversals(work, block[path.code[block] == FEED])
@@ -125,8 +126,8 @@ def _off_at(pieces: BlockPieces, t: Floats, path: JointPath, work: ErrorContext)
 
 
 def _bound(pieces: BlockPieces, path: JointPath, work: ErrorContext, allowed: float) -> Floats:
-    """(N,) mm: less where the axis turns so fast that the tip's being late would cost more than its share of the axis
-    tolerance; LOOSE times as much for rapids and arcs."""
+    """(N,) mm: less where the axis turns so fast that the tip's being late would cost more than its share of
+    the axis tolerance; LOOSE times as much for rapids and arcs."""
     ends = [np.concatenate(work.poses(work.nominal(pieces.block, t), pieces.block), axis=1) for t in (pieces.t0, pieces.t1)]
     approach, turn = (np.linalg.norm((ends[1] - ends[0])[:, part], axis=1) for part in (slice(0, 3), slice(3, 6)))
     late = work.axis_share * approach / np.where(turn > 0.0, turn, 1.0)

@@ -17,8 +17,8 @@ from toolpaths.shapes import arrays
 BISECTIONS = 14
 """halvings to find where between two looks an axis turns back"""
 LOOSE = 4.0
-"""times the share of the correction for rapids of the CL file, and for arcs and the lines that replace them, which take no
-share of linearising; linking moves only have to come to their ends"""
+"""times the share of the correction for rapids of the CL file, and for arcs and the lines that replace them,
+which take no share of linearising; linking moves only have to come to their ends"""
 SHORTEST = 0.05
 """mm of the path of the tip or degrees of a rotary axis: a block that short is not divided"""
 
@@ -47,8 +47,8 @@ def arcs_cut(path: JointPath, work: ErrorContext) -> Divided:
 @dataclass(frozen=True)
 @arrays(q="K J", approach="K J", block="N")
 class Starts:
-    """Joints (K, J) and approach directions (K, J) where blocks begin when corrected; those of `block` (N,) after taking up
-    what an axis has lost."""
+    """Joints (K, J) and approach directions (K, J) where blocks begin when corrected; those of `block` (N,)
+    after taking up what an axis has lost."""
 
     q: Floats
     approach: Floats
@@ -56,8 +56,8 @@ class Starts:
 
 
 def starts_of(path: JointPath, nominal: JointPath, work: ErrorContext, allowed: float) -> Starts:
-    """Corrected joints where blocks begin; those in which an axis turns back begin by the new approach direction, where that
-    moves one by more than `allowed` mm, rapids LOOSE times as much."""
+    """Corrected joints where blocks begin; those in which an axis turns back begin by the new approach
+    direction, where that moves one by more than `allowed` mm, rapids LOOSE times as much."""
     start, begun = (np.concatenate([x[:1], x[:-1]]) for x in (path.q, work.approach))
     block = np.flatnonzero(stretches(path) | ((path.code == ARC) & (np.arange(len(path)) > 0)))
     block = block[~path.home[block] & ~path.home[block - 1] & (work.whole[block] == ALONE)]

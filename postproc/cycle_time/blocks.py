@@ -55,8 +55,8 @@ class Axes:
 
     @staticmethod
     def of(machine: Machine) -> Axes:
-        """The axes of a machine; tip coordinates of a control that runs the kinematics have the limits of the joint of
-        the same letter, as LinuxCNC's axis sections do."""
+        """The axes of a machine; tip coordinates of a control that runs the kinematics have the limits of the
+        joint of the same letter, as LinuxCNC's axis sections do."""
         names, limits = machine.axis_names, machine.limits
         return Axes(names, np.array(machine.rotary), limits.velocity, limits.acceleration, limits.jerk,
                     np.array([names.index(k) if k in names else -1 for k in "XYZ"]))
@@ -91,7 +91,8 @@ class Pauses:
         return len(self.block)
 
 
-_SHARED = ("line", "rapid", "arc", "center", "normal", "sweep", "speed", "path", "tolerance", "chain", "operation")
+_SHARED = ("line", "rapid", "arc", "center", "normal", "sweep", "speed", "path", "tolerance", "chain",
+           "operation")
 """columns that are kept once where all rows are the same"""
 
 
@@ -107,17 +108,17 @@ class MotionBlocks:
         start, end (E, A): where the block begins and ends
         line (E,): line of the program
         rapid, arc (E,): kind; neither is a straight feed
-        center, normal (E, 3), sweep (E,): of arcs in X, Y, Z: counter-clockwise about `normal` by `sweep` rad, the center
-            at the height of the start
+        center, normal (E, 3), sweep (E,): of arcs in X, Y, Z: counter-clockwise about `normal` by `sweep`
+            rad, the center at the height of the start
         speed (E,): what the feed word asks for along `length`, inf for rapids
-        path (E,): Path that holds at the block; tolerance (E,): mm of its blends, inf without a limit, NaN where the
-            program does not say; chain (E,): mm within which short lines may be merged, 0 for not
+        path (E,): Path that holds at the block; tolerance (E,): mm of its blends, inf without a limit, NaN
+            where the program does not say; chain (E,): mm within which short lines may be merged, 0 for not
         operation (E,): index into `operations`
         pauses: rests by command
         cl_line (E,): line of the CL file that the block comes from, -1 where that is not known
         move (E,): row of the job's moves that the block does, -1 where none is known
-        given (E,): path that the feed refers to where the columns do not determine it (the tip's, under a control's own
-            kinematics), NaN elsewhere
+        given (E,): path that the feed refers to where the columns do not determine it (the tip's, under a
+            control's own kinematics), NaN elsewhere
         pieces (E,): of how many rows its block of the program consists; None: all of one
     """
 

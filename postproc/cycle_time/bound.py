@@ -1,9 +1,9 @@
 """No control can be faster: velocity, feed and acceleration only, every corner at full speed, rest where it is forced.
 
-The second-order bound (`postproc.feedrate.second_order`) of a path whose blocks are straight in the axes: between two
-grid points d2q is 0, so that one backward and one forward pass over the blocks give the greatest x = v^2. Corners cost
-nothing, and what a control may cut off at them within its tolerance is taken off the lengths. On arcs each axis may give
-all it has in every direction.
+The second-order bound (`postproc.feedrate.second_order`) of a path whose blocks are straight in the axes:
+between two grid points d2q is 0, so that one backward and one forward pass over the blocks give the greatest
+x = v^2. Corners cost nothing, and what a control may cut off at them within its tolerance is taken off the
+lengths. On arcs each axis may give all it has in every direction.
 """
 
 from __future__ import annotations
@@ -36,14 +36,15 @@ def lower_bound(blocks: MotionBlocks, model: CycleTimeModel) -> float:
     loop = chosen(speeds, len(merged), KERNEL_FROM)
     lent = shared_feed(merged, form, target, model)
     first, last = loop(length, lent, lent, rate, through, free, free)
-    seconds = np.maximum(ramps(length, first, last, lent, rate).seconds, at_feed(merged, form, length, target, lent, model))
+    seconds = np.maximum(ramps(length, first, last, lent, rate).seconds,
+                         at_feed(merged, form, length, target, lent, model))
     seconds = seconds - early(merged, form, model)
     return float(np.maximum(seconds, 0.0).sum() + blocks.pauses.seconds.sum())
 
 
 def shared_feed(blocks: MotionBlocks, form: Shape, target: Floats, model: CycleTimeModel) -> Floats:
-    """(E,) largest speed anywhere in each block: LinuxCNC runs through a blend arc at the faster of both feeds
-    (blendmath.c, `blendParamKinematics`)."""
+    """(E,) largest speed anywhere in each block: LinuxCNC runs through a blend arc at the faster of both
+    feeds (blendmath.c, `blendParamKinematics`)."""
     if model.kind != "linuxcnc" or not len(blocks):
         return target
     arc = (blocks.path[:-1] == CornerMode.BLEND) & ~blocks.forced[:-1] & (blocks.rapid[1:] == blocks.rapid[:-1])
@@ -62,8 +63,8 @@ def at_feed(blocks: MotionBlocks, form: Shape, length: Floats, target: Floats, l
 
 
 def early(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Floats:
-    """(E,) s by which the next block may begin before the feeds allow it: LinuxCNC's overlapping ramps begin with a servo
-    cycle, so that up to one is gained at each (`linuxcnc._overlapping`)."""
+    """(E,) s by which the next block may begin before the feeds allow it: LinuxCNC's overlapping ramps begin
+    with a servo cycle, so that up to one is gained at each (`linuxcnc._overlapping`)."""
     result = np.zeros(len(blocks))
     if model.kind == "linuxcnc":
         overlaps = (blocks.path[:-1] == CornerMode.BLEND) & ~blocks.forced[:-1] & (form.turns[:-1] | form.turns[1:])
@@ -74,9 +75,9 @@ def early(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Floats:
 def cut_off(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Floats:
     """(E,) mm by which blends can make each block shorter.
 
-    The chord that takes d off both sides of a corner of turning angle phi lies d sin(phi/2) from it and is 2 d
-    (1 - cos(phi/2)) shorter; d is at most half a block. Where the limit is a tolerance e, d <= e/sin(phi/2). The ideal
-    motion is planned within the model's tolerance, whatever the program leaves to the control.
+    The chord that takes d off both sides of a corner of turning angle phi lies d sin(phi/2) from it and is 2
+    d (1 - cos(phi/2)) shorter; d is at most half a block. Where the limit is a tolerance e, d <=
+    e/sin(phi/2). The ideal motion is planned within the model's tolerance, whatever the program leaves to the control.
     """
     reach, cosine = reaches(blocks, form, model)
     spared = reach * (1.0 - cosine)
@@ -89,7 +90,8 @@ def reaches(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> tuple[F
     sine, cosine = np.sqrt((1.0 - dot) / 2.0), np.sqrt((1.0 + dot) / 2.0)
     stated = blocks.tolerance[:-1]
     unlimited = model.kind == "linuxcnc"
-    tolerance = np.where(np.isnan(stated) | (np.isinf(stated) & (not unlimited)), model.corner_tolerance, stated)
+    tolerance = np.where(np.isnan(stated) | (np.isinf(stated) & (not unlimited)),
+                         model.corner_tolerance, stated)
     if model.kind == "ideal":
         tolerance = np.maximum(tolerance, model.corner_tolerance)
     with np.errstate(divide="ignore"):

@@ -1,9 +1,9 @@
 """The parameters of a control's model from a measured run, and how sure they are.
 
-Least squares on the times of sections of the run, over the logarithms of the parameters, with a wide normal prior about
-the model that the fit begins with, so that what the run does not show stays where it was and keeps its uncertainty (maximum
-a posteriori; the covariance is the inverse of J'J/s^2 + prior, J the derivatives of the sections' times; e.g. A. Tarantola,
-Inverse Problem Theory, 2005, section 3.2).
+Least squares on the times of sections of the run, over the logarithms of the parameters, with a wide normal
+prior about the model that the fit begins with, so that what the run does not show stays where it was and
+keeps its uncertainty (maximum a posteriori; the covariance is the inverse of J'J/s^2 + prior, J the
+derivatives of the sections' times; e.g. A. Tarantola, Inverse Problem Theory, 2005, section 3.2).
 """
 
 from __future__ import annotations
@@ -101,14 +101,16 @@ def _fitted(blocks: MotionBlocks, rows: Ints, measured: Floats, before: Floats, 
 
         def residual(x: Floats, uncertainty: Floats = uncertainty) -> Floats:
             return np.concatenate([(modelled(x) - measured) / uncertainty, x])
-        result = least_squares(residual, x, loss="soft_l1", diff_step=[1e-3] * len(x), max_nfev=60, f_scale=3.0)
+        result = least_squares(residual, x, loss="soft_l1", diff_step=[1e-3] * len(x), max_nfev=60,
+                               f_scale=3.0)
         x = result.x
         scale = max(_scatter(measured - modelled(x), measured), 1e-5)
     values = start.copy()
     values[free] += x * prior[free]
     uncertainty = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
     covariance = _covariance(_slopes(modelled, x) / uncertainty[:, None], free, prior)
-    return _fit(model, begin.with_values(values), covariance, free, prior, measured, before, modelled(x), file, machine)
+    return _fit(model, begin.with_values(values), covariance, free, prior, measured, before, modelled(x),
+                file, machine)
 
 
 def _scatter(residual: Floats, measured: Floats) -> float:
@@ -118,8 +120,8 @@ def _scatter(residual: Floats, measured: Floats) -> float:
 
 
 def _start(modelled: Modelled, measured: Floats, free: list[int]) -> Floats:
-    """Where the fit begins: the best of a coarse grid over block time and rapids, which a fit cannot feel from where
-    they hold nothing."""
+    """Where the fit begins: the best of a coarse grid over block time and rapids, which a fit cannot feel
+    from where they hold nothing."""
     grid = {"block_time": (0.0, 0.35, 0.55, 0.8, 1.05), "rapid": (0.0, -0.25, -0.6)}
     names = [PARAMETERS[k] for k in free]
     axes = [grid.get(name, (0.0,)) for name in names]
@@ -173,8 +175,8 @@ def _rms(values: Floats) -> float:
 def _relative(measured: Floats, modelled: Floats) -> float:
     """Standard deviation of a whole program's time as a share, from how blocks of sections scatter.
 
-    Neighbouring sections err alike (the same cutter path, the same kind of corner), so the run is cut into ten parts, and
-    what those scatter counts in full for another program; half a per cent is left to what no log shows.
+    Neighbouring sections err alike (the same cutter path, the same kind of corner), so the run is cut into
+    ten parts, and what those scatter counts in full for another program; half a per cent is left to what no log shows.
     """
     parts = np.array_split(np.arange(len(measured)), min(10, len(measured)))
     errors = np.array([(modelled[p].sum() - measured[p].sum()) / max(measured[p].sum(), CLOCK) for p in parts])

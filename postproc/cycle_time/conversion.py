@@ -35,7 +35,8 @@ def figures(e: Estimate | None) -> dict[str, Any]:
         return {"cycle_time_s": None, "lower_bound_s": None, "band_s": None, "time": None}
     d = as_dict(e)
     band = d["band_s"] if e.uncertainties else None
-    more = ("model", "assumed", "cutting_s", "rapids_s", "causes", "feed_s", "limiting", "operations", "most_expensive")
+    more = ("model", "assumed", "cutting_s", "rapids_s", "causes", "feed_s", "limiting", "operations",
+            "most_expensive")
     return {"cycle_time_s": e.seconds, "lower_bound_s": e.lower_bound, "band_s": band, "time": {key: d[key] for key in more}}
 
 

@@ -1,10 +1,10 @@
 """LinuxCNC's trajectory planner (2.9, no jerk limit): how long it takes over a program.
 
-Segments come from `linuxcnc_segments`, what happens where they meet from `linuxcnc_corners`; here they are put in a row,
-the look-ahead gives each its speeds, and ramps give the times. Described from src/emc/tp/tp.c of LinuxCNC 2.9
-(`tpRunOptimization`, `tpComputeOptimalVelocity`, `tpCalculateTrapezoidalAccel`, `tpActivateSegment`, `tcIsBlending`),
-src/emc/tp/tc.c (`tcGetOverallMaxAccel`) and src/emc/task/emctaskmain.cc; stop and command times are measured on the
-simulator.
+Segments come from `linuxcnc_segments`, what happens where they meet from `linuxcnc_corners`; here they are
+put in a row, the look-ahead gives each its speeds, and ramps give the times. Described from src/emc/tp/tp.c
+of LinuxCNC 2.9 (`tpRunOptimization`, `tpComputeOptimalVelocity`, `tpCalculateTrapezoidalAccel`,
+`tpActivateSegment`, `tcIsBlending`), src/emc/tp/tc.c (`tcGetOverallMaxAccel`) and
+src/emc/task/emctaskmain.cc; stop and command times are measured on the simulator.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ SETTLED = 0.003
 
 @dataclass(frozen=True)
 class Settings:
-    """Of the controller: servo cycle, s; depth of the look-ahead in segments ([TRAJ] ARC_BLEND_OPTIMIZATION_DEPTH).
+    """Of the controller: servo cycle, s; depth of the look-ahead in segments ([TRAJ]
+    ARC_BLEND_OPTIMIZATION_DEPTH).
 
     `stop_cycles`: servo cycles that a stop costs over the ramps, `blend_cycles`: by which overlapping segments begin earlier
     (both measured); `override`: of feeds; `rapid`: of rapids.
@@ -149,8 +150,8 @@ def _overlap(s: PlannerSegments, one: Ints, length: tuple[Floats, Floats], part:
 
 
 def _pull(s: PlannerSegments, rows: Ints, share: Floats) -> Floats:
-    """(K, 3) unit direction of the acceleration at the begin of segments: that of the tangent, on arcs with half the
-    asked speed's centripetal part (`tcCircleStartAccelUnitVector`)."""
+    """(K, 3) unit direction of the acceleration at the begin of segments: that of the tangent, on arcs with
+    half the asked speed's centripetal part (`tcCircleStartAccelUnitVector`)."""
     tangent = _flat(s, s.shape.first, rows)
     radius = np.where(s.blocks.arc[rows], s.shape.radius[rows], 1.0)
     spoke = s.blocks.xyz[rows] - s.blocks.center[rows]
@@ -161,8 +162,8 @@ def _pull(s: PlannerSegments, rows: Ints, share: Floats) -> Floats:
 
 
 def _flat(s: PlannerSegments, tangent: Floats, rows: Ints) -> Floats:
-    """(K, 3) tangents of segments; those of helices in the plane; along X where X, Y, Z stand still, as LinuxCNC has it
-    for a line without length."""
+    """(K, 3) tangents of segments; those of helices in the plane; along X where X, Y, Z stand still, as
+    LinuxCNC has it for a line without length."""
     own, normal = tangent[rows], s.blocks.normal[rows]
     own = np.where(s.blocks.arc[rows][:, None], own - (own * normal).sum(axis=1)[:, None] * normal, own)
     size = np.linalg.norm(own, axis=1, keepdims=True)
@@ -234,7 +235,8 @@ def _along_arcs(s: PlannerSegments, rate: Floats, most: Floats, finished: Bools)
     radius = radius + climb**2 * s.blocks.sweep**2 / radius
     inward = most**2 / radius
     with np.errstate(invalid="ignore"):
-        part = np.where(inward > NORMAL_SHARE * rate, TANGENTIAL, np.sqrt(np.maximum(1.0 - (inward / rate) ** 2, 0.0)))
+        part = np.where(inward > NORMAL_SHARE * rate, TANGENTIAL,
+                        np.sqrt(np.maximum(1.0 - (inward / rate) ** 2, 0.0)))
     part = np.where(finished, part, TANGENTIAL)
     slower = np.where(arc & finished, np.minimum(most, np.sqrt(NORMAL_SHARE * rate * radius)), most)
     return np.where(arc, rate * part, rate), slower
@@ -265,8 +267,9 @@ def _timed(blocks: MotionBlocks, s: PlannerSegments, row: Row, settings: Setting
 def _overlapping(row: Row, r: Ramps, settings: Settings) -> Floats:
     """(M,) s before the end of a segment at which the next begins.
 
-    It begins with the servo cycle in which the speed falls below that of the blend, half a cycle before it does on average;
-    of segments that only gain and lose speed the part that does not overlap (measured: the rounded peak takes the rest).
+    It begins with the servo cycle in which the speed falls below that of the blend, half a cycle before it
+    does on average; of segments that only gain and lose speed the part that does not overlap (measured: the
+    rounded peak takes the rest).
     """
     overlap = np.where(row.ends == OVERLAP, np.minimum(row.overlap_speed / row.rate, r.down), 0.0)
     part = np.maximum(np.minimum(r.steady / settings.cycle, 1.0), 1.0 - overlap / np.maximum(r.down, 1e-300))

@@ -1,9 +1,9 @@
 """Where two segments of LinuxCNC's planner meet: stop, tangent passage, blend arc or overlap of two ramps.
 
 Described from the source of LinuxCNC 2.9 (src/emc/tp/tp.c: `tpSetupTangent`, `tpChooseBestBlend`,
-`tpComputeBlendVelocity`; src/emc/tp/blendmath.c: `blendParamKinematics`, `blendComputeParameters`, the post-processing of
-lines and arcs). Every corner is worked out by itself: a blend takes at most half of a line, so that what it may take at
-one end does not depend on the other end.
+`tpComputeBlendVelocity`; src/emc/tp/blendmath.c: `blendParamKinematics`, `blendComputeParameters`, the
+post-processing of lines and arcs). Every corner is worked out by itself: a blend takes at most half of a
+line, so that what it may take at one end does not depend on the other end.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ class BlendArcs:
 @dataclass(frozen=True)
 @arrays(arc="K", arm="K", lean="K 3", ease="K", center="K 3", radius="K", convex="K", most="K")
 class _Side:
-    """One side of K corners. `arm`: length that may be taken; `lean`: direction of the secant that stands for a convex
-    arc; `ease`: rad by which it closes the corner; center, radius, convex, most: of arcs."""
+    """One side of K corners. `arm`: length that may be taken; `lean`: direction of the secant that stands for
+    a convex arc; `ease`: rad by which it closes the corner; center, radius, convex, most: of arcs."""
 
     arc: Bools
     arm: Floats
@@ -121,14 +121,16 @@ def _unit(v: Floats) -> Floats:
     return np.asarray(v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-300))
 
 
-def _side(s: PlannerSegments, rows: Ints, half: Floats, point: Floats, u1: Floats, u2: Floats, before: bool) -> _Side:
+def _side(s: PlannerSegments, rows: Ints, half: Floats, point: Floats, u1: Floats, u2: Floats,
+          before: bool) -> _Side:
     """The segments `rows` (K,) as the side before or behind the corner."""
     arc, center = s.blocks.arc[rows], s.blocks.center[rows]
     spoke = point - center
     radius = np.linalg.norm(spoke, axis=1)
     inward = (spoke * (u2 if before else u1)).sum(axis=1)
     convex = arc & ((inward < 0.0) if before else (inward >= 0.0))
-    most = np.minimum(s.blocks.sweep[rows] * (2.0 / 3.0 if before else 1.0 / 3.0), np.where(convex, half, np.pi / 2.0))
+    most = np.minimum(s.blocks.sweep[rows] * (2.0 / 3.0 if before else 1.0 / 3.0),
+                      np.where(convex, half, np.pi / 2.0))
     arm = np.where(arc, np.where(convex, np.sin(most / 4.0), most) * radius, s.length[rows] / 2.0)
     angle = (-most if before else most)[:, None] / 2.0
     middle = center + np.cos(angle) * spoke + np.sin(angle) * np.cross(s.blocks.normal[rows], spoke)

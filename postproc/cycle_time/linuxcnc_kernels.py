@@ -1,5 +1,5 @@
-"""Plain loops of the LinuxCNC model: interpreted for small programs, compiled for large ones, to the same bits
-(`toolpaths/compiled.py`)."""
+"""Plain loops of the LinuxCNC model: interpreted for small programs, compiled for large ones, to the same
+bits (`toolpaths/compiled.py`)."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ from toolpaths.compiled import loop
 def chain_ends(xyz: Any, joins: Any, tolerance: Any) -> Any:
     """(E,) True where a block ends a chain of merged lines.
 
-    A line joins while all points of the chain stay within the tolerance of the chord from the chain's start, and the
-    chain has at most 100 points (LinuxCNC `linkable`). xyz (E + 1, 3) block ends; joins (E,): may join the block before.
+    A line joins while all points of the chain stay within the tolerance of the chord from the chain's start,
+    and the chain has at most 100 points (LinuxCNC `linkable`). xyz (E + 1, 3) block ends; joins (E,): may
+    join the block before.
     """
     count = len(joins)
     ends = np.zeros(count, dtype=np.bool_)
@@ -48,8 +49,9 @@ def chain_ends(xyz: Any, joins: Any, tolerance: Any) -> Any:
 def speeds(length: Any, target: Any, most: Any, rate: Any, through: Any, kink: Any, ahead: Any) -> Any:
     """(2, N) speed at begin and end of each segment.
 
-    Backwards what lets each segment reach the speed of the next, forwards what it can reach itself. `through` (N,): True
-    where the segment runs into the next without a stop; `kink` (N,): most speed at its end; `ahead` (N,): what the
+    Backwards what lets each segment reach the speed of the next, forwards what it can reach itself. `through`
+    (N,): True where the segment runs into the next without a stop; `kink` (N,): most speed at its end;
+        `ahead` (N,): what the
     look-ahead allows there.
     """
     count = len(length)
@@ -57,7 +59,8 @@ def speeds(length: Any, target: Any, most: Any, rate: Any, through: Any, kink: A
     final = 0.0
     for k in range(count - 2, -1, -1):
         if through[k]:
-            final = min(np.sqrt(final * final + 2.0 * rate[k + 1] * length[k + 1]), most[k], most[k + 1], kink[k], ahead[k])
+            final = min(np.sqrt(final * final + 2.0 * rate[k + 1] * length[k + 1]), most[k], most[k + 1],
+                        kink[k], ahead[k])
         else:
             final = 0.0
         result[1, k] = final
@@ -65,7 +68,8 @@ def speeds(length: Any, target: Any, most: Any, rate: Any, through: Any, kink: A
     for k in range(count):
         result[0, k] = speed
         if through[k] and k + 1 < count:
-            speed = min(result[1, k], target[k], target[k + 1], np.sqrt(speed * speed + 2.0 * rate[k] * length[k]))
+            speed = min(result[1, k], target[k], target[k + 1],
+                        np.sqrt(speed * speed + 2.0 * rate[k] * length[k]))
         else:
             speed = 0.0
         result[1, k] = speed

@@ -1,7 +1,7 @@
 """LinuxCNC between interpreter and planner: short lines merged, a speed and an acceleration for every segment.
 
-Described from the source of LinuxCNC 2.9 (src/emc/task/emccanon.cc: `see_segment`, `linkable`, `getStraightVelocity`,
-`getStraightAcceleration`, `ARC_FEED`).
+Described from the source of LinuxCNC 2.9 (src/emc/task/emccanon.cc: `see_segment`, `linkable`,
+`getStraightVelocity`, `getStraightAcceleration`, `ARC_FEED`).
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ def segments(blocks: MotionBlocks, override: float = 1.0, rapid: float = 1.0) ->
         _arc_limits(merged, form, most, acceleration)
     fresh = np.concatenate([[True], merged.forced[:-1]])
     asked = np.where(merged.rapid, most * rapid, merged.speed * override)
-    return PlannerSegments(block, fresh, form.length, np.minimum(asked, most), most, acceleration, form, merged)
+    return PlannerSegments(block, fresh, form.length, np.minimum(asked, most), most, acceleration,
+                           form, merged)
 
 
 def _arc_limits(blocks: MotionBlocks, form: Shape, most: Floats, acceleration: Floats) -> None:
@@ -68,7 +69,8 @@ def _arc_limits(blocks: MotionBlocks, form: Shape, most: Floats, acceleration: F
     radius, around = form.radius[at], form.radius[at] * blocks.sweep[at]
     plane = np.minimum(np.sqrt(NORMAL_SHARE * accel * radius), velocity)
     straight = np.abs(blocks.end - blocks.start)[at]
-    for values, limit, around_limit in ((most, axes.velocity, plane), (acceleration, axes.acceleration, accel)):
+    for values, limit, around_limit in ((most, axes.velocity, plane),
+                                        (acceleration, axes.acceleration, accel)):
         values[at] = form.length[at] / np.maximum((straight / limit).max(axis=1), around / around_limit)
 
 

@@ -1,10 +1,10 @@
 """A control with look-ahead: blocks at their feed, corners as fast as the tolerance allows, stops where it must.
 
 Corners: a parabola over d of path on both sides of the corner lies |du| d/4 off it in X, Y, Z and takes each axis j the
-acceleration |du_j| v^2/(2 d), du the change of the derivatives by path length; so v^2 = 8 e A_j/(|du| |du_j|) for a
-tolerance e, d at most half of the shorter block. (Own derivation; the arc instead of the parabola gives the "junction
-deviation" of grbl.) Jerk: a change of speed by dv takes dv/a + a/j, or 2 sqrt(dv/j) where the acceleration is not
-reached; rest to rest see `rest_to_rest`.
+acceleration |du_j| v^2/(2 d), du the change of the derivatives by path length; so v^2 = 8 e A_j/(|du| |du_j|)
+for a tolerance e, d at most half of the shorter block. (Own derivation; the arc instead of the parabola gives
+the "junction deviation" of grbl.) Jerk: a change of speed by dv takes dv/a + a/j, or 2 sqrt(dv/j) where the
+acceleration is not reached; rest to rest see `rest_to_rest`.
 """
 
 from __future__ import annotations
@@ -102,10 +102,12 @@ def window(length: Floats, rate: Floats, count: int) -> Floats:
 
 
 def rest_to_rest(length: Floats, target: Floats, rate: Floats, jerk: Floats) -> Floats:
-    """(E,) least time from rest to rest under speed, acceleration and jerk: seven phases, fewer where limits are not
-    reached (L. Biagiotti, C. Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, section 3.4)."""
+    """(E,) least time from rest to rest under speed, acceleration and jerk: seven phases, fewer where limits
+    are not reached (L. Biagiotti, C. Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008,
+    section 3.4)."""
     rise = rate**2 / jerk
-    travel = np.where(target >= rise, target * (target / rate + rate / jerk), 2.0 * target * np.sqrt(target / jerk))
+    travel = np.where(target >= rise, target * (target / rate + rate / jerk),
+                      2.0 * target * np.sqrt(target / jerk))
     reached = np.where(target >= rise, target / rate + rate / jerk, 2.0 * np.sqrt(target / jerk)) + length / target
     peak = 0.5 * (np.sqrt(rise**2 + 4.0 * rate * length) - rise)
     short = np.where(length >= 2.0 * rate * rise / jerk, 2.0 * (peak / rate + rate / jerk),
@@ -113,7 +115,8 @@ def rest_to_rest(length: Floats, target: Floats, rate: Floats, jerk: Floats) -> 
     return np.asarray(np.where(length >= travel, reached, short))
 
 
-def jerk_time(length: Floats, first: Floats, last: Floats, r: Ramps, rate: Floats, jerk: Floats, target: Floats) -> Floats:
+def jerk_time(length: Floats, first: Floats, last: Floats, r: Ramps, rate: Floats, jerk: Floats,
+              target: Floats) -> Floats:
     """(E,) s that limited jerk adds to the ramps: exact from rest to rest, else for each run of rising or falling speed.
 
     A run from v0 to v1 takes a/j, or 2 sqrt(dv/j) - dv/a, longer at its mean speed, which spares a share of the time at
@@ -126,7 +129,8 @@ def jerk_time(length: Floats, first: Floats, last: Floats, r: Ramps, rate: Float
     return result
 
 
-def _run_share(begin: Floats, end: Floats, seconds: Floats, rate: Floats, jerk: Floats, alone: Bools) -> Floats:
+def _run_share(begin: Floats, end: Floats, seconds: Floats, rate: Floats, jerk: Floats,
+               alone: Bools) -> Floats:
     """(E,) each block's share of what its run of rising (or falling) speed loses to jerk."""
     rising = bool((end >= begin).all())
     active = seconds > 0.0
@@ -157,4 +161,5 @@ def on_the_clock(blocks: MotionBlocks, r: Ramps, extra: Floats, first: Floats, l
     lost_stop = np.where(before, loss[0], 0.0) + np.where(stops, loss[1] + stop_time, 0.0)
     lost_corner = np.where(before, 0.0, loss[0]) + np.where(stops, 0.0, loss[1])
     end = begin + seconds + np.where(stops, stop_time, 0.0)
-    return BlockTimes(begin, end, r.up + r.down, r.steady, extra, r.peak, lost_stop, lost_corner, p.seconds.copy())
+    return BlockTimes(begin, end, r.up + r.down, r.steady, extra, r.peak, lost_stop, lost_corner,
+                      p.seconds.copy())

@@ -30,11 +30,12 @@ class Ramps:
         return np.asarray(self.up + self.steady + self.down)
 
 
-def ramps(length: Floats, first: Floats, last: Floats, target: Floats, rate: Floats, gentle: Bools | None = None) -> Ramps:
+def ramps(length: Floats, first: Floats, last: Floats, target: Floats, rate: Floats,
+          gentle: Bools | None = None) -> Ramps:
     """The trapezoid of each length (N,) from speed `first` to `last` with at most `target` between, accelerations `rate`.
 
-    v_peak^2 = (2 a L + v0^2 + v1^2)/2 where the target is not reached. `gentle`: one constant acceleration for the whole
-    length instead. Ends that the rate cannot join take it anyway.
+    v_peak^2 = (2 a L + v0^2 + v1^2)/2 where the target is not reached. `gentle`: one constant acceleration
+    for the whole length instead. Ends that the rate cannot join take it anyway.
     """
     peak = np.sqrt(np.maximum((2.0 * rate * length + first**2 + last**2) / 2.0, 0.0))
     peak = np.maximum(np.minimum(peak, target), np.maximum(first, last))
@@ -52,14 +53,15 @@ def ramps(length: Floats, first: Floats, last: Floats, target: Floats, rate: Flo
 
 
 @dataclass(frozen=True)
-@arrays(begin="E", end="E", ramp="E", steady="E", jerk="E", peak="E", lost_stop="E", lost_corner="E", pause="P")
+@arrays(begin="E", end="E", ramp="E", steady="E", jerk="E", peak="E", lost_stop="E",
+        lost_corner="E", pause="P")
 class BlockTimes:
     """What a model says of E blocks.
 
     Attributes:
         begin, end (E,): s since the start of the program at which the control takes up and leaves each block
-        ramp, steady, jerk (E,): s of gaining or losing speed, of constant speed, of building up acceleration; their sum is
-            at most end - begin
+        ramp, steady, jerk (E,): s of gaining or losing speed, of constant speed, of building up acceleration;
+            their sum is at most end - begin
         peak (E,): largest speed, mm/s or rad/s
         lost_stop, lost_corner (E,): s that ramps to and from stops and corners cost over going on at the peak
         pause (P,): s that each pause takes

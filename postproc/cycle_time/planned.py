@@ -21,8 +21,8 @@ from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
 
 def planned_times(result: PostResult, blocks: MotionBlocks, model: CycleTimeModel,
                   override: float = 1.0) -> tuple[BlockTimes, list[Diagnostic]]:
-    """Times of a conversion's blocks, which were made with this `override`; a warning where no pass could be planned, so
-    that all times are the model's."""
+    """Times of a conversion's blocks, which were made with this `override`; a warning where no pass could be
+    planned, so that all times are the model's."""
     times = lookahead(blocks, model)
     job, path = result.job, result.path
     if job is None or path is None or blocks.move is None:

@@ -57,8 +57,8 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     Args:
         code: what the reader makes of the text; motion: what executing it gave
         origin: operations and CL lines; by tool where it is left out
-        own_path: True where a program without a path mode blends without a limit, and a feed keeps the units that held when
-            it was stated (LinuxCNC), else both are the control's
+        own_path: True where a program without a path mode blends without a limit, and a feed keeps the units
+            that held when it was stated (LinuxCNC), else both are the control's
         by_radius: inverse time of arcs counts radians
         override: the operator's feed override, 1 for 100 %: of feeds alone, not of rapids and taps
     """
@@ -129,7 +129,8 @@ def _tip_lengths(motion: Motion, control: Control) -> Floats:
 def _unrolled(blocks: MotionBlocks, motion: Motion, control: Control, unit: Floats) -> MotionBlocks:
     """Blocks that the control bends through its kinematics as straight pieces; what does not move is left out."""
     bent = blocks.arc & (motion.frame > 0)
-    count = np.where(bent, np.ceil(blocks.sweep / CHORD).astype(np.int64), _pieces(blocks, motion, control, unit))
+    count = np.where(bent, np.ceil(blocks.sweep / CHORD).astype(np.int64),
+                     _pieces(blocks, motion, control, unit))
     row = np.repeat(np.arange(len(blocks)), count)
     part = (np.arange(len(row)) - (np.cumsum(count) - count)[row] + 1.0) / count[row]
     wide = blocks.take(row)
@@ -157,8 +158,8 @@ def _pieces(blocks: MotionBlocks, motion: Motion, control: Control, unit: Floats
 
 
 def _path_modes(words: Words, own_path: bool) -> tuple[Array, Floats, Floats]:
-    """(B + 1,) Path, tolerance and chain in force at each block: G61, G61.1, G64 P Q (LinuxCNC G-code reference), else
-    what the reader says of the control's smoothing."""
+    """(B + 1,) Path, tolerance and chain in force at each block: G61, G61.1, G64 P Q (LinuxCNC G-code
+    reference), else what the reader says of the control's smoothing."""
     at, codes = words.pick("G")
     keep = np.isin(codes, (61.0, 61.1, 64.0))
     at, codes = at[keep], codes[keep]

@@ -68,7 +68,8 @@ def shape(blocks: MotionBlocks) -> Shape:
     if blocks.arc.any():
         radius, climb, first = np.zeros(len(step)), np.zeros(len(step)), direction.copy()
         _arcs(blocks, length, radius, climb, first, last, share)
-    return Shape(length, turns, radius, climb, first, last, share / np.where(length > 0.0, length, 1.0)[:, None])
+    return Shape(length, turns, radius, climb, first, last,
+                 share / np.where(length > 0.0, length, 1.0)[:, None])
 
 
 def _arcs(blocks: MotionBlocks, length: Floats, radius: Floats, climb: Floats, first: Floats, last: Floats,

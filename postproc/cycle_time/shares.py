@@ -12,7 +12,8 @@ from postproc.cycle_time.phases import BlockTimes, summed
 from postproc.cycle_time.shape import shape
 from toolpaths.arrays import Floats, Ints
 
-CAUSES = ("feed", "limits", "corners", "stops", "rapids", "indexing", "tool_change", "spindle", "dwell", "commands")
+CAUSES = ("feed", "limits", "corners", "stops", "rapids", "indexing", "tool_change", "spindle",
+          "dwell", "commands")
 FELT = 1e-9
 """relative difference above which an axis, not the feed word, holds the speed"""
 

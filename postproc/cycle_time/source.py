@@ -82,7 +82,8 @@ def _executed(data: bytes, controller: ControllerFile, control: Control, lengths
     """Text to canonical words to motion."""
     machine = control.machine
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(controller, machine.axis_names, home, machine.stop, control.rolls, machine.clamp_codes)
+    reader = reader_for(controller, machine.axis_names, home, machine.stop, control.rolls,
+                        machine.clamp_codes)
     code, found = reader.read(data, file, others)
     if code is None or has_errors(found):
         return None, None, found

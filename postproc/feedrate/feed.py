@@ -39,8 +39,8 @@ class StepFeed:
 FeedLimit = float | Callable[[Floats], Floats]
 """Largest ds/dt: one number, or a function of s (N,) that returns (N,): the tip's feed, if s is the length of its path.
 
-A function that changes suddenly has the places in an attribute `breaks` (M,), as `StepFeed`: knots are put there, and
-between them it is taken to be nearly constant.
+A function that changes suddenly has the places in an attribute `breaks` (M,), as `StepFeed`: knots are put
+there, and between them it is taken to be nearly constant.
 """
 TOUCH = 1e-9
 """Within this, as a share of the path between the first break and the last, a place counts to both sides of a break."""

@@ -1,12 +1,12 @@
 """Interior point on the squared speed: one Newton step per linearisation, every iterate respects the limits.
 
-Each row g(c) of `SpeedProblem` is convex in c (x^-1/2 less a linear form), so its tangent lies below it: where the
-linearised slack stays positive, so does the true one. Slacks are therefore computed from c, never stored. Newton's
-equations per step are
+Each row g(c) of `SpeedProblem` is convex in c (x^-1/2 less a linear form), so its tangent lies below it:
+where the linearised slack stays positive, so does the true one. Slacks are therefore computed from c, never
+stored. Newton's equations per step are
     (H + sum (z/g) grad g grad g') dc = -grad f + sum (mu/g) grad g,    dz = mu/g - z - (z/g) grad g' dc,
     H = 3/4 x^-5/2 max(w - sum of the jerk rows' z, 0),
-positive definite and, as three coefficients meet at a knot, pentadiagonal. (Convex-concave tangent: Debrouwere et
-al., IEEE T-RO 29 (2013); primal-dual interior point: Nocedal and Wright, Numerical Optimization, ch. 19.)
+positive definite and, as three coefficients meet at a knot, pentadiagonal. (Convex-concave tangent:
+Debrouwere et al., IEEE T-RO 29 (2013); primal-dual interior point: Nocedal and Wright, Numerical Optimization, ch. 19.)
 """
 
 from __future__ import annotations
@@ -69,7 +69,8 @@ class NewtonSteps(Protocol):
         ...
 
 
-def solve(steps: NewtonSteps, rows: int, gap: float, tolerance: float = TOLERANCE, most: int = MOST) -> InteriorSolution:
+def solve(steps: NewtonSteps, rows: int, gap: float, tolerance: float = TOLERANCE,
+          most: int = MOST) -> InteriorSolution:
     """Drive `steps` from a first `gap` until it is below tolerance x time.
 
     Any iterate respects the limits, so that a solution that is not `solved` is slow, not wrong.

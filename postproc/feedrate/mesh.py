@@ -44,9 +44,9 @@ def mesh(path: ParametricPath, limits: JointLimits, top: Callable[[Floats], Floa
          ramp: float = np.inf, marks: Marks | None = None) -> Floats:
     """Knots (K,) from path.start to path.end.
 
-    The limits are probed at the breaks of the path and between them; `top(sigma)` bounds the speed along sigma; `ramp`
-    is the time of full jerk after rest, into which RAMP knots go. Under a feed with `marks` knots lie on these and grow
-    from there and from rest, and its cruise, where nothing changes, takes the longest.
+    The limits are probed at the breaks of the path and between them; `top(sigma)` bounds the speed along
+    sigma; `ramp` is the time of full jerk after rest, into which RAMP knots go. Under a feed with `marks`
+    knots lie on these and grow from there and from rest, and its cruise, where nothing changes, takes the longest.
     """
     at = _probes(path, spacing, marks)
     parts = [_probed(path, limits, top, at[i:i + CHUNK]) for i in range(0, len(at), CHUNK)]
@@ -96,7 +96,8 @@ def ramp_time(dq: Floats, limits: JointLimits, feed: Floats) -> float:
     return float(np.min(np.where(times > 0.0, times, np.inf)))
 
 
-def _probed(path: ParametricPath, limits: JointLimits, top: Callable[[Floats], Floats], at: Floats) -> tuple[Floats, Floats]:
+def _probed(path: ParametricPath, limits: JointLimits, top: Callable[[Floats], Floats],
+            at: Floats) -> tuple[Floats, Floats]:
     """Speed (N,) along sigma that all limits would allow if it were constant; jerk over its limits (N, J) at that speed."""
     found = path.derivatives(at)
     cap = np.minimum(squared_speed(found.dq, limits.velocity), steady_cap(found.d2q, found.d3q, limits))

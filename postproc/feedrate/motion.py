@@ -120,7 +120,8 @@ class Plan:
         speeds = self.speed(every)
         lowest, highest = (np.minimum.reduceat(speeds, at[:-1]), np.maximum.reduceat(speeds, at[:-1]))
         seconds = np.diff(time)
-        return StretchSpeeds(seconds, np.diff(cuts) / seconds, np.minimum(lowest, speed[1:]), np.maximum(highest, speed[1:]))
+        return StretchSpeeds(seconds, np.diff(cuts) / seconds, np.minimum(lowest, speed[1:]),
+                             np.maximum(highest, speed[1:]))
 
     def _by_place(self, s: Floats) -> tuple[Floats, Floats]:
         """Time and ds/dt (N,) at s (N,)."""

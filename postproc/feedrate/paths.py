@@ -1,8 +1,8 @@
 """Paths q(sigma) with exact derivatives, and the change of parameter that lets a motion start and end at rest.
 
-Near rest under bounded jerk x = s_dot^2 grows as s^(4/3), which no polynomial in s follows. With the parameter
-sigma, where s = d (2 u^3 - 2 u^4 + 0.6 u^5), u = sigma/d on the first and last d (three times differentiable joint
-with s = sigma - 0.4 d), sigma_dot is finite at rest, and rest needs no condition of its own.
+Near rest under bounded jerk x = s_dot^2 grows as s^(4/3), which no polynomial in s follows. With the
+parameter sigma, where s = d (2 u^3 - 2 u^4 + 0.6 u^5), u = sigma/d on the first and last d (three times
+differentiable joint with s = sigma - 0.4 d), sigma_dot is finite at rest, and rest needs no condition of its own.
 """
 
 from __future__ import annotations

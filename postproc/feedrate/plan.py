@@ -64,8 +64,9 @@ def plan(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, st
         options: see `PlannerOptions`
         knots: sigma of the knots, instead of the mesh; only without stops
 
-    What is not solved at once is solved again on finer knots (`retried`). A motion that is not `solved` even then is slowed
-    down until its samples keep all limits, as in strict mode: it takes longer than it need, and exceeds nothing.
+    What is not solved at once is solved again on finer knots (`retried`). A motion that is not `solved` even
+    then is slowed down until its samples keep all limits, as in strict mode: it takes longer than it need,
+    and exceeds nothing.
 
     Raises:
         ValueError: stops outside the path or not rising; knots with stops; an infinite jerk limit everywhere.
@@ -128,7 +129,8 @@ def _mesh(eased: Eased, limits: JointLimits, feed: AllowedFeed, spacing: Spacing
 def _top(eased: Eased, limits: JointLimits, feed: AllowedFeed | None, sigma: Floats) -> Floats:
     """Largest constant sigma_dot (N,) under the feed, unless it has marks of its own, and the limits at the tool."""
     allowed = np.full(len(sigma), np.inf) if feed is None else eased.speed_limit(sigma, feed)
-    return allowed if limits.tool is None else np.minimum(allowed, steady_tool_speed(eased, sigma, limits.tool))
+    return allowed if limits.tool is None else np.minimum(allowed,
+                                                          steady_tool_speed(eased, sigma, limits.tool))
 
 
 def _stretches(path: ParametricPath, stops: Sequence[float], ease: float) -> list[Eased]:
@@ -155,7 +157,8 @@ def _solve(grid: MotionKnots, options: PlannerOptions) -> tuple[Profile, SolvedW
             break
         grid, report = solved_again(better, options.method, report.c if len(better.sigma) == len(grid.sigma) else None)
         profile = _profile(grid, report.c)
-        slower, better = tightened(grid, profile, SPLIT[min(before, len(SPLIT) - 1)], bool(options.method.kernel))
+        slower, better = tightened(grid, profile, SPLIT[min(before, len(SPLIT) - 1)],
+                                   bool(options.method.kernel))
         best = min(best, (slower * float(profile.times[-1]), slower, grid, report), key=lambda one: one[0])
     _, slower, grid, last = best
     return profile if last is report else _profile(grid, last.c), last, slower
@@ -176,8 +179,8 @@ def _profile(grid: MotionKnots, c: Floats) -> Profile:
 def _within(made: Plan, guess: Floats) -> Plan:
     """Slow each piece down until nothing is exceeded in the samples that are delivered, first by `guess`.
 
-    All limits are homogeneous in time, so that x/g^2 divides velocity by g, acceleration by g^2 and jerk by g^3.
-    Samples of the slower motion fall elsewhere, so it is measured again.
+    All limits are homogeneous in time, so that x/g^2 divides velocity by g, acceleration by g^2 and jerk by
+    g^3. Samples of the slower motion fall elsewhere, so it is measured again.
     """
     factor = guess
     for turn in range(ROUNDS):

@@ -80,8 +80,8 @@ class SpeedProblem:
 class MotionKnots:
     """One motion from rest to rest on its knots; problems are made for stretches of it, so that memory stays small.
 
-    `eased` path, `sigma` (K,) knots, `limits`; `feed` gives the largest ds/dt at s; `tight` (3, K) factors >= 1 on
-    the velocity, acceleration and jerk limits, None for ones.
+    `eased` path, `sigma` (K,) knots, `limits`; `feed` gives the largest ds/dt at s; `tight` (3, K) factors >=
+    1 on the velocity, acceleration and jerk limits, None for ones.
     """
 
     eased: Eased
@@ -104,4 +104,5 @@ class MotionKnots:
         weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
         dq, d2q, d3q = (np.ascontiguousarray(order.T) for order in at[:3])
         basis = rest_basis(self.sigma, self.eased.ease, first, last)
-        return SpeedProblem(basis, dq, d2q, d3q, at.limits, at.cap / tight[0] ** 2, at.capped, weight, tight[1:])
+        return SpeedProblem(basis, dq, d2q, d3q, at.limits, at.cap / tight[0] ** 2, at.capped,
+                            weight, tight[1:])

@@ -1,7 +1,7 @@
 """Moves from rest to rest without a path to keep: rapids, indexing, retracts, tool change. The only user of ruckig.
 
-Ruckig plans from state to state here. Its way-points are never set: the library would ask a service on the network for
-them, and its motion between them leaves the path anyway.
+Ruckig plans from state to state here. Its way-points are never set: the library would ask a service on the
+network for them, and its motion between them leaves the path anyway.
 """
 
 from __future__ import annotations
@@ -91,7 +91,8 @@ def _seconds(travel: Floats, velocity: Floats, acceleration: Floats, jerk: Float
         # v (v/A' + A'/J) = D: the positive root, in the form that does not cancel.
         top = 2.0 * travel / (rise + np.sqrt(rise**2 + 4.0 * travel / peak))
         top = np.minimum(v, top)
-        return np.where(travel >= 2.0 * peak * rise**2, travel / top + top / peak + rise, np.cbrt(32.0 * travel / j))
+        return np.where(travel >= 2.0 * peak * rise**2, travel / top + top / peak + rise,
+                        np.cbrt(32.0 * travel / j))
 
 
 def _states(q0: Floats, q1: Floats, limits: tuple[Floats, Floats, Floats], law: PointToPointMode,
@@ -130,4 +131,5 @@ def _sampled(states: list[Floats], step: float) -> JointTrajectory:
     share = np.linspace(0.0, 1.0, count) if count > 1 else np.zeros(1)
     rate = np.full(count, share[-1] / ((count - 1) * step) if count > 1 else 0.0)
     q, qd, qdd, qddd = states
-    return JointTrajectory(np.float64(step) * np.arange(count), share, q, qd, qdd, qddd, rate, np.full(count, np.inf))
+    return JointTrajectory(np.float64(step) * np.arange(count), share, q, qd, qdd, qddd, rate,
+                           np.full(count, np.inf))

@@ -2,8 +2,9 @@
 
 The tip's acceleration lies in the plane of tangent t and normal n of its path, and so does its jerk but for
 |b p'''| x^1.5 along the binormal b, which only caps x. The disc of allowed vectors in that plane is replaced by the
-regular octagon inside it that touches it along +-t and +-n: on straight lines nothing is given away, elsewhere at most
-1 - cos(pi/8) = 7.6 %. Where a twisted path has jerk in the plane and out of it at once, strict mode sees to their sum.
+regular octagon inside it that touches it along +-t and +-n: on straight lines nothing is given away,
+elsewhere at most 1 - cos(pi/8) = 7.6 %. Where a twisted path has jerk in the plane and out of it at once,
+strict mode sees to their sum.
 """
 
 from __future__ import annotations

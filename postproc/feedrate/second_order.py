@@ -1,17 +1,17 @@
 """Least time under velocity and acceleration on a grid, in two passes: the greedy solution of reachability analysis.
 
-x = sigma_dot^2 is linear between grid points, so sigma_ddot = (x1 - x0)/(2 h). Each acceleration limit, taken at
-both ends of an interval, is |a x0 + b x1| <= 1. For given x0 the next x1 lies in [l(x0), u(x0)], u concave and l
+x = sigma_dot^2 is linear between grid points, so sigma_ddot = (x1 - x0)/(2 h). Each acceleration limit, taken
+at both ends of an interval, is |a x0 + b x1| <= 1. For given x0 the next x1 lies in [l(x0), u(x0)], u concave and l
 convex. Backwards: the largest x0 that leaves room for x1 below its own bound is the largest root of the concave u -
 l, by Newton's method from the right, which ends after few steps. Forwards: always the largest x1; where
 a joint reverses on a coarse grid a linear program finds about 0.1 % less time. (Pham and Pham,
 IEEE T-RO 34 (2018), reachability analysis.)
 
-Where a joint reverses b may be as small as one likes, and (1 - a x0)/b has no digits left although the limit is
-respected to the last one. So a row counts by what x1 can change in it: where that is less than FLAT of the limit
-over all of [0, reach], `reach` the largest x1 that any row allows, the row bounds x0 alone, for every such x1. That
-gives away at most 2 FLAT of x0, and what is left determines x1 to FLAT of `reach`. Where rounding leaves l above u, x1
-is the value that exceeds both limits by the same, which the row of larger b decides.
+Where a joint reverses b may be as small as one likes, and (1 - a x0)/b has no digits left although the limit
+is respected to the last one. So a row counts by what x1 can change in it: where that is less than FLAT of the
+limit over all of [0, reach], `reach` the largest x1 that any row allows, the row bounds x0 alone, for every
+such x1. That gives away at most 2 FLAT of x0, and what is left determines x1 to FLAT of `reach`. Where
+rounding leaves l above u, x1 is the value that exceeds both limits by the same, which the row of larger b decides.
 """
 
 from __future__ import annotations

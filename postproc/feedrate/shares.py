@@ -1,8 +1,8 @@
 """Which limit costs how much time: the plan's multipliers as seconds that add up to its time.
 
 Time is homogeneous in the limits: velocities and feed times k, accelerations times k^2, jerks times k^3 give 1/k of the
-time. By Euler's theorem T = sum over limits of n (-dT/dln L), n = 1, 2, 3 for velocity, acceleration, jerk, and
--dT/dln L is the multiplier z of a row times what it uses of its limit.
+time. By Euler's theorem T = sum over limits of n (-dT/dln L), n = 1, 2, 3 for velocity, acceleration, jerk,
+and -dT/dln L is the multiplier z of a row times what it uses of its limit.
 """
 
 from __future__ import annotations
@@ -58,7 +58,8 @@ def weigh(problem: SpeedProblem, c: Floats, z: Multipliers, first: int, last: in
     velocity = 2.0 * z.velocity[here] * x[0] / problem.cap[here]
     found = np.zeros((3, count))
     found[0] = np.bincount(problem.capped[here], velocity, minlength=count)
-    for order, rows, multipliers in ((1, problem.acceleration_rows(), z.acceleration), (2, problem.jerk_rows(), z.jerk)):
+    for order, rows, multipliers in ((1, problem.acceleration_rows(), z.acceleration),
+                                     (2, problem.jerk_rows(), z.jerk)):
         used = np.einsum("ijk,ik->jk", rows[:, :, here], x[:len(rows)])
         found[order, :-1] = (order + 1) * np.einsum("jk,jk->j", multipliers[:, here], used)
     return found

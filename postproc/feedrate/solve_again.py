@@ -22,7 +22,8 @@ LARGEST = 4_000_000
 """knots beyond which they are not"""
 
 
-def solved_again(grid: MotionKnots, method: Method, near: Floats | None = None) -> tuple[MotionKnots, SolvedWindows]:
+def solved_again(grid: MotionKnots, method: Method,
+                 near: Floats | None = None) -> tuple[MotionKnots, SolvedWindows]:
     """The motion on its knots, or on finer ones where those do not solve it; `solved` is False where none did.
 
     Args:
@@ -42,7 +43,8 @@ def solved_again(grid: MotionKnots, method: Method, near: Floats | None = None) 
     return best
 
 
-def _others(grid: MotionKnots, method: Method, c: Floats) -> Iterator[tuple[MotionKnots, Method, Floats | None]]:
+def _others(grid: MotionKnots, method: Method,
+            c: Floats) -> Iterator[tuple[MotionKnots, Method, Floats | None]]:
     """Knots, method and start of each further try: from where the first one stood, then from rest on halved intervals."""
     yield grid, _whole(grid, method), c
     for _ in range(FINER):

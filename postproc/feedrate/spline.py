@@ -1,9 +1,9 @@
 """The squared speed x(sigma) as a cubic B-spline over its knots, and the law it follows next to rest.
 
-At a knot only three basis functions are non-zero, so x, x', x'' there are three-term stencils of the coefficients
-c[k:k+3]. Over the first REST intervals from rest x = X0 Psi(u), the law of constant jerk: near u = 0 slope and
-curvature of x have no weight in any limit, and an optimiser left free there would use it. X0 is one unknown: the
-coefficients c[:REST + 3] are tied to it, and the stencils carry the factors.
+At a knot only three basis functions are non-zero, so x, x', x'' there are three-term stencils of the
+coefficients c[k:k+3]. Over the first REST intervals from rest x = X0 Psi(u), the law of constant jerk: near u
+= 0 slope and curvature of x have no weight in any limit, and an optimiser left free there would use it. X0 is
+one unknown: the coefficients c[:REST + 3] are tied to it, and the stencils carry the factors.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ def stencils(sigma: Floats) -> Floats:
 
 
 def rest_law(u: Floats, ease: float) -> Floats:
-    """Psi and its first two derivatives by sigma, (3, N), for u = sigma/d: constant jerk from rest in the eased
-    parameter.
+    """Psi and its first two derivatives by sigma, (3, N), for u = sigma/d: constant jerk from rest in the
+    eased parameter.
 
     s = j t^3/6 and s = d (2u^3 - 2u^4 + 0.6u^5) give u_dot^2 ~ Psi = (1 - u + .3u^2)^(4/3) / (1 - 4u/3 + u^2/2)^2.
     """

@@ -29,8 +29,8 @@ def tightened(grid: MotionKnots, profile: Profile, split_from: float,
               kernel: bool = False) -> tuple[float, MotionKnots | None]:
     """Factor on time that brings what is seen between the knots to 1; a better grid, None where nothing is exceeded.
 
-    The better grid has tighter rows, and more knots where the ratio is above `split_from`: where tightening was in vain,
-    as a spline of the path bends within one interval.
+    The better grid has tighter rows, and more knots where the ratio is above `split_from`: where tightening
+    was in vain, as a spline of the path bends within one interval.
     """
     excess = np.empty((3, len(grid.sigma) - 1), dtype=np.float32)
     for first in range(0, excess.shape[1], CHUNK):

@@ -47,8 +47,8 @@ class Usage:
 
 
 class Binding(NamedTuple):
-    """Per sample (N,): joint (-1 the feed, J the tool), order (1 velocity, 2 acceleration, 3 jerk, 0 where nothing binds),
-    ratio; of the tool, velocity is the rate of its axis."""
+    """Per sample (N,): joint (-1 the feed, J the tool), order (1 velocity, 2 acceleration, 3 jerk, 0 where
+    nothing binds), ratio; of the tool, velocity is the rate of its axis."""
 
     axis: Ints
     order: Ints
@@ -107,7 +107,8 @@ class JointTrajectory:
         """Factor on time per sample (N,) that would bring the ratios seen there to 1."""
         velocity, acceleration, jerk = (np.maximum(a.max(axis=1), b) for a, b in
                                         zip(self._derived(limits), self._tool(limits).T, strict=True))
-        most = np.maximum(np.maximum(velocity, self.sd / self.feed), np.maximum(acceleration**0.5, jerk ** (1.0 / 3.0)))
+        most = np.maximum(np.maximum(velocity, self.sd / self.feed),
+                          np.maximum(acceleration**0.5, jerk ** (1.0 / 3.0)))
         for order, ratio in enumerate(self._differences(limits), start=1):
             worst = ratio.max(axis=1) ** (1.0 / order)
             for shift in range(order + 1):

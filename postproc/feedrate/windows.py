@@ -1,8 +1,8 @@
 """Solving a motion: in one piece, or for long ones in windows that overlap, every stitch checked.
 
 Windows have free ends: far enough from its ends the optimal speed does not depend on them, so that neighbours agree
-in the middle of the overlap. There the coefficients are blended; where they differ or the blend exceeds a limit the
-overlap is widened.
+in the middle of the overlap. There the coefficients are blended; where they differ or the blend exceeds a
+limit the overlap is widened.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ class Method:
 @dataclass(frozen=True)
 @arrays(c="C", weights="3 R")
 class SolvedWindows:
-    """Coefficients (K + 2,); most iterations of a window; worst stitch (relative difference); whether all were solved;
-    seconds of each row (3, R + 1), see `shares.weigh`."""
+    """Coefficients (K + 2,); most iterations of a window; worst stitch (relative difference); whether all
+    were solved; seconds of each row (3, R + 1), see `shares.weigh`."""
 
     c: Floats
     iterations: int

@@ -95,8 +95,8 @@ class Job:
         return self.gauge_length(index) if self.setup.output.tool_call else 0.0
 
     def number_of(self, index: int) -> int:
-        """Number of the tool of that index; -1 without one. Where the program calls none it is that of the one tool, 0
-        where that has no number."""
+        """Number of the tool of that index; -1 without one. Where the program calls none it is that of the
+        one tool, 0 where that has no number."""
         return self.toolpath.tools[index].number if index >= 0 else -1
 
     def length_of(self, number: int) -> float:
@@ -130,8 +130,8 @@ class Job:
         return result
 
     def home_rows(self) -> frozenset[int]:
-        """Moves whose link goes by home: the first, those after a tool change or GOHOME, and those whose link turns rotary
-        axes where they are to be turned at home."""
+        """Moves whose link goes by home: the first, those after a tool change or GOHOME, and those whose link
+        turns rotary axes where they are to be turned at home."""
         first = np.searchsorted(self.moves.row, [e.index for e in self.toolpath.events if e.word == "GOHOME"]
                                 + [c.index for c in tool_changes(self.toolpath)])
         restart = self.operation_starts() if self.setup.output.apart else []
@@ -190,8 +190,8 @@ def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) ->
 
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,
             options: Options, refused: Refused = frozenset()) -> tuple[Job | None, list[Diagnostic]]:
-    """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`: output modes
-    that "auto" passes over."""
+    """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`:
+    output modes that "auto" passes over."""
     toolpath, diagnostics = numbered(toolpath, setup, options.setup)
     toolpath, found = plain_records(toolpath, controller)
     diagnostics += found
@@ -237,7 +237,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
                       helix_planes=controller.arcs.helix_planes,
                       rolls=rolls, measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
     diagnostics += _measured(control, controller, moves.axis, setup, options)
-    modes, found = output_modes(control, controller, setup, options, toolpath, decimals(control, controller), refused)
+    modes, found = output_modes(control, controller, setup, options, toolpath,
+                                decimals(control, controller), refused)
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
               modes, errors, tuple(stated))
@@ -253,7 +254,8 @@ def _work_offset(controller: ControllerFile, setup: SetupFile, options: Options)
                   "offset", file=options.setup, hint=f"allowed are {program.offsets_named}")]
 
 
-def _program_number(toolpath: Toolpath, controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:
+def _program_number(toolpath: Toolpath, controller: ControllerFile, setup: SetupFile,
+                    options: Options) -> list[Diagnostic]:
     """A number of the program that one of its subprograms bears."""
     last, number = 1000 + len(toolpath.operations), setup.output.program_number
     numbered = setup.output.divided and "{number}" in controller.subprograms.call
@@ -265,8 +267,8 @@ def _program_number(toolpath: Toolpath, controller: ControllerFile, setup: Setup
 
 def _measured(control: Control, controller: ControllerFile, axis: Floats, setup: SetupFile,
               options: Options) -> list[Diagnostic]:
-    """Where a tool cannot be measured into the work offset: its length stands along Z of the words only where every rotary
-    axis carries the part and the words are axis positions, and where the control adds none of its own."""
+    """Where a tool cannot be measured into the work offset: its length stands along Z of the words only where
+    every rotary axis carries the part and the words are axis positions, and where the control adds none of its own."""
     if setup.output.tool_call:
         return []
     name = control.machine.name

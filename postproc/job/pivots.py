@@ -14,9 +14,10 @@ ALLOWED = 0.1
 """share of the tip tolerance that a pivot may be off by"""
 
 
-def control_kinematics(machine: Machine, setup: SetupFile, options: Options) -> tuple[Kinematics | None, list[Diagnostic]]:
-    """(the kinematics with the set-up's [control_pivots], None where it states none; pivots that differ from the
-    machine's).
+def control_kinematics(machine: Machine, setup: SetupFile,
+                       options: Options) -> tuple[Kinematics | None, list[Diagnostic]]:
+    """(the kinematics with the set-up's [control_pivots], None where it states none; pivots that differ from
+    the machine's).
 
     Of a pivot's point only what is square to its axis counts.
     """

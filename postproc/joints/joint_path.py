@@ -18,8 +18,8 @@ __all__ = ["TRAVEL_SLACK", "RunSolution", "branch_of", "nearest_solution", "reac
 def reachable_axes(kin: Kinematics, axis: Floats, tolerance: float) -> tuple[Floats, Floats]:
     """(axes the machine can take, angle (N,) rad by which they differ).
 
-    Directions of a CL file carry rounding, so that an axis on the edge of the reachable set may stand just outside:
-    those within `tolerance` (rad) are moved onto it, others stay as they are.
+    Directions of a CL file carry rounding, so that an axis on the edge of the reachable set may stand just
+    outside: those within `tolerance` (rad) are moved onto it, others stay as they are.
     """
     nearest = kin.nearest_axis(axis)
     off = angle_between(nearest, axis)
@@ -35,7 +35,8 @@ def solve(kin: Kinematics, tip: Floats, axis: Floats, limits: Limits, start: Flo
     return plan_runs([PoseRun(kin, tip, axis)], limits, start, None, may_rewind)[0]
 
 
-def nearest_solution(kin: Kinematics, tip: Floats, axis: Floats, near: Floats, branch: Ints | None = None) -> Floats:
+def nearest_solution(kin: Kinematics, tip: Floats, axis: Floats, near: Floats,
+                     branch: Ints | None = None) -> Floats:
     """Joints (N, J) of poses, on the branch and winding nearest to `near` (N, J).
 
     `branch` (N,) names the branch where it is known, -1 where it is not.

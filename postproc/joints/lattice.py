@@ -1,8 +1,8 @@
 """The joints that a run of poses can have: branches followed from pose to pose, and the windings that travel allows.
 
-A state of a pose is a branch of the inverse and, for each rotary axis of limited travel, a number of whole turns. The
-rotary values of a branch are carried on from pose to pose without a jump (`values`); at k turns a joint then stands at
-value + 2 pi k, and travel allows k from `least` to `most`.
+A state of a pose is a branch of the inverse and, for each rotary axis of limited travel, a number of whole
+turns. The rotary values of a branch are carried on from pose to pose without a jump (`values`); at k turns a
+joint then stands at value + 2 pi k, and travel allows k from `least` to `most`.
 """
 
 from __future__ import annotations
@@ -90,14 +90,16 @@ class Lattice:
         q[self.wound] += TWO_PI * np.array(turns)
         return q
 
-    def on(self, branch: int, pose: int, turns: tuple[int, ...], target: int) -> tuple[tuple[int, ...], Floats]:
+    def on(self, branch: int, pose: int, turns: tuple[int, ...],
+           target: int) -> tuple[tuple[int, ...], Floats]:
         """(turns at the next pose on branch `target`, path (J,)), every rotary axis going the shorter path."""
         step = self.values[target, pose + 1] - self.values[branch, pose]
         travel = np.where(self.rotary, wrap(step), step)
         added = np.nan_to_num(np.rint((travel - step) / TWO_PI)).astype(np.int64)[self.wound]
         return tuple(int(k) for k in np.array(turns, dtype=np.int64) + added), travel
 
-    def between(self, values: Floats, turns: tuple[int, ...], others: Floats, other_turns: tuple[int, ...]) -> Floats:
+    def between(self, values: Floats, turns: tuple[int, ...], others: Floats,
+                other_turns: tuple[int, ...]) -> Floats:
         """Paths (..., J) from one state to another at standing tool; axes without limits go the shorter path."""
         step = others - values
         travel = np.where(self.endless, wrap(step), step)
@@ -117,8 +119,8 @@ class Lattice:
 
 
 def lattice_of(run: PoseRun, limits: Limits, near: Floats) -> Lattice:
-    """The states of a run; where the tool lies along a rotary axis along the whole path, that axis stands as in `near` (F,
-    J).
+    """The states of a run; where the tool lies along a rotary axis along the whole path, that axis stands as
+    in `near` (F, J).
 
     Such a run has a branch for each row of `near`.
     """

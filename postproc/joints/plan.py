@@ -148,8 +148,8 @@ def _stages(runs: list[PoseRun], limits: Limits, start: Floats, may_rewind: bool
             progress: Callable[[int], None] | None) -> list[_Stage]:
     """Every run with its states.
 
-    A run whose tool lies along a rotary axis along the whole path may take that axis as it stands before or after it; where
-    neither is inside travel, at a quarter turn. One that holds it has no choice.
+    A run whose tool lies along a rotary axis along the whole path may take that axis as it stands before or
+    after it; where neither is inside travel, at a quarter turn. One that holds it has no choice.
     """
     result: list[_Stage] = []
     for k, run in enumerate(runs):
@@ -214,7 +214,8 @@ def _jumps(lattice: Lattice, taken: list[RunPiece], q: Floats) -> int:
     return int((step > np.pi + 1e-6).any(axis=1).sum())
 
 
-def _rejected(lattice: Lattice, first: Segment, q0: Floats, every: Floats, best: int) -> tuple[RejectedStart, ...]:
+def _rejected(lattice: Lattice, first: Segment, q0: Floats, every: Floats,
+              best: int) -> tuple[RejectedStart, ...]:
     """The other states of the first pose, and the branches that it has but the run has not."""
     shut = set(range(len(lattice.values))) - {branch for branch, _ in first.states}
     with np.errstate(invalid="ignore"):

@@ -109,11 +109,13 @@ def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves:
     for first, last in zip(starts.tolist(), [*starts[1:].tolist(), len(moves)], strict=True):
         parts.append(_part(machine, tools[int(moves.tool[first])], moves, first, last, given, run_options))
     runs = [_run(part, moves, run_options, machine.home) for part in parts]
-    found = plan_runs(runs, machine.limits, machine.home, run_options.preferences, run_options.may_rewind, progress)
+    found = plan_runs(runs, machine.limits, machine.home, run_options.preferences,
+                      run_options.may_rewind, progress)
     if run_options.may_rewind and any(s.outside for s in found):
         parts = [_finer(part, s) if s.outside else part for part, s in zip(parts, found, strict=True)]
         runs = [_run(part, moves, run_options, machine.home) for part in parts]
-        found = plan_runs(runs, machine.limits, machine.home, run_options.preferences, run_options.may_rewind, progress)
+        found = plan_runs(runs, machine.limits, machine.home, run_options.preferences,
+                          run_options.may_rewind, progress)
     return _together(moves, parts, found, run_options)
 
 
@@ -140,7 +142,8 @@ def _without_choice(machine: Machine, tools: dict[int, Kinematics], moves: Moves
                    (RunSolution(q[:0], singular[:0]),) * len(starts))
 
 
-def _reached(tools: dict[int, Kinematics], moves: Moves, starts: Ints, tolerance: float) -> tuple[Floats, Floats]:
+def _reached(tools: dict[int, Kinematics], moves: Moves, starts: Ints,
+             tolerance: float) -> tuple[Floats, Floats]:
     """Axes (R, 3) that the machine can take with the tool of each run, and by how much (R,) rad they are moved."""
     if len(tools) == 1 or moves.axis.strides[0] == 0:
         found = [reachable_axes(kin, moves.axis, tolerance) for kin in tools.values()]
@@ -158,7 +161,8 @@ def _part(machine: Machine, kin: Kinematics, moves: Moves, first: int, last: int
     """A run with the axes `given` (R, 3), which are moved by as much (R,)."""
     rows, curves = np.arange(first, last), moves.run(first, last)
     axis, moved = given[0][first:last], given[1][first:last]
-    curves = Curves(curves.start, curves.end, axis[:-1], axis[1:], curves.is_arc, curves.center, curves.normal, curves.sweep)
+    curves = Curves(curves.start, curves.end, axis[:-1], axis[1:], curves.is_arc, curves.center,
+                    curves.normal, curves.sweep)
     led = whole(curves)
     if len(curves) and any(kin.rotary):
         allowed = LEAD_SHARE * (run_options.tolerance - float(moved.max()))
@@ -194,7 +198,8 @@ def _finer(part: _Part, solution: RunSolution) -> _Part:
     low, high = k / count[index], np.where(k + 1 == count[index], 1.0, (k + 1) / count[index])
     picked = led.curves.take(index)
     (start, axis0), (end, axis1) = picked.at(low), picked.at(high)
-    curves = Curves(start, end, axis0, axis1, picked.is_arc, picked.center, picked.normal, picked.sweep * (high - low))
+    curves = Curves(start, end, axis0, axis1, picked.is_arc, picked.center, picked.normal,
+                    picked.sweep * (high - low))
     u0, u1 = led.u0[index], led.u1[index]
     end = np.where(high == 1.0, u1, u0 + high * (u1 - u0))
     finer = Led(curves, led.parent[index], u0 + low * (u1 - u0), end, led.events)
@@ -211,7 +216,8 @@ def _together(moves: Moves, parts: list[_Part], found: list[RunSolution], run_op
     begin = np.cumsum([0, *(len(k) for k in owner)])
     rewinds = [(int(b) + r.row, r) for b, s in zip(begin, found, strict=False) for r in s.rewinds]
     rows = np.array([row for row, _ in rewinds], dtype=np.int64)
-    refined = with_rewinds(refined, rows, np.array([r.cuts for _, r in rewinds], dtype=np.bool_), run_options.feed)
+    refined = with_rewinds(refined, rows, np.array([r.cuts for _, r in rewinds], dtype=np.bool_),
+                           run_options.feed)
     q, singular = np.concatenate([s.q for s in found]), np.concatenate([s.singular for s in found])
     moved = shared(np.concatenate([p.moved[k] for p, k in zip(parts, owner, strict=True)]))
     left = shared(np.repeat([_left(p, run_options) for p in parts], np.diff(begin)))

@@ -1,7 +1,7 @@
 """The cheapest sequence of states of a run: backwards over its segments (Bellman), exact.
 
-Inside a segment travel admits the same states everywhere and no branch changes, so one rewind there is enough: two could
-be replaced by one that goes along the whole path. It is made at the cheapest pose.
+Inside a segment travel admits the same states everywhere and no branch changes, so one rewind there is
+enough: two could be replaced by one that goes along the whole path. It is made at the cheapest pose.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from toolpaths.shapes import arrays
 @dataclass(frozen=True)
 @arrays(to="S", at="S", next="S")
 class SegmentChoice:
-    """What is done in a segment from each state: a rewind to state `to` (S,) at pose `at` (S,), -1 for none; then the state
-    `next` (S,) of the segment after."""
+    """What is done in a segment from each state: a rewind to state `to` (S,) at pose `at` (S,), -1 for none;
+    then the state `next` (S,) of the segment after."""
 
     to: Ints
     at: Ints

@@ -1,11 +1,12 @@
 """Singular directions: the path of the tool axis led past them with the least rotary speed that its tolerance allows.
 
-Where the tool comes near the direction of the rotary axis nearest the part (the pole), that axis has to follow the azimuth
-of the tool about it, however fast that turns. Seen along the path, an azimuth is allowed where a direction with it lies
+Where the tool comes near the direction of the rotary axis nearest the part (the pole), that axis has to
+follow the azimuth of the tool about it, however fast that turns. Seen along the path, an azimuth is allowed
+where a direction with it lies
 within the tolerance: on the sphere, sin d = sin(theta) sin(azimuth - wanted) for the distance d of a direction at the angle
 theta from the pole to a meridian (Napier). Of all azimuths in these gates the taut string turns least
-(`taut_string.py`); the nearest point of its meridian is the new direction. Where the pole itself is within the tolerance
-the axis is led through it, onto the opposite meridian, so that the azimuth need not turn at all.
+(`taut_string.py`); the nearest point of its meridian is the new direction. Where the pole itself is within
+the tolerance the axis is led through it, onto the opposite meridian, so that the azimuth need not turn at all.
 """
 
 from __future__ import annotations
@@ -156,7 +157,8 @@ def _window(pole: Pole, curves: Curves, time: Floats, tolerance: float) -> _Wind
     new, string = _led_axes(pole, axis, azimuth, at, _INSIDE * tolerance)
     before = float((np.abs(np.diff(azimuth)) / np.diff(at)).max())
     after = float((np.abs(np.diff(string)) / np.diff(at)).max())
-    return _Window(curve, u, new, curves, float(theta.min()), float(angle_between(new, axis).max()), before, after)
+    return _Window(curve, u, new, curves, float(theta.min()), float(angle_between(new, axis).max()),
+                   before, after)
 
 
 def _led_axes(pole: Pole, given: Floats, azimuth: Floats, at: Floats, reach: float) -> tuple[Floats, Floats]:
@@ -200,8 +202,8 @@ def _crossings(sign: Floats) -> Ints:
 def _through(theta: Floats, azimuth: Floats, free: Bools) -> tuple[Floats, Floats]:
     """(azimuths on meridians (P,), side of the pole on them (P,)) where each free stretch is gone through straight.
 
-    The side changes behind the place nearest to the pole. Whether it does is reported by the azimuths far from the pole,
-    before and after the stretch.
+    The side changes behind the place nearest to the pole. Whether it does is reported by the azimuths far
+    from the pole, before and after the stretch.
     """
     flat, sign = azimuth.copy(), np.ones(len(azimuth))
     found = stretches(free)
@@ -228,8 +230,8 @@ def _places(pole: Pole, curves: Curves, tolerance: float) -> tuple[Ints, Floats]
 
 
 def _inner(pole: Pole, a: Floats, b: Floats, tolerance: float) -> Floats:
-    """Places u of a great circle from a to b (3,), within the cone that is led: from its foot f at the angle m from the
-    pole, the azimuth turns by atan(tan(psi) / sin(m)) over the path psi (Napier)."""
+    """Places u of a great circle from a to b (3,), within the cone that is led: from its foot f at the angle
+    m from the pole, the azimuth turns by atan(tan(psi) / sin(m)) over the path psi (Napier)."""
     normal = np.cross(a, b)
     turn, size = float(angle_between(a[None], b[None])[0]), float(np.linalg.norm(normal))
     normal = normal / size

@@ -19,8 +19,8 @@ def free_joint(kin: Kinematics, tip: Floats, axis: Floats, home: Floats) -> int:
 
 
 def held_joints(kin: Kinematics, tip: Floats, axis: Floats, spin: float, home: Floats) -> Floats | None:
-    """`home` (J,) with the free joint where the tool has that spin (rad, see Toolpath) in the table frame; None where the
-    tool leaves no joint free."""
+    """`home` (J,) with the free joint where the tool has that spin (rad, see Toolpath) in the table frame;
+    None where the tool leaves no joint free."""
     joint = free_joint(kin, tip, axis, home)
     if joint < 0:
         return None
@@ -35,8 +35,8 @@ def spin_of(kin: Kinematics, q: Floats) -> float:
 
 
 def spins_off(kin: Kinematics, q: Floats, tip: Floats, axis: Floats, spin: Floats) -> Floats:
-    """By how much (N,) rad tools at joints (N, J), tips and axes (N, 3) are turned about themselves off `spin` (N,); 0
-    where that is NaN."""
+    """By how much (N,) rad tools at joints (N, J), tips and axes (N, 3) are turned about themselves off
+    `spin` (N,); 0 where that is NaN."""
     result, asked = np.zeros(len(q)), np.flatnonzero(np.isfinite(spin))
     if len(asked):
         found = kin.pose(q[asked], np.hstack((tip, axis))[asked])[2]

@@ -14,8 +14,8 @@ from toolpaths.shapes import arrays
 BranchState = tuple[int, tuple[int, ...]]
 """branch, turns of each wound joint"""
 BAD, REWINDS, CUTS, WRONG, SECONDS = range(5)
-"""columns of a cost, compared in this order: poses outside travel or without solution, rewinds, those of them in the cut,
-poses on the wrong side of the preferred axis, time"""
+"""columns of a cost, compared in this order: poses outside travel or without solution, rewinds, those of them
+in the cut, poses on the wrong side of the preferred axis, time"""
 NEVER = np.array([np.inf] * 5)
 
 
@@ -49,8 +49,8 @@ def tidy_segments(lattice: Lattice) -> list[Segment]:
 def rough_segments(lattice: Lattice, rewinds: bool) -> list[Segment]:
     """Segments between the places where travel admits other states.
 
-    States that travel admits in the segments before and after count as outside; without rewinds, where nothing leads
-    from one state to another, those of all segments.
+    States that travel admits in the segments before and after count as outside; without rewinds, where
+    nothing leads from one state to another, those of all segments.
     """
     change = _structure(lattice)
     for table in (lattice.least, lattice.most, lattice.inside[..., None]):
@@ -101,8 +101,8 @@ def staying(lattice: Lattice, segment: Segment, wrong: Floats) -> Floats:
 def leading(lattice: Lattice, segment: Segment, after: Segment) -> list[list[tuple[int, Floats]]]:
     """For each state of a segment the states of the next one that it may lead to, with the cost (5,) of the step.
 
-    Where the branch is free the axis may go to any branch, in either direction round. A state that leads to none that is
-    known goes to the nearest of its branch, which counts as one more pose outside.
+    Where the branch is free the axis may go to any branch, in either direction round. A state that leads to
+    none that is known goes to the nearest of its branch, which counts as one more pose outside.
     """
     pose, result = segment.last, []
     for branch, turns in segment.states:

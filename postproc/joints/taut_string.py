@@ -10,10 +10,10 @@ from toolpaths.arrays import Floats
 def taut_string(at: Floats, low: Floats, high: Floats) -> Floats:
     """Values (N,) at places `at` (N,), rising, with low <= value <= high, that minimise every convex function of the slopes.
 
-    The first and last gates must be closed (low = high). The shortest path through the gates does it for all convex
-    functions at once, the largest slope among them (Barlow, Bartholomew, Bremner, Brunk, Statistical Inference under
-    Order Restrictions, 1972, the taut string). Found by the funnel from the last bend: where it closes, the string
-    bends at the gate that closed it.
+    The first and last gates must be closed (low = high). The shortest path through the gates does it for all
+    convex functions at once, the largest slope among them (Barlow, Bartholomew, Bremner, Brunk, Statistical
+    Inference under Order Restrictions, 1972, the taut string). Found by the funnel from the last bend: where
+    it closes, the string bends at the gate that closed it.
     """
     result = np.empty(len(at))
     corner, value = 0, float(low[0])

@@ -19,8 +19,9 @@ _LEAST_STEP = 1e-10
 def branches_of(kin: Kinematics, tip: Floats, axis: Floats, near: Floats) -> tuple[Floats, Bools]:
     """(joints (B, N, J) of every branch, family (B, N)) of poses (N, 3), (N, 3), rotaries in (-pi, pi].
 
-    Where the tool lies along a rotary axis the free joint is carried on from the rows before, at the beginning of the
-    run from the first other row. Where it does so along the whole path there is one branch for each row of `near` (F, J).
+    Where the tool lies along a rotary axis the free joint is carried on from the rows before, at the
+    beginning of the run from the first other row. Where it does so along the whole path there is one branch
+    for each row of `near` (F, J).
     """
     rotary = np.array(kin.rotary)
     branches = kin.inverse(tip, axis, near=near[0])
@@ -58,8 +59,8 @@ def following(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats,
               family: Bools) -> tuple[Array, Bools]:
     """(B, N - 1) the branch that a branch of each pose leads to at the next, and (N - 1,) where it may change on the spot.
 
-    It is the nearest where the step is small or one end is free; elsewhere it is found by walking there. It may change
-    where the tool leaves the direction of a rotary axis.
+    It is the nearest where the step is small or one end is free; elsewhere it is found by walking there. It
+    may change where the tool leaves the direction of a rotary axis.
     """
     count, n, _ = branches.shape
     own = np.broadcast_to(np.arange(count, dtype=np.int8)[:, None], (count, n - 1))
@@ -84,9 +85,9 @@ def following(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats,
 def _walk(kin: Kinematics, tip: Floats, axis: Floats, q: Floats, branch: int) -> Floats:
     """Joints at the second of two poses, reached from joints q of the first without a jump.
 
-    Steps are halved until the joints move little; the branch may only change where it comes as near as where the tool
-    passes through a singular direction. Where the path leaves the reach, as around the pole of axes that are not square to
-    each other, it ends there.
+    Steps are halved until the joints move little; the branch may only change where it comes as near as where
+    the tool passes through a singular direction. Where the path leaves the reach, as around the pole of axes
+    that are not square to each other, it ends there.
     """
     rotary = np.array(kin.rotary)
     u, size = 0.0, 0.25

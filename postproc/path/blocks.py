@@ -48,8 +48,8 @@ class PathBuilder:
             state: Array | None = None, place: Array | None = None) -> None:
         """Blocks in `frame`; what is not given is that of straight blocks which name no axes.
 
-        Blocks come in the order of their `place` (K,) at last, those of one place in the order in which they were added;
-        without one it is that of their moves' links.
+        Blocks come in the order of their `place` (K,) at last, those of one place in the order in which they
+        were added; without one it is that of their moves' links.
         """
         n = len(q)
         if not n:
@@ -122,8 +122,8 @@ def _off(tip: Floats, begin: Floats, end: Floats) -> Floats:
 
 def add_run(out: PathBuilder, frame: WordFrame, kin: Kinematics, moves: Moves, rows: Ints, curves: Curves, q0: Floats,
             q1: Floats, tolerance: float, axis_tolerance: float) -> tuple[Floats, Ints, Ints]:
-    """The blocks of moves `rows` (N,), of one or many runs, along curves (N) from joints q0 to q1 (N, J): (worst deviations
-    (2,), rows with turns on the spot, broken rows)."""
+    """The blocks of moves `rows` (N,), of one or many runs, along curves (N) from joints q0 to q1 (N, J):
+    (worst deviations (2,), rows with turns on the spot, broken rows)."""
     control = frame.control
     where, begun = family_turns(kin, curves, q0, q1)
     start = q0.copy()
@@ -132,7 +132,8 @@ def add_run(out: PathBuilder, frame: WordFrame, kin: Kinematics, moves: Moves, r
     arcs = replace(arcs, keep=arcs.keep & (np.linalg.norm(curves.start - curves.center, axis=1) <= control.arc_limit))
     main = linearise(control, kin, curves, start, q1, arcs.keep, tolerance, axis_tolerance)
     if not len(where):
-        _emit(out, frame, moves, rows, kin, curves, arcs, main.curve, main.u, main.q, q0, tolerance, axis_tolerance)
+        _emit(out, frame, moves, rows, kin, curves, arcs, main.curve, main.u, main.q, q0, tolerance,
+              axis_tolerance)
         return np.array([main.worst_tip, main.worst_axis]), rows[where], rows[main.broken]
     spot = _on_the_spot(curves, where)
     turning = linearise(control, kin, spot, q0[where], begun, np.zeros(len(where), dtype=bool), tolerance,
@@ -150,7 +151,8 @@ def add_run(out: PathBuilder, frame: WordFrame, kin: Kinematics, moves: Moves, r
 
 def _on_the_spot(curves: Curves, where: Ints) -> Curves:
     c = curves.take(where)
-    return Curves(c.start, c.start, c.axis0, c.axis0, np.zeros(len(where), dtype=bool), c.center, c.normal, c.sweep)
+    return Curves(c.start, c.start, c.axis0, c.axis0, np.zeros(len(where), dtype=bool), c.center,
+                  c.normal, c.sweep)
 
 
 def _emit(out: PathBuilder, frame: WordFrame, moves: Moves, rows: Ints, kin: Kinematics, curves: Curves, arcs: WordArcs,
@@ -173,7 +175,8 @@ def _emit(out: PathBuilder, frame: WordFrame, moves: Moves, rows: Ints, kin: Kin
     level = moves.phase[row] == Phase.POSITION
     before = np.concatenate([q0[:1], q[:-1]])
     before[first] = q0[curve[first]]
-    code[rapid] = rapid_codes(frame.control, kin, before[rapid], q[rapid], tolerance, axis_tolerance, level[rapid])
+    code[rapid] = rapid_codes(frame.control, kin, before[rapid], q[rapid], tolerance, axis_tolerance,
+                              level[rapid])
     seconds = np.where(cutting, seconds, np.where(code == TRAVERSE, np.nan, 0.0))
     turned = np.where(keep & ~first, np.concatenate([[0.0], u[:-1]]) * curves.sweep[curve], 0.0)
     center = _turned_centers(arcs, curve, turned) if keep.any() else repeated(np.zeros(3), len(curve))

@@ -72,7 +72,8 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     plan = plan_moves(machine, kinematics, moves, drawing.run_options(machine, axis_tolerance),
                       None if progress is None else lambda run: progress("joints", run, int(given.link.sum())))
     moves = plan.refined.moves
-    road = _Road(plan, modes, operation[plan.refined.origin], space, drawing, plan.refined.among(home_rows), file)
+    road = _Road(plan, modes, operation[plan.refined.origin], space, drawing,
+                 plan.refined.among(home_rows), file)
     out = PathBuilder(moves, len(machine.axis_names))
     out.frame(modes.base)
     runs, diagnostics = solved_runs(plan, modes, kinematics, road.operation, axis_tolerance, file)
@@ -92,7 +93,8 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst)
     diagnostics += joint_faults.planned(plan, machine, given, file)
     diagnostics += cost(modes.tcp_code, longer, file)
-    return path, faults.merged(diagnostics) + faults.rapid_as_feed(path.code, path.move, path.seconds, given, file)
+    return path, faults.merged(diagnostics) + faults.rapid_as_feed(path.code, path.move, path.seconds,
+                                                                   given, file)
 
 
 def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count: int, turns: Ints,
@@ -110,8 +112,8 @@ def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count:
 
 def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,
               machine: Machine) -> tuple[SolvedRuns, Floats, list[Ints], list[Diagnostic]]:
-    """The blocks of all runs, those of one frame and tool together: (runs as their ends are approached, worst deviations
-    (2,), rows with turns, faults)."""
+    """The blocks of all runs, those of one frame and tool together: (runs as their ends are approached, worst
+    deviations (2,), rows with turns, faults)."""
     worst, turns, found = np.zeros(2), [np.zeros(0, dtype=np.int64)], list[Diagnostic]()
     moves = road.plan.refined.moves
     together: dict[tuple[int, int, float], list[SolvedRun]] = {}
@@ -142,7 +144,8 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
     """The linking moves to all runs in order: (where the tool stands at the end, s that entries at zero cost, faults)."""
     modes, space, refined = road.modes, road.space, road.plan.refined
     moves, longer, found = refined.moves, list[float](), list[Diagnostic]()
-    linked = np.array([run.first in road.home_rows and not refined.rewind[run.first] for run in runs.each], dtype=np.bool_)
+    linked = np.array([run.first in road.home_rows and not refined.rewind[run.first] for run in runs.each],
+                      dtype=np.bool_)
     done = add_home_links(out, modes.base, space, runs, moves, linked)
     for run, there in zip(runs.each, done.tolist(), strict=True):
         first, by_home, end = run.first, run.first in road.home_rows, run.last - 1
@@ -157,7 +160,8 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
             travel.control, before.kin, run.kin, space, before.pose, target, by_home)
         entry = None
         if enters and needed(modes.control, link):
-            link = link if by_home else plan_link(travel.control, before.kin, run.kin, space, before.pose, target, True)
+            link = link if by_home else plan_link(travel.control, before.kin, run.kin, space, before.pose,
+                                                  target, True)
             entry = zero_entry(modes.control, modes.tcp.control, run.kin, space, link)
             longer.append(entry.seconds)
             link = replace(link, clear=link.clear and entry.clear)
@@ -176,7 +180,8 @@ def _travel(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bo
 
 
 def _with_axes(curves: Curves, axis0: Floats, axis1: Floats) -> Curves:
-    return Curves(curves.start, curves.end, axis0, axis1, curves.is_arc, curves.center, curves.normal, curves.sweep)
+    return Curves(curves.start, curves.end, axis0, axis1, curves.is_arc, curves.center, curves.normal,
+                  curves.sweep)
 
 
 @dataclass(frozen=True)
@@ -196,8 +201,8 @@ class _Legs:
 def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs) -> None:
     """Retract, home, then the records without motion, then index and the approach to the pose itself.
 
-    A cutting move that is linked to (no RAPID before it) is approached at its feed. Before a mode is entered the rotary
-    axes are stated, whether they turn or not.
+    A cutting move that is linked to (no RAPID before it) is approached at its feed. Before a mode is entered
+    the rotary axes are stated, whether they turn or not.
     """
     if legs.start is not None:
         _leg(out, legs.before, legs.kin_before, legs.start.q, link.retract, row)

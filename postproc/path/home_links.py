@@ -55,8 +55,8 @@ class _Poses:
 
 def add_home_links(out: PathBuilder, base: WordFrame, space: SafeSpace, runs: SolvedRuns, moves: Moves,
                    linked: Bools) -> Bools:
-    """Add the links by home before those of the runs `linked` (runs,) that a first try brings home and back, clear and
-    inside travel; (runs,) True where that is done."""
+    """Add the links by home before those of the runs `linked` (runs,) that a first try brings home and back,
+    clear and inside travel; (runs,) True where that is done."""
     control, each = base.control, runs.each
     done = np.zeros(len(each), dtype=np.bool_)
     fits = [k for k in np.flatnonzero(linked).tolist() if k and each[k].frame is base and each[k - 1].frame is base
@@ -123,7 +123,8 @@ def _one_block(control: Control, start: _Poses, end: _Poses) -> Bools:
         n = len(k)
         line = Curves(start.tip[k], end.tip[k], start.axis[k], end.axis[k], np.zeros(n, dtype=bool), np.zeros((n, 3)),
                       np.zeros((n, 3)), np.zeros(n))
-        pieces = linearise(control, kin, line, start.q[k], end.q[k], np.zeros(n, dtype=bool), LEG_TOLERANCE, 1e-3)
+        pieces = linearise(control, kin, line, start.q[k], end.q[k], np.zeros(n, dtype=bool),
+                           LEG_TOLERANCE, 1e-3)
         one = np.bincount(pieces.curve, minlength=n) == 1
         one[pieces.broken] = False
         result[k] = one
@@ -143,7 +144,8 @@ def _clear(control: Control, space: SafeSpace, poses: _Poses, travels: Sequence[
     for kin, k in poses.each_tool():
         for begin, end in pairwise(travels):
             for t in np.linspace(0.0, 1.0, SAMPLES).tolist():
-                tip, axis, _ = control.between(begin[k], end[k], np.full(len(k), t), kin, np.ones(len(k), dtype=bool))
+                tip, axis, _ = control.between(begin[k], end[k], np.full(len(k), t), kin,
+                                               np.ones(len(k), dtype=bool))
                 result[k] &= space.clear(tip, axis, 0.5 * space.margin)
     return result
 
@@ -158,7 +160,8 @@ def _add_legs(out: PathBuilder, frame: WordFrame, start: _Poses, end: _Poses, ro
                 place=PARTS * rows[k] + part)
 
 
-def _add_rapids(out: PathBuilder, frame: WordFrame, q: Floats, rows: Ints, part: int, state: Bools, home: bool) -> None:
+def _add_rapids(out: PathBuilder, frame: WordFrame, q: Floats, rows: Ints, part: int, state: Bools,
+                home: bool) -> None:
     n = len(q)
     out.add(frame, q, rows, np.full(n, np.nan), np.full(n, TRAVERSE, dtype=np.int8), np.full(n, np.nan), home,
             state=np.tile(state, (n, 1)), place=PARTS * rows + part)

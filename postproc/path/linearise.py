@@ -1,7 +1,7 @@
 """Points between the CL points, so that the control's motion stays on the reference within the tolerance, proved.
 
-From the start of each curve the longest block is taken whose bound (`bound.py`) is inside the tolerance, then the next:
-where a shorter block is never worse than a longer one, no division that the same bound allows has fewer blocks.
+From the start of each curve the longest block is taken whose bound (`bound.py`) is inside the tolerance, then
+the next: where a shorter block is never worse than a longer one, no division that the same bound allows has fewer blocks.
 """
 
 from __future__ import annotations
@@ -56,7 +56,8 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
     """
     exact = keep | _straight_already(control, kin, curves, q0, q1)
     if exact.all():
-        return CurvePieces(np.arange(len(exact)), np.ones(len(exact)), q1, np.zeros(0, dtype=np.int64), 0.0, 0.0)
+        return CurvePieces(np.arange(len(exact)), np.ones(len(exact)), q1,
+                           np.zeros(0, dtype=np.int64), 0.0, 0.0)
     front = _Front(control, kin, curves, q0, q1, np.flatnonzero(~exact), tolerance, axis_tolerance)
     while len(front.index):
         front.advance()
@@ -131,7 +132,8 @@ class _Front:
         q = ends[self.index]
         inner = np.flatnonzero((u > 0.0) & (u < 1.0))
         if len(inner):
-            q[inner] = nearest_solution(self.kin, *self.curves.take(self.index[inner]).at(u[inner]), near[self.index[inner]])
+            q[inner] = nearest_solution(self.kin, *self.curves.take(self.index[inner]).at(u[inner]),
+                                        near[self.index[inner]])
         return q
 
     def _tried(self) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
@@ -190,17 +192,20 @@ class _Front:
         self.held, self.failed = np.where(taken, 0.0, held), np.where(taken, np.inf, failed)
         self.at = np.where(taken, u1, self.at)
         self.joints = np.where(taken[:, None], q1, self.joints)
-        self.pose = (np.where(taken[:, None], pose[0], self.pose[0]), np.where(taken[:, None], pose[1], self.pose[1]))
+        self.pose = (np.where(taken[:, None], pose[0], self.pose[0]),
+                     np.where(taken[:, None], pose[1], self.pose[1]))
 
     def _keep(self, rows: Bools) -> None:
-        for name in ("index", "at", "until", "joints", "goal", "longest", "step", "held", "failed", "branch", "even"):
+        for name in ("index", "at", "until", "joints", "goal", "longest", "step", "held", "failed",
+                     "branch", "even"):
             setattr(self, name, getattr(self, name)[rows])
         self.pose = (self.pose[0][rows], self.pose[1][rows])
 
 
-def _turns(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats, index: Ints) -> tuple[Ints, Floats, Floats]:
-    """(curve (K,), from u (K,), to u (K,)): the curves of `index`, those that wind more than once at standing rotary joints
-    and tool axis in as many parts as turns."""
+def _turns(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats,
+           index: Ints) -> tuple[Ints, Floats, Floats]:
+    """(curve (K,), from u (K,), to u (K,)): the curves of `index`, those that wind more than once at standing
+    rotary joints and tool axis in as many parts as turns."""
     rotary = np.array(kin.rotary)
     stands = (q0[index][:, rotary] == q1[index][:, rotary]).all(axis=1)
     stands &= (curves.axis0[index] == curves.axis1[index]).all(axis=1)
@@ -234,9 +239,9 @@ def family_turns(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> tup
 
 
 def approached(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> tuple[Ints, Floats]:
-    """(curves (K,), joints (K, J)): those of N curves from q0 to q1 (N, J) that end where the tool lies along a rotary axis,
-    with that axis as the curve needs it, where it is another one than in q1. With axes at right angles it has the value
-    from before, with nutating ones it has not."""
+    """(curves (K,), joints (K, J)): those of N curves from q0 to q1 (N, J) that end where the tool lies along
+    a rotary axis, with that axis as the curve needs it, where it is another one than in q1. With axes at
+    right angles it has the value from before, with nutating ones it has not."""
     rows = np.zeros(0, dtype=np.int64)
     if any(kin.rotary):
         rows = np.flatnonzero(kin.singular(np.nan_to_num(q1)) & ~kin.singular(np.nan_to_num(q0)))

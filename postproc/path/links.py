@@ -1,7 +1,7 @@
 """Linking moves: retract along the tool axis to the safe plane, index, approach along the new tool axis.
 
-A safe plane stands square to the tool axis at a distance from the centre of the part. A linking move is clear while the
-tool is above everything that is cut, seen along its own axis, or its axis line misses the sphere round all that.
+A safe plane stands square to the tool axis at a distance from the centre of the part. A linking move is clear
+while the tool is above everything that is cut, seen along its own axis, or its axis line misses the sphere round all that.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ def safe_space(moves: Moves, setup: SetupFile, placement: Placement) -> SafeSpac
 def _outermost(curves: Curves) -> Floats:
     """(K, 3) places of the arcs where x, y or z is greatest or least, in their first turn and in their last.
 
-    Seen from the centre the tip is r cos t + (n x r) sin t, whose coordinate k turns back at atan2((n x r)_k, r_k) and
-    half a turn on; whole circles count only as far as the arc goes.
+    Seen from the centre the tip is r cos t + (n x r) sin t, whose coordinate k turns back at atan2((n x r)_k,
+    r_k) and half a turn on; whole circles count only as far as the arc goes.
     """
     arcs = curves.take(np.flatnonzero(curves.is_arc))
     radial = arcs.start - arcs.center
@@ -109,9 +109,9 @@ def _outermost(curves: Curves) -> Floats:
 class Link:
     """Joints (K, J) of the four parts of a linking move.
 
-    `retract` along the tool axis, `home` in machine coordinates (tool change, end of program), `index` to above the
-    new pose, `approach` along the tool axis down to it. `home_state`, `index_state` (K, J) mark axes that a block must
-    state even where they stand already (after a tool change nobody knows where the axes are).
+    `retract` along the tool axis, `home` in machine coordinates (tool change, end of program), `index` to
+    above the new pose, `approach` along the tool axis down to it. `home_state`, `index_state` (K, J) mark
+    axes that a block must state even where they stand already (after a tool change nobody knows where the axes are).
     """
 
     retract: Floats
@@ -139,9 +139,10 @@ def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeS
               after: Pose | None, by_home: bool, turning: bool | None = None) -> Link:
     """The path from pose `before` (None: at home) to above pose `after` (None: home), with the tools of kin0, kin1.
 
-    `control` is under the law of the path between the safe planes; retract and approach go by the law of their pose.
-    Where travel is too short for any, the first is returned: the travel check then names the axis and the value.
-    `turning` says whether the part turns under the tool on the path; by itself where the tool axis is another.
+    `control` is under the law of the path between the safe planes; retract and approach go by the law of
+    their pose. Where travel is too short for any, the first is returned: the travel check then names the axis
+    and the value. `turning` says whether the part turns under the tool on the path; by itself where the tool
+    axis is another.
     """
     if turning is None:
         turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
@@ -226,7 +227,8 @@ def _all_home(control: Control, kin: Kinematics, space: SafeSpace, up: Pose | No
     if up is None:
         return home[None, :], True
     tip, axis = kin.forward(home[None, :])
-    return _index(control, kin, space, up.q, Pose(tip[0], axis[0], home), space.plane(axis[0], True, share), slack)
+    return _index(control, kin, space, up.q, Pose(tip[0], axis[0], home),
+                  space.plane(axis[0], True, share), slack)
 
 
 def _lift_home(control: Control, up: Pose | None, whole: bool) -> tuple[Floats, Bools]:

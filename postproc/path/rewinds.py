@@ -1,7 +1,7 @@
 """Rewinds: how the tool is drawn back to unwind an axis, and which joints a set-up prefers.
 
-The tool goes along its axis to where nothing is that it could cut, the axes turn there, and it comes back to the very pose:
-no rotary axis turns about a tool in the material.
+The tool goes along its axis to where nothing is that it could cut, the axes turn there, and it comes back to
+the very pose: no rotary axis turns about a tool in the material.
 """
 
 from __future__ import annotations

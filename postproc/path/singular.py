@@ -10,7 +10,8 @@ from postproc.reference.moves import Moves
 from toolpaths.diagnostics import Diagnostic, error, info
 
 
-def check_singular(path: JointPath, moves: Moves, control: Control, least: float, file: str = "") -> list[Diagnostic]:
+def check_singular(path: JointPath, moves: Moves, control: Control, least: float,
+                   file: str = "") -> list[Diagnostic]:
     """How near the blocks come to singular positions: an error below `least`; nothing where the machine measures none."""
     kinematics = control.machine.kinematics
     names = kinematics.singular_names

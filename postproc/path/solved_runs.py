@@ -72,7 +72,8 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
             if axis is moves.axis:
                 axis, q = np.array(axis), q.copy()
             frame, at = modes.plane(kin, q[first])
-            q[first:last] = kin.at_tip(moves.tip[first:last], np.tile(at, (last - first, 1)), frame.control.slides)
+            q[first:last] = kin.at_tip(moves.tip[first:last], np.tile(at, (last - first, 1)),
+                                       frame.control.slides)
             axis[first:last] = kin.forward(q[first:first + 1])[1]
         each.append(SolvedRun(first, last, frame, kin, left[k]))
     return SolvedRuns(tuple(each), axis, q), found

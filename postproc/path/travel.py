@@ -21,13 +21,14 @@ PART = 50_000
 """blocks that are looked at together"""
 
 
-def _arc_extremes(path: JointPath, law: Control, k: Ints, at_start: Floats, low: Floats, high: Floats) -> None:
-    """Widen the joints `low`, `high` (K, J) of the arc blocks k (K,) to where they are extreme between the ends; they begin
-    at joints `at_start` (K, J).
+def _arc_extremes(path: JointPath, law: Control, k: Ints, at_start: Floats, low: Floats,
+                  high: Floats) -> None:
+    """Widen the joints `low`, `high` (K, J) of the arc blocks k (K,) to where they are extreme between the
+    ends; they begin at joints `at_start` (K, J).
 
-    Rotary joints stand still, so that the slides are a linear function of the words X, Y, Z. On the circle first cos a +
-    across sin a of the plane each is extreme where its derivative vanishes; what runs along the axis of the arc is added
-    whole.
+    Rotary joints stand still, so that the slides are a linear function of the words X, Y, Z. On the circle
+    first cos a + across sin a of the plane each is extreme where its derivative vanishes; what runs along the
+    axis of the arc is added whole.
     """
     kin, slides = law.machine.kinematics, law.slides
     q0 = at_start[:, slides]
@@ -41,7 +42,8 @@ def _arc_extremes(path: JointPath, law: Control, k: Ints, at_start: Floats, low:
         sense = np.where(path.ccw[k[rows]], 1.0, -1.0)
         across = sense[:, None] * np.stack([-first[:, 1], first[:, 0]], axis=1)
         last = first + step[rows][:, (i, j)]
-        sweep = np.mod(sense * (np.arctan2(last[:, 1], last[:, 0]) - np.arctan2(first[:, 1], first[:, 0])), 2.0 * np.pi)
+        sweep = np.mod(sense * (np.arctan2(last[:, 1], last[:, 0]) - np.arctan2(first[:, 1], first[:, 0])),
+                       2.0 * np.pi)
         sweep = np.where(sweep < 1e-9, 2.0 * np.pi, sweep)
         p, s = (np.einsum("kab,kb->ka", slides_of[rows][:, :, (i, j)], v) for v in (first, across))
         rise = slides_of[rows][:, :, 3 - i - j] * step[rows, 3 - i - j][:, None]

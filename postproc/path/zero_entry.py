@@ -1,10 +1,11 @@
 """Tool-centre-point mode switched on with the rotary tables at zero, where makers' manuals leave open what its frame is.
 
-FANUC A-79348E p. 19 (and B-63783EN-1 p. 1116; Mitsubishi M700V p. 477): the programming frame is fixed to the table at
-switch-on, and "the angle of the table's rotary axis represents the initial state of the programming coordinate system". Read
-one direction the frame is that of the part, turned with the table by its scale; read in the other direction it is the work
-offset's frame, unturned, at the angle at which the table stands. With the tables at zero both are one: so the mode is
-entered there, at the height of home, and the tables turn in it, the slides standing as nearly as straight paths of the tip
+FANUC A-79348E p. 19 (and B-63783EN-1 p. 1116; Mitsubishi M700V p. 477): the programming frame is fixed to the
+table at switch-on, and "the angle of the table's rotary axis represents the initial state of the programming
+coordinate system". Read one direction the frame is that of the part, turned with the table by its scale; read
+in the other direction it is the work offset's frame, unturned, at the angle at which the table stands. With
+the tables at zero both are one: so the mode is entered there, at the height of home, and the tables turn in
+    it, the slides standing as nearly as straight paths of the tip
 let them.
 """
 
@@ -37,8 +38,8 @@ _PLACES = np.linspace(0.0, 1.0, 9)
 @dataclass(frozen=True)
 @arrays(before="K J", state="K J", inside="L J")
 class ZeroEntry:
-    """Joints (K, J) of the blocks up to the mode, with the axes that they state, and (L, J) of those in the mode; `seconds`
-    that the whole takes longer than indexing the tables before it."""
+    """Joints (K, J) of the blocks up to the mode, with the axes that they state, and (L, J) of those in the
+    mode; `seconds` that the whole takes longer than indexing the tables before it."""
 
     before: Floats
     state: Bools

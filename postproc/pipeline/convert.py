@@ -37,8 +37,8 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
         machine: one that is loaded, or a built-in name or path of a machine file
         controller: built-in name or path of a controller file
         setup: one that is loaded, or its path; default: the file that the options name, else the default set-up
-        diagnostics: what reading the path found; an ERROR among them, or among the path's own faults, stops the
-            conversion
+        diagnostics: what reading the path found; an ERROR among them, or among the path's own faults, stops
+            the conversion
 
     Raises:
         DiagnosticError: where machine, controller or set-up cannot be loaded.
@@ -89,8 +89,8 @@ def _oriented(start: PostResult, progress: Progress | None) -> tuple[PostResult,
 
 def choose_axes(path: Toolpath, machine: Machine, controller: str | FilePath, options: Options,
                 diagnostics: list[Diagnostic], progress: Progress | None = None) -> PostResult:
-    """The tool axes of a path as `options.orient` has them, in `choice` (None where an ERROR stands against them), proved by
-    the program for a controller; arguments and errors as of `convert`."""
+    """The tool axes of a path as `options.orient` has them, in `choice` (None where an ERROR stands against
+    them), proved by the program for a controller; arguments and errors as of `convert`."""
     from postproc.pipeline.oriented import oriented
 
     spec, machine, setup, options = _loaded(controller, machine, None, options)
@@ -105,8 +105,8 @@ def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diag
 
 
 def _stages(result: PostResult, progress: Progress | None) -> PostResult:
-    """All stages; with --smooth passes that cannot be smoothed are taken back; "auto" takes the next output mode where one
-    cannot be written or proved."""
+    """All stages; with --smooth passes that cannot be smoothed are taken back; "auto" takes the next output
+    mode where one cannot be written or proved."""
     def one(begun: PostResult, left: ExcludedPasses = frozenset()) -> PostResult:
         return with_next_modes(begun, lambda again: staged(again, progress, left))
     return with_passes_taken_back(result, one) if result.options.smooth else one(result)
@@ -122,8 +122,8 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         tool_table: file of the control's tool table: the program is verified with these lengths of tools
 
     Raises:
-        DiagnosticError: where machine, controller, set-up or tool table cannot be loaded, or the G-code file not be
-            opened.
+        DiagnosticError: where machine, controller, set-up or tool table cannot be loaded, or the G-code file
+            not be opened.
     """
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     try:
@@ -131,7 +131,8 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     except OSError as fault:
         raise DiagnosticError([unreadable(fault, "gcode.open", gcode, "name the program that is checked")]) from fault
     known = (*_reading(path, diagnostics), *unfinished(FilePath(gcode)))
-    begun = VerifyResult(str(gcode), None, (), None, options, path.source, path.file, hashlib.sha256(data).hexdigest())
+    begun = VerifyResult(str(gcode), None, (), None, options, path.source, path.file,
+                         hashlib.sha256(data).hexdigest())
     if other := other_axes(data, options, str(gcode)):
         return replace(begun, diagnostics=(*other, *known))
     start, _ = _oriented(_begun(path, machine, controller, spec, setup, options, known), progress)

@@ -26,7 +26,8 @@ _HINT = ("blocks of the shop hold comments and codes that come back to where the
 def check_hooks(job: Job) -> list[Diagnostic]:
     """Errors of blocks that do more than pass, and of passive codes that the control carries out."""
     machine, hooks = job.machine, job.hooks
-    reader = reader_for(job.controller, machine.axis_names, None, machine.stop, job.control.rolls, machine.clamp_codes)
+    reader = reader_for(job.controller, machine.axis_names, None, machine.stop, job.control.rolls,
+                        machine.clamp_codes)
     found = _executed(reader, job)
     values = dict.fromkeys(HOOK_VALUES, "NAME") | {"tool_number": "1", "work_offset": _offset(job)}
     for place, blocks in hooks.places.items():
@@ -72,8 +73,9 @@ def _begins(name: str, word: str) -> bool:
 
 
 def carried_out(reader: Reader, controller: ControllerFile, clamps: set[float], own: bool) -> CarriedOut:
-    """What a passive code must not be: that of the controller file, of the read-back and, for codes of hooks (`own` False),
-    of the program's own blocks; the shop's controller file (`own`) may name codes of its smoothing and blocks of its own."""
+    """What a passive code must not be: that of the controller file, of the read-back and, for codes of hooks
+    (`own` False), of the program's own blocks; the shop's controller file (`own`) may name codes of its
+    smoothing and blocks of its own."""
     numbers = [("G", v, v) for values in reader.groups.values() for v in values]
     numbers += [("M", v, v) for v in (*reader.m_codes, *reader.switches, *clamps)]
     words = set(reader.statements)
@@ -86,7 +88,8 @@ def carried_out(reader: Reader, controller: ControllerFile, clamps: set[float], 
     for block in () if own else written(controller):
         numbers += [(a, float(v), float(v)) for a, v in _CODE.findall(block)]
         words |= {m[1] for m in [_FIRST.match(block)] if m}
-    return CarriedOut(tuple(numbers), tuple(sorted(words)), frozenset(reader.groups.get("path", ()) if own else ()))
+    return CarriedOut(tuple(numbers), tuple(sorted(words)),
+                      frozenset(reader.groups.get("path", ()) if own else ()))
 
 
 def written(controller: ControllerFile) -> Iterator[str]:

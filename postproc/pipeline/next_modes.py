@@ -120,7 +120,8 @@ def _each_alone(made: PostResult) -> Iterator[Refused]:
             yield frozenset((k, other) for k in _auto(modes) for other in _LAWS if other != law)
 
 
-def _said(first: PostResult, made: PostResult, why: dict[tuple[int, InterpolationMode], Diagnostic]) -> PostResult:
+def _said(first: PostResult, made: PostResult,
+          why: dict[tuple[int, InterpolationMode], Diagnostic]) -> PostResult:
     """With a warning for each mode that another was taken for: operations, both modes, the reason."""
     assert first.job is not None and made.job is not None
     path, groups = made.toolpath, dict[tuple[InterpolationMode, InterpolationMode], list[int]]()

@@ -15,12 +15,13 @@ from postproc.pipeline.result import PostResult
 Stages = Callable[[PostResult, Progress | None], PostResult]
 
 
-def oriented(start: PostResult, stages: Stages, progress: Progress | None = None) -> tuple[PostResult, PostResult | None]:
-    """`start`, a conversion before its first stage, with the tool axes of the plan `orient` of its options; the program that
-    proved the plan, written or refused, None where there is no choice.
+def oriented(start: PostResult, stages: Stages,
+             progress: Progress | None = None) -> tuple[PostResult, PostResult | None]:
+    """`start`, a conversion before its first stage, with the tool axes of the plan `orient` of its options;
+    the program that proved the plan, written or refused, None where there is no choice.
 
-    The plan is proved by `stages` (from a path to its program) with what convert, verify and trace all know: feeds, output
-    mode, smoothing and geometric errors are left out, so that the three choose the same axes.
+    The plan is proved by `stages` (from a path to its program) with what convert, verify and trace all know:
+    feeds, output mode, smoothing and geometric errors are left out, so that the three choose the same axes.
     """
     plan, options = start.options.orient, common(start.options)
 

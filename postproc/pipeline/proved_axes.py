@@ -1,7 +1,7 @@
 """The plan that is asked for, proved as `convert` does: its program, moves between passes and from home included.
 
-What is counted in `turns` says how long paths take, not what the tool touches on them. Where the program of a plan is
-refused, the paths and states that it was refused for are barred, and the plan is chosen again, until one passes.
+What is counted in `turns` says how long paths take, not what the tool touches on them. Where the program of a
+plan is refused, the paths and states that it was refused for are barred, and the plan is chosen again, until one passes.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ _OF_BODIES = "collision."
 
 @dataclass(frozen=True)
 class _Blame:
-    """What a program was refused for: `links` (number n leads to pass n, the last one home) and `passes`, and why; `bodies`
-    where it is what tools touch."""
+    """What a program was refused for: `links` (number n leads to pass n, the last one home) and `passes`, and
+    why; `bodies` where it is what tools touch."""
 
     links: frozenset[int]
     passes: frozenset[int]
@@ -116,7 +116,8 @@ def _touched(work: PassContext, program: PostResult) -> _Blame:
     job, comparison = program.job, program.comparison
     assert job is not None and comparison is not None and comparison.executed is not None
     motion, moves = comparison.executed[1], job.moves.without_pecks()
-    executed = BlockPoses(job.control, job.kinematics_of, job.register_lengths(), poses_before(motion, job.control))
+    executed = BlockPoses(job.control, job.kinematics_of, job.register_lengths(),
+                          poses_before(motion, job.control))
     serves = np.minimum(comparison.owner, len(moves) - 1)
     first = np.append(True, np.diff(moves.row) != 0)[serves]
     part = np.where(comparison.owner < len(moves), _parts(work, moves.row[serves], first), len(work.passes))
@@ -127,8 +128,8 @@ def _touched(work: PassContext, program: PostResult) -> _Blame:
 
 
 def _parts(work: PassContext, rows: Ints, first: Ints | bool = True) -> Ints:
-    """Parts (K,) of a program by rows of the CL path: n >= 0 for the path to pass n, which serves its first row (`first`:
-    the first move of a row), -1 - n inside it."""
+    """Parts (K,) of a program by rows of the CL path: n >= 0 for the path to pass n, which serves its first
+    row (`first`: the first move of a row), -1 - n inside it."""
     begins = work.moves.row[[one.rows[0] for one in work.passes]]
     n = np.maximum(np.searchsorted(begins, rows, side="right") - 1, 0)
     return np.where((begins[n] == rows) & first, n, -1 - n)
@@ -154,7 +155,8 @@ def _of_the_file(made: Proved, plan: Orientation, convert: Convert) -> bool:
     return not mine.isdisjoint(keep)
 
 
-def _noted(passed: list[tuple[OrientationPlan, str]], choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
+def _noted(passed: list[tuple[OrientationPlan, str]], choice: OrientationChoice,
+           plan: Orientation) -> list[Diagnostic]:
     """What was passed over before a plan whose program is written."""
     if not passed:
         return []

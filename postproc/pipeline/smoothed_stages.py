@@ -28,7 +28,8 @@ TURNS = 2
 _SHOWN = 6
 
 
-def written_moves(job: Job, shares: dict[str, float], left: ExcludedPasses = frozenset()) -> tuple[Moves, list[Diagnostic]]:
+def written_moves(job: Job, shares: dict[str, float],
+                  left: ExcludedPasses = frozenset()) -> tuple[Moves, list[Diagnostic]]:
     """The moves that are written: those of the CL file, with --smooth moved within their share of the tolerance."""
     if not job.options.smooth:
         return job.moves, []
@@ -55,8 +56,8 @@ def _staying(job: Job, made: Smoothed) -> list[Diagnostic]:
 
 
 def with_passes_taken_back(result: PostResult, staged: Staged) -> PostResult:
-    """A conversion with --smooth: where an error stands against it, again without smoothing the passes that it names, and
-    then without any, so that what can be converted without --smooth can be with it."""
+    """A conversion with --smooth: where an error stands against it, again without smoothing the passes that
+    it names, and then without any, so that what can be converted without --smooth can be with it."""
     left: ExcludedPasses = frozenset()
     for turn in range(TURNS + 1):
         made = staged(result, left)

@@ -67,8 +67,8 @@ _STRETCH = 1_000_000
 class Stage:
     """One step of a conversion: its name, what it does, and the function.
 
-    Where the function cannot make its value it hands back what it was given, with the errors that say why; an error ends the
-    conversion in either direction.
+    Where the function cannot make its value it hands back what it was given, with the errors that say why; an
+    error ends the conversion in either direction.
     """
 
     name: StageName
@@ -76,7 +76,8 @@ class Stage:
     run: Callable[[Any, Progress | None], tuple[BegunStage, DiagnosticList]]
 
 
-def staged(result: PostResult, progress: Progress | None = None, left: ExcludedPasses = frozenset()) -> PostResult:
+def staged(result: PostResult, progress: Progress | None = None,
+           left: ExcludedPasses = frozenset()) -> PostResult:
     """A conversion through all stages, up to the first that finds an error; `left`: passes that --smooth leaves."""
     made: Any = BegunStage(**shared_fields(BegunStage, result), left=left)
     for stage in STAGES:
@@ -124,7 +125,8 @@ def placed(made: SharedStage, progress: Progress | None) -> tuple[PlacedStage, D
     """The moves that are written, with --smooth moved; how the tool is drawn back."""
     job = made.job
     moves, found = written_moves(job, made.shares, made.left)
-    drawing, more = drawing_of(job.setup, job.placement, job.space, job.machine, made.options.setup or made.toolpath.file)
+    drawing, more = drawing_of(job.setup, job.placement, job.space, job.machine,
+                               made.options.setup or made.toolpath.file)
     return handed_on(PlacedStage, made, moves=moves, drawing=drawing), [*found, *more]
 
 
@@ -191,7 +193,8 @@ def compiled(made: PlannedStage, progress: Progress | None) -> tuple[CompiledSta
                                                              made.options.merge_feeds)
     program, feeds, found = compile_program(job, made.moves, made.path, feeds_planned,
                                             None if compensation is None else compensation.apart)
-    found += unwritable(made.controller, program, made.toolpath.cycles, made.toolpath.file, job.control.length_on_z)
+    found += unwritable(made.controller, program, made.toolpath.cycles, made.toolpath.file,
+                        job.control.length_on_z)
     return handed_on(CompiledStage, made, program=program, feeds=feeds), found
 
 
@@ -249,7 +252,8 @@ def stated(made: VerifiedStage, progress: Progress | None) -> tuple[VerifiedStag
     """What is proved, in the head of the program: another comment in the place of the one that was read back."""
     if made.comparison is None:
         return made, []
-    text, found = with_statement(made.text, made.controller, made.comparison, made.witness, made.toolpath.file)
+    text, found = with_statement(made.text, made.controller, made.comparison, made.witness,
+                                 made.toolpath.file)
     return replace(made, text=text), found
 
 

@@ -1,7 +1,7 @@
 """What stays where it is while the part is placed: table and fixtures of the set-up, next to the part and next to the tool.
 
-What moves with the part (its mesh, fixtures in its frame) stands to the tool as ever, wherever the part is placed: that is
-looked at by the conversion alone.
+What moves with the part (its mesh, fixtures in its frame) stands to the tool as ever, wherever the part is
+placed: that is looked at by the conversion alone.
 """
 
 from __future__ import annotations

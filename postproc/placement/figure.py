@@ -52,8 +52,10 @@ def _fill(sheet: Figure, choice: PlacementChoice) -> None:
     refused = [one for one in every if one.refused]
     lost = [one for one in every if not one.refused and not np.isfinite(one.seconds)]
     timed = sorted((one for one in every if np.isfinite(one.seconds)), key=lambda one: -one.seconds)
-    _points(place, refused, across, up, marker="x", color=_REFUSED, s=28, label=f"cannot stand there ({len(refused)})")
-    _points(place, lost, across, up, marker=".", color=_LOST, s=28, label=f"cannot be faster, not planned ({len(lost)})")
+    _points(place, refused, across, up, marker="x", color=_REFUSED, s=28,
+            label=f"cannot stand there ({len(refused)})")
+    _points(place, lost, across, up, marker=".", color=_LOST, s=28,
+            label=f"cannot be faster, not planned ({len(lost)})")
     if timed:
         dots = _points(place, timed, across, up, c=[one.seconds for one in timed], cmap="viridis_r", s=46,
                        edgecolors="#333333", linewidths=0.4, label=f"planned ({len(timed)})")

@@ -25,8 +25,8 @@ _LEAST, _MOST = 8, 40
 class OrientedTimer(Timer):
     """As `Timer`, with the plan that `options.orient` names instead of the axes of the file.
 
-    There is no bound on what a choice of axes can reach, and the axes of the file need not be inside travel: every place
-    costs a whole choice, so that few are looked at.
+    There is no bound on what a choice of axes can reach, and the axes of the file need not be inside travel:
+    every place costs a whole choice, so that few are looked at.
     """
 
     def __init__(self, work: PassContext, space: Space, setup: SetupFile, options: Options,

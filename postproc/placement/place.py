@@ -44,8 +44,8 @@ class PlacementChoice:
     Attributes:
         work: the file with its part frame on the table frame
         best: the place that is taken
-        planned, looked, pruned, refused: cuts that were planned; places that were looked at, rejected by their bound
-            alone, and where the part cannot stand
+        planned, looked, pruned, refused: cuts that were planned; places that were looked at, rejected by
+            their bound alone, and where the part cannot stand
     """
 
     work: PassContext
@@ -71,8 +71,8 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
           progress: Progress | None = None) -> tuple[PlacementChoice | None, list[Diagnostic]]:
     """The place of least planned time inside [placement] of the set-up; None where a diagnostic is an ERROR.
 
-    The place is converted for the controller and read back before it is taken, and only where that program takes less time
-    than the one at [part] does, links included.
+    The place is converted for the controller and read back before it is taken, and only where that program
+    takes less time than the one at [part] does, links included.
     """
     options = options or Options()
     setup, stands = standing(setup, toolpath, options.setup)
@@ -157,8 +157,8 @@ def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
 
 
 def _likely(search: PlaceSearch) -> list[TimedPlace]:
-    """Places to choose tool axes at: the best of each attitude with the axes of the file; where these cannot be run, the
-    middle of what is allowed."""
+    """Places to choose tool axes at: the best of each attitude with the axes of the file; where these cannot
+    be run, the middle of what is allowed."""
     space = search.space
     found = search.likely()
     known = [one.place[ANGLES:] for one in found]
@@ -199,7 +199,8 @@ class _Proof:
 
         if id(one) not in self.done:
             here = self.setup.model_copy(update={"part": self.space.part(one.place)})
-            result = convert(self.toolpath, self.machine, self.controller, here, self.options, progress=self.progress)
+            result = convert(self.toolpath, self.machine, self.controller, here, self.options,
+                             progress=self.progress)
             why = None if result.ok else max(result.diagnostics, key=lambda d: d.severity)
             self.done[id(one)] = program_seconds(result), why
         return self.done[id(one)]
@@ -209,11 +210,13 @@ class _Proof:
         return np.nan if one.refused else self.of(one)[0]
 
 
-def _proved(proof: _Proof, timer: Timer, best: TimedPlace, now: TimedPlace) -> tuple[TimedPlace | None, list[Diagnostic]]:
+def _proved(proof: _Proof, timer: Timer, best: TimedPlace,
+            now: TimedPlace) -> tuple[TimedPlace | None, list[Diagnostic]]:
     """The best place whose conversion is proved; what stood against better ones is reported.
 
-    After a failure come in turn the place farthest from all that failed and the fastest that is left: what stands against
-    one place (a link that leaves the workspace) stands against its neighbours too. At last the part may stay where it is.
+    After a failure come in turn the place farthest from all that failed and the fastest that is left: what
+    stands against one place (a link that leaves the workspace) stands against its neighbours too. At last the
+    part may stay where it is.
     """
     failed: list[tuple[TimedPlace, Diagnostic]] = []
     left = _candidates(timer, best)
@@ -239,7 +242,8 @@ def _candidates(timer: Timer, best: TimedPlace) -> list[TimedPlace]:
 def _off(one: TimedPlace, failed: list[tuple[TimedPlace, Diagnostic]]) -> float:
     """Least distance from places that failed, 1 where they count as another place."""
     scale = np.repeat(_APART, ANGLES)
-    return min((float((np.abs(one.place - other.place) / scale).max()) for other, _ in failed), default=np.inf)
+    return min((float((np.abs(one.place - other.place) / scale).max()) for other, _ in failed),
+               default=np.inf)
 
 
 def _passed_over(one: TimedPlace, why: Diagnostic, options: Options) -> Diagnostic:

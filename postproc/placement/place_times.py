@@ -77,8 +77,9 @@ class _Cut:
 class Timer:
     """Times of a file at places, each path of the joints planned once.
 
-    A plan depends on how the joints go, not on where: on serial machines moving the part along its table does not change
-    passes during which no rotary joint turns, and a table that turns back what the part is turned changes nothing at all.
+    A plan depends on how the joints go, not on where: on serial machines moving the part along its table does
+    not change passes during which no rotary joint turns, and a table that turns back what the part is turned
+    changes nothing at all.
 
     Args:
         work: the file with its part frame on the table frame
@@ -92,7 +93,8 @@ class Timer:
         unsolved: lines of passes with a plan that was not solved, whose time is longer than need be
     """
 
-    def __init__(self, work: PassContext, space: Space, least: float, bodies: StationaryBodies | None = None) -> None:
+    def __init__(self, work: PassContext, space: Space, least: float,
+                 bodies: StationaryBodies | None = None) -> None:
         self.work, self.space, self.least, self.bodies = work, space, least, bodies
         self.planned, self.looked, self.pruned, self.refused = 0, 0, 0, 0
         self.unsolved: set[int] = set()
@@ -145,7 +147,8 @@ class Timer:
         limiting: dict[str, float] = {}
         for spent, name in cuts:
             limiting[name] = limiting.get(name, 0.0) + spent
-        return TimedPlace(place, cutting + linking, cutting, linking, bound + linking, low, high, singular, None, limiting)
+        return TimedPlace(place, cutting + linking, cutting, linking, bound + linking, low, high, singular,
+                          None, limiting)
 
     def stands(self, place: Floats) -> Obstacle | None:
         """What the part would stand in or hang over, None where it stands free."""
@@ -183,7 +186,8 @@ class Timer:
                 if total >= best * (1.0 - _WORTH):
                     return [], total, True
                 self.planned += 1
-                cut = self._cuts[keys[k]] = _Cut(cut.bound, (made[k].seconds, " ".join(made[k].limiting).strip()))
+                cut = self._cuts[keys[k]] = _Cut(cut.bound,
+                                                 (made[k].seconds, " ".join(made[k].limiting).strip()))
                 self.unsolved |= set() if made[k].solved else {made[k].one.line}
             assert cut.planned is not None
             total += cut.planned[0] - bounds[k]

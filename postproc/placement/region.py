@@ -112,7 +112,8 @@ class Slabs:
         return [int(k[values[k].argmin()]) for one in np.unique(key) if len(k := np.flatnonzero(key == one))]
 
 
-def region_of(work: PassContext, space: Space, angles: Floats, least: float) -> tuple[Region | None, RefusedPass | None]:
+def region_of(work: PassContext, space: Space, angles: Floats,
+              least: float) -> tuple[Region | None, RefusedPass | None]:
     """The region of a part turned by `angles` (3,), or why there is none.
 
     Args:
@@ -136,7 +137,8 @@ def region_of(work: PassContext, space: Space, angles: Floats, least: float) -> 
 def _unbounded(work: PassContext) -> PassContext:
     """The same work on a machine whose slides never end, with the least safe planes."""
     limits, slides = work.machine.limits, ~np.array(work.machine.rotary)
-    free = replace(limits, lower=np.where(slides, -np.inf, limits.lower), upper=np.where(slides, np.inf, limits.upper))
+    free = replace(limits, lower=np.where(slides, -np.inf, limits.lower),
+                   upper=np.where(slides, np.inf, limits.upper))
     return replace(work, machine=replace(work.machine, limits=free),
                    space=replace(work.space, margin=_MARGIN * work.space.margin))
 

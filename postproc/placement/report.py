@@ -62,7 +62,8 @@ def as_text(choice: PlacementChoice) -> str:
         figures = ((f"{one.seconds:.3f}", f"{one.cutting:.3f}", f"{one.linking:.3f}", "") if math.isfinite(one.seconds)
                    else ("-", "-", "-", str(one.refused or "")))
         rows.append((name, *(f"{round(value, 3) + 0.0:.3f}" for value in (x, y, z, turn / DEG)), *figures))
-    lines = table_text(rows, ("", "x mm", "y mm", "z mm", "turn deg", "seconds", "cuts", "linking", ""), "lrrrrrrrl")
+    lines = table_text(rows, ("", "x mm", "y mm", "z mm", "turn deg", "seconds", "cuts", "linking", ""),
+                       "lrrrrrrrl")
     gain = _gain(choice)
     if math.isfinite(gain):
         lines.append(f"planned time saved: {100.0 * gain:.2f} %")

@@ -40,8 +40,8 @@ class FoundPlaces:
 
     Attributes:
         best: of least time, most travel margin among equals; None where the part can stand nowhere
-        lacks: (turn, tilt_y, tilt_x) with the margin that is missing at best, mm (nan: the attitude cannot be had
-            anywhere), and why, of attitudes without a place
+        lacks: (turn, tilt_y, tilt_x) with the margin that is missing at best, mm (nan: the attitude cannot be
+            had anywhere), and why, of attitudes without a place
     """
 
     now: TimedPlace
@@ -124,7 +124,8 @@ class PlaceSearch:
             return []
         return self._inside(region, centre, angles, low, high)
 
-    def _inside(self, region: Region, centre: Floats, angles: Floats, low: Floats, high: Floats) -> list[Floats]:
+    def _inside(self, region: Region, centre: Floats, angles: Floats, low: Floats,
+                high: Floats) -> list[Floats]:
         """The centre of a region, the present place where it is inside, and some spread over it."""
         from scipy.stats import qmc
 

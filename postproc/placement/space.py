@@ -125,8 +125,8 @@ class Space:
         return BeyondTable(worst, "xyz"[int(over.max(axis=0).argmax())])
 
     def room(self, angles: Floats) -> tuple[Floats, Floats]:
-        """Least and greatest x, y, z (3,) of a part turned by `angles` (3,) so that it stays on its table; low > high
-        where it does not fit."""
+        """Least and greatest x, y, z (3,) of a part turned by `angles` (3,) so that it stays on its table;
+        low > high where it does not fit."""
         low = np.array([min(one.values) if one.values else one.low for one in self.dims[:ANGLES]])
         high = np.array([max(one.values) if one.values else one.high for one in self.dims[:ANGLES]])
         if self.table is None:

@@ -1,8 +1,9 @@
 """The path that the machine is planned to take: a joint-space spline along a smoothed path, its deviation bounded.
 
-The joints of the smoothed tip and axis are exact at the sites, and a quintic spline through them is what is planned, so
-that its derivatives are exact to every order. Between sites it is compared with the smoothed path in the part frame,
-and sites are added where it is off by more than a small share of the tolerance. Serial and parallel machines alike.
+The joints of the smoothed tip and axis are exact at the sites, and a quintic spline through them is what is
+planned, so that its derivatives are exact to every order. Between sites it is compared with the smoothed path
+in the part frame, and sites are added where it is off by more than a small share of the tolerance. Serial and
+parallel machines alike.
 """
 
 from __future__ import annotations
@@ -115,8 +116,8 @@ class PathStretch:
 
 
 def machine_paths(stretches: list[PathStretch], kin: Kinematics) -> list[MachinePath | str]:
-    """The joints' spline of each, without a stop between its ends; what is wrong where the machine has no solution, with the
-    s of the first such place. Many short ones are solved together."""
+    """The joints' spline of each, without a stop between its ends; what is wrong where the machine has no
+    solution, with the s of the first such place. Many short ones are solved together."""
     result: list[MachinePath | str] = [""] * len(stretches)
     at = {i: sites(one.path, one.first, one.last) for i, one in enumerate(stretches)}
     for turn in range(ROUNDS + 1):

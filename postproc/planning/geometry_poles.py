@@ -1,9 +1,9 @@
 """Rotary joints of a planned path where it passes near a singular direction.
 
-Where the tool lies nearly along a rotary axis, deviations of its direction far inside the tolerance turn that axis by any
-angle, so that joints solved from a smoothed direction are noise there. Inside such a zone the rotary joints are those of a
-spline through the joints before and behind it; the slides keep the tip. Where the tool axis would leave the tolerance by
-that (the rotary axis really has to swing), the solved joints stay.
+Where the tool lies nearly along a rotary axis, deviations of its direction far inside the tolerance turn that
+axis by any angle, so that joints solved from a smoothed direction are noise there. Inside such a zone the
+rotary joints are those of a spline through the joints before and behind it; the slides keep the tip. Where
+the tool axis would leave the tolerance by that (the rotary axis really has to swing), the solved joints stay.
 """
 
 from __future__ import annotations

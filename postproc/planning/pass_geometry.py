@@ -152,7 +152,8 @@ def _written(path: JointPath, block: Ints, reference: Curves, kin: Kinematics) -
     axis0 = np.concatenate((first if aside_first[0] else own.axis0[:1], axis[rows[:-1]]))
     begin = np.concatenate(([0.0], np.where(u[rows[:-1]] < 1.0, u[rows[:-1]], 0.0)))
     whole = ~led[rows]
-    curves = Curves(start, tip[rows], axis0, axis[rows], own.is_arc & whole, own.center, own.normal, own.sweep)
+    curves = Curves(start, tip[rows], axis0, axis[rows], own.is_arc & whole, own.center,
+                    own.normal, own.sweep)
     return _Written(block, curves, move[rows], u[rows] - begin, curve, np.where(led, 1.0, u))
 
 

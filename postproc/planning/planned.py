@@ -43,7 +43,8 @@ def tool_limits(tool: ToolSetup | None) -> ToolLimits | None:
     """What the planner needs of a tool of the set-up; None where it has no limit."""
     if tool is None or not tool.limited:
         return None
-    return ToolLimits((tool.axis_rate or np.inf) * DEG, tool.tip_acceleration or np.inf, tool.tip_jerk or np.inf)
+    return ToolLimits((tool.axis_rate or np.inf) * DEG, tool.tip_acceleration or np.inf,
+                      tool.tip_jerk or np.inf)
 
 
 @dataclass(frozen=True)
@@ -159,9 +160,9 @@ class PlannedMotion:
 @dataclass(frozen=True)
 @arrays(stops="S")
 class Source:
-    """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it stops, how
-    geometric errors are corrected, where they are, the feed override (1 for 100 %) at which the motion is planned, and
-    limits by index of the tool."""
+    """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it
+    stops, how geometric errors are corrected, where they are, the feed override (1 for 100 %) at which the
+    motion is planned, and limits by index of the tool."""
 
     path: JointPath
     moves: Moves
@@ -200,7 +201,8 @@ def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnosti
     return PlannedMotion(source, steady_seconds([(one, source.bounds_of(one)) for one in stopping], len(source.path))), []
 
 
-def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits, options: PlannerOptions | None = None) -> Plan:
+def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits,
+              options: PlannerOptions | None = None) -> Plan:
     """The motion of least time along a pass, from rest to rest, stopping where its geometry does.
 
     Of second order where the machine states no jerk for some axis.

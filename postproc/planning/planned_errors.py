@@ -32,8 +32,8 @@ class PlannedCorrection:
     """How a conversion corrects its path.
 
     Attributes:
-        errors: the machine's; axes that lose motion count by the mean of both directions: what they take up where they turn
-            back is no part of the plan
+        errors: the machine's; axes that lose motion count by the mean of both directions: what they take up
+            where they turn back is no part of the plan
         corrected: the path; owner (K,): the block of the nominal path that each of its blocks is of
         axis_tolerance: rad
     """

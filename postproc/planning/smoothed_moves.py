@@ -1,7 +1,8 @@
 """`--smooth`: CL points moved onto smooth curves within a share of the tolerance; corners, arcs and ends stay.
 
-A program is compared with the CL file point by point. Where points are nearer together than smoothing moves them, a moved
-point could pass for its neighbour; there they are moved less, or not at all, so that each keeps its place in the order.
+A program is compared with the CL file point by point. Where points are nearer together than smoothing moves
+them, a moved point could pass for its neighbour; there they are moved less, or not at all, so that each keeps
+its place in the order.
 """
 
 from __future__ import annotations
@@ -47,8 +48,8 @@ def smoothed_moves(moves: Moves, tolerance: Tolerance, stops: Ints, grain: Toler
                    left: Collection[tuple[int, int]] = ()) -> Smoothed:
     """The same moves, points of dense straight moves at most `tolerance` off where they were.
 
-    Chords between moved points stay within the same tolerance of the chords they replace. Points between other moves
-    (long lines, arcs, corners) and points before which the motion stops (`stops`, rows) are not moved.
+    Chords between moved points stay within the same tolerance of the chords they replace. Points between
+    other moves (long lines, arcs, corners) and points before which the motion stops (`stops`, rows) are not moved.
 
     Args:
         grain: mm, rad by which a written point must be nearer to its own CL point than to the one before or behind
@@ -112,8 +113,8 @@ def _with_repeated(bad: Bools, repeated: Bools) -> Bools:
 
 
 def _in_order(moves: Moves, tip: Floats, axis: Floats, grain: Tolerance) -> Bools:
-    """(M - 1,) True where two neighbouring points (M, 3) are each nearer to their own point of `moves` than the other, by
-    tip or by axis, and their chord is not much shorter."""
+    """(M - 1,) True where two neighbouring points (M, 3) are each nearer to their own point of `moves` than
+    the other, by tip or by axis, and their chord is not much shorter."""
     apart = np.zeros(len(moves) - 1, dtype=np.bool_)
     for now, given, least in ((tip, moves.tip, grain.tip), (axis, moves.axis, grain.axis)):
         own = np.linalg.norm(now - given, axis=1)

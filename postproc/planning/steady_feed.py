@@ -1,5 +1,5 @@
-"""The highest constant speed of each block at which no axis exceeds velocity, acceleration or jerk anywhere in it, nor the
-tool the limits that the set-up gives it.
+"""The highest constant speed of each block at which no axis exceeds velocity, acceleration or jerk anywhere
+in it, nor the tool the limits that the set-up gives it.
 
 At a constant rate v of the path parameter the joints move with q' v, q'' v^2 and q''' v^3. The passes must stop at corners
 (`CORNER`): there no feed of a block keeps the limits, and the control slows down by itself.
@@ -44,8 +44,8 @@ def steady_speed(one: PassGeometry, limits: JointLimits) -> Floats:
 
 
 def span_speed(path: MachinePath, limits: JointLimits) -> Floats:
-    """(S,) largest constant ds/dt on each span between knots, from below: derivatives stay within the hull of their
-    B-spline coefficients (de Boor, A Practical Guide to Splines, XI)."""
+    """(S,) largest constant ds/dt on each span between knots, from below: derivatives stay within the hull of
+    their B-spline coefficients (de Boor, A Practical Guide to Splines, XI)."""
     speed = np.full(len(path.s) - DEGREE, np.inf)
     orders = _hulls(path.fitted.t, path.fitted.c, len(speed))
     for order, (limit, hull) in enumerate(zip((limits.velocity, limits.acceleration, limits.jerk), orders, strict=True), 1):

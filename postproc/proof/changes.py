@@ -44,12 +44,13 @@ def proof_place(gcode: Path) -> Path:
     return gcode.with_name(gcode.name + ENDING)
 
 
-def compared(result: VerifyResult, inputs: dict[ProofInput, Hashes], proof: str) -> tuple[Kept | None, list[Diagnostic]]:
+def compared(result: VerifyResult, inputs: dict[ProofInput, Hashes],
+             proof: str) -> tuple[Kept | None, list[Diagnostic]]:
     """What has changed since the proof of a program was written, warned where the program is right all the same.
 
     Args:
-        proof: the file that was named; "": the one next to the program, where there is one. A damaged one is an error, or
-            a warning where it was not named.
+        proof: the file that was named; "": the one next to the program, where there is one. A damaged one is
+            an error, or a warning where it was not named.
     """
     file = Path(proof) if proof else proof_place(Path(result.gcode))
     if not proof and (result.gcode in STANDARD_INPUT or not is_regular(file)):

@@ -23,8 +23,8 @@ def hashed(machine: str, controller: str, options: Options) -> dict[ProofInput, 
 
 def kept(result: PostResult, machine: str, controller: str, wanted: bool, known: dict[ProofInput, Hashes] | None,
          output: Path) -> tuple[dict[Path, str], list[Diagnostic]]:
-    """The proof file by its place, where one is `wanted` (`known`: the hashes before the files were read); else a warning
-    where that of an older program stands there.
+    """The proof file by its place, where one is `wanted` (`known`: the hashes before the files were read);
+    else a warning where that of an older program stands there.
 
     Raises:
         DiagnosticError: where an input was changed while it was converted.

@@ -13,9 +13,10 @@ _APT = 7
 def ball_radius(tool: Tool | None) -> float | None:
     """Radius of a ball-end mill in mm; 0 for cutters that are known to be of another form, None where the file does not say.
 
-    A cutter with corner radius D/2 is a ball; one with a smaller corner radius has a flat end, and turning it moves the
-    contact. Where the file gives all seven parameters of APT (CUTTER/d, r, e, f, a, b, h), e and f decide, the place of the
-    corner's centre next to the axis and above the tip: the diameter of a tapered ball is not twice its radius.
+    A cutter with corner radius D/2 is a ball; one with a smaller corner radius has a flat end, and turning it
+    moves the contact. Where the file gives all seven parameters of APT (CUTTER/d, r, e, f, a, b, h), e and f
+    decide, the place of the corner's centre next to the axis and above the tip: the diameter of a tapered
+    ball is not twice its radius.
     """
     if tool is None or tool.diameter is None:
         return None

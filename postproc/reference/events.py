@@ -83,8 +83,8 @@ def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
 
 
 def stops_between(toolpath: Toolpath) -> list[ToolChange]:
-    """The tool changes, but for the first, before which the file itself does not stop since the last cut: where
-    `stop_between_tools` does."""
+    """The tool changes, but for the first, before which the file itself does not stop since the last cut:
+    where `stop_between_tools` does."""
     changes = tool_changes(toolpath)[1:]
     stops = sorted((e.index, e.line) for e in toolpath.events if e.word in ("STOP", "OPSTOP"))
     cuts = np.flatnonzero(cutting(toolpath))
@@ -101,8 +101,8 @@ def register_changes(toolpath: Toolpath) -> list[ToolChange]:
 
 @dataclass(frozen=True)
 class Spindle:
-    """State of the spindle: `rpm` NaN where none is known; direction -1 anti-clockwise, 0 off, 1 clockwise; `last` of
-    the two that turn."""
+    """State of the spindle: `rpm` NaN where none is known; direction -1 anti-clockwise, 0 off, 1 clockwise;
+    `last` of the two that turn."""
 
     rpm: float = math.nan
     direction: int = 0

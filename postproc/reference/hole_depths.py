@@ -14,8 +14,8 @@ _SAME = 1e-9
 
 
 def unfit_holes(toolpath: Toolpath, controller: ControllerFile) -> list[Diagnostic]:
-    """Cycles with holes that have no depth in the words of the controller, whose planes are in the wrong order, or whose
-    pecks are nothing; all by the line of the CYCLE record."""
+    """Cycles with holes that have no depth in the words of the controller, whose planes are in the wrong
+    order, or whose pecks are nothing; all by the line of the CYCLE record."""
     used = [toolpath.cycles[int(k)] for k in np.unique(toolpath.cycle[toolpath.cycle >= 0])]
     if not used:
         return []

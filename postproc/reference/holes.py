@@ -50,8 +50,8 @@ def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initia
     """Above the hole at the level the tool is at (never below the clearance plane), down, drill, out.
 
     Without a known level (`before` None: a linking move leads here) the tool comes straight to the clearance plane
-    and AUTO retracts to it. A tap stops on its path down at the retract level that it names: controls come back to the
-    level that a cycle begins from.
+    and AUTO retracts to it. A tap stops on its path down at the retract level that it names: controls come
+    back to the level that a cycle begins from.
     """
     height = float(axis @ top)
     plane = height + cycle.clearance

@@ -1,5 +1,5 @@
-"""Registers of length (ADJUST, OSETNO of LOADTL) and radius (CUTCOM): by a rule of the shop where the file names none, and
-on controls whose tools bring their lengths along."""
+"""Registers of length (ADJUST, OSETNO of LOADTL) and radius (CUTCOM): by a rule of the shop where the file
+names none, and on controls whose tools bring their lengths along."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ EDGES = range(1, 10)
 
 
 def by_rule(toolpath: Toolpath, controller: ControllerFile, length: int, radius: int | None) -> Toolpath:
-    """The path whose records name registers by the rules of the shop, H = T + `length`, D = T + `radius`, where the file
-    names none, or the tool's number, as CAM systems do by themselves; where the controller's codes have none, nothing is
-    named."""
+    """The path whose records name registers by the rules of the shop, H = T + `length`, D = T + `radius`,
+    where the file names none, or the tool's number, as CAM systems do by themselves; where the controller's
+    codes have none, nothing is named."""
     codes = controller.codes
     cutcom = radius is not None and "{register}" in codes.compensation_left
     lengths = bool(length) and "{register}" in codes.length_offset
@@ -41,8 +41,8 @@ def by_rule(toolpath: Toolpath, controller: ControllerFile, length: int, radius:
 def own_registers(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolpath, list[Diagnostic]]:
     """The path without length registers where the controller has none, and what is then written.
 
-    Refused is what may mean another length than the tool's own: two registers of one tool, and 2 to 9 where the number may
-    be that of a cutting edge.
+    Refused is what may mean another length than the tool's own: two registers of one tool, and 2 to 9 where
+    the number may be that of a cutting edge.
     """
     text = controller.codes.length_offset
     if "{register}" in text:

@@ -90,7 +90,8 @@ class Moves:
         """The reference motion of every row, or of some; linked rows stand still at their end."""
         ends = np.arange(len(self))[rows]
         first = np.where(self.link[rows], ends, np.maximum(ends - 1, 0))
-        return Curves(self.tip[first], self.tip[rows], taken(self.axis, first), taken(self.axis, rows), *self._arcs_of(rows))
+        return Curves(self.tip[first], self.tip[rows], taken(self.axis, first), taken(self.axis, rows),
+                      *self._arcs_of(rows))
 
     def lengths(self) -> Floats:
         """(M,) mm that the tip goes in every row."""
@@ -104,7 +105,8 @@ class Moves:
     def run(self, first: int, last: int) -> Curves:
         """Those of the rows behind `first` to before `last`, none of them linked, without a copy of tips and axes."""
         ends, starts = slice(first + 1, last), slice(first, last - 1)
-        return Curves(self.tip[starts], self.tip[ends], self.axis[starts], self.axis[ends], *self._arcs_of(ends))
+        return Curves(self.tip[starts], self.tip[ends], self.axis[starts], self.axis[ends],
+                      *self._arcs_of(ends))
 
     def _arcs_of(self, rows: Ints | slice) -> tuple[Bools, Floats, Floats, Floats]:
         """(is_arc, center, normal, sweep) of `Curves`."""
@@ -128,10 +130,11 @@ def _spin_in(placement: Placement, axis: Floats, spin: Floats) -> Floats:
 def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bools:
     """Rows (N,) that are reached by a linking move.
 
-    The first motion, the first after a tool change, a bare GOHOME or a FROM elsewhere, the first of an operation whose
-    tool axis differs from the last one's by more than `axis_tolerance` (rad), rapids that turn the axis by more than the
-    set-up's link_angle, rapids from or to where the tool is held about its axis, and the first of an operation that begins
-    again (`begins_again`). Where such a row cuts, `build_moves` puts a linked row before it.
+    The first motion, the first after a tool change, a bare GOHOME or a FROM elsewhere, the first of an
+    operation whose tool axis differs from the last one's by more than `axis_tolerance` (rad), rapids that
+    turn the axis by more than the set-up's link_angle, rapids from or to where the tool is held about its
+    axis, and the first of an operation that begins again (`begins_again`). Where such a row cuts,
+    `build_moves` puts a linked row before it.
     """
     n = len(toolpath)
     link = np.zeros(n, dtype=bool)
@@ -167,8 +170,8 @@ def _spins_again(toolpath: Toolpath, moving: Ints) -> Bools:
 
 
 def begins_again(toolpath: Toolpath, setup: SetupFile) -> Bools:
-    """(operations,) True where an operation is reached from the safe planes, whatever its axis: where it can be a restart
-    point, and where the set-up gives it, or the one before it, an output mode of its own."""
+    """(operations,) True where an operation is reached from the safe planes, whatever its axis: where it can
+    be a restart point, and where the set-up gives it, or the one before it, an output mode of its own."""
     own = np.array([op.name in setup.output.operations for op in toolpath.operations])
     return np.asarray(own | np.concatenate([[False], own[:-1]]) | setup.output.apart)
 
@@ -192,7 +195,8 @@ def _begins(toolpath: Toolpath, link: Bools) -> Ints:
     return result
 
 
-def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> tuple[Moves, list[Diagnostic]]:
+def build_moves(toolpath: Toolpath, setup: SetupFile,
+                axis_tolerance: float) -> tuple[Moves, list[Diagnostic]]:
     """The reference moves of a Toolpath, in the part frame."""
     link = link_rows(toolpath, setup, axis_tolerance)
     feed, seconds, diagnostics = feeds_of(toolpath, setup.output.feed)

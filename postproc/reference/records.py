@@ -137,7 +137,8 @@ def _is_switch(letter: str, value: float, switches: Switches) -> bool:
     return letter == "S" or (letter, value) in (("M", 3.0), ("M", 4.0)) or (letter, value) in switches
 
 
-def _switches(event: Event, said: list[tuple[str, float]], spindle: Spindle, switches: Switches) -> list[Event] | None:
+def _switches(event: Event, said: list[tuple[str, float]], spindle: Spindle,
+              switches: Switches) -> list[Event] | None:
     """Records for the words of a block that only switches; None where it does more, none for S alone at a standstill."""
     if not all(_is_switch(letter, value, switches) for letter, value in said):
         return None
@@ -189,7 +190,8 @@ def _check_spindle(event: Event, report: Report) -> None:
             report(Severity.ERROR, "spindle.word", f"SPINDL: {word} cannot be carried out", event.line,
                    "allowed: SPINDL/RPM,n,CLW or CCLW, ON, OFF")
     if {"NEUTRL", "NEUTRAL"} & said:
-        report(Severity.WARNING, "spindle.neutral", "SPINDL/NEUTRL is written as a stop of the spindle", event.line, "")
+        report(Severity.WARNING, "spindle.neutral", "SPINDL/NEUTRL is written as a stop of the spindle",
+               event.line, "")
     speed = speed_said(event)
     if {"SFM", "SMM"} & said:
         report(Severity.ERROR, "spindle.surface_speed", "the spindle speed is given as a cutting speed", event.line,
@@ -208,15 +210,17 @@ def _check_spindle(event: Event, report: Report) -> None:
 def _check_delay(event: Event, spindle: Spindle, report: Report) -> None:
     value = next(iter(numbers(event)), 0.0)
     if value < 0.0 or not math.isfinite(value):
-        report(Severity.ERROR, "delay.value", f"DELAY: the time is {value:g}", event.line, "seconds, 0 or more")
+        report(Severity.ERROR, "delay.value", f"DELAY: the time is {value:g}", event.line,
+               "seconds, 0 or more")
     elif "REV" in words(event) and not (spindle.direction and spindle.rpm > 0.0):
         report(Severity.ERROR, "delay.revolutions", "DELAY in revolutions while the spindle stands or its speed is unknown",
                event.line, "state seconds, or the speed before it (SPINDL/RPM,n,CLW)")
 
 
 def _check_retract(event: Event, away: int, rows: int, report: Report) -> None:
-    """RETRCT moves the tool to the clearance plane before the next motion, which would else go straight through the part,
-    unless the program ends or the tool goes home at the same place (line `away`). ON and OFF move nothing."""
+    """RETRCT moves the tool to the clearance plane before the next motion, which would else go straight
+    through the part, unless the program ends or the tool goes home at the same place (line `away`). ON and
+    OFF move nothing."""
     if not {"ON", "OFF"} & set(words(event)) and event.index < rows and away < event.line:
         report(Severity.ERROR, "retract.motion", "RETRCT moves the tool to a clearance plane before the next point: this "
                "is not carried out", event.line, "have the CAM system write the retract as a point (GOTO or GODLTA)")
@@ -231,7 +235,8 @@ def _check_coolant(event: Event, controller: ControllerFile, report: Report) -> 
                f"{LABELS[COMMANDS[got]]} is written", event.line, f"set codes.{key} in the controller file")
     for word in said if got in COMMANDS else ():
         if word not in _COOLANT:
-            report(Severity.WARNING, "coolant.word", f"COOLNT/{word} is written as {LABELS[COMMANDS[got]]}", event.line, "")
+            report(Severity.WARNING, "coolant.word", f"COOLNT/{word} is written as {LABELS[COMMANDS[got]]}",
+                   event.line, "")
 
 
 def _check_compensation(event: Event, report: Report) -> None:

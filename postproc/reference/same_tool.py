@@ -10,7 +10,8 @@ _SAME = 1e-6
 
 def differ(a: Tool, b: Tool) -> bool:
     """True where a text or size of the cutting edge that both state is not the same."""
-    pairs = ((a.diameter, b.diameter), (a.corner_radius, b.corner_radius), (a.tip_angle, b.tip_angle), (a.taper, b.taper))
+    pairs = ((a.diameter, b.diameter), (a.corner_radius, b.corner_radius), (a.tip_angle, b.tip_angle),
+             (a.taper, b.taper))
     stated = [abs(x - y) > _SAME for x, y in pairs if x is not None and y is not None]
     names = a.name and b.name and a.name.upper() != b.name.upper() and not stated
     shapes = a.shape and b.shape and a.shape != b.shape

@@ -24,8 +24,8 @@ _DRY: tuple[str | float, ...] = ("OFF",)
 
 @dataclass(frozen=True)
 class Use:
-    """A tool from where it is loaded to the next change: rows `first` to `last`, events `begin` to `end` (both one past);
-    `at` is the event behind which its records belong, `line` that of its load."""
+    """A tool from where it is loaded to the next change: rows `first` to `last`, events `begin` to `end`
+    (both one past); `at` is the event behind which its records belong, `line` that of its load."""
 
     number: int
     first: int
@@ -41,12 +41,13 @@ Stated = dict[tuple[int, str], list[int]]
 
 
 def with_defaults(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, Stated]:
-    """The path with SPINDL and COOLNT of the set-up where a tool has none of its own, behind the record that loads it; and
-    what the set-up states so.
+    """The path with SPINDL and COOLNT of the set-up where a tool has none of its own, behind the record that
+    loads it; and what the set-up states so.
 
-    A record states it for a tool where it stands between the tool's load and the next one; a start that stands right before
-    the load, without a motion between, is the tool's too. `[tools.N]` comes before what the records of the tool before have
-    left in force, `[output]` behind it; what the set-up states for one tool is never in force for the next.
+    A record states it for a tool where it stands between the tool's load and the next one; a start that
+    stands right before the load, without a motion between, is the tool's too. `[tools.N]` comes before what
+    the records of the tool before have left in force, `[output]` behind it; what the set-up states for one
+    tool is never in force for the next.
     """
     new: list[tuple[int, Event]] = []
     toolpath, stated = _with_speeds(toolpath, setup)
@@ -108,8 +109,8 @@ def _said(word: str, here: tuple[Event, ...], first: int) -> bool:
 
 
 def _with_speeds(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, Stated]:
-    """The path with the set-up's speed in records that state 0 rev/min, as CAM systems write where nobody has entered one;
-    the direction is the record's, where it says one."""
+    """The path with the set-up's speed in records that state 0 rev/min, as CAM systems write where nobody has
+    entered one; the direction is the record's, where it says one."""
     if not any(e.word == "SPINDL" and speed_said(e) == 0.0 for e in toolpath.events):
         return toolpath, {}
     result, stated = list(toolpath.events), Stated()
@@ -135,8 +136,8 @@ def stated_by_setup(toolpath: Toolpath, stated: Stated) -> list[Diagnostic]:
 
 def _spindle_of(here: tuple[Event, ...], first: int, before: Spindle, own: ToolSetup,
                 setup: SetupFile) -> SpindleSetup | None:
-    """What the set-up gives a tool with the records `here`, the first cut of which is row `first`; None where the file says
-    enough."""
+    """What the set-up gives a tool with the records `here`, the first cut of which is row `first`; None where
+    the file says enough."""
     said = [e for e in here if e.word == "SPINDL" and e.index <= first]
     turns, speed = before.direction != 0, before.rpm
     for event in said:

@@ -15,12 +15,13 @@ from toolpaths.toolpath import Kind, Role, Toolpath
 def cut_operations(toolpath: Toolpath, longest: int) -> tuple[Toolpath, list[Diagnostic]]:
     """The path with operations of more than `longest` rows in several of the same name; 0 leaves it as it is.
 
-    A part begins at the last rapid that keeps the one before it within the length. No cut is made under cutter
-    compensation or where a switch may leave blocks out; what can then not be kept within the length is named.
+    A part begins at the last rapid that keeps the one before it within the length. No cut is made under
+    cutter compensation or where a switch may leave blocks out; what can then not be kept within the length is named.
     """
     if longest <= 0 or not len(toolpath):
         return toolpath, []
-    begins, too_long = _begins(_run_starts(toolpath), np.flatnonzero(_may_cut(toolpath)), len(toolpath), longest)
+    begins, too_long = _begins(_run_starts(toolpath), np.flatnonzero(_may_cut(toolpath)),
+                               len(toolpath), longest)
     found = [] if not too_long else [warning(
         "output.longest", f"a part of the program has more than {longest} points: there is no rapid to cut it at",
         file=toolpath.file, lines=toolpath.line[too_long][:6].tolist(), count=len(too_long),

@@ -12,8 +12,8 @@ from toolpaths.units import PER_MINUTE
 
 
 def feeds_of(toolpath: Toolpath, default: float | None) -> tuple[Floats, Floats, list[Diagnostic]]:
-    """(mm/s, seconds of inverse-time rows, diagnostics) per row; holes take the feed of their cycle, rows for which the
-    file states none `default` (mm/min)."""
+    """(mm/s, seconds of inverse-time rows, diagnostics) per row; holes take the feed of their cycle, rows for
+    which the file states none `default` (mm/min)."""
     feed, mode = _stated_feeds(toolpath)
     cutting = _cutting(toolpath)
     feed[~cutting] = np.nan

@@ -25,8 +25,8 @@ def named_by(tool: Tool) -> str:
 
 
 def with_tools(toolpath: Toolpath) -> Toolpath:
-    """The path with a tool in every row: rapids before the first load are made with the tool that it loads; what cuts
-    without any gets an unnamed one, which the set-up can number."""
+    """The path with a tool in every row: rapids before the first load are made with the tool that it loads;
+    what cuts without any gets an unnamed one, which the set-up can number."""
     if not len(toolpath):
         return toolpath
     number = _numbers(toolpath)
@@ -39,12 +39,13 @@ def with_tools(toolpath: Toolpath) -> Toolpath:
         tool[:known] = np.where(number[:known] > 0, tool[:known], tool[known])
     if not (tool < 0).any():
         return replace(toolpath, tool=tool)
-    return replace(toolpath, tool=np.where(tool < 0, len(toolpath.tools), tool), tools=(*toolpath.tools, Tool(0)))
+    return replace(toolpath, tool=np.where(tool < 0, len(toolpath.tools), tool),
+                   tools=(*toolpath.tools, Tool(0)))
 
 
 def with_loads(toolpath: Toolpath) -> tuple[Toolpath, list[Diagnostic]]:
-    """The path with LOADTL where its rows begin with a tool that has a number and that no record has loaded by then: at the
-    beginning of the file, and in files without any such record at every change."""
+    """The path with LOADTL where its rows begin with a tool that has a number and that no record has loaded
+    by then: at the beginning of the file, and in files without any such record at every change."""
     events, number = toolpath.events, _numbers(toolpath)
     loads = [e for e in events if e.word in TOOL_WORDS and numbers(e)]
     if not len(toolpath) or (loads and loads[0].index == 0):

@@ -32,7 +32,8 @@ def residual_figure(field: Residuals, title: str, ending: FigureEnding) -> bytes
 
 def _fill(sheet: Figure, field: Residuals) -> None:
     places = sheet.subplots(2, 2, width_ratios=(1.4, 1.0))
-    rows = ((slice(0, 3), UM, "tip, um", field.tip_bound), (slice(3, 6), ARCSEC, "axis, arcsec", field.axis_bound))
+    rows = ((slice(0, 3), UM, "tip, um", field.tip_bound),
+            (slice(3, 6), ARCSEC, "axis, arcsec", field.axis_bound))
     for (course, there), (part, unit, name, bound) in zip(places, rows, strict=True):
         before, after = (np.linalg.norm(x[:, part], axis=1) / unit for x in (field.before, field.after))
         _course(course, before, after, bound / unit, name)
@@ -67,12 +68,14 @@ def _worst(values: Floats) -> tuple[Ints, Floats]:
     return edges, np.maximum.reduceat(values, edges) if len(edges) else values
 
 
-def _map(sheet: Figure, place: Any, field: Residuals, what: Floats, part: slice, unit: float, name: str) -> None:
+def _map(sheet: Figure, place: Any, field: Residuals, what: Floats, part: slice, unit: float,
+         name: str) -> None:
     """The field over the two widest directions of the part, with arrows along them."""
     across, up = sorted(np.argsort(-np.ptp(field.tip, axis=0), kind="stable")[:2].tolist()) if len(field.tip) else (0, 1)
     rows = _spread(len(field.tip), _DOTS)
     size = np.linalg.norm(what[rows][:, part], axis=1) / unit
-    dots = place.scatter(field.tip[rows, across], field.tip[rows, up], c=size, s=6, cmap="viridis", rasterized=True)
+    dots = place.scatter(field.tip[rows, across], field.tip[rows, up], c=size, s=6, cmap="viridis",
+                         rasterized=True)
     sheet.colorbar(dots, ax=place, label=name)
     rows = _spread(len(field.tip), _ARROWS)
     arrows = what[rows][:, part] / unit

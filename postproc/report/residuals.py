@@ -29,8 +29,8 @@ class Residuals:
     Attributes:
         line: (M,) of the CL file; tip, axis: (M, 3) wanted, mm
         q: (M, J) nominal joints, mm and rad
-        before, after: (M, 6) tip and axis of the machine with errors less wanted ones, mm and 1: commanded nominal joints,
-            and commanded the program as it was read back
+        before, after: (M, 6) tip and axis of the machine with errors less wanted ones, mm and 1: commanded
+            nominal joints, and commanded the program as it was read back
         tip_bound, axis_bound: what may be left, mm and rad (see `after_formatting`)
     """
 

@@ -26,12 +26,12 @@ SetupVector = Annotated[tuple[float, float, float], Field(description="x, y, z")
 
 
 class PartPlacement(UserModel):
-    """Where the part frame (the absolute frame of the CL file), or a system of the file, stands on the table, all axes at
-    zero."""
+    """Where the part frame (the absolute frame of the CL file), or a system of the file, stands on the table,
+    all axes at zero."""
 
     system: bool | Annotated[str, Field(min_length=1)] = False
-    """true: origin, x_axis and y_axis are those of the system that is the work offset; a name: of that system of the CL file
-    (see inspect); false: of the file's absolute frame"""
+    """true: origin, x_axis and y_axis are those of the system that is the work offset; a name: of that system
+    of the CL file (see inspect); false: of the file's absolute frame"""
     origin: SetupVector = (0.0, 0.0, 0.0)
     """its origin in the table frame, mm"""
     x_axis: SetupVector = (1.0, 0.0, 0.0)
@@ -87,8 +87,8 @@ class OutputSettings(UserModel):
     """What the words of the program mean, and how it is divided."""
 
     default: OutputMode = "auto"
-    """axes: machine coordinates; tcp: tool-centre-point control; tilted: the tip in a tilted work plane, rotary axes
-    standing still; auto: the best that controller and machine can. --output-mode goes before it"""
+    """axes: machine coordinates; tcp: tool-centre-point control; tilted: the tip in a tilted work plane,
+    rotary axes standing still; auto: the best that controller and machine can. --output-mode goes before it"""
     operations: dict[str, OutputMode] = Field(default_factory=dict)
     """by name of the operation"""
     restart: bool = False
@@ -106,18 +106,18 @@ class OutputSettings(UserModel):
     coolant: CoolantKind | None = None
     """of tools for which neither the CL file (COOLNT) nor [tools.N] states one; default: off"""
     tool_call: bool = True
-    """false: the program calls no tool and no length: the one tool of the file stands in the spindle already and its length
-    is measured into the work offset. [tools.N] gauge_length (N = 0 for a tool without a number) is then part of the work
-    offset that the header names"""
+    """false: the program calls no tool and no length: the one tool of the file stands in the spindle already
+    and its length is measured into the work offset. [tools.N] gauge_length (N = 0 for a tool without a
+    number) is then part of the work offset that the header names"""
 
     program_number: int | None = Field(default=None, ge=1, le=9999)
     """of the program on controls that number them (O1234); default: that of the controller file"""
     program_name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,24}$")] | None = None
-    """of the program on controls that name them (BEGIN PGM NAME MM) and of its subprograms; default: that of the output
-    file"""
+    """of the program on controls that name them (BEGIN PGM NAME MM) and of its subprograms; default: that of
+    the output file"""
     stop_between_tools: bool = False
-    """an optional stop (M1) before every tool change but the first, spindle and coolant off; where the CL file stops there
-    itself, none besides"""
+    """an optional stop (M1) before every tool change but the first, spindle and coolant off; where the CL
+    file stops there itself, none besides"""
 
     @property
     def apart(self) -> bool:
@@ -175,8 +175,8 @@ class SetupFile(UserModel):
     work_offset: str = ""
     """name of the system of the CL file that is the work offset; default: its first"""
     work_offset_code: str = Field(default="G54", pattern=r"^(G[0-9]+(\.[0-9])?( P[0-9]+)?|preset [0-9]+)$")
-    """register of the control that holds it: G54 to G59, G59.1 to G59.3 where the control has them, or a further one by the
-    control's own name, as "G54.1 P12" (Fanuc), "G154 P40" (Haas), "G520" (Siemens), "preset 12" (TNC)"""
+    """register of the control that holds it: G54 to G59, G59.1 to G59.3 where the control has them, or a
+    further one by the control's own name, as "G54.1 P12" (Fanuc), "G154 P40" (Haas), "G520" (Siemens), "preset 12" (TNC)"""
     part: PartPlacement = PartPlacement()
     placement: PlacementLimits = PlacementLimits()
     clearance: LinkClearance = LinkClearance()
@@ -184,8 +184,9 @@ class SetupFile(UserModel):
     """by tool number without leading zeros, e.g. [tools.1]"""
     tool_numbers: dict[Annotated[str, Field(min_length=1)], Annotated[int, Field(ge=1, lt=10**9)]] = Field(
         default_factory=dict)
-    """by name of the tool in the CL file (see inspect), e.g. [tool_numbers] "EM12" = 2: its number, whatever the file loads
-    it by, and where it loads none; lengths in [tools.2] are then its. "unnamed" is a tool without name and number"""
+    """by name of the tool in the CL file (see inspect), e.g. [tool_numbers] "EM12" = 2: its number, whatever
+    the file loads it by, and where it loads none; lengths in [tools.2] are then its. "unnamed" is a tool
+    without name and number"""
     output: OutputSettings = OutputSettings()
     control_pivots: dict[Annotated[str, Field(pattern="^[ABC]$")], Pivot] = Field(default_factory=dict)
     """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""
@@ -240,8 +241,8 @@ def load_setup(path: str | Path | None) -> tuple[SetupFile | None, list[Diagnost
 def part_placement(setup: SetupFile, file: str = "") -> tuple[Placement | None, list[Diagnostic]]:
     """T_table_part of a set-up; its two directions must be square to each other within 1e-6.
 
-    Where `part.system` names a system it takes that one's coordinates to the table, until `setup_system.standing` has put
-    the absolute frame in its place.
+    Where `part.system` names a system it takes that one's coordinates to the table, until
+    `setup_system.standing` has put the absolute frame in its place.
     """
     x, y = np.array(setup.part.x_axis), np.array(setup.part.y_axis)
     if not np.linalg.norm(x) > 0.0 or not np.linalg.norm(y) > 0.0:

@@ -24,16 +24,16 @@ AngleRange = Annotated[tuple[LimitAngle, LimitAngle], BeforeValidator(pair), Aft
 class OrientationLimits(UserModel):
     """Tool axes that a re-oriented pass may take, at every point of it; --max-tilt holds besides.
 
-    The angles are those between axis and surface normal, looked at against the feed direction (LEAD and TILT as in
-    Siemens, SINUMERIK 840D programming guide Advanced, "tool orientation with LEAD and TILT"). They need surface normals:
-    those of the CL file, or of the part mesh ([bodies] part).
+    The angles are those between axis and surface normal, looked at against the feed direction (LEAD and TILT
+    as in Siemens, SINUMERIK 840D programming guide Advanced, "tool orientation with LEAD and TILT"). They
+    need surface normals: those of the CL file, or of the part mesh ([bodies] part).
     """
 
     lead: AngleRange | None = None
     """[least, greatest] degrees in the plane of feed and surface normal, positive where the axis leans towards the feed"""
     tilt: AngleRange | None = None
-    """[least, greatest] degrees in the plane square to the feed, positive where the axis leans to the right, seen along
-    the feed with the surface normal upwards"""
+    """[least, greatest] degrees in the plane square to the feed, positive where the axis leans to the right,
+    seen along the feed with the surface normal upwards"""
     off_centre: float | None = Field(default=None, ge=0.0, lt=90.0)
     """least angle between axis and surface normal, degrees, so that a ball does not cut with its dead centre"""
     contact_radius: float | None = Field(default=None, gt=0.0)

@@ -31,8 +31,8 @@ class PlaceBox(UserModel):
 class PlacementLimits(UserModel):
     """Limits of the part's place on the table; what has none stays as [part] has it.
 
-    The part stands at Rz(turn) Ry(tilt_y) Rx(tilt_x), the axes those of the table frame, all three 0 where the part
-    frame is parallel to it.
+    The part stands at Rz(turn) Ry(tilt_y) Rx(tilt_x), the axes those of the table frame, all three 0 where
+    the part frame is parallel to it.
     """
 
     point: PlacePoint = (0.0, 0.0, 0.0)

@@ -75,8 +75,8 @@ def with_system(found: list[Diagnostic], frame: Frame, placement: Placement) -> 
 
 
 def _stands(frame: Frame, placement: Placement) -> str:
-    """What sets the work system upright, where the part stands as the CAM system has it and that system does not; what
-    brings it to the table, where it lies farther from the table's origin than the absolute one does."""
+    """What sets the work system upright, where the part stands as the CAM system has it and that system does
+    not; what brings it to the table, where it lies farther from the table's origin than the absolute one does."""
     own = placed(frame)
     if not bool((placement.rotation == np.eye(3)).all()):
         return ""

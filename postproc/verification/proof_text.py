@@ -1,7 +1,7 @@
 """What the proof of a program covers and by what: a line for the summary, and one for the head of the program.
 
-The head is part of the text that is read back. So it is written with a line in its place first (`PENDING`), and that line
-is replaced when the proof is complete; the control sees a comment before and after, which is checked.
+The head is part of the text that is read back. So it is written with a line in its place first (`PENDING`),
+and that line is replaced when the proof is complete; the control sees a comment before and after, which is checked.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def _means(said: Testimony | None) -> str:
 def head_line(c: Comparison, said: Testimony | None, room: int) -> str:
     """The same for the head of the program, in at most `room` characters, never cut short; bounds are rounded up.
 
-    Without room for the names of what was not compared it says how many that are; without room for that, how near alone; and
-    where not even that has room, that it is not said here.
+    Without room for the names of what was not compared it says how many that are; without room for that, how
+    near alone; and where not even that has room, that it is not said here.
     """
     second = said is not None and bool(said.compared)
     by = "read-back, second reading" if second else "read-back"
@@ -91,7 +91,8 @@ def with_statement(text: str, controller: ControllerFile, comparison: Comparison
     return text, found
 
 
-def _in_place_of(text: str, controller: ControllerFile, pending: str, line: str, file: str) -> tuple[str, list[Diagnostic]]:
+def _in_place_of(text: str, controller: ControllerFile, pending: str, line: str,
+                 file: str) -> tuple[str, list[Diagnostic]]:
     """The text with another comment in the head in the place of one that was read back."""
     style = controller.comment
     capitals = f"{style.open}{_cleaned(controller, pending, True)}{style.close}" in text[:HEADER]

@@ -172,8 +172,8 @@ def _uncorrected(head: Head, job: Job, motion: Motion, executed: BlockPoses, com
 
 
 def _of_model(head: Head, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
-    """What its header says of the model that a program corrects, its name and fingerprint, where that is not the one
-    that it is verified with; `off`: the program fails. Programs without a fingerprint have only the name."""
+    """What its header says of the model that a program corrects, its name and fingerprint, where that is not
+    the one that it is verified with; `off`: the program fails. Programs without a fingerprint have only the name."""
     from machines.geometric_error.files.fingerprint import fingerprint
 
     assert job.errors is not None
@@ -205,7 +205,8 @@ def _amounts(job: Job, motion: Motion, executed: BlockPoses, comparison: Compari
             f"{tilt.max():.6f} degrees, allowed {job.options.axis_tolerance:g} degrees")
 
 
-def _bodies(motion: Motion, executed: BlockPoses, job: Job, comparison: Comparison, faults: Faults) -> list[Diagnostic]:
+def _bodies(motion: Motion, executed: BlockPoses, job: Job, comparison: Comparison,
+            faults: Faults) -> list[Diagnostic]:
     """What the tools touch, where the set-up names bodies."""
     if job.setup.bodies is None:
         return []

@@ -61,10 +61,10 @@ def after_formatting(result: CorrectedConversion) -> AfterFormatting | None:
     """The deviations of a conversion that corrects geometric errors; None of one that does not or that is not proved.
 
     CL points are where the tool cuts to: ends of feed moves and arcs, bottoms of holes; as the path before correction has
-    them, which --smooth may have moved and whose axis may have been led past a singular direction. The bound adds what the
-    correction itself leaves (near poles, and where a machine cannot turn the tool), half a last decimal in every word
-    (`rounding_bound`), and for joints that lose motion a whole one: rounded words may turn one back by that much, within
-    its play.
+    them, which --smooth may have moved and whose axis may have been led past a singular direction. The bound
+    adds what the correction itself leaves (near poles, and where a machine cannot turn the tool), half a last
+    decimal in every word (`rounding_bound`), and for joints that lose motion a whole one: rounded words may
+    turn one back by that much, within its play.
     """
     found, comparison, job = result.compensation, result.comparison, result.job
     if found is None or comparison is None or job is None or job.errors is None or result.moves is None:

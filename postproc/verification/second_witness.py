@@ -30,8 +30,8 @@ from toolpaths.toolpath import ClSource
 
 
 def machine_tables(machine: Machine) -> list[dict[str, Any]]:
-    """The machine's file as parsed, then that of its base and so on; none where there is no file. Limits that a caller has
-    changed in memory stand before it."""
+    """The machine's file as parsed, then that of its base and so on; none where there is no file. Limits that
+    a caller has changed in memory stand before it."""
     known = builtin()
     path = Path(machine.file) if machine.file else known.get(machine.name)
     if path is None or not path.is_file():

@@ -1,8 +1,9 @@
 """Lengths of tools as the control's own tool table has them, from the file that the control writes of it.
 
 LinuxCNC: the tool table itself (`T1 P1 Z120.03 D6 ; remark`). Fanuc and Haas: G10 L10 (geometry) and L11 (wear), each with P
-and R (B-63944EN 14.2; Haas "G10 Set Offsets"), in mm or, behind G20, in inches. Siemens: $TC_DP3 (length 1), $TC_DP12 (wear)
-and $TC_DP21 (adapter) of edge 1 of a tool archive. Heidenhain: TOOL.T, columns T, L and DL below the names in its head line.
+and R (B-63944EN 14.2; Haas "G10 Set Offsets"), in mm or, behind G20, in inches. Siemens: $TC_DP3 (length 1),
+$TC_DP12 (wear) and $TC_DP21 (adapter) of edge 1 of a tool archive. Heidenhain: TOOL.T, columns T, L and DL
+below the names in its head line.
 Any control: a table of text with the columns `register` or `tool`, `length` and, where there is any, `wear`, mm.
 """
 
@@ -62,14 +63,16 @@ class _Rows:
         """A number that is nothing but one; None, and a fault, for all else."""
         if _NUMBER.fullmatch(text.strip()):
             return float(text)
-        self.fault("number", f"{text.strip()[:40]!r} is not a number", line, "a number is like 120.03, with a decimal point")
+        self.fault("number", f"{text.strip()[:40]!r} is not a number", line,
+                   "a number is like 120.03, with a decimal point")
         return None
 
     def add(self, number: float, part: Part, mm: float, line: int) -> None:
         """A length, or what is added to it."""
         n = int(number)
         if n != number or n < 1:
-            self.fault("register", f"{number:g} is not the number of a register or tool", line, "numbers are 1, 2, 3 ...")
+            self.fault("register", f"{number:g} is not the number of a register or tool", line,
+                       "numbers are 1, 2, 3 ...")
         elif self.parts.setdefault(n, {}).setdefault(part, mm) != mm:
             self.fault("twice", f"number {n} has two lengths, {self.parts[n][part]:g} and {mm:g} mm", line,
                        "leave the one that is not in force out")
@@ -208,7 +211,8 @@ def _offsets(lines: list[str], rows: _Rows) -> None:
         codes = {value for letter, value in words if letter == "G"}
         unit = MM_PER_INCH if 20.0 in codes else 1.0 if 21.0 in codes else unit
         if 91.0 in codes:
-            rows.fault("increments", "G91: the numbers are added to what the control holds", n, "write the table with G90")
+            rows.fault("increments", "G91: the numbers are added to what the control holds", n,
+                       "write the table with G90")
         kinds = [value for letter, value in words if letter == "L"]
         if 10.0 not in codes or not set(kinds) & {10.0, 11.0}:
             continue
@@ -270,7 +274,8 @@ def _separated(lines: list[str], rows: _Rows) -> None:
     names = [cell.strip().lower() for cell in head.split(mark)]
     columns = [_COLUMNS.get(name, "") for name in names]
     if "" in columns or len(set(columns)) < len(columns):
-        rows.fault("columns", f"columns are {', '.join(names)}", at, "allowed are register or tool, length, wear, each once")
+        rows.fault("columns", f"columns are {', '.join(names)}", at,
+                   "allowed are register or tool, length, wear, each once")
         return
     rows.by = "register" if "register" in columns else "tool"
     for n, line in list(_numbered(lines))[1:]:

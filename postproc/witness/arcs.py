@@ -20,8 +20,8 @@ _SAME, _NEAR = 2e-5, 2e-3
 
 @dataclass(frozen=True)
 class Given:
-    """A record: centre and axis (right-hand sense) in the units and system of the file, whole turns, angle (rad) or NaN;
-    where there is a direction at its start, `toward`, that decides the sense."""
+    """A record: centre and axis (right-hand sense) in the units and system of the file, whole turns, angle
+    (rad) or NaN; where there is a direction at its start, `toward`, that decides the sense."""
 
     centre: tuple[float, ...]
     normal: tuple[float, ...]
@@ -102,7 +102,8 @@ def stacked(frames: list[tuple[Array, Array]]) -> tuple[Array, Array]:
     return np.stack([m for m, _ in frames]), np.stack([o for _, o in frames])
 
 
-def _sweeps(u: Array, v: Array, normal: Array, own: list[Given], dialect: WitnessDialect) -> tuple[Array, Array]:
+def _sweeps(u: Array, v: Array, normal: Array, own: list[Given],
+            dialect: WitnessDialect) -> tuple[Array, Array]:
     """(angle (K,) from u to v about the normal with whole turns, True (K,) where nothing about it hangs on rounding)."""
     u = u - np.einsum("ni,ni->n", u, normal)[:, None] * normal
     v = v - np.einsum("ni,ni->n", v, normal)[:, None] * normal

@@ -22,8 +22,8 @@ def walk(tip: Array, axis: Array, sweep: Array, targets: Array, directions: Arra
         tip, axis (E, 3): tool at the end of every block; sweep (E, 3): rotation vector of blocks that are arcs
         targets, directions (M, 3): tips and axes to come to, in order
         arc (M,): rad that the tool turns about `around` (M, 6), centre and axis, on its path there; 0 for no arc
-        skipped (M,): positions that nobody knows stand before it, so that the tool leaves, though it may come back to
-            where it stood
+        skipped (M,): positions that nobody knows stand before it, so that the tool leaves, though it may come
+            back to where it stood
         within: mm and rad
     """
     run = _walk if len(tip) < COMPILED_FROM else _fast()

@@ -72,7 +72,7 @@ def _one(e: Execution, r: Record, line: int) -> None:
         e.gap.add(e.row)
 
 
-# ---- positions ---------------------------------------------------------------------------------------------------------
+# ---- positions ---------------------------------------------------------------------------------------------
 
 def _goto(e: Execution, r: Record, line: int) -> None:
     n = r.numbers
@@ -136,7 +136,7 @@ def _cntrl(e: Execution, r: Record, line: int) -> None:
     e.known.set(e.row, e.known.now)
 
 
-# ---- systems -----------------------------------------------------------------------------------------------------------
+# ---- systems -----------------------------------------------------------------------------------------------
 
 def _msys(e: Execution, r: Record, line: int) -> None:
     n = np.array(r.numbers)
@@ -196,7 +196,7 @@ def _sub_unknown(e: Execution, r: Record, line: int) -> None:
     e.gap.add(e.row)
 
 
-# ---- arcs --------------------------------------------------------------------------------------------------------------
+# ---- arcs --------------------------------------------------------------------------------------------------
 
 def _circle(e: Execution, r: Record, line: int) -> None:
     found = arcs.circle(r, e.dialect)
@@ -231,7 +231,7 @@ def _tlon(e: Execution, r: Record, line: int) -> None:
     e.point(end, _NAN3, line)
 
 
-# ---- states ------------------------------------------------------------------------------------------------------------
+# ---- states ------------------------------------------------------------------------------------------------
 
 def _rapid(e: Execution, r: Record, line: int) -> None:
     e.rapid.add(e.row)
@@ -271,8 +271,8 @@ def _load(e: Execution, r: Record, line: int) -> None:
 
 
 def _register(r: Record) -> int:
-    """The length register that a record which loads a tool names: behind a word, else second of LOADTL's numbers, fourth of
-    four (ISO 4343); OWN without one."""
+    """The length register that a record which loads a tool names: behind a word, else second of LOADTL's
+    numbers, fourth of four (ISO 4343); OWN without one."""
     named: float | str | None = r.after("OSETNO") if r.major == "TURRET" else r.after("ADJUST", "OSETNO", "OFFSET")
     if named is None and r.major == "LOADTL":
         placed = list(takewhile(lambda w: isinstance(w, float), r.words))

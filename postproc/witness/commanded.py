@@ -51,8 +51,8 @@ class Commanded:
         cycle (N,): index into cycles, -1; tool, spindle, coolant (N,): number; -1, 0, 1; "" to words; UNKNOWN
         register (N,): length register, OWN where no record names one
         rpm (N,): NaN where not stated; turned, flowed (N,): row of the last SPINDL and COOLNT record; name (N,): into names
-        systems: rotation and origin of every system of the file by its name, in order; first: name of the one that the first
-            position is in, "" for the absolute frame, None where that is not sure
+        systems: rotation and origin of every system of the file by its name, in order; first: name of the one
+            that the first position is in, "" for the absolute frame, None where that is not sure
         unread: what was not understood, by its text
     """
 

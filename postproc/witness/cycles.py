@@ -19,7 +19,8 @@ _LABELS = {*_STEPS, "FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "RETURN", "AUT
            "DIAMET", "TLANGL", "TIMES", "BACK", "REV", *_PER_MINUTE, *_PER_TURN}
 
 
-def cycle(r: Record, dialect: WitnessDialect, scale: float, feed: tuple[float, bool, bool], line: int) -> WitnessCycle:
+def cycle(r: Record, dialect: WitnessDialect, scale: float, feed: tuple[float, bool, bool],
+          line: int) -> WitnessCycle:
     """A CYCLE record; depth NaN where numbers without words would have to be guessed."""
     words = [w for w in r.words if isinstance(w, str) and w not in _LABELS]
     plain = next((w for w in words if w in _KINDS and w != "DRILL"), "DRILL")
@@ -29,7 +30,8 @@ def cycle(r: Record, dialect: WitnessDialect, scale: float, feed: tuple[float, b
     return _stated(bare, r, dialect, scale, line)
 
 
-def changed(before: WitnessCycle, r: Record, dialect: WitnessDialect, scale: float, line: int) -> WitnessCycle:
+def changed(before: WitnessCycle, r: Record, dialect: WitnessDialect, scale: float,
+            line: int) -> WitnessCycle:
     """CYCLE/ON with parameters: the last cycle with those."""
     return _stated(before, r, dialect, scale, line)
 

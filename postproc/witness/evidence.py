@@ -53,13 +53,13 @@ class ExecutedBlocks:
     Attributes:
         letters: of the joints; joints (E, J) at the end of every block, mm and rad; start (J,)
         line, code (E,): line of the program; 0 rapid, 1 feed, 2 arc; straight (E,): True where joints go straight
-        sweep (E,): rad of arcs, NaN; feed (E,): F word in force, mm or degrees, or inch where `inch` (E,), per minute, or
-            1/min where `inverse` (E,)
+        sweep (E,): rad of arcs, NaN; feed (E,): F word in force, mm or degrees, or inch where `inch` (E,),
+            per minute, or 1/min where `inverse` (E,)
         steps: words (K, J) of blocks less those where they begin, mm and degrees; by_tip (E,): X, Y, Z are the tip
         rule: what a feed per minute refers to ("xyz-first", "geometry", "all"); by_angle: inverse time of arcs counts rad
         tool, spindle, rpm, coolant, dwell, pitch, hole (E,): as in force; pitch NaN outside taps, hole True in cycles
-        register (E,): length register in force, -1 for none; lengthless (E,): True where none may be, since the joints
-            hold the tool's length already
+        register (E,): length register in force, -1 for none; lengthless (E,): True where none may be, since
+            the joints hold the tool's length already
         joints_at: joints (K, J) of blocks (K,) at a fraction of each
         poses_at: (tip, axis) of blocks as the reader has them: the claim that rods are held against
     """

@@ -91,7 +91,8 @@ def chain(table: dict[str, Any]) -> Chain:
         along = np.array(own.get("direction", _ALONG[name]), np.float64)
         direction[name] = unit(along) * float(own.get("positive", 1))
         point[name] = np.array(own.get("point", (0.0, 0.0, 0.0)), np.float64)
-    return Chain(tuple(names), direction, point, unit(np.array(kinematics.get("tool_axis", (0.0, 0.0, 1.0)), np.float64)))
+    return Chain(tuple(names), direction, point,
+                 unit(np.array(kinematics.get("tool_axis", (0.0, 0.0, 1.0)), np.float64)))
 
 
 @dataclass(frozen=True)
@@ -111,8 +112,8 @@ class Rods:
     pivot: Array
 
     def misfit(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array, length: Array) -> Array:
-        """(N,) mm: the worst of rods off their length, and of the axis off what the platform can do (times 1000); infinite
-        where a carriage stands on the wrong side of its rod."""
+        """(N,) mm: the worst of rods off their length, and of the axis off what the platform can do (times
+        1000); infinite where a carriage stands on the wrong side of its rod."""
         turn = self.sense * q[:, letters.index(self.rotary)] if self.rotary else np.zeros(len(q))
         if self.carries == "part":
             back = rotations(np.array([0.0, 0.0, 1.0]), -turn)
@@ -121,7 +122,8 @@ class Rods:
         tilt = np.arctan2(-axis[:, 1], axis[:, 2]) if self.rotary else np.zeros(len(q))
         expected = np.stack([s, -np.sin(tilt) * c, np.cos(tilt) * c], axis=1)
         platform = rotations(np.array([1.0, 0.0, 0.0]), tilt)
-        centre = tip + (self.gauge + length)[:, None] * axis - apply(platform, np.broadcast_to(self.pivot, tip.shape))
+        centre = tip + (self.gauge + length)[:, None] * axis - apply(platform,
+                                                                     np.broadcast_to(self.pivot, tip.shape))
         worst = 1000.0 * np.abs(axis - expected).max(axis=1)
         for k, name in enumerate(self.legs):
             carriage = self.slide[k] + q[:, letters.index(name)][:, None] * self.direction[k]

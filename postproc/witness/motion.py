@@ -47,9 +47,10 @@ class Walked:
         """(E,) of blocks at feed"""
 
     def _left_holes(self) -> tuple[Array, Array]:
-        """Of cuts behind a hole: (E,) True for the first blocks, which rise along its axis as far as its record says, else
-        in rapid, in a cycle or up to its start plane; (E,) block behind the last one on that axis, where the cut leads off
-        it and the record names no level (a tool may have been changed over the hole), -1 for others."""
+        """Of cuts behind a hole: (E,) True for the first blocks, which rise along its axis as far as its
+        record says, else in rapid, in a cycle or up to its start plane; (E,) block behind the last one on
+        that axis, where the cut leads off it and the record names no level (a tool may have been changed over
+        the hole), -1 for others."""
         t, e, near = self.targets, self.poses.executed, self.tolerance[0] + EXACT
         rows = np.flatnonzero(is_cut(self.kind) & (self.kind != BOTTOM) & (self.owner > 0))
         rows = rows[(rows > 0) & (t.kind[self.owner[rows] - 1] == BOTTOM)]
@@ -146,8 +147,8 @@ def _finding(w: Walked, rows: Array, lines: Array, code: str, message: str) -> l
 
 def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, turned: Array,
          table: dict[str, object]) -> Array:
-    """(K,) True for blocks that are neither clear nor on the line of a retract or an approach, nor, but for those that are
-    `turned` (K,), a rapid that keeps its height."""
+    """(K,) True for blocks that are neither clear nor on the line of a retract or an approach, nor, but for
+    those that are `turned` (K,), a rapid that keeps its height."""
     m, near = len(w.targets), w.tolerance[0] + EXACT
     to, before = np.minimum(w.owner[rows], m - 1), np.maximum(w.owner[rows] - 1, 0)
     ends, begins = w.owner[rows] >= m, w.owner[rows] == 0
@@ -162,7 +163,8 @@ def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, tur
     cuts = (w.code[rows] > 0) & is_cut(w.kind[rows]) & ~w.gap[rows] & (w.owner[rows] != np.append(w.owner, m + 1)[rows + 1])
     for t in (0.25, 0.5, 0.75, 1.0):
         tip, axis = w.poses.at(rows, t)
-        line = np.fmin(_above(tip, w.targets.tip[before], w.targets.axis[before]), _above(tip, w.tip[here], w.axis[here]))
+        line = np.fmin(_above(tip, w.targets.tip[before], w.targets.axis[before]),
+                       _above(tip, w.tip[here], w.axis[here]))
         line = np.fmin(line, _above(tip, w.tip[left], w.axis[left]))
         line = np.where(begins, np.inf, line)
         line = np.fmin(line, np.where(ends, np.inf, _above(tip, w.targets.tip[to], w.targets.axis[to])))
@@ -188,8 +190,8 @@ def _above(tip: Array, end: Array, axis: Array) -> Array:
 
 
 def _level(w: Walked, rows: Array, to: Array, away: Array, tip: Array, near: float, bent: bool) -> Array:
-    """(K,) True for rapids to a hole or from one that keep the height of where they come from: the start plane of the hole
-    before, or the position before; and for dog-legs."""
+    """(K,) True for rapids to a hole or from one that keep the height of where they come from: the start
+    plane of the hole before, or the position before; and for dog-legs."""
     before = np.maximum(to - 1, 0)
     drilled = w.targets.kind[before] == BOTTOM
     level = w.targets.tip[before - drilled]

@@ -42,8 +42,8 @@ def placement(setup: dict[str, Any], c: Commanded) -> tuple[Array, Array]:
 
 
 def zero_of(setup: dict[str, Any], c: Commanded, place: tuple[Array, Array]) -> Array | None:
-    """(3,) origin in the table frame of the system that is the work offset: the set-up's, else the first position's; None
-    where that is not known."""
+    """(3,) origin in the table frame of the system that is the work offset: the set-up's, else the first
+    position's; None where that is not known."""
     name = setup.get("work_offset") or c.first
     if name is None:
         return None
@@ -68,8 +68,8 @@ class Poses:
     uncalled: int = 0
 
     def lengths(self, rows: Array) -> Array:
-        """(K,) gauge length of the tool in the spindle: of a tool that the program does not call, its length is in the work
-        offset, and the joints hold it too; 0 where the set-up states none."""
+        """(K,) gauge length of the tool in the spindle: of a tool that the program does not call, its length
+        is in the work offset, and the joints hold it too; 0 where the set-up states none."""
         tools, number = self.case.setup.get("tools", {}), self.executed.tool[rows]
         if not (self.case.setup.get("output") or {}).get("tool_call", True):
             number = np.full(len(rows), self.uncalled)
@@ -125,8 +125,8 @@ class Cut:
     radius: float
 
     def clear(self, tip: Array, axis: Array, margin: float) -> Array:
-        """(N,) True where the half line from a tip along its axis keeps `margin` mm from the box seen along the axis, or
-        from the sphere."""
+        """(N,) True where the half line from a tip along its axis keeps `margin` mm from the box seen along
+        the axis, or from the sphere."""
         rise = np.einsum("ni,ni->n", tip, axis)
         above = rise - (axis @ self.corners.T).max(axis=1) >= margin
         offset = tip - self.centre
@@ -160,7 +160,8 @@ def cut_of(case: Case, c: Commanded, tip: Array, axis: Array, centre: Array, nor
     return Cut(corners, middle, float(np.sqrt(((every - middle) ** 2).sum(axis=1).max())))
 
 
-def on_arc(start: Array, end: Array, centre: Array, normal: Array, sweep: Array, share: float | Array) -> Array:
+def on_arc(start: Array, end: Array, centre: Array, normal: Array, sweep: Array,
+           share: float | Array) -> Array:
     """(N, 3) places on arcs and helices from `start` about (centre, normal) by `sweep`, at a share of each."""
     share = np.broadcast_to(share, sweep.shape)
     offset = start - centre

@@ -49,11 +49,13 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
     if machine is None:
         missing.append("kinematics (machine with geometric errors: poses of the read-back)" if case.errors
                        else "kinematics (no machine file of a known kind: poses of the read-back)")
-    poses = Poses(case, executed, machine, machine is not None, [], max(int(tools_of(c, case.setup).max(initial=0)), 0))
+    poses = Poses(case, executed, machine, machine is not None, [],
+                  max(int(tools_of(c, case.setup).max(initial=0)), 0))
     with np.errstate(all="ignore"):
         found, worst, counts, silent = _compare(case, executed, c, place, poses, table)
     compared = [f"{n} {what}" for what, n in counts.items() if n]
-    return Testimony(tuple(compared), (*missing, *silent), tuple(found), int(c.known.sum()), *worst, process_time() - began)
+    return Testimony(tuple(compared), (*missing, *silent), tuple(found), int(c.known.sum()), *worst,
+                     process_time() - began)
 
 
 def _nothing(why: str, began: float) -> Testimony:
@@ -100,7 +102,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     faults, turned = check_turning(case, executed)
     found += faults
     feeding = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
-    faults, clamped = check_clamps(case, executed, w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
+    faults, clamped = check_clamps(case, executed,
+                                   w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
     found += faults
     faults, zeros = _zero(case, c, place, poses)
     found += faults

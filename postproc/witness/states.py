@@ -26,9 +26,9 @@ _FEED_OUT = ("BORE", "REAM", "TAP")
 
 
 def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
-    """With the set-up's spindle where it counts: `[tools.N]` for a tool that no SPINDL record is for, `[output]` where the
-    spindle stands there too, either where no record at all states one, and the speed of either where the file turns the
-    spindle without one."""
+    """With the set-up's spindle where it counts: `[tools.N]` for a tool that no SPINDL record is for,
+    `[output]` where the spindle stands there too, either where no record at all states one, and the speed of
+    either where the file turns the spindle without one."""
     output = (setup.get("output") or {}).get("spindle")
     own = {int(n): t["spindle"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("spindle")}
     if not len(c) or not (output or own):
@@ -68,7 +68,8 @@ def feeds_of(c: Commanded, setup: dict[str, Any]) -> Array:
     return np.asarray(np.where(per_turn, feed * c.rpm, np.where(c.inverse & ~hole, math.nan, feed)))
 
 
-def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], match: Array) -> tuple[list[Finding], int]:
+def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any],
+                match: Array) -> tuple[list[Finding], int]:
     """Cuts that are faster than programmed, or slower and no axis explains it; the number of cuts that were compared."""
     t = w.targets
     rows = np.flatnonzero(w.inside & (w.code > 0) & ~w.gap & ~w.returns & ((w.kind == LINE) | (w.kind == ARC)) & w.on_path())
@@ -117,8 +118,8 @@ def _groups(check: Array, feed: Array) -> Array:
 
 
 def _off_in_all(group: Array, more: Array, less: Array, slack: Array) -> Array:
-    """(M,) True for targets of a group whose sum of `more` s passes that of `less` by what rounding, which goes in either
-    direction, may make of the sum."""
+    """(M,) True for targets of a group whose sum of `more` s passes that of `less` by what rounding, which
+    goes in either direction, may make of the sum."""
     n = int(group.max(initial=0)) + 1
     over = np.bincount(group, weights=np.where(group > 0, more - less, 0.0), minlength=n)
     allowed = np.sqrt(np.bincount(group, weights=np.where(group > 0, slack * slack, 0.0), minlength=n))
@@ -126,8 +127,8 @@ def _off_in_all(group: Array, more: Array, less: Array, slack: Array) -> Array:
 
 
 def _needed(w: Walked, rows: Array, slow: Array, pace: Array, table: dict[str, Any]) -> Array:
-    """(M,) s of the targets `slow` where every block takes what the feed, `pace` (M,) s/mm, and the velocities of the axes
-    ask for."""
+    """(M,) s of the targets `slow` where every block takes what the feed, `pace` (M,) s/mm, and the
+    velocities of the axes ask for."""
     result = np.zeros(len(w.targets))
     here = rows[np.isin(w.owner[rows], slow)]
     if len(here):
@@ -177,8 +178,10 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     row = w.targets.row[w.owner[rows] - w.returns[rows]]
     tool, coolant = tools_of(c, case.setup)[row], _coolants(c, case.setup)[row]
     own = np.where(tool >= 0, tool + case.register_beyond, tool)
-    register = np.where((c.register[row] == OWN) | (c.register[row] == tool) | (not case.registers), own, c.register[row])
-    register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)), -1, register)
+    register = np.where((c.register[row] == OWN) | (c.register[row] == tool) | (not case.registers), own,
+                        c.register[row])
+    register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)),
+                        -1, register)
     direction, rpm = c.spindle[row], c.rpm[row]
     if not (case.setup.get("output") or {}).get("tool_call", True):
         tool = np.full(len(rows), -1)
@@ -273,13 +276,15 @@ def check_holes(w: Walked, c: Commanded, case: Case, match: Array) -> tuple[list
         last = int(match[i])
         blocks = np.arange(first, last + 1)
         if len(blocks):
-            for what in _hole_faults(w, i, blocks, c.cycles[c.cycle[t.row[i]]], float(c.rpm[t.row[i]]), case.tolerance):
+            for what in _hole_faults(w, i, blocks, c.cycles[c.cycle[t.row[i]]], float(c.rpm[t.row[i]]),
+                                     case.tolerance):
                 bad.setdefault(what, []).append((i, last))
     return [Finding("hole", what, int(c.line[t.row[at[0][0]]]), int(e.line[at[0][1]]), len(at))
             for what, at in bad.items()], len(holes)
 
 
-def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: float, tolerance: float) -> list[str]:
+def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: float,
+                 tolerance: float) -> list[str]:
     t, e = w.targets, w.poses.executed
     depth = (t.tip[i] - w.tip[blocks]) @ t.axis[i]
     total, found = cycle.depth + cycle.clearance, []
@@ -327,8 +332,8 @@ def _risen(w: Walked, i: int, last: int, depth: float, tolerance: float) -> floa
 
 
 def _feed_fault(w: Walked, blocks: Array, cycle: WitnessCycle, rpm: float) -> list[str]:
-    """That a block which goes deeper than those before it is faster than the feed of the cycle, or slower and no axis is at
-    its velocity."""
+    """That a block which goes deeper than those before it is faster than the feed of the cycle, or slower and
+    no axis is at its velocity."""
     feed = cycle.feed * rpm if cycle.per_turn else cycle.feed
     step = w.tip[blocks] - w.tip[np.maximum(blocks - 1, 0)]
     length = np.sqrt((step * step).sum(axis=1))

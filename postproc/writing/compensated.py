@@ -20,10 +20,11 @@ LEADS = {False: ("begins", "CUTCOM before a straight move that leads to the cont
 def compensated_arcs(controller: ControllerFile, program: Program, file: str) -> list[Diagnostic]:
     """Arcs that the controller cannot run where the program has them.
 
-    The first move in the plane behind G41 or G40 builds the offset up or takes it down. It has to be straight on Fanuc
-    (16/18-C operator's manual, cutter compensation C, start-up and cancel: G00 or G01), on Siemens (S1, G41 and G40 with G0
-    or G1), on Heidenhain (TNC 620 DIN/ISO 34056x-02, 6.2) and on Haas (alarms 340, 341); LinuxCNC 2.9 begins on an arc, and
-    ends on none (measured with rs274). None of them changes the plane while it is on (Siemens alarm 10757; rs274 says so).
+    The first move in the plane behind G41 or G40 builds the offset up or takes it down. It has to be straight
+    on Fanuc (16/18-C operator's manual, cutter compensation C, start-up and cancel: G00 or G01), on Siemens
+    (S1, G41 and G40 with G0 or G1), on Heidenhain (TNC 620 DIN/ISO 34056x-02, 6.2) and on Haas (alarms 340,
+    341); LinuxCNC 2.9 begins on an arc, and ends on none (measured with rs274). None of them changes the
+    plane while it is on (Siemens alarm 10757; rs274 says so).
     """
     rules, leads = controller.cutter_compensation, _leading(program)
     allowed = {False: rules.begins_on_arc, True: rules.ends_on_arc}

@@ -22,8 +22,8 @@ LONGEST_DWELL = 3600.0
 class KlartextWriter(Writer):
     """Blocks L, CC, C, CP; FMAX for rapids, R0, RL, RR where it changes, M91 for machine coordinates, M99 for cycles.
 
-    `side` is the radius compensation in force, `asked` the one that the next line takes up; `helix` the block of the last
-    CP and where in X, Y it ends, which is not to the last digit where its words say.
+    `side` is the radius compensation in force, `asked` the one that the next line takes up; `helix` the block
+    of the last CP and where in X, Y it ends, which is not to the last digit where its words say.
     """
 
     side, asked = "", "R0"
@@ -52,7 +52,7 @@ class KlartextWriter(Writer):
         """Blocks of the frame, and comments, are numbered too."""
         return self.numbered(block)
 
-    # ---- motion -------------------------------------------------------------------------------------------------
+    # ---- motion --------------------------------------------------------------------------------------------
 
     def blocks(self, at: int, stop: int) -> Iterator[str]:
         """Motion blocks at..stop."""
@@ -143,7 +143,7 @@ class KlartextWriter(Writer):
         super().forget()
         self.side = ""
 
-    # ---- commands -----------------------------------------------------------------------------------------------
+    # ---- commands ------------------------------------------------------------------------------------------
 
     def command(self, command: Command) -> Iterator[str]:
         """The blocks of one canonical command; radius compensation waits for the next line."""

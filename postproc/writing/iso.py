@@ -119,8 +119,8 @@ class IsoWriter(Writer):
 
     @cached_property
     def fed(self) -> tuple[Ints, Ints, Bools]:
-        """Blocks that cut, in order; those of them (by number) that have another feed than the one before or must state it;
-        and (C,) whether each must."""
+        """Blocks that cut, in order; those of them (by number) that have another feed than the one before or
+        must state it; and (C,) whether each must."""
         p, cutting = self.program, np.flatnonzero(self.program.code > 0)
         values, inverse = p.feed[cutting], p.mode[cutting] == INVERSE
         needed = self.mode_changes[cutting] | (inverse & self.controller.feed.word_every_inverse_block)

@@ -26,13 +26,15 @@ class PolarArc:
     end: Floats
 
 
-def polar_arc(start: Floats, end: Floats, centre: Floats, turn: float, grain: float, angle_grain: float) -> PolarArc:
+def polar_arc(start: Floats, end: Floats, centre: Floats, turn: float, grain: float,
+              angle_grain: float) -> PolarArc:
     """The arc from `start` about a pole near `centre` that ends nearest to `end` (2,), mm.
 
-    The control keeps the distance of the start from the pole (Klartext Programming 34059x, CP). So the end is off along the
-    radius by the difference of the pole's distances from both ends, and along the arc by what the angle is rounded by. A
-    pole one last decimal farther changes the one by up to two, the other by steps that do not fit those of the angle: some
-    pole around the centre is better than the one that the centre is rounded to. The end is off by hypot(grain, radius *
+    The control keeps the distance of the start from the pole (Klartext Programming 34059x, CP). So the end is
+    off along the radius by the difference of the pole's distances from both ends, and along the arc by what
+    the angle is rounded by. A pole one last decimal farther changes the one by up to two, the other by steps
+    that do not fit those of the angle: some pole around the centre is better than the one that the centre is
+        rounded to. The end is off by hypot(grain, radius *
     angle_grain / 2) at most (`helix_bound`).
 
     Args:

@@ -18,13 +18,14 @@ from toolpaths.toolpath import Cycle
 class WriterState:
     """One program on its path to text; the state is what the controller holds while it reads.
 
-    `law` is that of the words; `register` the length register of the tool in the spindle; `length_off` is True where the
-    register is not in force and waits for the next block that states Z; `speed` is the spindle's as it is written (1/min,
+    `law` is that of the words; `register` the length register of the tool in the spindle; `length_off` is
+    True where the register is not in force and waits for the next block that states Z; `speed` is the
+    spindle's as it is written (1/min,
     negative: anti-clockwise, 0 unknown), `rounded` its ratio to what was asked. `files` are the subprograms in files of
-    their own, by name, once the program is written. `turning` and `cooling` say whether spindle and coolant run, None where
-    nobody knows, `flowing` the kinds of coolant that may run (`postproc.reference.coolant`); `taken` are block numbers that
-    subprograms bear; `stock` (2, 3) least and greatest X, Y, Z of the stock; `ahead` the axis words of a stretch of blocks,
-    and the first of them.
+    their own, by name, once the program is written. `turning` and `cooling` say whether spindle and coolant
+    run, None where nobody knows, `flowing` the kinds of coolant that may run (`postproc.reference.coolant`);
+    `taken` are block numbers that subprograms bear; `stock` (2, 3) least and greatest X, Y, Z of the stock;
+    `ahead` the axis words of a stretch of blocks, and the first of them.
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
@@ -74,7 +75,7 @@ class WriterState:
         """The text without characters that a comment must not hold, cut to the line length."""
         return clean(self.controller, text)
 
-    # ---- numbers ------------------------------------------------------------------------------------------------
+    # ---- numbers -------------------------------------------------------------------------------------------
 
     def number_text(self, values: Floats, places: int) -> list[str]:
         """Numbers as text, rounded to `places`, -0 as 0; all at once, which is much faster than one by one."""
@@ -93,8 +94,8 @@ class WriterState:
         return float(self.program.feed[hole.drill]) * (self.rounded if hole.key.startswith("TAP") else 1.0)
 
     def spindle_speed(self, asked: float) -> float:
-        """The speed as S can state it, 1/min: more than 0 where it is asked for; decimals that are less than a part in ten
-        thousand of it are left out, no spindle keeps them."""
+        """The speed as S can state it, 1/min: more than 0 where it is asked for; decimals that are less than
+        a part in ten thousand of it are left out, no spindle keeps them."""
         most = self.controller.format.speed_decimals
         places = min(most, max(SPEED_DIGITS - math.floor(math.log10(asked)), 0)) if asked > 0.0 else most
         return round(asked, places) or (10.0**-places if asked > 0.0 else 0.0)
@@ -120,7 +121,7 @@ class WriterState:
         """A number without an exponent or needless zeros."""
         return f"{float(value):.6f}".rstrip("0").rstrip(".")
 
-    # ---- sections -----------------------------------------------------------------------------------------------
+    # ---- sections ------------------------------------------------------------------------------------------
 
     def mode_of(self, section: Section) -> Mode | None:
         """The controller's mode for the law of a section."""

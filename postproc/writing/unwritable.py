@@ -20,7 +20,8 @@ def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle
             *_pitches(controller, program, cycles, file)]
 
 
-def _own_length(controller: ControllerFile, program: Program, file: str, length_offsets: bool) -> list[Diagnostic]:
+def _own_length(controller: ControllerFile, program: Program, file: str,
+                length_offsets: bool) -> list[Diagnostic]:
     """A length that a tool change puts in force for good, where the words hold it already."""
     if length_offsets or not controller.keeps_length:
         return []
@@ -46,7 +47,8 @@ def _radius_registers(controller: ControllerFile, program: Program, file: str) -
                     hint="put what the register would hold into the tool's own data")]
 
 
-def _pitches(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], file: str) -> list[Diagnostic]:
+def _pitches(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...],
+             file: str) -> list[Diagnostic]:
     """Taps without a pitch, where the controller's cycle states it."""
     tables = controller.cycles.table, controller.cycles.with_dwell
     stating = {key for table in tables for key, spec in table.items() if "{pitch}" in spec.code}

@@ -256,7 +256,7 @@ class Writer(WriterState, ABC):
     def hole(self, hole: Hole) -> Iterator[str]:
         """A canned cycle: in full where anything but the place of the hole changes, else the place alone."""
 
-    # ---- commands -----------------------------------------------------------------------------------------------
+    # ---- commands ------------------------------------------------------------------------------------------
 
     def command(self, command: Command) -> Iterator[str]:
         """The blocks of one canonical command."""

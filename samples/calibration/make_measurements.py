@@ -1,7 +1,8 @@
 """Simulate the sample measurements of this folder: `python samples/calibration/make_measurements.py [FOLDER]`.
 
-A Mikron UCP 710 with known errors (truth.toml): the C axis by reversal (12 steps, 4 set-ups, indexer and mounting with
-errors of their own), then the places of its axes by a probe on a ball. start.toml is what the second fit starts from.
+A Mikron UCP 710 with known errors (truth.toml): the C axis by reversal (12 steps, 4 set-ups, indexer and
+mounting with errors of their own), then the places of its axes by a probe on a ball. start.toml is what the
+second fit starts from.
 Next to it, each with a start of its own: the squareness of the slides by a ball-bar, the screw of X by a laser (both
 directions, screw-truth.toml), all six errors of C by reversal.
 """
@@ -39,7 +40,8 @@ def truth() -> ErrorModel:
     assert name is not None
     series = Fourier(np.array([0.0, 6.0, -3.0, 1.0, 4.0, 2.0, -0.5]) * ARCSEC)
     constants = {k: v * (ARCSEC if k[1] in "ABC" else 1e-3) for k, v in PLACES.items()}
-    return ErrorModel(SerialErrors((Component(name, series),), constants), name="truth", machine="mikron-ucp710")
+    return ErrorModel(SerialErrors((Component(name, series),), constants), name="truth",
+                      machine="mikron-ucp710")
 
 
 def reversal(rng: np.random.Generator) -> str:
@@ -87,7 +89,8 @@ def ball_bar(rng: np.random.Generator, n: int = 24) -> str:
     q = np.round(np.column_stack([q, np.zeros((3 * n, 2))]), 4)
     bar = truth().on(kin).place(q)[0] - kin.forward(np.zeros((1, 5)))[0] - BALL
     read = np.linalg.norm(bar, axis=1) + LONG + rng.normal(size=3 * n) * NOISE[1]
-    return write_csv(_joints(q) | {"distance": ("mm", np.round(read, 5))}, ["ball-bar, three circles of 150 mm"])
+    return write_csv(_joints(q) | {"distance": ("mm", np.round(read, 5))},
+                     ["ball-bar, three circles of 150 mm"])
 
 
 def screw() -> ErrorModel:

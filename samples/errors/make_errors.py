@@ -88,7 +88,8 @@ def runs(rng: np.random.Generator) -> str:
 
 def measured_map(rng: np.random.Generator) -> str:
     """Displacements of a ball 120 mm below the gauge point of mikron-ucp710 over X, Y and C, as read by a laser tracker."""
-    levels = np.meshgrid([-300.0, 0.0, 300.0], [-250.0, 0.0, 250.0], np.radians([0.0, 90.0, 180.0, 270.0]), indexing="ij")
+    levels = np.meshgrid([-300.0, 0.0, 300.0], [-250.0, 0.0, 250.0], np.radians([0.0, 90.0, 180.0, 270.0]),
+                         indexing="ij")
     x, y, c = (level.ravel() for level in levels)
     moved = [0.010 * x / 300.0 - 0.004 * y / 250.0 + 0.012 * np.cos(c), 0.008 * y / 250.0 + 0.012 * np.sin(c),
              0.006 * (x / 300.0) ** 2 - 0.005 * np.cos(2.0 * c)]

@@ -1,10 +1,11 @@
-"""Calibration: rank, condition number, uncertainty against set-ups, coverage of the stated bounds, what is left, the whole
-loop.
+"""Calibration: rank, condition number, uncertainty against set-ups, coverage of the stated bounds, what is
+left, the whole loop.
 
     python -m tests.benchmarks.bench_calibration [TRIALS]
 
-n = 12 steps, readings simulated with 0.1 arcsec of noise; `left` is the largest residual without noise. The loop is that of
-samples/calibration: tip deviation of the true machine at 2000 poses before and after correction by the model found.
+n = 12 steps, readings simulated with 0.1 arcsec of noise; `left` is the largest residual without noise. The
+loop is that of samples/calibration: tip deviation of the true machine at 2000 poses before and after
+correction by the model found.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Figures of collisions: python tests/benchmarks/bench_collision.py.
 
 Seconds of the processor: candidates of 61 passes next to part, vise, post and table of samples/bodies, by compiled loops, by
-numpy, and by trimesh's collision manager at the points of the path only; a whole program with and without bodies; a cutter
-on a fine mesh.
+numpy, and by trimesh's collision manager at the points of the path only; a whole program with and without
+bodies; a cutter on a fine mesh.
 """
 
 from __future__ import annotations

@@ -2,12 +2,13 @@
 
     python -m tests.benchmarks.bench_compensation [POINTS]
 
-Realistic errors (all component errors and locations of serial machines, all dimensions of parallel ones: 10 to 50 um, 5 to
-20 arcsec and more at the tip). Joint commands before formatting; axis figures away from poles, where the turn is free, and
-over all points. Processor time, best of two. Then samples on machines, controllers and modes with the models of
-samples/errors: worst deviation of block ends before and after, before formatting; of the program as it is read back on the
-machine with errors at the CL points, next to the rounding of the words and the whole bound; and along the whole program.
-Last 4000 drilled holes without a model, with tables of one direction and of two.
+Realistic errors (all component errors and locations of serial machines, all dimensions of parallel ones: 10
+to 50 um, 5 to 20 arcsec and more at the tip). Joint commands before formatting; axis figures away from poles,
+where the turn is free, and over all points. Processor time, best of two. Then samples on machines,
+controllers and modes with the models of samples/errors: worst deviation of block ends before and after,
+before formatting; of the program as it is read back on the machine with errors at the CL points, next to the
+rounding of the words and the whole bound; and along the whole program. Last 4000 drilled holes without a
+model, with tables of one direction and of two.
 """
 
 from __future__ import annotations
@@ -59,7 +60,8 @@ def samples() -> None:
           "axis in arcsec before, after, at the CL points, bound")
     for sample, machine, controller, setup in CASES:
         path, found = toolpaths.read(SAMPLES / sample)
-        options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"), error_model=str(SAMPLES / f"errors/{machine}.toml"))
+        options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"),
+                          error_model=str(SAMPLES / f"errors/{machine}.toml"))
         result = postproc.convert(path, machine, controller, options=options, diagnostics=found)
         name = f"{sample.split('.')[0]} {machine} {controller}"
         proof = after_formatting(result)

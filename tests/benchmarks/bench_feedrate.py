@@ -61,7 +61,8 @@ Run = Callable[[], tuple[float, int]]
 """A plan's time of motion and its number of points."""
 
 
-def jerk(path: SplinePath, knots: Floats | None, strict: bool = False, threads: int = 1, kernel: bool = True) -> Run:
+def jerk(path: SplinePath, knots: Floats | None, strict: bool = False, threads: int = 1,
+         kernel: bool = True) -> Run:
     def run() -> tuple[float, int]:
         options = PlannerOptions(method=Method(kernel=kernel, threads=threads), strict=strict)
         made = plan(path, MIKRON, options=options, knots=knots)

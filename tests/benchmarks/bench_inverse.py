@@ -16,7 +16,8 @@ import machines
 from toolpaths.arrays import Floats
 
 SERIAL = "mikron-ucp710"
-NAMES = (SERIAL, "mill-3axis", "uranesx", "delta-hybrid", "linuxcnc-lineardelta", "h4a-c-table", "h4a-spindle-axis")
+NAMES = (SERIAL, "mill-3axis", "uranesx", "delta-hybrid", "linuxcnc-lineardelta", "h4a-c-table",
+         "h4a-spindle-axis")
 TOOL = 60.0
 
 

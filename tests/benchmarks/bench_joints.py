@@ -155,7 +155,8 @@ def speed(n: int) -> None:
         clocked("plan", n, base, lambda: found.append(plan_runs(  # noqa: B023
             [PoseRun(m.kinematics, tip, axis)], limits, m.home)[0].q))  # noqa: B023
         zero = np.zeros((n - 1, 3))
-        curves = Curves(tip[:-1], tip[1:], axis[:-1], axis[1:], np.zeros(n - 1, dtype=bool), zero, zero, np.zeros(n - 1))
+        curves = Curves(tip[:-1], tip[1:], axis[:-1], axis[1:], np.zeros(n - 1, dtype=bool), zero, zero,
+                        np.zeros(n - 1))
         clocked("leading past singular directions", n, base, lambda: lead_past(
             m.kinematics, curves, curves.length() / 20.0, AXIS / 2, limits.velocity))  # noqa: B023
         clocked("linearising, proved", n, base, lambda: linearise(

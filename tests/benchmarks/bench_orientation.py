@@ -1,5 +1,5 @@
-"""Figures of the choice of orientations: python tests/benchmarks/bench_orientation.py [part | full | brute | five | many |
-ranking].
+"""Figures of the choice of orientations: python tests/benchmarks/bench_orientation.py [part | full | brute |
+five | many | ranking].
 
 part: the paper's test part under its jerks alone; full: samples under all limits; brute: distance to a grid of orientations,
 all planned; five: five parts on two machines; many: seconds for 500 passes; ranking: what times on shared knots are off by.
@@ -140,7 +140,8 @@ def five(names: tuple[str, ...] = ("mikron-ucp710", "trunnion-bc")) -> None:
 
 def many(count: int = 500) -> None:
     """Strips of the bicubic surface."""
-    timed(f"{count} strips on mikron-ucp710", _read(samples.surface(count)[0]), machines.load("mikron-ucp710"))
+    timed(f"{count} strips on mikron-ucp710", _read(samples.surface(count)[0]),
+          machines.load("mikron-ucp710"))
 
 
 def _read(text: str) -> Toolpath:

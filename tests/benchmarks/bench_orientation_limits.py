@@ -1,8 +1,8 @@
 """Choice of orientations compared with all that it could choose, and what decides.
 
-python tests/benchmarks/bench_orientation_limits.py [brute | plans | cases]; brute: the search compared with a grid of 0.25
-degrees, every axis planned in full, on three passes of the test part; plans: `auto` compared with all sequences of such axes
-on six strips;
+python tests/benchmarks/bench_orientation_limits.py [brute | plans | cases]; brute: the search compared with a
+grid of 0.25 degrees, every axis planned in full, on three passes of the test part; plans: `auto` compared
+with all sequences of such axes on six strips;
 cases: what travel, indexing time and a free rotary axis decide.
 """
 
@@ -58,7 +58,8 @@ def disc(axis: Floats, cap: float, step: float) -> Floats:
     return np.asarray(np.cos(size)[:, None] * axis + flat[:, None] * (u[:, None] * x + v[:, None] * y))
 
 
-def grid_of(one: Pass, m: Machine, allowed: AllowedAxes, centre: Floats, cap: float, step: float) -> list[Candidate]:
+def grid_of(one: Pass, m: Machine, allowed: AllowedAxes, centre: Floats, cap: float,
+            step: float) -> list[Candidate]:
     """The pass along every allowed axis of a disc that the machine can run it along."""
     axes = disc(centre, cap, step)
     axes = axes[allowed.mask(one, axes)]
@@ -82,7 +83,8 @@ def compared(name: str, one: Pass, m: Machine, allowed: AllowedAxes, centre: Flo
 
 def test_part(m: Machine) -> PassContext:
     """The paper's part on a machine."""
-    work, found = work_of(toolpaths.read(SAMPLES / "test_part.cls")[0], m, setup_of("tools.setup.toml"), Options())
+    work, found = work_of(toolpaths.read(SAMPLES / "test_part.cls")[0], m,
+                          setup_of("tools.setup.toml"), Options())
     assert work is not None, found
     return work
 
@@ -97,7 +99,8 @@ def brute() -> None:
         compared(f"{name}, round the best of 60 degrees", one, m, AllowedAxes(60.0 * DEG), None, CAP, GRID)
 
 
-def strips(directions: list[float], cutter: str = "16,8", length: float = 80.0, pitch: float = 1.0) -> Toolpath:
+def strips(directions: list[float], cutter: str = "16,8", length: float = 80.0,
+           pitch: float = 1.0) -> Toolpath:
     """Level straight passes next to each other; directions in degrees from +x."""
     lines = ["UNITS/MM", f"CUTTER/{cutter}", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,60000"]
     for k, angle in enumerate(directions):

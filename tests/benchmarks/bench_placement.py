@@ -1,8 +1,8 @@
 """Figures of placing: python tests/benchmarks/bench_placement.py [gain | grid | proof | long].
 
 gain: what the place gives samples on serial and parallel machines; grid: the search compared with a grid of places that are
-all planned; proof: what place says next to the conversion of both places under the ideal control; long: a file of many
-points.
+all planned; proof: what place says next to the conversion of both places under the ideal control; long: a
+file of many points.
 """
 
 from __future__ import annotations
@@ -82,7 +82,8 @@ def gain() -> None:
         shown(f"{file} on {name}", *placed(path, machines.load(name), loaded(setup, limits)))
     path, _ = toolpaths.read(SAMPLES / "test_part.cls")
     wide = {"x": (-250.0, 250.0), "y": (-250.0, 250.0), "turn": (0.0, 180.0)}
-    shown("test_part.cls on a slow uranesx", *placed(path, slow(machines.load("uranesx")), loaded("delta.setup.toml", wide)))
+    shown("test_part.cls on a slow uranesx",
+          *placed(path, slow(machines.load("uranesx")), loaded("delta.setup.toml", wide)))
     mill = loaded("tools.setup.toml", LEVEL | {"turn": (0.0, 90.0)})
     shown("test_part.cls on mikron-ucp710, axes chosen (auto)", *placed(path, machines.load("mikron-ucp710"), mill,
                                                                       orient="auto"))

@@ -1,7 +1,7 @@
 """What the second witness and the bound cost in a conversion: python tests/benchmarks/bench_witness.py [POINTS ...]
 
-Processor seconds of `postproc.convert` on files of three and of five axes (samples/make_big.py), the second of two runs
-(of a million points and more, the first).
+Processor seconds of `postproc.convert` on files of three and of five axes (samples/make_big.py), the second
+of two runs (of a million points and more, the first).
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ def main() -> None:
         for kind in ([], ["--five-axis"]):
             with tempfile.TemporaryDirectory() as folder:
                 file = Path(folder, "big.cls")
-                subprocess.run([sys.executable, "samples/make_big.py", points, str(file), *kind], cwd=ROOT, check=True)
+                subprocess.run([sys.executable, "samples/make_big.py", points, str(file), *kind],
+                               cwd=ROOT, check=True)
                 for _ in range(2 if int(points) < LARGE else 1):
                     begun = time.process_time()
                     path, found = toolpaths.read(file)

@@ -1,5 +1,5 @@
-"""Jerk-limited times by copp-py (`pip install copp-py`, not among the requirements): TOPP3-LP, a sequence of linear
-programs on a grid in s with end conditions of its own."""
+"""Jerk-limited times by copp-py (`pip install copp-py`, not among the requirements): TOPP3-LP, a sequence of
+linear programs on a grid in s with end conditions of its own."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from postproc.feedrate.paths import ParametricPath
 from toolpaths.arrays import Floats
 
 
-def copp_times(path: ParametricPath, s: Floats, limits: JointLimits, passes: int, unit: float = 10.0) -> Iterator[float]:
+def copp_times(path: ParametricPath, s: Floats, limits: JointLimits, passes: int,
+               unit: float = 10.0) -> Iterator[float]:
     """Time of motion after each linear program on the grid s (N,); the parameter in units of `unit`, which suits it.
 
     The first one is linearised about the second-order optimum, each further one about the last motion.
@@ -26,7 +27,8 @@ def copp_times(path: ParametricPath, s: Floats, limits: JointLimits, passes: int
     robot.set_q(at.q, at.dq * unit, at.d2q * unit**2, 0, dddq=at.d3q * unit**3)
     robot.add_velocity_limits(limits.velocity, -limits.velocity, start_idx_s=0)
     robot.add_acceleration_limits(limits.acceleration, -limits.acceleration, start_idx_s=0)
-    second = copp.solver.topp2_ra.Problem(robot.constraints, idx_s_interval=(0, len(s) - 1), a_boundary=(0.0, 0.0))
+    second = copp.solver.topp2_ra.Problem(robot.constraints, idx_s_interval=(0, len(s) - 1),
+                                          a_boundary=(0.0, 0.0))
     about: dict[str, Any] = {}
     speed = copp.solver.topp2_ra.solve(second, copp.solver.topp2_ra.Options())
     robot.add_jerk_limits(limits.jerk, -limits.jerk, start_idx_s=0)

@@ -1,5 +1,5 @@
-"""Paths for `bench_feedrate.py` compared with those of the tests: smoothed CL points on a machine, polylines with tight
-blends."""
+"""Paths for `bench_feedrate.py` compared with those of the tests: smoothed CL points on a machine, polylines
+with tight blends."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Figures of the layout: `python tests/benchmarks/layout_figures.py [REVISION ...]`; of the working tree without one.
 
-Circles of files and of rooms by imports (those in functions and for the type checker too; the front doors `__init__.py` left
-out), files per room, lines of files and functions (median, 90 %, largest), lines of product and of tests.
+Circles of files and of rooms by imports (those in functions and for the type checker too; the front doors
+`__init__.py` left out), files per room, lines of files and functions (median, 90 %, largest), lines of product and of tests.
 """
 
 from __future__ import annotations
@@ -105,7 +105,8 @@ def main() -> None:
         if not revision:
             print(figures(ROOT))
             continue
-        made = subprocess.run(["git", "archive", revision, *TOPS, "tests"], cwd=ROOT, check=True, capture_output=True)
+        made = subprocess.run(["git", "archive", revision, *TOPS, "tests"], cwd=ROOT, check=True,
+                              capture_output=True)
         with tempfile.TemporaryDirectory() as folder, tarfile.open(fileobj=io.BytesIO(made.stdout)) as archive:
             archive.extractall(folder, filter="data")
             print(figures(Path(folder)))

@@ -18,7 +18,8 @@ from toolpaths.units import DEG
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 THREE_AXIS = ("pocket.cls", "bicubic.cls", "inch_plate.apt")
-FIVE_AXIS = ("h4a_dome.cls", "h4a_indexed.cls", "five_tilted.cls", "blade.cls", "five_faces.cls", "tool_axis_tour.apt")
+FIVE_AXIS = ("h4a_dome.cls", "h4a_indexed.cls", "five_tilted.cls", "blade.cls", "five_faces.cls",
+             "tool_axis_tour.apt")
 
 
 def line(file: str, name: str, setup_name: str) -> str:

@@ -160,7 +160,8 @@ def records() -> Iterator[Record]:
         at = 0
         for record in _joined(text):
             first = record.split("\n")[0]
-            yield Record(f"{name}: {first[:24]}", text.encode(), at, at + len(record), first.startswith(LEFT_OUT))
+            yield Record(f"{name}: {first[:24]}", text.encode(), at, at + len(record),
+                         first.startswith(LEFT_OUT))
             at += len(record)
 
 

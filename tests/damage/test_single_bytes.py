@@ -45,7 +45,8 @@ def test_every_byte_of_a_short_motion_by_every_common_one(name: str) -> None:
     assert losses(record, COMMON, b",$") == []
 
 
-@pytest.mark.skipif("DAMAGE" not in os.environ, reason="make damage: any of 256 bytes at any place, hours of processor")
+@pytest.mark.skipif("DAMAGE" not in os.environ,
+                    reason="make damage: any of 256 bytes at any place, hours of processor")
 @pytest.mark.parametrize("record", RECORDS, ids=lambda r: r.name)
 def test_all_bytes(record: Record) -> None:
     """DAMAGE=all, or a number of seeded changes of each record."""

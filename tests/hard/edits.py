@@ -24,8 +24,8 @@ VALUES = ("0", "-1", "99999999")
 
 
 def edits(text: str, most: int | None = None, seed: int = 1) -> Iterator[tuple[str, str]]:
-    """(what was done, program): each block, or `most` of them, deleted, doubled, swapped with the next, each of its words
-    left out and given other values; the text cut off at as many places."""
+    """(what was done, program): each block, or `most` of them, deleted, doubled, swapped with the next, each
+    of its words left out and given other values; the text cut off at as many places."""
     chance, lines = random.Random(seed), text.splitlines()
     count = len(lines) if most is None else min(most, len(lines))
     for i in sorted(chance.sample(range(len(lines)), count)):
@@ -36,8 +36,8 @@ def edits(text: str, most: int | None = None, seed: int = 1) -> Iterator[tuple[s
 
 
 def deletions(text: str, alike: int | None = None) -> Iterator[tuple[str, str]]:
-    """(what was done, program) with each block deleted in turn. With `alike` only so many, evenly spread, of blocks that
-    have the same words as each other and as the blocks before and after them."""
+    """(what was done, program) with each block deleted in turn. With `alike` only so many, evenly spread, of
+    blocks that have the same words as each other and as the blocks before and after them."""
     lines = text.splitlines()
     shapes = ["", *(re.sub(r"[-+]?\d[\d.]*", "", n.split("(")[0].split(";")[0]) + _codes(n) for n in lines), ""]
     classes: dict[tuple[str, ...], list[int]] = {}

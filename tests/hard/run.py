@@ -3,10 +3,11 @@
     python tests/hard/run.py [FOLDER] [--machine NAME ...] [--controller NAME ...] [--workers 2]
                              [--edits N | --edits all | --edits deleted [--alike N] [--first]]
 
-Each conversion is written and proved, or refused with a code; the estimate of its time and all texts are made too. With
---edits each program is changed in N blocks (`edits.py`) and goes through `time` and `verify` again; `--edits deleted` takes
-each block out in turn (with --alike N at most N of blocks that are alike in themselves and their neighbours), with --first
-on the first machine of the list that the file can be written for. Internal errors, and conversions without an end, are
+Each conversion is written and proved, or refused with a code; the estimate of its time and all texts are made
+too. With --edits each program is changed in N blocks (`edits.py`) and goes through `time` and `verify` again;
+`--edits deleted` takes each block out in turn (with --alike N at most N of blocks that are alike in
+themselves and their neighbours), with --first on the first machine of the list that the file can be written
+for. Internal errors, and conversions without an end, are
 failures: exit code 1.
 """
 
@@ -222,7 +223,8 @@ def main() -> int:
     import machines
     from postproc.controllers.model import builtin_files
 
-    wanted = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    wanted = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     wanted.add_argument("folder", nargs="?", type=Path)
     wanted.add_argument("--machine", nargs="*", default=list(machines.names()))
     wanted.add_argument("--controller", nargs="*", default=sorted(builtin_files()))

@@ -27,8 +27,8 @@ def joints(m: Machine, n: int, seed: int = 1) -> np.ndarray:
 
 
 def poses(m: Machine, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(q, tip, axis) of n random joint positions; for a parallel machine, whose legs seldom meet at those, of up to n
-    random poses around the ones that do, `calm` without those next to a singular one."""
+    """(q, tip, axis) of n random joint positions; for a parallel machine, whose legs seldom meet at those, of
+    up to n random poses around the ones that do, `calm` without those next to a singular one."""
     if m.kinematics.straight_slides:
         q = joints(m, n, seed)
         return q, *m.kinematics.forward(q)

@@ -1,5 +1,5 @@
-"""Laws of reading and writing CL text: whatever the text, what is read is whole, written text reads back, fast and slow
-paths agree."""
+"""Laws of reading and writing CL text: whatever the text, what is read is whole, written text reads back,
+fast and slow paths agree."""
 
 from __future__ import annotations
 
@@ -67,8 +67,9 @@ def assert_writes_back(toolpath: Toolpath) -> None:
 
 
 def assert_whole(result: ReadResult) -> None:
-    """What holds of any text: rows and arcs fit together, each row and each diagnostic names a line of the file, directions
-    are unit vectors, an error says what to do; without one nothing is infinite, and the text that we write reads back."""
+    """What holds of any text: rows and arcs fit together, each row and each diagnostic names a line of the
+    file, directions are unit vectors, an error says what to do; without one nothing is infinite, and the text
+    that we write reads back."""
     path, found = result.toolpath, result.diagnostics
     assert path.axis.shape == path.tip.shape == (len(path), 3) and len(path.line) == len(path.feed) == len(path)
     assert ((path.line >= 1) & (path.line <= result.lines)).all()

@@ -93,7 +93,8 @@ def test_a_batch_equals_its_points_one_by_one(name):
     rates = m.kinematics.jacobian(q)
     for i in range(len(q)):
         one = slice(i, i + 1)
-        np.testing.assert_allclose(m.kinematics.inverse(tip[one], axis[one])[:, 0], batch[:, i], rtol=0, atol=1e-10)
+        np.testing.assert_allclose(m.kinematics.inverse(tip[one], axis[one])[:, 0], batch[:, i],
+                                   rtol=0, atol=1e-10)
         np.testing.assert_allclose(m.kinematics.jacobian(q[one])[0], rates[i], rtol=1e-10, atol=1e-10)
         for alone, together in zip(m.kinematics.pose(q[one]), poses, strict=True):
             np.testing.assert_allclose(alone[0], together[i], rtol=0, atol=1e-10)

@@ -156,7 +156,8 @@ def test_the_axis_need_not_be_of_length_one_but_must_have_one():
 
 def test_dependent_slides_have_no_solution():
     """X under the table C, Y and Z beyond it: at C = 90 degrees X and Y move the same path."""
-    k = Serial((SLIDES[0], Joint("C", True, Z), Joint("A", True, X), SLIDES[1], SLIDES[2]), ("X", "Y", "Z", "A", "C"))
+    k = Serial((SLIDES[0], Joint("C", True, Z), Joint("A", True, X), SLIDES[1], SLIDES[2]),
+               ("X", "Y", "Z", "A", "C"))
     q = k.inverse(np.ones((1, 3)), np.array([[0.6, 0.0, 0.8]]))
     assert np.isnan(q).all()
 

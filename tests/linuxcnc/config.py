@@ -80,7 +80,8 @@ def _ini(folder: Path, machine: Machine, axes: str) -> Iterator[str]:
     yield from ("[EMC]", "VERSION = 1.1", "MACHINE = simulation", "DEBUG = 0", f"NML_FILE = {folder}/sim.nml")
     yield from ("[DISPLAY]", "DISPLAY = dummy", "[TASK]", "TASK = milltask", "CYCLE_TIME = 0.001")
     yield from ("[RS274NGC]", f"PARAMETER_FILE = {folder}/sim.var")
-    yield from ("[EMCMOT]", "EMCMOT = motmod", f"SERVO_PERIOD = {round(PERIOD * 1e9)}", f"COMM_TIMEOUT = {PATIENCE}")
+    yield from ("[EMCMOT]", "EMCMOT = motmod", f"SERVO_PERIOD = {round(PERIOD * 1e9)}",
+                f"COMM_TIMEOUT = {PATIENCE}")
     yield from ("[EMCIO]", "EMCIO = io", "CYCLE_TIME = 0.01", f"TOOL_TABLE = {folder}/tool.tbl")
     yield from ("[TRAJ]", f"COORDINATES = {' '.join(axes)}", "LINEAR_UNITS = mm", "ANGULAR_UNITS = degree")
     for kind in ("LINEAR", "ANGULAR"):

@@ -1,7 +1,8 @@
 """Run LinuxCNC's interpreter on a program and write its canonical moves as doubles.
 
-A script for Debian's own Python, which has the `gcode` module: exact.py JOB_FOLDER. The folder holds program.ngc and
-tool.tbl (mm) and receives rows.f64 (one row of `WIDTH` numbers per move) and result.json. $HOME must be a folder of
+A script for Debian's own Python, which has the `gcode` module: exact.py JOB_FOLDER. The folder holds
+program.ngc and tool.tbl (mm) and receives rows.f64 (one row of `WIDTH` numbers per move) and result.json.
+$HOME must be a folder of
 this run alone: LinuxCNC keeps its tool data in a file there.
 """
 

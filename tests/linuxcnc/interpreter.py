@@ -66,8 +66,8 @@ class Canonical:
         plane (N,): 17, 18 or 19
         center (N, 2): of arcs, program coordinates, (x, y) in plane 17, (z, x) in 18, (y, z) in 19; nan elsewhere
         turn (N,): of arcs, turns begun, counter-clockwise (G3) positive; 0 elsewhere
-        events: (index of the next move, function, arguments as text) of the other canonical calls, feeds left out;
-            none where the program moves U, V or W
+        events: (index of the next move, function, arguments as text) of the other canonical calls, feeds left
+            out; none where the program moves U, V or W
         error: the interpreter's message, "" where the program was accepted
     """
 

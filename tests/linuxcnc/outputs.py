@@ -133,8 +133,8 @@ def _without_stops(motion: Motion) -> Motion:
 def known(o: Output) -> Bools:
     """(E, J) False for axes that no block has stated since a tool change.
 
-    LinuxCNC's stand-alone interpreter takes its position again after M6 and then counts the tool length twice; a whole
-    LinuxCNC reads it from its motion control.
+    LinuxCNC's stand-alone interpreter takes its position again after M6 and then counts the tool length
+    twice; a whole LinuxCNC reads it from its motion control.
     """
     words, line = o.words, o.motion.line
     change = np.concatenate([[0], words.line[(words.letter == ord("M")) & (words.value == 6)]])

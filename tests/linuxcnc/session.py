@@ -1,7 +1,8 @@
 """Run one program through a whole headless LinuxCNC and record every servo cycle.
 
-A script for Debian's own Python, which has the `linuxcnc` and `hal` modules: session.py JOB_FOLDER. The folder holds
-what simulator.py wrote there (job.json, sim.ini, sim.nml, sim.hal, program.ngc ...) and receives samples.f64 (one row
+A script for Debian's own Python, which has the `linuxcnc` and `hal` modules: session.py JOB_FOLDER. The
+folder holds what simulator.py wrote there (job.json, sim.ini, sim.nml, sim.hal, program.ngc ...) and receives
+samples.f64 (one row
 per servo cycle: its number, then the pins of the sampler) and result.json. Only processes started here are ended.
 """
 

@@ -54,8 +54,8 @@ class Run:
         line (N,): line of the program being executed, 0 where none is
         axes: letters of the program
         errors: what the control had to say; a run with errors has usually stopped early
-        starved: share of looks at which the motion queue was nearly empty; above a few percent in a program of many
-            short blocks the host was too slow, and a smaller warp is called for
+        starved: share of looks at which the motion queue was nearly empty; above a few percent in a program
+            of many short blocks the host was too slow, and a smaller warp is called for
     """
 
     t: Floats
@@ -75,8 +75,8 @@ class Run:
 
     @property
     def uncertain(self) -> bool:
-        """Whether a busy host may have made the machine time longer: motion stood, or its queue was nearly empty, and the
-        processes that feed it waited for a processor."""
+        """Whether a busy host may have made the machine time longer: motion stood, or its queue was nearly
+        empty, and the processes that feed it waited for a processor."""
         moves = np.any(np.diff(self.joints, axis=0) != 0, axis=1)
         still = (self.seconds - moves.sum() * config.PERIOD) if moves.any() else 0.0
         return self.waited > AGREE * self.seconds and (still > AGREE * self.seconds or self.starved > HUNGRY)
@@ -212,7 +212,8 @@ def _launch(folder: Path, time_limit: float) -> None:
             os.chown(path, NOBODY, NOBODY)
     command = [*_isolation(), *_identity(), SYSTEM_PYTHON, "-B", folder / "session.py", folder]
     with nullcontext() if _isolation() else _alone(), (folder / "stderr").open("w") as stderr:
-        process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=stderr, stderr=stderr)
+        process = subprocess.Popen(command, cwd=folder, stdin=subprocess.DEVNULL, stdout=stderr,
+                                   stderr=stderr)
         try:
             code = process.wait(time_limit + 60.0)
         except BaseException:

@@ -101,7 +101,8 @@ def test_positions_are_exact_and_carry_their_lines(run) -> None:
     canonical = run(HEAD + "G0 X0 Y0 Z50 A0 C0\nG1 X10.123456789 Y-5 A10.000001 C400\nG10 L2 P1 X100\nG1 X1\nM2\n")
     assert canonical.line.tolist() == [5, 6, 8]
     assert canonical.kind.tolist() == [Move.TRAVERSE, Move.FEED, Move.FEED]
-    np.testing.assert_allclose(canonical.pos[1], [10.123456789, -5, 50, 10.000001, 0, 400, 0, 0, 0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(canonical.pos[1], [10.123456789, -5, 50, 10.000001, 0, 400, 0, 0, 0],
+                               rtol=0, atol=1e-12)
     np.testing.assert_allclose(canonical.machine[:, [0, 2]], [[0, 125.5], [10.123456789, 125.5], [101, 125.5]],
                                rtol=0, atol=1e-12)
     assert canonical.tool.tolist() == [1, 1, 1]

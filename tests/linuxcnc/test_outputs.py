@@ -300,7 +300,8 @@ def slides_at(world: Floats, o: Output, length: float) -> Floats:
 
 def test_offset_in_the_header_is_the_one_used() -> None:
     path, found = toolpaths.read(SAMPLES / "five_tilted.cls")
-    result = convert(path, found, "mikron-ucp710", setup_file().model_copy(update={"part": TURNED, "tools": SHORT}))
+    result = convert(path, found, "mikron-ucp710",
+                     setup_file().model_copy(update={"part": TURNED, "tools": SHORT}))
     line = next(line for line in result.text.splitlines() if line.startswith("(work offset G54"))
     stated = [float(word[1:]) for word in line.strip("()").split()[-5:]]
     assert result.job is not None

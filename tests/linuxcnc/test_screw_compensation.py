@@ -62,7 +62,8 @@ def at_rest(run_joints: Floats, stops: tuple[float, ...]) -> Floats:
     return np.array(found)
 
 
-def test_the_motor_moves_by_the_tables_value(simulate, tmp_path: Path, compensated: Callable[[bool], None]) -> None:
+def test_the_motor_moves_by_the_tables_value(simulate, tmp_path: Path,
+                                             compensated: Callable[[bool], None]) -> None:
     machine = machines.load("mill-3axis")
     program = tmp_path / "x.ngc"
     moves = "\n".join(f"G1 X{x} F3000\nG4 P0.3" for x in STOPS)

@@ -112,8 +112,8 @@ def recording(seconds: float, waited: float, still: float = 0.0) -> Run:
     ([(10.5 - 0.1 * k, 5.0, 1.0) for k in range(6)], 10.0, 6)])
 def test_starved_recordings_are_made_again(monkeypatch: pytest.MonkeyPatch, taken: list[tuple[float, float, float]],
                                            seconds: float, made: int) -> None:
-    """Until one is beyond uncertainty or the two shortest agree, each at half the warp of the one before; the shortest
-    counts."""
+    """Until one is beyond uncertainty or the two shortest agree, each at half the warp of the one before; the
+    shortest counts."""
     warps: list[Fraction] = []
 
     def simulated(machine: Machine, program: Path, tools: None, warp: Fraction) -> Run:

@@ -49,7 +49,8 @@ def _curve(rng: np.random.Generator, rotary: bool, k: int, size: float) -> Table
     return TableCurve(x, rng.normal(size=13) * size, "spline" if k == 2 else "linear")
 
 
-def rod_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01, angle: float = 3.0 * ARCSEC) -> RodErrors:
+def rod_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01,
+               angle: float = 3.0 * ARCSEC) -> RodErrors:
     """All dimensions of a machine on rods."""
     rng = np.random.default_rng(seed)
     frame = rod_frame(kinematics)

@@ -1,9 +1,9 @@
 """A machine with geometric errors, read from its files and built a second time; nothing of the code under test is used.
 
-Serial machines are products of 4 x 4 matrices, one point at a time, torsors "displaced, then turned about x, y, z"
-(Oueslati 2004, 1.12 to 1.18). Machines on rods close |A'B| = L + dl six times (Company 2000, II-52 to II-58, E-1 to E-9)
-by scipy's least squares in place and rotation vector of the platform. What the files mean is what the READMEs of
-`machines` and `machines/geometric_error` say.
+Serial machines are products of 4 x 4 matrices, one point at a time, torsors "displaced, then turned about x,
+y, z" (Oueslati 2004, 1.12 to 1.18). Machines on rods close |A'B| = L + dl six times (Company 2000, II-52 to
+II-58, E-1 to E-9) by scipy's least squares in place and rotation vector of the platform. What the files mean
+is what the READMEs of `machines` and `machines/geometric_error` say.
 """
 
 from __future__ import annotations

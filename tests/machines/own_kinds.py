@@ -58,8 +58,8 @@ class PolarModel(KinematicsModel):
 
 @dataclass(frozen=True, eq=False)
 class Tilting(Kinematics):
-    """A head on X, Y, Z that a screw along U tilts about x, `arm` mm from its pivot: U = arm sin(tilt); the gauge point
-    hangs `below` mm under the pivot."""
+    """A head on X, Y, Z that a screw along U tilts about x, `arm` mm from its pivot: U = arm sin(tilt); the
+    gauge point hangs `below` mm under the pivot."""
 
     arm: float
     below: float
@@ -68,7 +68,8 @@ class Tilting(Kinematics):
     turns_tool = (False, False, False, True)
 
     def inverse(self, tip, axis, spin=0.0, near=None):
-        tilt = np.where((np.abs(axis[:, 0]) < 1e-9) & (axis[:, 2] > 0.1), np.arctan2(-axis[:, 1], axis[:, 2]), np.nan)
+        tilt = np.where((np.abs(axis[:, 0]) < 1e-9) & (axis[:, 2] > 0.1),
+                        np.arctan2(-axis[:, 1], axis[:, 2]), np.nan)
         slides = tip + (self.below + self.tool_length) * self._axis(tilt) - [0.0, 0.0, self.below]
         return np.column_stack([slides, self.arm * np.sin(tilt)])[None]
 
@@ -110,7 +111,8 @@ NAMES = list(OWN)
 @cache
 def own_machine(name: str) -> Machine:
     """The machine of that name, loaded from its file as anybody's."""
-    with TemporaryDirectory() as folder, patch.dict(os.environ, {FILES: os.pathsep.join([str(SAMPLE), __file__])}):
+    with TemporaryDirectory() as folder, patch.dict(os.environ,
+                                                    {FILES: os.pathsep.join([str(SAMPLE), __file__])}):
         file = Path(folder) / f"{name}.toml"
         file.write_text(OWN[name])
         return machines.load(file)

@@ -81,7 +81,8 @@ def test_a_package_registers_a_kind_by_its_metadata(tmp_path, monkeypatch) -> No
 
 def test_files_that_are_no_kinds_are_refused_with_what_is_wrong(tmp_path, monkeypatch) -> None:
     broken = tmp_path / "broken.py"
-    for text, words in (("1 / 0", "is not run: ZeroDivisionError"), ("nothing = 1", "holds no kind of machine")):
+    for text, words in (("1 / 0", "is not run: ZeroDivisionError"),
+                        ("nothing = 1", "holds no kind of machine")):
         broken.write_text(text)
         kinds._of_file.cache_clear()
         monkeypatch.setenv(kinds.FILES, str(broken))
@@ -181,7 +182,8 @@ def test_the_contract_is_held_against_a_file_that_is_loaded(tmp_path, monkeypatc
     ("def forward(", "def forwards(", "builds no kinematics: TypeError: Can't instantiate abstract class"),
     ('axis_names = ("X", "Y", "Z")', 'axis_names = ("X", "Y", "C")', "'C' is not a letter of a linear axis"),
     ('    axis_names = ("X", "Y", "Z")', "    names = ()", "has no attribute 'axis_names'")])
-def test_a_model_that_gives_no_kinematics_is_refused(tmp_path, monkeypatch, old: str, new: str, words: str) -> None:
+def test_a_model_that_gives_no_kinematics_is_refused(tmp_path, monkeypatch, old: str, new: str,
+                                                     words: str) -> None:
     wrong = tmp_path / "wrong.py"
     assert old in SAMPLE.read_text()
     wrong.write_text(SAMPLE.read_text().replace(old, new))

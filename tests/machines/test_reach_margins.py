@@ -51,7 +51,8 @@ def test_workspace_margins_are_the_distance_to_the_faces() -> None:
     kinematics = parallel("uranesx")
     place = np.array([[0.0, 0.0, 0.0], [240.0, -251.0, 100.0]])
     q = kinematics.inverse(place, np.tile([0.0, 0.0, 1.0], (2, 1)))[0]
-    np.testing.assert_allclose(reach(kinematics, q).values[:, :3], [[250, 250, 250], [10, -1, 150]], atol=1e-8)
+    np.testing.assert_allclose(reach(kinematics, q).values[:, :3],
+                               [[250, 250, 250], [10, -1, 150]], atol=1e-8)
     long = kinematics.with_tool(100.0)
     np.testing.assert_allclose(reach(long, q).values[:, :3], [[250, 250, 250], [10, -1, 150]], atol=1e-8)
 
@@ -127,7 +128,8 @@ def test_between_ends_reports_joints_that_lose_the_platform() -> None:
 
 
 def test_passed_lists_the_worst_first() -> None:
-    margins = Margins(("a", "b", "c"), np.array([False, False, True]), np.array([[-1.0, -2, 1], [-3.0, 5, -0.1]]))
+    margins = Margins(("a", "b", "c"), np.array([False, False, True]),
+                      np.array([[-1.0, -2, 1], [-3.0, 5, -0.1]]))
     assert margins.passed() == [("a", False, 2, 1, -3.0), ("b", False, 1, 0, -2.0), ("c", True, 1, 1, -0.1)]
 
 

@@ -192,7 +192,7 @@ def test_key_lines_of_every_construct():
     assert ("no",) not in lines and ("z",) not in lines
 
 
-# ---- what is allowed, in words ----------------------------------------------------------------------------------------
+# ---- what is allowed, in words -----------------------------------------------------------------------------
 
 class Every(UserModel):
     number: float = 0.0

@@ -21,11 +21,13 @@ def main() -> int:
     from tests.mutants.rooms import FAULTS
     from tests.mutants.run import Bench, outcomes
 
-    wanted = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    wanted = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     wanted.add_argument("--room", default="", help="faults of the rooms whose name holds this")
     wanted.add_argument("--only", default="", help="faults whose name holds this")
     wanted.add_argument("--jobs", type=int, default=1)
-    wanted.add_argument("--no-tests", action="store_true", help="do not ask the tests about what the proof lets pass")
+    wanted.add_argument("--no-tests", action="store_true",
+                        help="do not ask the tests about what the proof lets pass")
     wanted.add_argument("--no-programs", action="store_true", help="leave the faults in written programs out")
     wanted.add_argument("--json", type=Path)
     wanted.add_argument("--page", type=Path, help="write the published table")

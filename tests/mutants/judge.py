@@ -13,7 +13,8 @@ from tests.mutants.battery import Case
 FEED, REST = 0.005, 2e-3
 """share of the time of a move, and s, from which on a feed or a rest counts as another one"""
 NEXT = "output.next_mode"
-SAME = ("tool", "spindle", "rpm", "coolant", "register", "plane", "compensation", "radius", "offset", "pitch", "blend")
+SAME = ("tool", "spindle", "rpm", "coolant", "register", "plane", "compensation", "radius", "offset",
+        "pitch", "blend")
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,8 @@ class Made:
 
 @dataclass(frozen=True)
 class Effect:
-    """What a program does at every move of the CL file, by the reader: seconds, least and largest feed per minute (NaN in
-    inverse time), and rests of cuts; states of cuts; worst deviations (mm, degrees)."""
+    """What a program does at every move of the CL file, by the reader: seconds, least and largest feed per
+    minute (NaN in inverse time), and rests of cuts; states of cuts; worst deviations (mm, degrees)."""
 
     seconds: np.ndarray
     feeds: np.ndarray
@@ -127,7 +128,8 @@ def effect_of(job: Any, comparison: Any) -> Effect:
             values = np.where(np.broadcast_to(motion.compensation, cut.shape) == 40, -1.0, values)
         column[owner[cut]] = values[cut]
         states[name] = column
-    return Effect(spent, feeds, rests, turns, states, (comparison.worst_tip, float(np.degrees(comparison.worst_axis))))
+    return Effect(spent, feeds, rests, turns, states,
+                  (comparison.worst_tip, float(np.degrees(comparison.worst_axis))))
 
 
 def passed_on(base: Made, got: Made) -> bool:
@@ -172,7 +174,8 @@ def verified(asked: Any, text: str, files: dict[str, str]) -> Made:
     from postproc.verification.read_back import read_back
     from postproc.verification.second_witness import second_witness
 
-    comparison, found = read_back(text, asked.job, "part.cls", others={name: t.encode() for name, t in files.items()})
+    comparison, found = read_back(text, asked.job, "part.cls",
+                                  others={name: t.encode() for name, t in files.items()})
     errors, warned = [d for d in found if d.severity == 2], tuple(str(d) for d in found if d.severity == 1)
     if not errors and comparison is not None:
         found = second_witness(asked.source, asked.asked or asked.setup, asked.options, asked.job, comparison)[1]

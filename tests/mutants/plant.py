@@ -34,8 +34,8 @@ class Fault:
         name: in words, stable
         room: where it belongs in the table
         function: qualified name of a function at the top of a module or of a class
-        old, new: text that stands once in that function (of several of one name: in one of them), and what stands there
-            instead
+        old, new: text that stands once in that function (of several of one name: in one of them), and what
+            stands there instead
         cases: names of the conversions in which it acts; () for those of the room
         why: what makes a survivor harmless or out of reach, for the published table
     """

@@ -1,8 +1,8 @@
 """Faults in written programs: which of them `verify` refuses, which do no harm, which pass (`make mutants`).
 
-2,000 and more, picked with a fixed seed from all changes of one kind each: words and blocks left out, blocks doubled and
-exchanged, signs, digits, codes, numbers of tools and registers, feeds and speeds, over every control, with the part off the
-rotary axes and tools of different lengths.
+2,000 and more, picked with a fixed seed from all changes of one kind each: words and blocks left out, blocks
+doubled and exchanged, signs, digits, codes, numbers of tools and registers, feeds and speeds, over every
+control, with the part off the rotary axes and tools of different lengths.
 """
 
 from __future__ import annotations
@@ -102,7 +102,8 @@ def _said(asked: Any, base: Made, plain: Effect, one: Mutant) -> str:
     if differs:
         warned = [text for text in got.said if "[verify" in text]
         return f"harmless: {WARNED}" if warned else f"survivor: {differs}"
-    comparison, _ = read_back(one.text, asked.job, "part.cls", others={n: t.encode() for n, t in base.files.items()})
+    comparison, _ = read_back(one.text, asked.job, "part.cls",
+                              others={n: t.encode() for n, t in base.files.items()})
     apart_ = plain.against(Effect.of(asked.job, comparison)).split()[0]
     return f"harmless: {SAME.get(apart_, 'cuts inside the tolerance, their times, rests and states the same')}"
 

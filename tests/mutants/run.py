@@ -108,7 +108,8 @@ def _some(faults: list[Fault], bench: Bench, tests: bool) -> list[Outcome]:
     result = []
     for fault in faults:
         result.append(outcome(fault, bench, tests))
-        print(f"{fault.room}: {fault.name}: {result[-1].caught_by} {result[-1].test}", file=sys.stderr, flush=True)
+        print(f"{fault.room}: {fault.name}: {result[-1].caught_by} {result[-1].test}",
+              file=sys.stderr, flush=True)
     return result
 
 

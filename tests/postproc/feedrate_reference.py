@@ -109,7 +109,8 @@ Row = tuple[Fraction, Fraction]
 """(a, b) of |a x0 + b x1| <= 1, b >= 0."""
 
 
-def exact_second_order(sigma: Floats, dq: Floats, d2q: Floats, cap: Floats, flat: float = 0.0) -> list[Fraction]:
+def exact_second_order(sigma: Floats, dq: Floats, d2q: Floats, cap: Floats,
+                       flat: float = 0.0) -> list[Fraction]:
     """The squared speeds of `second_order` in fractions, nothing rounded; dq, d2q (N, J) over the limits.
 
     `flat` 0 is the greedy solution itself: it gives all of x1 away for the last bit of x0 where x1 hardly counts in a row.

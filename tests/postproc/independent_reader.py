@@ -1,7 +1,7 @@
 """Programs of every control read a second time, as far as tests of geometric errors need it: where every block ends.
 
-Words by patterns, state by the controls' manuals; joints of tip coordinates through the second implementation of the
-nominal machine. Nothing of the code under test is used. One work offset, mm, tools by their gauge lengths.
+Words by patterns, state by the controls' manuals; joints of tip coordinates through the second implementation
+of the nominal machine. Nothing of the code under test is used. One work offset, mm, tools by their gauge lengths.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Reading:
         home = {k: self.machine.toml["axes"][k]["home"] for k in self.machine.letters}
         self.joint: dict[str, float] = {k: float(v) for k, v in home.items()}
 
-    # ---- what all controls share ------------------------------------------------------------------------------------
+    # ---- what all controls share ---------------------------------------------------------------------------
 
     def enter(self, law: str, plane: np.ndarray | None = None) -> None:
         self.law, self.plane, self.tips = law, np.eye(3) if plane is None else plane, {}
@@ -99,7 +99,7 @@ class Reading:
         self.move({"Z": bottom}, True, text)
         self.move({"Z": back}, False, text)
 
-    # ---- dialects ----------------------------------------------------------------------------------------------------
+    # ---- dialects ------------------------------------------------------------------------------------------
 
     def iso(self, text: str) -> list[End]:
         """LinuxCNC, Fanuc, Haas."""
@@ -117,7 +117,8 @@ class Reading:
                 self.machine_move(axes, raw)
             elif self.motion in (81, 82, 83, 73, 85):
                 self.sticky |= {k: words[k] for k in "ZR" if k in words}
-                self.drill({k: v for k, v in axes.items() if k != "Z"}, self.sticky["Z"], self.sticky[self.level], raw)
+                self.drill({k: v for k, v in axes.items() if k != "Z"}, self.sticky["Z"],
+                           self.sticky[self.level], raw)
             else:
                 self.move(axes, self.motion > 0, raw)
         return self.ends

@@ -38,7 +38,8 @@ def lines(tip: np.ndarray, axis: np.ndarray) -> Curves:
 def segments(start: np.ndarray, end: np.ndarray, axis0: np.ndarray, axis1: np.ndarray) -> Curves:
     """Straight moves, each by itself."""
     n = len(start)
-    return Curves(start, end, axis0, axis1, np.zeros(n, dtype=bool), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n))
+    return Curves(start, end, axis0, axis1, np.zeros(n, dtype=bool), np.zeros((n, 3)), np.zeros((n, 3)),
+                  np.zeros(n))
 
 
 def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -32,7 +32,8 @@ NX = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM
 
 def toolpath(*lines: str, head: list[str] | None = None) -> Toolpath:
     """The Toolpath of CL lines after a usual beginning; a fault of the text fails the test."""
-    path, found = toolpaths.read_bytes("\n".join([*(HEAD if head is None else head), *lines, "FINI"]), file="test.apt")
+    path, found = toolpaths.read_bytes("\n".join([*(HEAD if head is None else head), *lines, "FINI"]),
+                                       file="test.apt")
     assert not has_errors(found), [str(d) for d in found]
     return path
 
@@ -102,7 +103,7 @@ def body(text: str) -> list[str]:
     return lines[first:last]
 
 
-# ---- what is shared by tests of the text -----------------------------------------------------------------------------
+# ---- what is shared by tests of the text -------------------------------------------------------------------
 
 
 def shop_file(folder: Path, text: str, base: str = "linuxcnc") -> Path:
@@ -117,7 +118,8 @@ def words_of(block: str) -> dict[str, str]:
     return dict(re.findall(r"([A-Z])(-?[\d.]+)", block))
 
 
-def flat(*lines: str, controller: str | Path = "linuxcnc", name: str = "mill-3axis", **options: object) -> list[str]:
+def flat(*lines: str, controller: str | Path = "linuxcnc", name: str = "mill-3axis",
+         **options: object) -> list[str]:
     """The blocks from the first cut on, for a path that begins above the origin."""
     result = good(convert(toolpath("RAPID", "GOTO/0,0,5", *lines), name, controller, **options))
     blocks = body(result.text)
@@ -130,11 +132,12 @@ def execute(result: PostResult, text: str | None = None) -> list[Step]:
     assert job is not None
     lengths = {int(k): v.gauge_length for k, v in result.setup.tools.items()}
     unit = np.where(np.array(m.rotary), 180.0 / math.pi, 1.0)
-    peer = Peer(m.axis_names, np.asarray(job.control.work_offset), lengths, m.home * unit, job.control.length_on_z)
+    peer = Peer(m.axis_names, np.asarray(job.control.work_offset), lengths, m.home * unit,
+                job.control.length_on_z)
     return peer.run(result.text if text is None else text)
 
 
-# ---- own kinematics ----------------------------------------------------------------------------------------------
+# ---- own kinematics ----------------------------------------------------------------------------------------
 
 _CHAINS: dict[str, list[tuple[str, tuple[float, float, float], tuple[float, float, float]]]] = {
     "mill-3axis": [("X", (1, 0, 0), (0, 0, 0)), ("Y", (0, 1, 0), (0, 0, 0)), ("Z", (0, 0, 1), (0, 0, 0))],
@@ -175,7 +178,7 @@ def tool_poses(result: PostResult, steps: list[Step]) -> list[tuple[np.ndarray, 
     return [pose_of(result.machine.name, s.points, tools.get(s.tool, 0.0)) for s in steps]
 
 
-# ---- own geometry ------------------------------------------------------------------------------------------------
+# ---- own geometry ------------------------------------------------------------------------------------------
 
 
 def unit(v: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Written programs with one thing changed: every word and block left out, every number and code changed, blocks twice.
 
-`mutants` gives them all for the text of any of the controls; `verdict` says what the read-back makes of one: refused, the
-same motion and states as before, or neither, which is to be judged.
+`mutants` gives them all for the text of any of the controls; `verdict` says what the read-back makes of one:
+refused, the same motion and states as before, or neither, which is to be judged.
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ def _numbers(text: str) -> Iterator[tuple[str, str]]:
 
 
 def verdict(job: Job, text: str, effect: Effect) -> str:
-    """"caught CODE", "same", "placed" (only rapids between operations end elsewhere, which the read-back has found clear and
-    inside travel), "near" (inside the tolerance), or what differs from what the program does unchanged."""
+    """"caught CODE", "same", "placed" (only rapids between operations end elsewhere, which the read-back has
+    found clear and inside travel), "near" (inside the tolerance), or what differs from what the program does unchanged."""
     comparison, found = read_back(text.encode(), job, "f.cls")
     errors = [d.code for d in found if d.severity is Severity.ERROR]
     if errors:
@@ -139,7 +139,8 @@ class Effect:
 
     def kept(self, keep: np.ndarray) -> Effect:
         """Some of the rows."""
-        return Effect(self.end[keep], self.link[keep], {k: v[keep] for k, v in self.states.items()}, self.line[keep])
+        return Effect(self.end[keep], self.link[keep], {k: v[keep] for k, v in self.states.items()},
+                      self.line[keep])
 
     def against(self, other: Effect) -> str:
         """What differs in the other program."""

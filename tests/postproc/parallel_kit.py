@@ -1,7 +1,7 @@
 """An own look at programs for parallel machines: dense joints, assembly followed, distance from the CL path.
 
-The executor is peer.Peer, the path geometry is written out here; of the product only the kinematics' forward model is
-used, without a hint, and what it gives must hang together from home on.
+The executor is peer.Peer, the path geometry is written out here; of the product only the kinematics' forward
+model is used, without a hint, and what it gives must hang together from home on.
 """
 
 from __future__ import annotations

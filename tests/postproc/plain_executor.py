@@ -135,7 +135,8 @@ class Peer:
         t = np.linspace(0.0, 1.0, self.dense + 1)[1:, None]
         self.step(number, kind, target, self.arc(target, words) if kind == "arc" else self.at + t * (target - self.at))
 
-    def step(self, number: int, kind: str, target: np.ndarray, points: np.ndarray, level: float = math.nan) -> None:
+    def step(self, number: int, kind: str, target: np.ndarray, points: np.ndarray,
+             level: float = math.nan) -> None:
         """One motion with the state that it is run in."""
         self.steps.append(Step(number, kind, target, points, self.feed, self.inverse, self.tool, self.register, self.spindle,
                                self.coolant, level))

@@ -79,7 +79,8 @@ def faults(dialect: str, text: str, on: str = "mill-3axis") -> dict[str, list[in
     return result
 
 
-def execute(words: Words, letters: tuple[str, ...], offsets: Offsets, file: str = "") -> tuple[Motion, list[Diagnostic]]:
+def execute(words: Words, letters: tuple[str, ...], offsets: Offsets,
+            file: str = "") -> tuple[Motion, list[Diagnostic]]:
     """The motion of a program in RS274/NGC words, without subprograms, that starts with the machine at home."""
     reader = IsoReader(letters)
     found = reader.check(words, file)

@@ -32,7 +32,8 @@ def test_a_shared_array_cannot_be_written() -> None:
 
 @pytest.mark.parametrize("index", [np.array([2, 0, 0]), np.array([True, False, True]), slice(1, 3), np.zeros(0, dtype=int)],
                          ids=str)
-@pytest.mark.parametrize("values", [repeated([1.0, 2.0], 3), np.arange(6.0).reshape(3, 2)], ids=["once", "rows"])
+@pytest.mark.parametrize("values", [repeated([1.0, 2.0], 3), np.arange(6.0).reshape(3, 2)],
+                         ids=["once", "rows"])
 def test_rows_taken_of_what_is_kept_once_are_those_of_a_copy(values: Array, index: Array | slice) -> None:
     found = taken(values, index)
     assert bits(found) == bits(np.array(values)[index])
@@ -42,7 +43,8 @@ def test_rows_taken_of_what_is_kept_once_are_those_of_a_copy(values: Array, inde
 def test_parts_with_one_row_stay_one_row() -> None:
     alike = [repeated(2.0, 3), repeated(2.0, 0), repeated(2.0, 2)]
     assert kept_once(joined(alike))
-    for parts in (alike, [repeated(2.0, 3), repeated(3.0, 2)], [repeated(2.0, 2), np.arange(2.0)], [np.zeros(0)]):
+    for parts in (alike, [repeated(2.0, 3), repeated(3.0, 2)], [repeated(2.0, 2), np.arange(2.0)],
+                  [np.zeros(0)]):
         assert bits(joined(parts)) == bits(np.concatenate(parts))
 
 

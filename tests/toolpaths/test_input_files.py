@@ -44,7 +44,8 @@ def test_only_regular_files_are_read(kind: str, tmp_path: Path, monkeypatch: pyt
     assert [d.code for d in found] == ["cl.open"]
 
 
-def test_a_file_that_becomes_a_pipe_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_becomes_a_pipe_is_not_waited_for(tmp_path: Path,
+                                                      monkeypatch: pytest.MonkeyPatch) -> None:
     pipe, plain = tmp_path / "pipe", tmp_path / "plain"
     os.mkfifo(pipe)
     plain.write_text("x")

@@ -198,7 +198,8 @@ def interrupts() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("interrupts")
-def test_an_interrupt_waits_for_the_renames(shop: tuple[Path, dict[Path, str]], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupt_waits_for_the_renames(shop: tuple[Path, dict[Path, str]],
+                                            monkeypatch: pytest.MonkeyPatch) -> None:
     folder, outputs = shop
     before, link = state(folder), Path.hardlink_to
 

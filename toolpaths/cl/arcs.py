@@ -21,8 +21,8 @@ RADIUS_ERROR = 0.1
 SAME_POINT = 2e-5
 """mm: ends this near count as one point where a system means a whole turn"""
 ROUNDING = 2e-3
-"""mm: an end this near to its start is there by rounding: where a system writes no whole circles and it lies behind the
-start; where it does and the arc is a helix"""
+"""mm: an end this near to its start is there by rounding: where a system writes no whole circles and it lies
+behind the start; where it does and the arc is a helix"""
 _STEEP = 10.0
 """a helix that ends above its start and rises more than this times the chord between them makes a whole turn"""
 _SENSE_LEAST, _SENSE_ALL = 8, 3
@@ -34,8 +34,8 @@ _MOST_TURNS = 10000
 
 @dataclass
 class ArcTable:
-    """K circle records in file units and local frame: row of the arc's end, (center, direction) as 6 numbers, radius
-    (NaN where not written), whole turns, sense (+1 right-hand), sweep (rad, NaN where not written), line."""
+    """K circle records in file units and local frame: row of the arc's end, (center, direction) as 6 numbers,
+    radius (NaN where not written), whole turns, sense (+1 right-hand), sweep (rad, NaN where not written), line."""
 
     row: list[int] = field(default_factory=list)
     numbers: list[tuple[float, ...]] = field(default_factory=list)

@@ -23,8 +23,8 @@ T = TypeVar("T")
 
 @dataclass
 class PointRows:
-    """The N rows while they are worked on, mm; `given` (N,): the record carries an axis of its own, `index` (N,): which map
-    of the builder it takes."""
+    """The N rows while they are worked on, mm; `given` (N,): the record carries an axis of its own, `index`
+    (N,): which map of the builder it takes."""
 
     tip: Floats
     axis: Floats
@@ -132,7 +132,8 @@ def _fill_axis(b: ToolpathBuilder, rows: PointRows) -> None:
     _check_multax_off(b, rows, marks)
 
 
-def _check_multax_off(b: ToolpathBuilder, rows: PointRows, marks: dict[int, tuple[float, float, float]]) -> None:
+def _check_multax_off(b: ToolpathBuilder, rows: PointRows,
+                      marks: dict[int, tuple[float, float, float]]) -> None:
     """Systems differ in what points of three numbers after MULTAX/OFF mean; CATIA documents the locked axis."""
     for row, line in b.multax_off:
         if row < len(rows) and not rows.given[row] and row not in marks and abs(rows.axis[row, 2] - 1.0) > UNIT_ROUNDING:
@@ -194,7 +195,8 @@ def _place_frames(b: ToolpathBuilder, rows: PointRows) -> None:
     indexing.check_cuts(b, ~rapid, rows.index, rows.line)
 
 
-def _to_part_frame(b: ToolpathBuilder, rows: PointRows, normal: Floats | None, contact: Floats | None) -> None:
+def _to_part_frame(b: ToolpathBuilder, rows: PointRows, normal: Floats | None,
+                   contact: Floats | None) -> None:
     for start, end in _runs(rows.index):
         found = b.maps[rows.index[start]]
         if found is None:
@@ -275,15 +277,18 @@ def _has_start(b: ToolpathBuilder, rows: PointRows, kind: Array, k: int, row: in
     if row >= len(rows):
         return False
     if row == 0:
-        b.log.error("cl.arc-start", "an arc needs a point before it", b.arcs.line[k], "put a GOTO before the arc")
+        b.log.error("cl.arc-start", "an arc needs a point before it", b.arcs.line[k],
+                    "put a GOTO before the arc")
         return False
     if kind[row] == Kind.RAPID:
-        b.log.error("cl.arc-rapid", "RAPID does not go with an arc", b.arcs.line[k], "put RAPID before a GOTO")
+        b.log.error("cl.arc-rapid", "RAPID does not go with an arc", b.arcs.line[k],
+                    "put RAPID before a GOTO")
         return False
     return b.arcs.row[k + 1:k + 2] != [row]
 
 
-def _map_arcs(b: ToolpathBuilder, rows: PointRows, row: Ints, center: Floats, normal: Floats, toward: Floats) -> None:
+def _map_arcs(b: ToolpathBuilder, rows: PointRows, row: Ints, center: Floats, normal: Floats,
+              toward: Floats) -> None:
     index = rows.index[row]
     if rows.common is not None:
         index = np.where(rows.common[row], 0, index)
@@ -325,8 +330,10 @@ def _feeds(b: ToolpathBuilder, rows: PointRows, kind: Array) -> tuple[Floats, Ar
     rapid = kind == Kind.RAPID
     feed[rapid] = np.nan
     mode[rapid | np.isnan(feed)] = FeedMode.PER_TIME
-    b.log.many(Severity.WARNING, "cl.no-feed", "cutting motion before any FEDRAT", rows.line[~rapid & np.isnan(feed)])
-    b.log.many(Severity.ERROR, "cl.feed", "cutting motion at a feed of 0 or less", rows.line[~rapid & (feed <= 0.0)])
+    b.log.many(Severity.WARNING, "cl.no-feed", "cutting motion before any FEDRAT",
+               rows.line[~rapid & np.isnan(feed)])
+    b.log.many(Severity.ERROR, "cl.feed", "cutting motion at a feed of 0 or less",
+               rows.line[~rapid & (feed <= 0.0)])
     return feed, mode
 
 

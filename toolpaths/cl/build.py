@@ -1,7 +1,7 @@
 """The state of reading: where we are in the file, what holds from here on, what was found so far.
 
-Plain points are never touched one by one: a record that changes something notes the row from which it holds (`ModalValue`),
-and `assemble` spreads these over the rows at the end.
+Plain points are never touched one by one: a record that changes something notes the row from which it holds
+(`ModalValue`), and `assemble` spreads these over the rows at the end.
 """
 
 from __future__ import annotations

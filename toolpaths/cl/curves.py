@@ -41,8 +41,8 @@ def indirp(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def tlon(b: ToolpathBuilder, s: Statement) -> None:
-    """TLON,GOFWD/(CIRCLE/...),ON[,2,INTOF],(LINE/center, end) or /(CYLNDR/...),ON,(PLANE/...(POINT/end)), or of
-    PostWorks (NCL) /(CIRCLE/CANON,center,axis,radius),ON|TANTO,(PLANE/a, b, c, d).
+    """TLON,GOFWD/(CIRCLE/...),ON[,2,INTOF],(LINE/center, end) or /(CYLNDR/...),ON,(PLANE/...(POINT/end)), or
+    of PostWorks (NCL) /(CIRCLE/CANON,center,axis,radius),ON|TANTO,(PLANE/a, b, c, d).
 
     Where the end is written out, counting crossings (2,INTOF) is not needed to find it.
     """
@@ -149,8 +149,8 @@ def _end_on_plane(b: ToolpathBuilder, arc: list[float], found: list[tuple[str, l
 def nurbs(b: ToolpathBuilder, s: Statement) -> None:
     """NURBS, KNOT/values, CNTRL/x,y,z ...: a clamped cubic that begins at the current point.
 
-    The knots written are the inner ones and the end; with the first point there are three more control points than
-    knots (inferred from files, no document states it).
+    The knots written are the inner ones and the end; with the first point there are three more control points
+    than knots (inferred from files, no document states it).
     """
     knots, control = _gather(b)
     start = b.last_point()

@@ -61,9 +61,10 @@ def _again(b: ToolpathBuilder, s: Statement) -> None:
     _arm(b, values(replace(last, empty=()), s.words[1:]))
 
 
-def _variant(b: ToolpathBuilder, kind: CycleKind, words: tuple[Word, ...], rest: tuple[Word, ...]) -> tuple[Word, ...]:
-    """`rest` without the word that makes another cycle of a bore (NX: DRAG, NODRAG, MANUAL); what cannot be carried out as
-    the cycle of its kind, a bore from below and a tap in steps, is refused."""
+def _variant(b: ToolpathBuilder, kind: CycleKind, words: tuple[Word, ...],
+             rest: tuple[Word, ...]) -> tuple[Word, ...]:
+    """`rest` without the word that makes another cycle of a bore (NX: DRAG, NODRAG, MANUAL); what cannot be
+    carried out as the cycle of its kind, a bore from below and a tap in steps, is refused."""
     steps = [str(w) for w in words[:len(words) - len(rest)] if w in _IN_STEPS]
     if kind == "TAP" and steps:
         b.log.error("cl.cycle", f"CYCLE/TAP,{steps[0]}: peck tapping is not supported", b.line,
@@ -86,7 +87,8 @@ def _arm(b: ToolpathBuilder, v: CycleValues) -> None:
         v = replace(v, kind="DEEP")
     b.memory[_LAST] = v
     for word in v.empty:
-        b.log.error("cl.cycle-value", f"CYCLE/{v.kind}: {word} has no number", b.line, "write the number behind it")
+        b.log.error("cl.cycle-value", f"CYCLE/{v.kind}: {word} has no number", b.line,
+                    "write the number behind it")
     for word in v.strange:
         b.log.warning("cl.cycle-option", f"CYCLE/{v.kind}: {word} is not used", b.line, key=word)
     if v.placed and b.dialect.name == "catia":
@@ -109,8 +111,8 @@ def _approached(b: ToolpathBuilder, v: CycleValues) -> CycleValues:
 
 
 def _placed(v: CycleValues, planes: Planes) -> CycleValues:
-    """Numbers without a word by their place: depth, then feed where no unit stands, then clearance and retract; in the
-    posts that say RAPTO from the clearance, this stands next to it, and goes without a retract plane."""
+    """Numbers without a word by their place: depth, then feed where no unit stands, then clearance and
+    retract; in the posts that say RAPTO from the clearance, this stands next to it, and goes without a retract plane."""
     free = list(v.free)
     found: dict[str, object] = {}
     if math.isnan(v.depth) and free:
@@ -149,7 +151,8 @@ def _depth(b: ToolpathBuilder, v: CycleValues) -> float:
     if math.isnan(depth) and v.kind == "CSINK" and v.diameter > 0.0 and 0.0 < v.angle < 180.0:
         return 0.5 * v.diameter / math.tan(math.radians(0.5 * v.angle))
     if math.isnan(depth) and _DEPTH.isdisjoint(v.empty):
-        b.log.error("cl.cycle-value", f"CYCLE/{v.kind} states no depth", b.line, "write it with DEPTH or FEDTO")
+        b.log.error("cl.cycle-value", f"CYCLE/{v.kind} states no depth", b.line,
+                    "write it with DEPTH or FEDTO")
     elif depth < 0.0:
         b.log.error("cl.cycle-depth", f"CYCLE/{v.kind}: the depth {v.depth:g} points away from the part", b.line,
                     f"{b.dialect.title} writes depths {'negative' if b.dialect.depth_sign < 0 else 'positive'}")

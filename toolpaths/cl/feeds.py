@@ -55,7 +55,8 @@ def fedrat(b: ToolpathBuilder, s: Statement) -> None:
         b.log.warning("cl.feed-option", f"FEDRAT/{s.body}: it states no feed and is not used", b.line)
         return
     if not numbers:
-        b.log.error("cl.feed", f"FEDRAT/{s.body} holds no number", b.line, "write for example FEDRAT/MMPM,250.0")
+        b.log.error("cl.feed", f"FEDRAT/{s.body} holds no number", b.line,
+                    "write for example FEDRAT/MMPM,250.0")
         return
     if len(numbers) > 1 or any(isinstance(w, str) and w not in UNITS for w in s.words):
         b.log.warning("cl.feed-option", f"FEDRAT/{s.body}: only the feed itself is used", b.line)

@@ -1,7 +1,8 @@
 """The form of records: which words and how many numbers each takes. A damaged byte shows where a record departs from it.
 
-A word that a form does not list passes (posts have words of their own), unless it is one edit from a listed one, begins
-like a number, or holds another record. A number that does not fit, an empty field and a second slash are refused.
+A word that a form does not list passes (posts have words of their own), unless it is one edit from a listed
+one, begins like a number, or holds another record. A number that does not fit, an empty field and a second
+slash are refused.
 """
 
 from __future__ import annotations
@@ -181,8 +182,8 @@ def _whole(text: str) -> bool:
 
 
 def _tdata_fault(s: Statement) -> str:
-    """TDATA (tables of post-processor words of CATIA) has words that TLDATA has not: without them it may be what is left
-    of that."""
+    """TDATA (tables of post-processor words of CATIA) has words that TLDATA has not: without them it may be
+    what is left of that."""
     return "" if s.has("DIAM", "TYPE", "QUADRANT") else "it has DIAM, TYPE or QUADRANT; TLDATA?"
 
 

@@ -151,7 +151,8 @@ def work_offset(b: ToolpathBuilder, number: float) -> None:
 def trans(b: ToolpathBuilder, s: Statement) -> None:
     """TRANS/x, y, z: points from here on are shifted by it; the next TRANS replaces it."""
     if len(s.numbers) != 3 or len(s.words) != 3:
-        b.log.error("cl.frame", f"TRANS/{s.body}: only three numbers are understood", b.line, "write TRANS/x,y,z")
+        b.log.error("cl.frame", f"TRANS/{s.body}: only three numbers are understood", b.line,
+                    "write TRANS/x,y,z")
         return
     shift = np.array(s.numbers) * b.scale
     b.shift = np.zeros(3) if indexing.cancels(b, shift) else shift
@@ -202,9 +203,9 @@ _TURNED = frozenset({"creo", "solidworks-clt"})
 
 
 def rotate(b: ToolpathBuilder, s: Statement) -> None:
-    """ROTATE, ROTABL, ROTHED: an event. In Creo and `.clt`, points after it are in the turned frame, unless a system
-    (CSYS) follows, which then says where they are. In Creo the table turns by the angle, so the frame turns by less that
-    angle in the part; in `.clt` the frame itself does, as the TLAXIS of the same operation shows."""
+    """ROTATE, ROTABL, ROTHED: an event. In Creo and `.clt`, points after it are in the turned frame, unless a
+    system (CSYS) follows, which then says where they are. In Creo the table turns by the angle, so the frame
+    turns by less that angle in the part; in `.clt` the frame itself does, as the TLAXIS of the same operation shows."""
     b.event(s.major, tuple(w for w in s.words if w != ""))
     axis = next((_AXES[w] for w in s.words if isinstance(w, str) and w in _AXES), None)
     angle = s.after("ATANGL", "INCR")

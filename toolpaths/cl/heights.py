@@ -54,7 +54,8 @@ def _above(cycle: Cycle, planes: Heights, top: float) -> Cycle:
     return replace(cycle, clearance=clearance, retract=planes.retract - top)
 
 
-def _check_clearance(b: ToolpathBuilder, planes: Heights, height: Floats, cycle: Array, row: int, line: Ints) -> None:
+def _check_clearance(b: ToolpathBuilder, planes: Heights, height: Floats, cycle: Array, row: int,
+                     line: Ints) -> None:
     """The tool stands at the clearance height before the first hole; else the numbers are not what they are taken for."""
     if row == 0 or cycle[row - 1] >= 0 or abs(height[row - 1] - planes.retract) <= _AT_CLEARANCE:
         return

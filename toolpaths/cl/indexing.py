@@ -27,8 +27,8 @@ TRANS_HINT = ("have Creo write the sequence with MULTAX/ON (six numbers) and wit
 
 
 def in_force(b: ToolpathBuilder) -> bool:
-    """True where points stand about the rotation axis: the table is turned, or a subroutine runs that is called under a
-    turned table elsewhere."""
+    """True where points stand about the rotation axis: the table is turned, or a subroutine runs that is
+    called under a turned table elsewhere."""
     return b.dialect.table_frames and (any(b.table) or b.about_axis)
 
 
@@ -88,8 +88,8 @@ def _axis_fault(b: ToolpathBuilder, matrix: Floats) -> str:
 
 
 def cancels(b: ToolpathBuilder, shift: Floats) -> bool:
-    """True where TRANS/-h after TRANS/+h ends that shift, as Creo writes it around a CALSUB; under a turned table alone, and
-    not where the next CALSUB runs at -h."""
+    """True where TRANS/-h after TRANS/+h ends that shift, as Creo writes it around a CALSUB; under a turned
+    table alone, and not where the next CALSUB runs at -h."""
     if not in_force(b) or not b.shift.any() or _apart(shift, -b.shift) > _STEP * float(np.abs(shift).max()):
         return False
     for s in b.program.statements[b.index + 1:b.stop]:
@@ -107,8 +107,9 @@ def note_call(b: ToolpathBuilder, begun: int) -> None:
 
 
 def approaches(b: ToolpathBuilder, tip: Floats, rapid: Bools, index: Ints) -> tuple[Ints, Bools]:
-    """(`index` (N,) of maps with that of a subroutine for the points that lead to it, those points (N,)): the last one
-    before CALSUB, and rapids before that straight above it; not one that stands over the subroutine's start as is."""
+    """(`index` (N,) of maps with that of a subroutine for the points that lead to it, those points (N,)): the
+    last one before CALSUB, and rapids before that straight above it; not one that stands over the
+    subroutine's start as is."""
     index, found = index.copy(), np.zeros(len(index), dtype=np.bool_)
     for begun, first in b.entries:
         row = first - 1
@@ -137,9 +138,10 @@ def _placed(b: ToolpathBuilder, map_index: int, point: Floats) -> Floats:
     return point if found is None else found[0] @ point + found[1]
 
 
-def local_rows(b: ToolpathBuilder, given: Bools, inside: Bools, approach: Bools, axis: Floats, index: Ints) -> Bools:
-    """True (N,) for points of six numbers that are in the local frame: those of subroutines, and those under a turned table
-    whose tool axis is the local z and not that of the frame in the part."""
+def local_rows(b: ToolpathBuilder, given: Bools, inside: Bools, approach: Bools, axis: Floats,
+               index: Ints) -> Bools:
+    """True (N,) for points of six numbers that are in the local frame: those of subroutines, and those under
+    a turned table whose tool axis is the local z and not that of the frame in the part."""
     local: Bools = inside.copy()
     if not b.turns_at:
         return local
@@ -168,7 +170,8 @@ def check_frames(b: ToolpathBuilder, index: Ints, local: Bools, lines: Ints) -> 
                    "the CSYS remark is not added", int(lines[dropped[0]]))
 
 
-def check_axes(b: ToolpathBuilder, inside: Bools, given: Bools, axis: Floats, index: Ints, lines: Ints) -> None:
+def check_axes(b: ToolpathBuilder, inside: Bools, given: Bools, axis: Floats, index: Ints,
+               lines: Ints) -> None:
     """Points of six numbers of a subroutine are local: an axis that is radial as it stands would be turned twice."""
     if not b.turns_at:
         return

@@ -29,11 +29,11 @@ _TOOL_ANGLES = ("taper", "tip_angle")
 def inspect(result: ReadResult) -> dict[str, object]:
     """The JSON form: lengths mm, angles degrees.
 
-    `points` counts each commanded position once (not FROM, GOHOME), `arcs` the CIRCLE and other arc records, `cycles`
-    the CYCLE records that name a kind, `rapids` the rapid moves; `arcs_over_180_deg` says whether the sense of the
+    `points` counts each commanded position once (not FROM, GOHOME), `arcs` the CIRCLE and other arc records,
+    `cycles` the CYCLE records that name a kind, `rapids` the rapid moves; `arcs_over_180_deg` says whether the sense of the
     arcs fits the dialect: few arcs of a real path sweep more than half a turn (whole turns apart); `axis_motion` is
-    fixed, indexed (between cuts only) or continuous, and `five_axis` is true unless it is fixed; `extents` are those
-    of the commanded positions; `normals` counts the positions that give a surface normal (GOTO with nine numbers).
+    fixed, indexed (between cuts only) or continuous, and `five_axis` is true unless it is fixed; `extents`
+    are those of the commanded positions; `normals` counts the positions that give a surface normal (GOTO with nine numbers).
     """
     p = result.toolpath
     point = is_point(p)
@@ -103,8 +103,8 @@ def tool_dict(tool: Tool) -> dict[str, object]:
 
 
 def tools_lacking(p: Toolpath) -> dict[str, list[str]]:
-    """Tools that move without a number, and tools that cut before any record starts the spindle or after one has stopped it;
-    "unnamed" where the file does not name them, T and the number where it numbers them."""
+    """Tools that move without a number, and tools that cut before any record starts the spindle or after one
+    has stopped it; "unnamed" where the file does not name them, T and the number where it numbers them."""
     moving = p.role != Role.START
     cuts = moving & ((p.kind != Kind.RAPID) | (p.cycle >= 0))
     number = np.array([t.number for t in p.tools] + [0])[p.tool]
@@ -171,8 +171,8 @@ def summary(result: ReadResult) -> str:
 
 
 def stands(frame: Frame) -> str:
-    """Where a system stands in the part frame and how far it is turned there: the angle about the one axis that turns it
-    (the trace of a rotation is 1 + 2 cos), and how far its z leans."""
+    """Where a system stands in the part frame and how far it is turned there: the angle about the one axis
+    that turns it (the trace of a rotation is 1 + 2 cos), and how far its z leans."""
     turned = math.degrees(math.acos(min(max((np.trace(frame.rotation) - 1.0) / 2.0, -1.0), 1.0)))
     lean = math.degrees(math.acos(min(max(frame.rotation[2][2], -1.0), 1.0)))
     place = ", ".join(f"{round(v, 4) + 0.0:g}" for v in frame.origin)

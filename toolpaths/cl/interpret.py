@@ -137,8 +137,8 @@ def _other(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def _remark(b: ToolpathBuilder, s: Statement) -> None:
-    """A `$$->` remark that nobody reads is a comment, unless it is what a damaged byte leaves of one that says something:
-    its word is one edit from that word, or that word stands with a body in its form and no slash between."""
+    """A `$$->` remark that nobody reads is a comment, unless it is what a damaged byte leaves of one that
+    says something: its word is one edit from that word, or that word stands with a body in its form and no slash between."""
     word = s.major.removeprefix(DATA_COMMENT)
     if re.split(r"[^A-Z]", word + " ")[0] in REMARKS:
         return

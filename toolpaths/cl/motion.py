@@ -98,7 +98,8 @@ def rapid(b: ToolpathBuilder, s: Statement) -> None:
 def tlaxis(b: ToolpathBuilder, s: Statement) -> None:
     """The tool axis of points of three numbers from here on. In `.clt` it is that in the part, whatever ROTABL says."""
     if len(s.numbers) != 3:
-        b.log.error("cl.tlaxis", f"TLAXIS/{s.body}: only three numbers are understood", b.line, "write TLAXIS/i,j,k")
+        b.log.error("cl.tlaxis", f"TLAXIS/{s.body}: only three numbers are understood", b.line,
+                    "write TLAXIS/i,j,k")
     elif b.dialect.frame_turns:
         b.world_axes.append((b.row, _triple(s.numbers, 0), b.line))
         use_world_axis(b)
@@ -151,7 +152,8 @@ def _circle_numbers(n: list[float]) -> tuple[float, ...] | None:
     return tuple(n[:7]) if len(n) >= 7 else None
 
 
-def _axis_and_sense(b: ToolpathBuilder, s: Statement, numbers: tuple[float, ...]) -> tuple[tuple[float, ...], int]:
+def _axis_and_sense(b: ToolpathBuilder, s: Statement,
+                    numbers: tuple[float, ...]) -> tuple[tuple[float, ...], int]:
     for word in s.tail:
         if isinstance(word, str) and word in _CLOCKWISE:
             return (0.0, 0.0, 1.0), _CLOCKWISE[word]
@@ -161,8 +163,8 @@ def _axis_and_sense(b: ToolpathBuilder, s: Statement, numbers: tuple[float, ...]
 
 
 def movarc(b: ToolpathBuilder, s: Statement) -> None:
-    """MOVARC/center, axis, radius, ANGLE, degrees, or MOVARC/CENTER, x, y, z, AXIS, i, j, k, RADIUS, r[, TIMES, n]
-    with or without ANGLE; the next GOTO is its end."""
+    """MOVARC/center, axis, radius, ANGLE, degrees, or MOVARC/CENTER, x, y, z, AXIS, i, j, k, RADIUS, r[,
+    TIMES, n] with or without ANGLE; the next GOTO is its end."""
     b.arc_records += 1
     angle, numbers = s.after("ANGLE"), _labelled(s) if s.has("CENTER") else s.numbers
     if len(numbers) != 7 or (angle is None and not s.has("CENTER")):

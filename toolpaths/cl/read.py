@@ -148,7 +148,8 @@ def _units(program: StatementList, given: LengthUnit | None, log: DiagnosticLog)
                         next(iter(said.words.values())))
         return given
     if len(said.words) > 1:
-        log.error("cl.units", "the file changes its units", max(said.words.values()), "give them with --units")
+        log.error("cl.units", "the file changes its units", max(said.words.values()),
+                  "give them with --units")
     if said.words:
         return next(iter(said.words))
     return _units_of_feeds(said.feeds, log)
@@ -161,7 +162,8 @@ def _units_of_feeds(feeds: dict[LengthUnit, int], log: DiagnosticLog) -> LengthU
         add("cl.no-units", f"the file has no UNITS record; {unit} is taken from the unit of its feeds", line,
             "give the units with --units")
         return unit
-    log.warning("cl.no-units", "the file has no UNITS record; mm is taken", hint="give the units with --units")
+    log.warning("cl.no-units", "the file has no UNITS record; mm is taken",
+                hint="give the units with --units")
     return "mm"
 
 

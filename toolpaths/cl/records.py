@@ -13,9 +13,9 @@ from toolpaths.toolpath import RecordCounts
 
 
 def counted(b: ToolpathBuilder, known: frozenset[str]) -> RecordCounts:
-    """Records (continued lines are one, comments none): executed, neutral by the list in `words`, by the rules for text
-    around the program or as --allow-unknown asks, dropped. A file with dropped records has errors that name them; where
-    it has none, no handler answered for the record, which is an error here (`cl.dropped`)."""
+    """Records (continued lines are one, comments none): executed, neutral by the list in `words`, by the
+    rules for text around the program or as --allow-unknown asks, dropped. A file with dropped records has
+    errors that name them; where it has none, no handler answered for the record, which is an error here (`cl.dropped`)."""
     majors = Counter(map(attrgetter("major"), b.program.statements))
     comments = sum(n for word, n in majors.items()
                    if word == COMMENT or (word.startswith(DATA_COMMENT) and word not in known))

@@ -147,8 +147,8 @@ def nothing(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def multax(b: ToolpathBuilder, s: Statement) -> None:
-    """MULTAX/ON, OFF: the points say by themselves; after OFF those of three numbers keep the last axis (CATIA: APT
-    formats, MULTAX influence on output), which others may not mean."""
+    """MULTAX/ON, OFF: the points say by themselves; after OFF those of three numbers keep the last axis
+    (CATIA: APT formats, MULTAX influence on output), which others may not mean."""
     if s.has("OFF") and b.dialect.name != "catia":
         b.multax_off.append((b.row, b.line))
 
@@ -201,7 +201,8 @@ def own_item(b: ToolpathBuilder, s: Statement) -> None:
             b.declared.operations.append(Operation(str(found.get("name", "")), str(found.get("tool_name", "")),
                                                    _index(found, "frame"), bool(found.get("turning")), b.line))
     except (TypeError, ValueError, KeyError) as fault:
-        b.log.error("cl.data-comment", f"{s.major}: {fault}", b.line, "correct the object, or take the line out")
+        b.log.error("cl.data-comment", f"{s.major}: {fault}", b.line,
+                    "correct the object, or take the line out")
 
 
 def _index(found: dict[str, object], key: str) -> int:

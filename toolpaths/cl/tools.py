@@ -1,7 +1,7 @@
 """Tools: their numbers (LOADTL, LOAD/TOOL, TURRET, TOOLNO) and what the file says of their shape.
 
-Systems give the shape before or after the number. Records without a point between them describe one tool; after a
-point, a description begins again.
+Systems give the shape before or after the number. Records without a point between them describe one tool;
+after a point, a description begins again.
 """
 
 from __future__ import annotations
@@ -94,8 +94,8 @@ def change(b: ToolpathBuilder, number: float, register: float | None, more: tupl
 
 
 def _drop_plain_load(b: ToolpathBuilder, number: float) -> None:
-    """Drop LOADTL/number right before another of the same tool: CATIA writes one at the change, and one with the register
-    at each operation (NC_COMPENSATION in its tables of post-processor words)."""
+    """Drop LOADTL/number right before another of the same tool: CATIA writes one at the change, and one with
+    the register at each operation (NC_COMPENSATION in its tables of post-processor words)."""
     for k in range(len(b.events) - 1, -1, -1):
         if b.events[k].index != b.row:
             return
@@ -151,8 +151,8 @@ def turret(b: ToolpathBuilder, s: Statement) -> None:
 def toolno(b: ToolpathBuilder, s: Statement) -> None:
     """CATIA: TOOLNO/number, kind[, diameter[, corner radius[, length]]] describes, LOADTL loads.
 
-    The longer forms follow a table of the user: their numbers are left alone, CUTTER has the sizes. MfgSuite: TOOLNO/number,
-    kind, OSETNO, length register, radius register.
+    The longer forms follow a table of the user: their numbers are left alone, CUTTER has the sizes. MfgSuite:
+    TOOLNO/number, kind, OSETNO, length register, radius register.
     """
     if s.has(*TURNING):
         b.turns()
@@ -175,8 +175,8 @@ def _register_field(b: ToolpathBuilder, register: float | None) -> dict[str, Any
 
 
 def cutcom(b: ToolpathBuilder, s: Statement) -> None:
-    """An event, but for CUTCOM/ON, LENGTH, register, which names the length register of the tool (MfgSuite), and CUTCOM/ON
-    right before the CUTCOM that says the side."""
+    """An event, but for CUTCOM/ON, LENGTH, register, which names the length register of the tool (MfgSuite),
+    and CUTCOM/ON right before the CUTCOM that says the side."""
     register = s.after("LENGTH")
     if register is not None and s.words[0] == "ON":
         describe(b, **_register_field(b, register))
@@ -185,8 +185,8 @@ def cutcom(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def tldata(b: ToolpathBuilder, s: Statement) -> None:
-    """TLDATA/MILL, d, r, length, taper, tip, ... or DRILL[, MILL], d, r, length, point angle, flute length; with MILL
-    behind it THREAD is a thread mill, without a tool of a lathe."""
+    """TLDATA/MILL, d, r, length, taper, tip, ... or DRILL[, MILL], d, r, length, point angle, flute length;
+    with MILL behind it THREAD is a thread mill, without a tool of a lathe."""
     kinds = [w for w in s.words if isinstance(w, str) and w]
     n = [w for w in s.words if isinstance(w, float)]
     shape = kinds[0] if kinds else ""

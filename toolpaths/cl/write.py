@@ -1,7 +1,7 @@
 """Write a Toolpath as generic APT text that reads back to the same Toolpath, coordinates bit for bit.
 
-All lengths are mm in the part frame (MULTAX/ON); what APT has no record for (lists of frames, tools, operations) stands
-in `$$->` comments as JSON. Numbers are the shortest text that reads back to the same double.
+All lengths are mm in the part frame (MULTAX/ON); what APT has no record for (lists of frames, tools,
+operations) stands in `$$->` comments as JSON. Numbers are the shortest text that reads back to the same double.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ def text_of(p: Toolpath) -> str:
     """The text of `p`; its passes are not written but counted again when it is read.
 
     Raises:
-        ValueError: where `p` holds what a CL file cannot say (NaN positions, a feed that becomes unknown again, a
-            point with both a normal and a contact point, a tool that must not turn about its axis).
+        ValueError: where `p` holds what a CL file cannot say (NaN positions, a feed that becomes unknown
+            again, a point with both a normal and a contact point, a tool that must not turn about its axis).
     """
     _check(p)
     return "\n".join([*_header(p), *_body(p), "FINI", ""])

@@ -1,9 +1,10 @@
 """Where two segments meet: one turns into the other within a short distance, or the motion stops.
 
-With A before the joint and B behind it, D = B - A (zero at the joint) and x the path from the joint, the path is
-A(s) + D(R(x)): R is the ramp max(x, 0) rounded over |x| < a by a polynomial of degree 6 whose third derivative is
-continuous. Outside it the path is A and B themselves; between two lines its direction turns one direction only, and its
-speed never exceeds theirs. What it leaves is D where the ramp's rounding is highest, at x = 0: R(0) = 5/32 a.
+With A before the joint and B behind it, D = B - A (zero at the joint) and x the path from the joint, the path
+is A(s) + D(R(x)): R is the ramp max(x, 0) rounded over |x| < a by a polynomial of degree 6 whose third
+derivative is continuous. Outside it the path is A and B themselves; between two lines its direction turns one
+direction only, and its speed never exceeds theirs. What it leaves is D where the ramp's rounding is highest,
+at x = 0: R(0) = 5/32 a.
 """
 
 from __future__ import annotations
@@ -69,7 +70,8 @@ class SegmentBlends:
         return np.asarray(members.at(joint, s) + members.at(joint + 1, there) - members.at(joint, there))
 
 
-def chosen(members: Members, turn: Floats, tolerance: float, adjacent_splines: float, sharpest: float) -> SegmentBlends:
+def chosen(members: Members, turn: Floats, tolerance: float, adjacent_splines: float,
+           sharpest: float) -> SegmentBlends:
     """Blends as long as room and tolerance allow.
 
     Args:

@@ -1,8 +1,8 @@
 """Quintic B-splines of many separate stretches in one set of arrays.
 
-Stretch g has its own clamped knot vector (both end knots six times); the vectors stand one behind the other. A basis
-function begins at the knot that has its number plus 6 g. Basis functions of different stretches do not overlap, so that
-one banded system holds them all.
+Stretch g has its own clamped knot vector (both end knots six times); the vectors stand one behind the other.
+A basis function begins at the knot that has its number plus 6 g. Basis functions of different stretches do
+not overlap, so that one banded system holds them all.
 """
 
 from __future__ import annotations

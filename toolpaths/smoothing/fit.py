@@ -1,7 +1,7 @@
 """Quintic P-splines through rounded points, inside a tolerance at the points and on the chords between them.
 
-A P-spline (Eilers and Marx 1996) weighs the points against the size of the third derivative. Places that are off by
-too much get more weight in the next round; where that does not help the knots are halved.
+A P-spline (Eilers and Marx 1996) weighs the points against the size of the third derivative. Places that are
+off by too much get more weight in the next round; where that does not help the knots are halved.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class SplineFit:
 @dataclass(frozen=True)
 @arrays(t="T", c="K 6", ratio="C")
 class Spline:
-    """One stretch: clamped knots t, coefficients c (k, 6), `ratio` (P - 1,) bound of deviation over tolerance on each
-    chord of its polyline."""
+    """One stretch: clamped knots t, coefficients c (k, 6), `ratio` (P - 1,) bound of deviation over tolerance
+    on each chord of its polyline."""
 
     t: Floats
     c: Floats
@@ -65,8 +65,8 @@ def assembled(splines: list[Spline], shift: float) -> SplineFit | None:
 class _Polyline:
     """The points with the middles of their chords: s, p, stretch and weight of N places in order.
 
-    `ends` (P,) parameter of the points, `chord` numbers (by their first point) of the chords inside stretches, `row`
-    the place where each of these begins; its middle and its end follow.
+    `ends` (P,) parameter of the points, `chord` numbers (by their first point) of the chords inside
+    stretches, `row` the place where each of these begins; its middle and its end follow.
     """
 
     s: Floats
@@ -115,8 +115,9 @@ def _one(made: SplineFit, ratio: Floats, first: Ints, k: int) -> Spline:
 def heights(s: Floats, p: Floats, first: Ints) -> Floats:
     """(P - 1,) height over each chord of a curve that turns there as the polyline turns at the chord's ends.
 
-    An arc of length h that turns by an angle a rises h a/8 over its chord; half of the turn at each end is the chord's.
-    Chords at the end of a stretch take the turn at their other end for both; those between stretches count as 0.
+    An arc of length h that turns by an angle a rises h a/8 over its chord; half of the turn at each end is
+    the chord's. Chords at the end of a stretch take the turn at their other end for both; those between
+    stretches count as 0.
     """
     step = np.diff(s)
     step[first[1:-1] - 1] = 1.0
@@ -157,7 +158,8 @@ def _polyline(s: Floats, p: Floats, first: Ints, height: Floats) -> _Polyline:
     return _Polyline(every, values, number, weight, s, chord, row)
 
 
-def _rounds(knots: KnotVectors, line: _Polyline, fixed: tuple[Floats, Floats], tolerance: float) -> tuple[SplineFit, Floats]:
+def _rounds(knots: KnotVectors, line: _Polyline, fixed: tuple[Floats, Floats],
+            tolerance: float) -> tuple[SplineFit, Floats]:
     """The fit on these knots after some rounds of raising weights, and the bound on each chord (P - 1,).
 
     A stretch that is good enough stays as it is.

@@ -1,9 +1,9 @@
 """CL points as a curve that is three times continuously differentiable, within a tolerance of tip and axis.
 
-The parameter s is the path of the reference motion: tip in mm and axis times (tip tolerance over axis tolerance),
-together as root of squares, so that one tolerance holds for both and an axis that turns on the spot has a path, too.
-Rounded points on dense chords become splines, arcs and long lines stay what they are; where these meet, one turns into
-the other within a short distance, or the motion stops.
+The parameter s is the path of the reference motion: tip in mm and axis times (tip tolerance over axis
+tolerance), together as root of squares, so that one tolerance holds for both and an axis that turns on the
+spot has a path, too. Rounded points on dense chords become splines, arcs and long lines stay what they are;
+where these meet, one turns into the other within a short distance, or the motion stops.
 """
 
 from __future__ import annotations
@@ -76,9 +76,10 @@ class Smooth:
         return values[:, :3], axis / np.linalg.norm(axis, axis=1, keepdims=True)
 
 
-def smooth_all(curves: Curves, first: Ints, tolerance: Tolerance, sharpest: float = SHARPEST) -> list[Smooth | None]:
-    """The smoothed motion along chains of curves, [first[k], first[k + 1]) of each, each curve beginning where the one
-    before ends; None where nothing moves. What comes out of one chain does not depend on the others.
+def smooth_all(curves: Curves, first: Ints, tolerance: Tolerance,
+               sharpest: float = SHARPEST) -> list[Smooth | None]:
+    """The smoothed motion along chains of curves, [first[k], first[k + 1]) of each, each curve beginning
+    where the one before ends; None where nothing moves. What comes out of one chain does not depend on the others.
 
     `sharpest`, rad: the motion stops where tip and axis together turn by more in one joint.
     """
@@ -119,7 +120,8 @@ def _chain(members: Members, blends: SegmentBlends, splines: list[Spline], rows:
     mine = Members(curves, ends, members.first[low:high + 1] - rows[0],
                    members.spline[low:high], members.scale, assembled(own, start))
     joints = slice(low, high - 1)
-    joined = SegmentBlends(blends.s[joints] - start, blends.half[joints], blends.stop[joints], blends.turn[joints])
+    joined = SegmentBlends(blends.s[joints] - start, blends.half[joints], blends.stop[joints],
+                           blends.turn[joints])
     worst = SHARE * max((float(one.ratio.max()) for one in own), default=0.0)
     return Smooth(s, mine, joined, worst, tolerance)
 
@@ -128,8 +130,8 @@ def _fitted(curves: Curves, s: Floats, travel: Floats, turn: Floats, apart: Bool
             tolerance: Tolerance) -> tuple[ChainSegments, list[Spline]]:
     """Segments, and the splines of those that are splines; `apart` are joints of two chains.
 
-    Chords that no spline keeps to end up between corners; after some tries all chords of such a spline do, so that
-    this ends.
+    Chords that no spline keeps to end up between corners; after some tries all chords of such a spline do, so
+    that this ends.
     """
     corner = corners(travel, turn, curves.is_arc, apart, SHARE * tolerance.tip)
     known: dict[tuple[int, int], Spline] = {}

@@ -43,8 +43,8 @@ class ChainSegments:
 def corners(length: Floats, turn: Floats, is_arc: Bools, apart: Bools, tolerance: float) -> Bools:
     """(M - 1,) joints between M moves that no spline may cross.
 
-    Next to arcs and long chords; where the polyline turns by more than a curve within the tolerance of its chords
-    could, and where it turns much more than next to the joint; and at those that are `apart`.
+    Next to arcs and long chords; where the polyline turns by more than a curve within the tolerance of its
+    chords could, and where it turns much more than next to the joint; and at those that are `apart`.
     """
     long = _long(length, np.concatenate(([0], np.cumsum(apart)))) | is_arc
     shorter = np.minimum(length[1:], length[:-1])

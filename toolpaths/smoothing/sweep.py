@@ -48,7 +48,8 @@ def evaluate(t: Floats, c: Floats, data: Data) -> Floats:
     return result
 
 
-def sweep(t: Floats, data: Data, c: Floats, weight: Floats, tolerance: float, ratio: Floats, normal: Normal) -> None:
+def sweep(t: Floats, data: Data, c: Floats, weight: Floats, tolerance: float, ratio: Floats,
+          normal: Normal) -> None:
     """Set `ratio` (N,) to deviation over tolerance, raise `weight` (N,), add to `normal`; tolerance inf raises none."""
     values = basis(t, data.k, data.s)
     off = -data.p
@@ -107,7 +108,8 @@ def _loop(t: Floats, s: Floats, p: Floats, k: Ints, first: Ints, c: Floats, weig
 def compiled_sweep(t: Floats, data: Data, c: Floats, weight: Floats, tolerance: float, ratio: Floats,
                    normal: Normal) -> None:
     """See `sweep`."""
-    compiled(_loop)(t, data.s, data.p, data.k, data.first, c, weight, tolerance, ratio, normal.bands, normal.right)
+    compiled(_loop)(t, data.s, data.p, data.k, data.first, c, weight, tolerance, ratio, normal.bands,
+                    normal.right)
 
 
 def sweep_for(count: int) -> Callable[..., None]:

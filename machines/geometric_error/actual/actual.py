@@ -1,7 +1,8 @@
 """The machine as it is: a nominal kinematics with its errors. What every kind of machine gives to the correction.
 
-Everything is computed in coordinates `w` (N, 3 + R) in which any machine is a chain: three displacements of the tip, then
-R turns. For a serial machine they are its joints, for a Delta the place of its platform, for an H4 place, tilt and rotary
+Everything is computed in coordinates `w` (N, 3 + R) in which any machine is a chain: three displacements of
+the tip, then R turns. For a serial machine they are its joints, for a Delta the place of its platform, for an
+H4 place, tilt and rotary
 axis. `w` stands for commands: the errors come in between w and the tool.
 """
 
@@ -47,8 +48,8 @@ class Actual(ABC):
         """Where the tool is, exactly, when w (N, 3 + R) is commanded.
 
         Args:
-            direction: (N, J) sign of each joint's last motion, for tables with two approach directions; without it their
-                mean
+            direction: (N, J) sign of each joint's last motion, for tables with two approach directions;
+                without it their mean
         """
 
     def aim(self, w: Floats, direction: Floats | None = None) -> tuple[Floats, Floats]:

@@ -56,7 +56,8 @@ class ActualKinematics(Kinematics):
         """The machine with errors."""
         return self.model.on(self.nominal)
 
-    def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0, near: Floats | None = None) -> Floats:
+    def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0,
+                near: Floats | None = None) -> Floats:
         """Corrected joints (B, N, J) next to each nominal branch."""
         actual = self.actual
         unit = axis / np.linalg.norm(axis, axis=1, keepdims=True)

@@ -75,7 +75,8 @@ class ActualByMap(Actual):
             turned = self.directions(self.joints(w))
             error = np.concatenate([np.einsum("nij,nj->ni", turned, v) for v in (error[:, :3], error[:, 3:])], axis=1)
         arm = -self.arm * axis
-        return (tip + error[:, :3] + (spun(arm, error[:, 3:]) - arm), spun(axis, error[:, 3:]), spun(side, error[:, 3:]))
+        return (tip + error[:, :3] + (spun(arm, error[:, 3:]) - arm), spun(axis, error[:, 3:]),
+                spun(side, error[:, 3:]))
 
     def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
         """See the base class: by the slopes of the map, along its coordinates, times how fast a joint moves those."""

@@ -1,7 +1,7 @@
 """A machine on slides and rods with its errors: linear Delta and both H4a, through the exact closure of `rods`.
 
-The rotary axis of an H4 (table under the part, or axis at the spindle) and the spindle take the errors of a serial
-machine's axis; they stand before and after the platform in the chain.
+The rotary axis of an H4 (table under the part, or axis at the spindle) and the spindle take the errors of a
+serial machine's axis; they stand before and after the platform in the chain.
 """
 
 from __future__ import annotations
@@ -139,7 +139,8 @@ class ActualDelta(ActualRods):
         length = self.kinematics.tool_length
         tools: list[list[Columns]] = [[columns.of_one(v) for v in actual_tool(UP, length, chain)]
                                       for chain in (self.chain, SerialErrors())]
-        tool = self._tool_rates(self.coordinates(q), reach, (tools[0], tools[1]), np.zeros(len(q)), np.zeros(len(q)))
+        tool = self._tool_rates(self.coordinates(q), reach, (tools[0], tools[1]), np.zeros(len(q)),
+                                np.zeros(len(q)))
         none = np.zeros(q.shape)
         return ErrorRates(tool.tip, tool.axis, none, none)
 
@@ -203,7 +204,8 @@ class ActualH4(ActualRods):
 
     def outside(self, w: Floats, margin: float = EDGE) -> Bools:
         """See the base class; only the rotary axis has a range."""
-        return self.chain.outside(self.kinematics.axis_names, np.column_stack([np.zeros((len(w), 4)), w[:, 4]]), margin)
+        return self.chain.outside(self.kinematics.axis_names,
+                                  np.column_stack([np.zeros((len(w), 4)), w[:, 4]]), margin)
 
     def _platform(self, w: Floats) -> tuple[Floats, Floats, Floats]:
         return w[:, :3], platform_turn(w[:, 3]), self.kinematics.platform.inverse(w[:, :4])
@@ -265,7 +267,8 @@ class ActualH4(ActualRods):
         rods = generalised @ carried(np.tile(np.eye(3), (len(w), 1, 1)), arm) @ twist
         return np.concatenate([rods, self._chain_columns(w, part, tip, axis, direction)], axis=2)
 
-    def _chain_columns(self, w: Floats, part: Floats, tip: Floats, axis: Floats, direction: Floats | None) -> Floats:
+    def _chain_columns(self, w: Floats, part: Floats, tip: Floats, axis: Floats,
+                       direction: Floats | None) -> Floats:
         """(N, 6, P) of the errors in `chain`: the rotary axis stands before the platform or after it."""
         approach = np.zeros(len(w)) if direction is None else direction[:, 4]
         tilted = platform_turn(w[:, 3])

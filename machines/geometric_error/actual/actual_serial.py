@@ -1,7 +1,7 @@
 """A serial machine with its errors, exactly (homogeneous transforms) and to first order (transport matrices).
 
-The exact chain is that of `serial_errors`, carried out from the tool to the workpiece on the tip and the tool's own
-directions by columns, which is the product of the 4 x 4 matrices without their constant row (C 1.1, 1.11).
+The exact chain is that of `serial_errors`, carried out from the tool to the workpiece on the tip and the
+tool's own directions by columns, which is the product of the 4 x 4 matrices without their constant row (C 1.1, 1.11).
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class ActualSerial(Actual):
         """See the base class."""
         return serial_rates(self.kinematics, self.errors, q, reach)
 
-    # ---- exact -----------------------------------------------------------------------------------------------------
+    # ---- exact ---------------------------------------------------------------------------------------------
 
     def place(self, w: Floats, direction: Floats | None = None) -> ToolPlace:
         """See the base class."""
@@ -92,7 +92,7 @@ class ActualSerial(Actual):
         """(tip, axis, x), each (3,), at q = 0, as the spindle's errors leave them."""
         return actual_tool(self.kinematics.tool_axis, self.kinematics.tool_length, self.errors)
 
-    # ---- first order -----------------------------------------------------------------------------------------------
+    # ---- first order ---------------------------------------------------------------------------------------
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class: transport matrices (C 1.20, 1.25) times the basis of each curve."""
@@ -112,7 +112,8 @@ class ActualSerial(Actual):
             at += 1
         return result
 
-    def _location_column(self, text: str, w: Floats, before: list[Floats], after: list[Floats], tip: Floats) -> Floats:
+    def _location_column(self, text: str, w: Floats, before: list[Floats], after: list[Floats],
+                         tip: Floats) -> Floats:
         """Effect (N, 6) of one location error: what L does before the axis less what it undoes after it; of a zero
         position: the axis's own motion."""
         axis, torsor, name = text[-1], SerialErrors(constants={text: 1.0}).location(text[-1]), parse(text)

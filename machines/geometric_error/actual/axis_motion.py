@@ -28,8 +28,8 @@ ALONG = 1e-9
 @dataclass(frozen=True, eq=False)
 @arrays(direction="3", point="3", reference="3")
 class Line:
-    """An axis as its location errors leave it: direction (3,), a point of its line (3,), reference point (3,), and by how
-    much it stands farther than it counts."""
+    """An axis as its location errors leave it: direction (3,), a point of its line (3,), reference point
+    (3,), and by how much it stands farther than it counts."""
 
     joint: Joint
     index: int
@@ -87,7 +87,8 @@ def moved(line: Line, x: Floats, carried_along: Sequence[Columns]) -> list[Colum
     return [turned, *(columns.turn(line.direction, cos, sin, v) for v in vectors)]
 
 
-def displaced(torsor: list[Floats | float], centre: Floats, carried_along: Sequence[Columns]) -> list[Columns]:
+def displaced(torsor: list[Floats | float], centre: Floats,
+              carried_along: Sequence[Columns]) -> list[Columns]:
     """A point and directions by one small transform about `centre`: turned about z, y, x, then displaced (C 1.14).
 
     The point gets what its arm changes by, so that zero angles leave it to the last digit.

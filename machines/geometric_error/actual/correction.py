@@ -1,13 +1,14 @@
 """Commands that put the tool of a machine with errors where the nominal one would have it.
 
-Chord (Newton) iteration on the exact model in the coordinates w of `actual`, with the rates of the nominal machine: errors
-of 1e-4 leave 1e-4 of themselves at each step. The tip is always corrected in full: the three displacements can do it at
+Chord (Newton) iteration on the exact model in the coordinates w of `actual`, with the rates of the nominal
+machine: errors of 1e-4 leave 1e-4 of themselves at each step. The tip is always corrected in full: the three
+    displacements can do it at
 any turn. The axis is corrected by the R turns, along the two principal directions of the axis's rates:
 
 - where a turn moves the axis well, in full;
-- near a pole, where it moves it ever less: the share (s / POLE)^2 of the error at rate s, and more only where less would
-  leave the axis tolerance, by no more than MOST_TURN. So the rotary motion stays bounded and fades at the pole, where the
-  tip alone is corrected;
+- near a pole, where it moves it ever less: the share (s / POLE)^2 of the error at rate s, and more only where
+  less would leave the axis tolerance, by no more than MOST_TURN. So the rotary motion stays bounded and fades
+  at the pole, where the tip alone is corrected;
 - directions that the machine does not have (3 and 4 axes, tilt of a Delta) are left: they are the residual.
 
 Points of one group (3+2, cycles, arcs) get one and the same turn, that of their mean error.
@@ -105,7 +106,8 @@ def correct(actual: Actual, q: Floats, tip: Floats, axis: Floats, *, group: Ints
         steps += 1
     partial = np.zeros(len(q), dtype=np.bool_) if turns is None else np.asarray(np.any(turns.weak, axis=1))
     after = _deviation(at_tip, at_axis, tip, axis)
-    return CorrectedCommands(_wound(actual, w, q), *before, *after, at_tip - tip, at_axis - axis, partial, unmeasured, steps)
+    return CorrectedCommands(_wound(actual, w, q), *before, *after, at_tip - tip, at_axis - axis, partial,
+                             unmeasured, steps)
 
 
 def _wound(actual: Actual, w: Floats, q: Floats) -> Floats:

@@ -1,10 +1,11 @@
 """How fast the errors of a machine change as its joints move: bounds that hold everywhere near a pose, not samples.
 
-E(q) is the pose of the machine with errors less that of the machine without. With the chain of `serial_errors`, a slide k
-that moves by dq moves the tool by R' (d' + E_k'(p)) dq instead of R d dq, a turning axis by R' (w' x (p' - o') + E_k'(p)) dq
-instead of R (w x (p - o)) dq. Rotations differ by no more than the sum of their angles, points by no more than the errors
-displace them, so that with arm A from the axis to the tip, l and g the steepest slopes of its own component errors, and
-Theta, D the largest turn and displacement of the axes between it and the workpiece, and of all,
+E(q) is the pose of the machine with errors less that of the machine without. With the chain of
+`serial_errors`, a slide k that moves by dq moves the tool by R' (d' + E_k'(p)) dq instead of R d dq, a
+turning axis by R' (w' x (p' - o') + E_k'(p)) dq instead of R (w x (p - o)) dq. Rotations differ by no more
+than the sum of their angles, points by no more than the errors displace them, so that with arm A from the
+axis to the tip, l and g the steepest slopes of its own component errors, and Theta, D the largest turn and
+displacement of the axes between it and the workpiece, and of all,
 
     slide:         |dE/dq| <= Theta + location + l + g (A + D)                                 mm/mm; axis: g
     turning axis:  |dE/dq| <= Theta (A + D + shift) + location A + D + shift + l + g (A + D)   mm/rad; axis: 2 Theta + ...
@@ -41,8 +42,8 @@ class ErrorRates:
 
     Attributes:
         tip, axis (N, J): mm and rad of the tip and the tool axis per mm or rad of each joint
-        tip_reversal, axis_reversal (N, J): the same per unit of the approach direction by which a joint is where it is
-            (`lost_motion`)
+        tip_reversal, axis_reversal (N, J): the same per unit of the approach direction by which a joint is
+            where it is (`lost_motion`)
     """
 
     tip: Floats
@@ -53,8 +54,9 @@ class ErrorRates:
 
 @dataclass(frozen=True)
 class AxisSizes:
-    """Of one axis of the chain: largest turn (rad) and displacement (mm) by its component errors, their steepest slopes
-    per mm or rad, how far the two approach directions differ; turn and shift of its line, its zero position."""
+    """Of one axis of the chain: largest turn (rad) and displacement (mm) by its component errors, their
+    steepest slopes per mm or rad, how far the two approach directions differ; turn and shift of its line, its
+    zero position."""
 
     turn: float = 0.0
     shift: float = 0.0
@@ -81,8 +83,8 @@ def joined(parts: Iterable[tuple[Ints, ErrorRates]]) -> ErrorRates:
 
 
 def pivot_rates(kin: Kinematics, held: Kinematics | None, q: Floats) -> ErrorRates:
-    """Of machine `kin` against the same one with other points of its turning axes and another length of its tool, as its
-    control holds it.
+    """Of machine `kin` against the same one with other points of its turning axes and another length of its
+    tool, as its control holds it.
 
     The tip is linear in the points: E = sum of R (I - R_k) (offset of axis k), which a radian of any axis changes by no more
     than twice the offsets, square to their axes, together.
@@ -155,8 +157,8 @@ def serial_rates(kin: Kinematics, errors: SerialErrors, q: Floats, reach: Floats
 def standing_arm(kin: Kinematics, q: Floats) -> Floats:
     """(N,) mm that the tip is away from any turning axis at q (N, J), and wherever it goes while it stands on the part.
 
-    Where all slides are together the turning axes on either side of them keep their distances from each other, from the
-    part or from the tool; infinite elsewhere.
+    Where all slides are together the turning axes on either side of them keep their distances from each
+    other, from the part or from the tool; infinite elsewhere.
     """
     if not kin.chain or not kin.slides_square:
         return np.full(len(q), np.inf)
@@ -169,8 +171,8 @@ def standing_arm(kin: Kinematics, q: Floats) -> Floats:
 
 
 def arms_of(kin: Kinematics, errors: SerialErrors, q: Floats, reach: Floats) -> list[Floats]:
-    """By axis of the chain the largest distance (N,) of the tip from its point and its reference point, with what it may
-    grow by while the joints move by `reach` (N, J)."""
+    """By axis of the chain the largest distance (N,) of the tip from its point and its reference point, with
+    what it may grow by while the joints move by `reach` (N, J)."""
     point = np.broadcast_to(-kin.tool_length * kin.tool_axis, (len(q), 3))
     arms = list[Floats]()
     for joint in reversed(kin.chain):

@@ -2,10 +2,10 @@
 
 The approach direction is a number per axis: +1 reached forwards, -1 backwards, between by shares. An axis that turns back
     first moves
-through the play g between its two approach directions: a step d changes the approach direction by 2 d / g, held between -1
-and 1 (the play operator; Brokate, Sprekels, Hysteresis and Phase Transitions, 1996, 2.1). Steps one after the other compose
-to one function of the approach direction before them, again a shift held between two bounds, so that whole programs are
-walked in a few passes.
+through the play g between its two approach directions: a step d changes the approach direction by 2 d / g,
+held between -1 and 1 (the play operator; Brokate, Sprekels, Hysteresis and Phase Transitions, 1996, 2.1).
+Steps one after the other compose to one function of the approach direction before them, again a shift held
+between two bounds, so that whole programs are walked in a few passes.
 """
 
 from __future__ import annotations
@@ -61,8 +61,8 @@ class PlaySteps:
 
 
 def turning_sign(step: Floats, rotary: Bools) -> Floats:
-    """Sign (N, J) of the last motion of joints that go by steps (N, J) one after the other: what goes back by less than the
-    grain of words, in one step or in many, turns nothing; 0 before a joint has moved by that much."""
+    """Sign (N, J) of the last motion of joints that go by steps (N, J) one after the other: what goes back by
+    less than the grain of words, in one step or in many, turns nothing; 0 before a joint has moved by that much."""
     least = np.broadcast_to(np.where(rotary, GRAIN[1], GRAIN[0]), step.shape)
     approach = PlaySteps.of(step, least).walked().at(np.zeros((1, step.shape[1])))
     return carried_on(np.where(np.abs(approach) == 1.0, approach, 0.0))

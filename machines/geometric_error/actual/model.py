@@ -73,7 +73,8 @@ class ErrorModel:
         if self.rods is None:
             return replace(self, axes=self.axes.with_values(values))
         split = len(self.rods.values)
-        return replace(self, rods=self.rods.with_values(values[:split]), axes=self.axes.with_values(values[split:]))
+        return replace(self, rods=self.rods.with_values(values[:split]),
+                       axes=self.axes.with_values(values[split:]))
 
     def zero(self) -> Self:
         """The same parameters, all 0."""
@@ -85,7 +86,8 @@ class ErrorModel:
         for component in self.axes.components:
             j = names.index(component.name.axis)
             result[j] = min(result[j], component.curve.detail)
-        for letter, (nodes, _) in () if self.map is None else zip(self.map.letters, self.map.closed(), strict=True):
+        for letter, (nodes, _) in () if self.map is None else zip(self.map.letters, self.map.closed(),
+                                                                  strict=True):
             mine = [j for j, name in enumerate(names) if name == letter or (letter in "xyz" and name not in "ABC")]
             result[mine] = np.minimum(result[mine], least_apart(nodes))
         return result

@@ -1,15 +1,16 @@
 """How fast the errors of a machine on six rods change as its slides move: bounds that hold wherever the slides may be.
 
-A platform is held by W (dX, lever turn) = D dq, the rods' fixed lengths differentiated (II-15 of Company 2000, E-15):
-the rows of W are (r, b x r / lever) with the rods r and the arms b from the platform's point X to their joints, D holds
-r along the slides. The columns J of W^-1 D say how each slide moves a platform. From q to q' on a straight line
+A platform is held by W (dX, lever turn) = D dq, the rods' fixed lengths differentiated (II-15 of Company
+2000, E-15): the rows of W are (r, b x r / lever) with the rods r and the arms b from the platform's point X
+to their joints, D holds r along the slides. The columns J of W^-1 D say how each slide moves a platform. From
+q to q' on a straight line
 
     W' (J' - J) = (D' - D) - (W' - W) J,     |W'^-1| <= 1 / (least singular value of W - |W' - W|),
 
-where row k of the right side is (r_k' - r_k) . (u - v - w x b_k) - r_k' . (w x (b_k' - b_k)) with the slide's direction
-u, the platform's v and w. What r and b change by follows from J along the line: a bound of J' - J that comes out smaller
-than it was assumed holds all along the line, by continuity. The rate of the errors is the difference of J with errors
-and without, exact at q, and what both may change by.
+where row k of the right side is (r_k' - r_k) . (u - v - w x b_k) - r_k' . (w x (b_k' - b_k)) with the slide's
+direction u, the platform's v and w. What r and b change by follows from J along the line: a bound of J' - J
+that comes out smaller than it was assumed holds all along the line, by continuity. The rate of the errors is
+the difference of J with errors and without, exact at q, and what both may change by.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ UNBOUNDED = 1e30
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(place="N 3", turned="N 3 3", shift="N 3 K", turn="N 3 K", shift_change="N K", turn_change="N K", swing="N")
+@arrays(place="N 3", turned="N 3 3", shift="N 3 K", turn="N 3 K", shift_change="N K",
+        turn_change="N K", swing="N")
 class PlatformMotion:
     """N platforms and how K slides move them.
 
@@ -90,8 +92,9 @@ def platform_motion(frame: RodFrame, errors: RodErrors, q: Floats, pose: tuple[F
 @dataclass(frozen=True, eq=False)
 @arrays(least="N", rates="N R K", turn="N K", arm="R", length="R", reach="N K")
 class _Loops:
-    """What bounds need of N platforms: least singular value of W (N,), mm that each rod's vector changes by per mm of each
-    slide (N, 6, K), rad of the platform (N, K), arms and lengths (6,), the lever, how far the slides go (N, K)."""
+    """What bounds need of N platforms: least singular value of W (N,), mm that each rod's vector changes by
+    per mm of each slide (N, 6, K), rad of the platform (N, K), arms and lengths (6,), the lever, how far the
+    slides go (N, K)."""
 
     least: Floats
     rates: Floats
@@ -102,8 +105,8 @@ class _Loops:
     reach: Floats
 
     def held(self) -> tuple[Floats, Floats]:
-        """(by how much columns of J change at most (N, K), turns times the lever; rad that the platform turns (N,));
-        UNBOUNDED where W might become singular."""
+        """(by how much columns of J change at most (N, K), turns times the lever; rad that the platform turns
+        (N,)); UNBOUNDED where W might become singular."""
         change, swing = np.full(self.reach.shape, UNBOUNDED), np.full(len(self.reach), UNBOUNDED)
         open_, guess = np.ones(len(swing), dtype=np.bool_), np.zeros(self.reach.shape)
         for _ in range(_ROUNDS):
@@ -133,8 +136,9 @@ class _Loops:
 @dataclass(frozen=True, eq=False)
 @arrays(tip="N K", axis="N K", nominal_tip="N K", nominal_axis="N K", apart="N", turned="N")
 class ToolRates:
-    """N tools on the platform: mm (or rad, of the axis) per mm of each slide with errors less without, and how large it is
-    without them at most (N, K) each; how far apart the tips and how many rad the platforms are, at most (N,)."""
+    """N tools on the platform: mm (or rad, of the axis) per mm of each slide with errors less without, and
+    how large it is without them at most (N, K) each; how far apart the tips and how many rad the platforms
+    are, at most (N,)."""
 
     tip: Floats
     axis: Floats
@@ -146,8 +150,9 @@ class ToolRates:
 
 def tool_rates(actual: PlatformMotion, nominal: PlatformMotion, arms: tuple[Floats, Floats], axes: tuple[Floats, Floats],
                 reach: Floats, arm_reach: Floats, axis_reach: Floats) -> ToolRates:
-    """Tools at `arms` (N, 3) from X with `axes` (N, 3), machine frame, with errors and without, while slides go by `reach`
-    (N, K), the arms' ends move on the platform by up to `arm_reach` (N,) mm and the axes turn on it by `axis_reach` (N,)."""
+    """Tools at `arms` (N, 3) from X with `axes` (N, 3), machine frame, with errors and without, while slides
+    go by `reach` (N, K), the arms' ends move on the platform by up to `arm_reach` (N,) mm and the axes turn
+    on it by `axis_reach` (N,)."""
     rates, sizes = [], []
     for one, other in ((actual.of_point(arms[0]), nominal.of_point(arms[1])),
                        (actual.of_vector(axes[0]), nominal.of_vector(axes[1]))):

@@ -1,13 +1,14 @@
 """Dimensional errors of machines on slides and rods, and the exact closure of their six rods.
 
-Rod r belongs to leg k. The rail of leg k is at P_k, its carriage at P_k + q u_k, the joint of the rod on the carriage and
-on the platform as the machine file has them. With the errors of annex E (Company 2000, "T"; II-52 to II-58, E-1 to E-9):
+Rod r belongs to leg k. The rail of leg k is at P_k, its carriage at P_k + q u_k, the joint of the rod on the
+carriage and on the platform as the machine file has them. With the errors of annex E (Company 2000, "T";
+II-52 to II-58, E-1 to E-9):
 
     A_r = P_k + dP_k + G_k (q u_k + a_r) + R_k dA_r,     B_r = X + R (b_r + dB_r),     |B_r - A_r| = L_r + dl_r,
 
 G_k: exact turn of the guide about x, y, z of the machine frame, a_r: from the rail's point to the joint, R_k: guide frame
-(z along the slide, x from the rail to the joint). The six equations give the platform's place X and turn R, which no
-longer only translates or tilts.
+(z along the slide, x from the rail to the joint). The six equations give the platform's place X and turn R,
+which no longer only translates or tilts.
 """
 
 from __future__ import annotations
@@ -136,7 +137,8 @@ class RodFrame:
         with np.errstate(over="ignore", invalid="ignore"):  # what does not close grows out of bounds
             return self._by_chords(q, place, turned, errors)
 
-    def _by_chords(self, q: Floats, place: Floats, turned: Floats, errors: RodErrors) -> tuple[Floats, Floats]:
+    def _by_chords(self, q: Floats, place: Floats, turned: Floats,
+                   errors: RodErrors) -> tuple[Floats, Floats]:
         """`solve` without a compiler."""
         a, b, lengths = self.carriage_joints(q, errors), self.joint + errors.platform, self.length + errors.length
         inverse = inverted(self.twist_rows(self.carriage_joints(q), place, turned))
@@ -210,8 +212,8 @@ def gives_rods(kinematics: RodPlatform) -> bool:
 def rod_frame(kinematics: RodPlatform, pairs: tuple[float, ...] = ()) -> RodFrame:
     """The rods of a machine; `pairs` as in `RodErrors`.
 
-    The joints of a pair whose place the file does not give lie square to its slide and, in the middle of the workspace, to
-    its rods.
+    The joints of a pair whose place the file does not give lie square to its slide and, in the middle of the
+    workspace, to its rods.
 
     Raises:
         ValueError: where neither its file nor `pairs` give six rods.
@@ -229,7 +231,8 @@ def rod_frame(kinematics: RodPlatform, pairs: tuple[float, ...] = ()) -> RodFram
     rail = legs.points + offset
     guide = np.stack([_guide(u, -o, kinematics.workspace.middle - p)
                       for u, o, p in zip(legs.directions, offset, rail, strict=True)])
-    return RodFrame(leg, rail, legs.directions, shift - offset[leg], platform[leg] + shift, legs.lengths[leg], guide)
+    return RodFrame(leg, rail, legs.directions, shift - offset[leg], platform[leg] + shift,
+                    legs.lengths[leg], guide)
 
 
 def _pairs(kinematics: RodPlatform, platform: Floats, pairs: tuple[float, ...]) -> Floats:

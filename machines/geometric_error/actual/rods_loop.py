@@ -33,7 +33,8 @@ def close_all(q: Any, leg: Any, base: Any, along: Any, joint: Any, squares: Any,
         for r in range(6):
             for k in range(3):
                 a[r, k] = base[r, k] + q[n, leg[r]] * along[r, k]
-        worst[n] = _close(a, joint, squares, place[n], turned[n], steps, closed, least_gain, rows, end, gap, order)
+        worst[n] = _close(a, joint, squares, place[n], turned[n], steps, closed, least_gain, rows,
+                          end, gap, order)
     return worst
 
 

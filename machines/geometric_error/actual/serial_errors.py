@@ -1,18 +1,20 @@
 """Errors of a serial machine: six component errors per axis, location errors of its axes, errors of the spindle.
 
-All of them, like all motions, are those of the tool's side of the axis relative to the workpiece's side, along and about
-x, y, z of the machine frame, so that primed axes need no rule of their own. With the nominal motion M_i(q_i) of axis i,
+All of them, like all motions, are those of the tool's side of the axis relative to the workpiece's side,
+along and about x, y, z of the machine frame, so that primed axes need no rule of their own. With the nominal
+motion M_i(q_i) of axis i,
 
     tip = T_1 T_2 ... T_J S tip_0,   T_i = E_i M'_i,  M'_i = L_i M_i(q_i + z_i) L_i^-1   (turning axes, "fixed" frame)
                                      T_i = M'_i E_i                           (slides; turning axes, "moving" frame)
 
 - L_i, location: moves the line of the axis (about a point of it; for a slide about its reference point) and nothing
   that the axis carries: at q = 0 it has no effect. That is what ISO 230-1 calls the axis average line.
-- z_i, zero position (EX0X, EC0C ..., ISO 230-1): the axis stands so much farther along or about its own line than it
-  counts, in the sense of the machine axis that it is named after; on a nutated axis too. E_i goes by the count.
-- E_i, component errors: displaced, then turned about x, y, z (C 1.14), about the reference point of the axis. "fixed"
-  takes their directions on the part's side of the axis, "moving" on its tool's side, as C 1.11 and 1.14 have it:
-  those of the bed, which ISO 230-1 and ISO 230-7 mean (the probe stands still, the artefact turns), are "fixed" for an
+- z_i, zero position (EX0X, EC0C ..., ISO 230-1): the axis stands so much farther along or about its own line
+  than it counts, in the sense of the machine axis that it is named after; on a nutated axis too. E_i goes by the count.
+- E_i, component errors: displaced, then turned about x, y, z (C 1.14), about the reference point of the axis.
+  "fixed" takes their directions on the part's side of the axis, "moving" on its tool's side, as C 1.11 and
+  1.14 have it: those of the bed, which ISO 230-1 and ISO 230-7 mean (the probe stands still, the artefact
+      turns), are "fixed" for an
   axis that carries the tool, "moving" for one that carries the part. The reference point of a slide travels with it.
 - S, spindle: displaces and turns the tool about the gauge point.
 
@@ -53,8 +55,8 @@ class SerialErrors:
     Attributes:
         components: any of the six of any axis; what is not there is 0
         constants: location errors by name, EC0Y ..., those of the spindle as EA0S ...
-        reference: (3,) point that the turns of an axis act about, at q = 0, by letter; default the machine origin for
-            slides, the point of its line for turning axes
+        reference: (3,) point that the turns of an axis act about, at q = 0, by letter; default the machine
+            origin for slides, the point of its line for turning axes
         frame: "fixed" (default) or "moving", by letter of turning axes
     """
 
@@ -63,7 +65,7 @@ class SerialErrors:
     reference: Mapping[str, Floats] = field(default_factory=dict)
     frame: Mapping[str, ErrorFrame] = field(default_factory=dict)
 
-    # ---- parameters ------------------------------------------------------------------------------------------------
+    # ---- parameters ----------------------------------------------------------------------------------------
 
     @property
     def names(self) -> list[str]:
@@ -88,7 +90,7 @@ class SerialErrors:
         """Letters that any error is of."""
         return {c.name.axis for c in self.components} | {text[-1] for text in self.constants}
 
-    # ---- evaluation ------------------------------------------------------------------------------------------------
+    # ---- evaluation ----------------------------------------------------------------------------------------
 
     def torsors(self, axis: str, x: Floats, direction: Floats | float = 0.0) -> list[Floats | float]:
         """Six component errors of an axis at positions (N,), arrays (N,) or a plain 0.0."""
@@ -113,8 +115,8 @@ class SerialErrors:
         return [j for j, name in enumerate(names) if name in found]
 
     def gaps(self, names: tuple[str, ...], q: Floats, joints: list[int]) -> Floats:
-        """Lost motion (N, len(joints)) of some axes at q (N, J): how far their positioning error differs by the approach
-        direction, and no less than the grain of words."""
+        """Lost motion (N, len(joints)) of some axes at q (N, J): how far their positioning error differs by
+        the approach direction, and no less than the grain of words."""
         result = np.zeros((len(q), len(joints)))
         for k, j in enumerate(joints):
             for component in self.components:

@@ -1,8 +1,8 @@
 """Small displacements as homogeneous transforms and as transport matrices.
 
 A torsor is (dx, dy, dz, ex, ey, ez): a displacement of a frame in mm and rad, along and about its own x, y, z. Two
-orders of its three turns are in use, both after the displacement: x y z for errors of axes and of mounting (C 1.12 to
-1.18) and z y x for placing one frame in another (C 1.2, 1.10 with entry (1, 2) as cos c sin a sin b - cos a sin c).
+orders of its three turns are in use, both after the displacement: x y z for errors of axes and of mounting (C
+1.12 to 1.18) and z y x for placing one frame in another (C 1.2, 1.10 with entry (1, 2) as cos c sin a sin b - cos a sin c).
 Source: Oueslati, calibration of rotary axes (2004), "C" below.
 """
 

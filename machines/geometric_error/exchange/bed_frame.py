@@ -1,8 +1,8 @@
 """Errors of rotary axes along and about x, y, z of the bed, as ISO 230-1 and ISO 230-7 have them.
 
-With R(q) the turn of the tool's side of an axis, e_fixed = R e_moving for displacements and, to first order, for turns,
-where the point that the turns act about lies on the axis. So a component in one frame is a sum of three in the other, times
-the entries of R; its parameters are theirs.
+With R(q) the turn of the tool's side of an axis, e_fixed = R e_moving for displacements and, to first order,
+for turns, where the point that the turns act about lies on the axis. So a component in one frame is a sum of
+three in the other, times the entries of R; its parameters are theirs.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ PLACES = 5000
 GridSteps = Mapping[str, float]
 
 
-# ---- tables per axis --------------------------------------------------------------------------------------------------
+# ---- tables per axis ---------------------------------------------------------------------------------------
 
 def to_tables(model: ErrorModel, machine: Machine, step: GridSteps, length: float,
               angle: float) -> tuple[ErrorModel, dict[str, float]]:
@@ -82,12 +82,12 @@ def travel(machine: Machine, turns: float = 0.5) -> dict[str, tuple[float, float
             for letter, a, b in zip(machine.axis_names, lower, upper, strict=True)}
 
 
-# ---- screw compensation -----------------------------------------------------------------------------------------------
+# ---- screw compensation ------------------------------------------------------------------------------------
 
 @dataclass(frozen=True)
 class Screws:
-    """Screw compensation of LinuxCNC: text per joint letter, tables, losses (mm or rad), the model that the tables are, and
-    the model without them."""
+    """Screw compensation of LinuxCNC: text per joint letter, tables, losses (mm or rad), the model that the
+    tables are, and the model without them."""
 
     texts: dict[str, str]
     tables: dict[str, TableCurve]
@@ -101,8 +101,8 @@ class Screws:
 def to_screws(model: ErrorModel, machine: Machine, step: GridSteps, length: float, angle: float) -> Screws:
     """Positioning errors as LinuxCNC's files; arguments as `to_tables`.
 
-    Axes that go round have rows over two turns in either direction, or as many as rows allow. Beyond its rows LinuxCNC goes
-    on with
+    Axes that go round have rows over two turns in either direction, or as many as rows allow. Beyond its rows
+    LinuxCNC goes on with
     the last: where a joint can go there the rest has a component of zeros that ends with them, so that programs stop too.
 
     Raises:
@@ -130,7 +130,8 @@ def _screw_rows(components: Sequence[Component], machine: Machine, step: GridSte
     """Rows by component over as many turns of axes that go round as LinuxCNC has rows for."""
     for turns in TURNS[:-1]:
         with suppress(ValueError):
-            return rows_for(components, travel(machine, turns), step, length, angle, LINUXCNC_ROWS, repeat=False)
+            return rows_for(components, travel(machine, turns), step, length, angle, LINUXCNC_ROWS,
+                            repeat=False)
     return rows_for(components, travel(machine, TURNS[-1]), step, length, angle, LINUXCNC_ROWS, repeat=False)
 
 
@@ -183,7 +184,7 @@ def notices(model: ErrorModel, machine: Machine) -> list[str]:
                                     for letter, frame in sorted(own.items()))]
 
 
-# ---- error map -----------------------------------------------------------------------------------------------------
+# ---- error map ---------------------------------------------------------------------------------------------
 
 @dataclass(frozen=True)
 class MadeMap:
@@ -201,8 +202,8 @@ def lattice_for(model: ErrorModel, machine: Machine, letters: str, step: GridSte
 
     Args:
         letters: coordinates; "" for the slides of a serial machine, x y z of one on rods
-        step: mm or rad between nodes, by coordinate; without it the rows that the model's own tables have of it, else its
-            ends, or every 30 degrees of a turn
+        step: mm or rad between nodes, by coordinate; without it the rows that the model's own tables have of
+            it, else its ends, or every 30 degrees of a turn
         at: mm or rad, joints that the lattice does not name and that do not stand in the middle of the volume
         length: mm, of the tool whose tip is displaced
         directions: "machine" or "table"
@@ -218,7 +219,8 @@ def lattice_for(model: ErrorModel, machine: Machine, letters: str, step: GridSte
         fixed[j] = value
         if not machine.limits.lower[j] <= value <= machine.limits.upper[j]:
             raise ValueError(f"{letter} cannot stand there: it is outside its travel")
-    for what, names, wrong in (("step", step, set(step) - set(letters)), ("place to stand", at, set(at) & set(letters))):
+    for what, names, wrong in (("step", step, set(step) - set(letters)),
+                               ("place to stand", at, set(at) & set(letters))):
         if wrong:
             raise ValueError(f"a {what} is given for {', '.join(x for x in names if x in wrong)}; the map's coordinates are "
                              f"{', '.join(letters)}")
@@ -255,7 +257,8 @@ def _levels(model: ErrorModel, machine: Machine, letter: str, ends: tuple[float,
     return np.unique(np.concatenate([ends, inner[(inner > ends[0]) & (inner < ends[1])]])), 0.0
 
 
-def to_map(model: ErrorModel, machine: Machine, lattice: ErrorMap, fixed: Floats, tolerance: float | None) -> MadeMap:
+def to_map(model: ErrorModel, machine: Machine, lattice: ErrorMap, fixed: Floats,
+           tolerance: float | None) -> MadeMap:
     """The map of a model; where a `tolerance` (mm) is given its cells are divided until it loses no more inside.
 
     Raises:
@@ -304,11 +307,12 @@ def _rows(by_map: ActualByMap, actual: Actual, fixed: Floats) -> Floats:
     return result
 
 
-# ---- what stays ----------------------------------------------------------------------------------------------------
+# ---- what stays --------------------------------------------------------------------------------------------
 
-def worst(model: ErrorModel, machine: Machine, tool_length: float, places_of: ErrorModel) -> tuple[float, float]:
-    """Worst tip (um) and axis (arcsec) of a model at the places of `survey` where `places_of` holds; 0 where that is
-    nowhere. Two approach directions count by their mean."""
+def worst(model: ErrorModel, machine: Machine, tool_length: float,
+          places_of: ErrorModel) -> tuple[float, float]:
+    """Worst tip (um) and axis (arcsec) of a model at the places of `survey` where `places_of` holds; 0 where
+    that is nowhere. Two approach directions count by their mean."""
     kinematics = machine.kinematics.with_tool(tool_length)
     w = samples(places_of, machine, places_of.on(kinematics), WORST_PLACES)
     tip, axis = apart(model.on(kinematics), model.zero().on(kinematics), w)

@@ -86,7 +86,8 @@ def _curve(place: Any, component: Component, x: Floats, position: float,
     """A component, approached backwards as dots where that differs; a band of its uncertainty."""
     curve, unit = component.curve, ARCSEC if component.name.angular else UM
     both = both_directions(curve)
-    line, = place.plot(x / position, curve.at(x, 1.0 if both else 0.0) / unit, linewidth=1.1, label=str(component.name))
+    line, = place.plot(x / position, curve.at(x, 1.0 if both else 0.0) / unit, linewidth=1.1,
+                       label=str(component.name))
     if both:
         place.plot(x / position, curve.at(x, -1.0) / unit, linewidth=1.1, linestyle=":", color=line.get_color(),
                    label=f"{component.name}, backwards")

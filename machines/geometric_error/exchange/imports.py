@@ -61,8 +61,8 @@ class ImportOptions:
         tool_length: mm, of the tool whose tip a map displaces
         directions: of a map
         zero: mm or rad by coordinate: the place at which a map is to be 0; {} takes it as it is
-        average: rows at the same place, columns of runs and files of runs are readings of it: their mean counts, and
-            their scatter is the uncertainty
+        average: rows at the same place, columns of runs and files of runs are readings of it: their mean
+            counts, and their scatter is the uncertainty
         large: errors above 1 mm or 0.5 degrees are so
         near: mm or rad by axis or coordinate: readings no farther apart are of one place
     """
@@ -79,13 +79,14 @@ class ImportOptions:
     large: bool = False
 
 
-def read_sources(sources: Sequence[str], machine: Machine, how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
+def read_sources(sources: Sequence[str], machine: Machine,
+                 how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
     """The model that all sources make together; None where any has a fault.
 
     Args:
-        sources: `x.csv`: tables per axis, location errors or a lattice, reported by their columns; `EXX=x.csv`: positions
-            and runs of one component, whatever its columns are called; `X=x.comp`: LinuxCNC's screw compensation of the
-            joint X
+        sources: `x.csv`: tables per axis, location errors or a lattice, reported by their columns;
+            `EXX=x.csv`: positions and runs of one component, whatever its columns are called; `X=x.comp`:
+            LinuxCNC's screw compensation of the joint X
     """
     model, places = ErrorModel(machine=machine.name), dict[str, str]()
     parts, found = _parts(sources, machine, how)
@@ -176,7 +177,7 @@ def with_covariance(model: ErrorModel, path: Path) -> tuple[ErrorModel | None, l
     return replace(model, covariance=matrix * np.outer(scale, scale)), []
 
 
-# ---- CSV ------------------------------------------------------------------------------------------------------------
+# ---- CSV ---------------------------------------------------------------------------------------------------
 
 def _read(source: str, how: ImportOptions) -> tuple[CsvTable | None, list[Diagnostic]]:
     """The table of a CSV file, its columns by ISO 230-1 names."""
@@ -200,7 +201,8 @@ def _gap(table: CsvTable) -> Fault | None:
         blank = np.isnan(table.columns[name])
         if blank.any():
             hint = "give the position of every reading" if places else "take the column out where nothing was measured"
-            return Fault("error-table.row", f"no number in column {name[:40]}", hint, table.lines[int(np.argmax(blank))])
+            return Fault("error-table.row", f"no number in column {name[:40]}", hint,
+                         table.lines[int(np.argmax(blank))])
     return None
 
 
@@ -338,9 +340,10 @@ def _location(table: CsvTable, how: ImportOptions) -> tuple[ErrorModel | None, l
     return (None if found else ErrorModel(SerialErrors(constants=constants))), found
 
 
-# ---- LinuxCNC ----------------------------------------------------------------------------------------------------------
+# ---- LinuxCNC ----------------------------------------------------------------------------------------------
 
-def _screw(letter: str, path: Path, machine: Machine, how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
+def _screw(letter: str, path: Path, machine: Machine,
+           how: ImportOptions) -> tuple[ErrorModel | None, list[Diagnostic]]:
     mine = machine.kinematics.axes_with_errors
     if letter not in mine:
         return None, [error("error-model.axis", f"{machine.name} has no axis {letter!r} with a positioning error",

@@ -97,7 +97,8 @@ def map_loss(by_map: Actual, actual: Actual, w: Floats) -> MapLoss:
     tip, axis = np.linalg.norm(t1 - t0, axis=1), 2.0 * np.arcsin(0.5 * np.linalg.norm(a1 - a0, axis=1))
     worst = (float(x.max(initial=0.0)) for x in (tip, axis))
     (tip_worst, axis_worst), n = worst, max(len(w), 1)
-    return MapLoss(tip_worst, float(np.sqrt(np.sum(tip**2) / n)), axis_worst, float(np.sqrt(np.sum(axis**2) / n)))
+    return MapLoss(tip_worst, float(np.sqrt(np.sum(tip**2) / n)), axis_worst,
+                   float(np.sqrt(np.sum(axis**2) / n)))
 
 
 def divided(base: ErrorMap, parts: Sequence[int]) -> ErrorMap:
@@ -118,8 +119,8 @@ def probes(lattice: ErrorMap, rng: np.random.Generator, count: int = PROBES) -> 
 
 def refined(actual: Actual, nominal: Actual, base: ErrorMap, fixed: Floats, tolerance: float,
             most: int) -> tuple[ErrorMap, MapLoss]:
-    """The map on the coarsest of the lattices that were tried, cells of `base` divided evenly, that loses no more than
-    `tolerance` mm at the tip, at places inside it.
+    """The map on the coarsest of the lattices that were tried, cells of `base` divided evenly, that loses no
+    more than `tolerance` mm at the tip, at places inside it.
 
     What interpolating along one coordinate alone loses says which one to divide.
 

@@ -75,8 +75,8 @@ def unmeasured(model: ErrorModel, machine: Machine, file: str) -> list[Diagnosti
 
 
 def beyond_travel(model: ErrorModel, machine: Machine, file: str) -> list[Diagnostic]:
-    """Warnings where an error was measured far outside travel, where its machine cannot have been: a wrong unit, most
-    likely."""
+    """Warnings where an error was measured far outside travel, where its machine cannot have been: a wrong
+    unit, most likely."""
     spans = {(c.name.axis, c.curve.range) for c in model.axes.components}
     if model.map is not None:
         spans |= {(x, (float(n[0]), float(n[-1]))) for x, n in zip(model.map.letters, model.map.nodes, strict=True)}

@@ -1,5 +1,5 @@
-"""Any curves as linear tables, as controls and tables per axis hold them; the covariance goes along, the loss is
-reported."""
+"""Any curves as linear tables, as controls and tables per axis hold them; the covariance goes along, the loss
+is reported."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ def sampled(curve: Curve, x: Floats, period: float = 0.0) -> TableCurve:
         return curve
     both = both_directions(curve)
     approaches = (1.0, -1.0) if both else (0.0,)
-    return TableCurve(x, np.concatenate([curve.at(x, approach) for approach in approaches]), "linear", both, period)
+    return TableCurve(x, np.concatenate([curve.at(x, approach) for approach in approaches]), "linear",
+                      both, period)
 
 
 def both_directions(curve: Curve) -> bool:
@@ -57,7 +58,8 @@ def loss(curve: Curve, rows: TablePositions) -> float:
     closed, table = rows.closed, sampled(curve, rows.x, rows.period)
     count = max(PROBES * (len(closed) - 1), LEAST)
     jitter = np.random.default_rng(0).uniform(0.0, 1.0, count)  # a series would hide between even places
-    places = np.interp((np.arange(count) + jitter) / count * (len(closed) - 1), np.arange(len(closed)), closed)
+    places = np.interp((np.arange(count) + jitter) / count * (len(closed) - 1),
+                       np.arange(len(closed)), closed)
     if isinstance(curve, TableCurve):
         places = np.concatenate([places, curve.x[(curve.x >= closed[0]) & (curve.x <= closed[-1])]])
     approaches = (1.0, -1.0) if table.both else (0.0,)
@@ -71,8 +73,8 @@ def rows_for(components: Sequence[Component], travel: Mapping[str, tuple[float, 
 
     Args:
         travel: mm or rad, of axes whose curves hold everywhere and do not repeat
-        step: mm or rad between rows, by axis letter; else the rows of the components' own linear tables, their cells
-            divided evenly until no component loses more than `length` mm or `angle` rad
+        step: mm or rad between rows, by axis letter; else the rows of the components' own linear tables,
+            their cells divided evenly until no component loses more than `length` mm or `angle` rad
         most: rows of a table
         repeat: False where tables cannot repeat: then over the travel
 
@@ -137,8 +139,8 @@ def tabulated(model: ErrorModel, components: Sequence[Component], frame: Mapping
               most: int) -> ErrorModel:
     """The model with components as linear tables, and the covariance of their values.
 
-    The values of a table are linear in the parameters of its curve, so that covariance is A Sigma A^T. It is left out where
-    tables differ from their curves and there are more than `most` parameters.
+    The values of a table are linear in the parameters of its curve, so that covariance is A Sigma A^T. It is
+    left out where tables differ from their curves and there are more than `most` parameters.
 
     Args:
         components: the model's own, or `RotatedCurve` of them, in directions of `frame`
@@ -180,7 +182,7 @@ def _basis(curve: Curve, x: Floats) -> Floats:
                            for approach in ((1.0, -1.0) if both_directions(curve) else (0.0,))])
 
 
-# ---- parts of models ---------------------------------------------------------------------------------------------------
+# ---- parts of models ---------------------------------------------------------------------------------------
 
 def without(model: ErrorModel, names: Sequence[ErrorName]) -> ErrorModel:
     """The model less some components; the covariance of the others stays."""
@@ -210,7 +212,8 @@ def replaced(model: ErrorModel, more: ErrorModel) -> set[str]:
     return {name + label for name, label in mine if name in whole} | (set(model.axes.constants) & set(more.axes.constants))
 
 
-def _with_axes(source: ErrorModel, target: ErrorModel, lost: set[str] | frozenset[str] = frozenset()) -> ErrorModel:
+def _with_axes(source: ErrorModel, target: ErrorModel,
+               lost: set[str] | frozenset[str] = frozenset()) -> ErrorModel:
     """`target` with the covariance that `source` has of the parameters that both have, apart from those `lost`."""
     if source.covariance is None:
         return target

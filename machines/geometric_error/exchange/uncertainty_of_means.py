@@ -17,7 +17,8 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, info
 
 
-def with_scatter(model: ErrorModel, read: Averaged, zero: Mapping[str, float]) -> tuple[ErrorModel, Diagnostic]:
+def with_scatter(model: ErrorModel, read: Averaged,
+                 zero: Mapping[str, float]) -> tuple[ErrorModel, Diagnostic]:
     """The model with the uncertainty of its means, and what is reported of it; none is written of more than
     `MOST_UNCERTAINTY` values."""
     units = {name: UNITS["arcsec" if name[0] == "r" or name[1] in "ABC" else "um"] for name in read.scatter}

@@ -80,8 +80,8 @@ def corners(machine: Machine, lower: Floats, upper: Floats, fixed: Floats) -> Fl
 
 def section(machine: Machine, lower: Floats, upper: Floats, across: int, up: int,
             count: int) -> tuple[Floats, Floats, Floats]:
-    """Joints (count^2, J) over two slides, or two directions of the platform (0, 1, 2 for x, y, z), the rest in the middle;
-    and the positions (count,) of both, mm."""
+    """Joints (count^2, J) over two slides, or two directions of the platform (0, 1, 2 for x, y, z), the rest
+    in the middle; and the positions (count,) of both, mm."""
     platform, rest = machine.kinematics.on_rods, middle(machine)
     box = platform.workspace if platform is not None else None
     j = [across, up] if box else [machine.axis_names.index("XYZ"[k]) for k in (across, up)]

@@ -40,7 +40,8 @@ def units(names: list[str], model: ErrorFileModel) -> Floats:
     return np.array([UNITS[model.angle_unit if angular(name) else model.length_unit] for name in names])
 
 
-def covariance_of(model: ErrorModel, file: UserFile, checked: ErrorFileModel) -> tuple[ErrorModel, list[Diagnostic]]:
+def covariance_of(model: ErrorModel, file: UserFile,
+                  checked: ErrorFileModel) -> tuple[ErrorModel, list[Diagnostic]]:
     """The model with the covariance that its file gives; without it, reported, where it has more parameters than MOST."""
     given = "covariance" if checked.covariance is not None else "sigma"
     if checked.covariance is None and not checked.sigma:
@@ -68,7 +69,8 @@ def covariance_of(model: ErrorModel, file: UserFile, checked: ErrorFileModel) ->
     return replace(model, covariance=np.diag((sigma * units(names, checked)) ** 2)), found
 
 
-def read_covariance(path: Path, names: list[str], cited: tuple[str, int]) -> tuple[Floats | None, list[Diagnostic]]:
+def read_covariance(path: Path, names: list[str],
+                    cited: tuple[str, int]) -> tuple[Floats | None, list[Diagnostic]]:
     """(P, P) in the order of `names`, in the units of the table; parameters that it leaves out have none."""
     text, found = read_text(path, cited)
     if text is None:
@@ -122,7 +124,8 @@ def _row(text: str, name: str, count: int) -> list[float] | tuple[str, str]:
         values = [float(cell) for cell in cells]
     except ValueError as fault:
         return f"row {name!r}: {fault}", "write numbers with a decimal point"
-    return values if np.isfinite(values).all() else (f"row {name!r} holds a number that is not finite", "write 0 for none")
+    return values if np.isfinite(values).all() else (f"row {name!r} holds a number that is not finite",
+                                                     "write 0 for none")
 
 
 def _cells(text: str) -> list[str]:

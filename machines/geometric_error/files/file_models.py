@@ -1,7 +1,8 @@
 """The error model file: what each key may hold.
 
-Lengths of errors are in `length_unit`, angles in `angle_unit`; positions (points, ranges, periods) in mm and degrees. All
-errors are actual less commanded, of the tool's side relative to the part's side, along and about x, y, z of the machine.
+Lengths of errors are in `length_unit`, angles in `angle_unit`; positions (points, ranges, periods) in mm and
+degrees. All errors are actual less commanded, of the tool's side relative to the part's side, along and about
+x, y, z of the machine.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ class CurveModel(UserModel):
     """`[components.NAME]`: one of `table`, `polynomial`, or `mean` / `cosine` / `sine`."""
 
     table: str | None = None
-    """CSV file next to this one: a column of positions named as the axis, e.g. X [mm], and one of values named as the
-    component, EXX [um]; or two for both approach directions, EXX+ and EXX-"""
+    """CSV file next to this one: a column of positions named as the axis, e.g. X [mm], and one of values
+    named as the component, EXX [um]; or two for both approach directions, EXX+ and EXX-"""
     interpolation: TableRule = "linear"
     """between the rows of the table"""
     repeats: Positive | None = None
@@ -69,9 +70,10 @@ class ReferenceModel(UserModel):
     point: Vector | None = None
     """mm in machine coordinates at zero; for slides it travels along. Default: machine origin; point of a rotary axis"""
     frame: Literal["bed", "fixed", "moving"] = "bed"
-    """rotary axes: whose x, y, z the component errors are along and about: those of the bed, where a probe stands still (ISO
-    230-1, ISO 230-7); or those of the part's side of the axis ("fixed") or of its tool's side ("moving"). The bed is on the
-    part's side of an axis that carries the tool, on the tool's side of one that carries the part"""
+    """rotary axes: whose x, y, z the component errors are along and about: those of the bed, where a probe
+    stands still (ISO 230-1, ISO 230-7); or those of the part's side of the axis ("fixed") or of its tool's
+    side ("moving"). The bed is on the part's side of an axis that carries the tool, on the tool's side of one
+    that carries the part"""
 
 
 class LegErrorModel(UserModel):
@@ -95,20 +97,20 @@ class MapModel(UserModel):
     """`[map]`: an error map, computed or measured."""
 
     table: str
-    """CSV file: coordinates X [mm] ... C [deg] of axes, or x y z of the point in the table frame; dx dy dz, and rx ry rz if
-    measured. One row per node of a full lattice, in any order"""
+    """CSV file: coordinates X [mm] ... C [deg] of axes, or x y z of the point in the table frame; dx dy dz,
+    and rx ry rz if measured. One row per node of a full lattice, in any order"""
     tool_length: Annotated[float, Field(ge=0)] = 0.0
     """mm: the displacements are those of the tip of a tool this long; 0: of the gauge point"""
     directions: MapDirections = "table"
-    """what dx ... rz are along and about: x, y, z of the table, which turns with the rotary axes under the part, or of the
-    machine"""
+    """what dx ... rz are along and about: x, y, z of the table, which turns with the rotary axes under the
+    part, or of the machine"""
     sign: Literal[1, -1] = 1
     """-1 where the numbers say how the part moves relative to the tool, or what the control is to add"""
     repeats: dict[str, Positive] = Field(default_factory=dict)
     """by coordinate that goes round: degrees (mm) after which it repeats, e.g. { C = 360 }"""
     zero: dict[str, float] = Field(default_factory=dict)
-    """place, all coordinates in mm and degrees, at which the map is to be 0: what it says there is taken off everywhere;
-    [sigma] and [covariance] are those of the table as it stands"""
+    """place, all coordinates in mm and degrees, at which the map is to be 0: what it says there is taken off
+    everywhere; [sigma] and [covariance] are those of the table as it stands"""
 
 
 class CovarianceModel(UserModel):
@@ -132,8 +134,8 @@ class ErrorFileModel(UserModel):
     angle_unit: Literal["arcsec", "urad", "deg"] = "arcsec"
     """of the numbers in this file"""
     large: bool = False
-    """true: errors above 1 mm or 0.5 degrees are so; else they are refused, as most likely a wrong unit. Those above
-    100 mm or 10 degrees always are"""
+    """true: errors above 1 mm or 0.5 degrees are so; else they are refused, as most likely a wrong unit.
+    Those above 100 mm or 10 degrees always are"""
     components: dict[str, CurveModel] = Field(default_factory=dict)
     """component errors by ISO 230-1 name, EXX, EYX, ... ECC"""
     location: dict[str, float] = Field(default_factory=dict)

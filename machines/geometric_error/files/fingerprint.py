@@ -26,8 +26,8 @@ PLACES = 6
 def fingerprint(model: ErrorModel) -> str:
     """The same for files that make the same corrections, whatever their names, units, signs, order and spelling.
 
-    Aside stand the name, the machine and who corrects, which other checks look at, and the covariance: what is known of
-    the uncertainty changes no word of a program.
+    Aside stand the name, the machine and who corrects, which other checks look at, and the covariance: what
+    is known of the uncertainty changes no word of a program.
     """
     lines = [*_axes(model.axes), *([] if model.rods is None else _rods(model.rods)),
              *([] if model.map is None else _map(model.map))]

@@ -122,7 +122,7 @@ class _Loader:
                 given.large, "length_unit, angle_unit, headers of tables", "large = true in this file"))
             self.found.append(found if one.refused(given.large) else replace(found, severity=Severity.WARNING))
 
-    # ---- axes ------------------------------------------------------------------------------------------------------
+    # ---- axes ----------------------------------------------------------------------------------------------
 
     def _axes(self) -> SerialErrors:
         components = tuple(Component(name, curve) for text, given in self.checked.components.items()
@@ -137,7 +137,8 @@ class _Loader:
                 self._problem("error-model.axis", ("reference", letter, "frame"), f"{letter} is a slide, its frame does "
                               "not turn", "take frame out")
         turning = {c.name.axis for c in components} | set(self.checked.reference)
-        return SerialErrors(components, constants, reference, {k: self._frame(k) for k in sorted(turning) if k in ROTARY})
+        return SerialErrors(components, constants, reference,
+                            {k: self._frame(k) for k in sorted(turning) if k in ROTARY})
 
     def _frame(self, letter: str) -> ErrorFrame:
         """The directions of an axis's errors; those of the bed are on the side that the axis does not carry."""
@@ -156,7 +157,8 @@ class _Loader:
         if given.kind == "table":
             return self._table(name, given, position)
         if given.kind == "polynomial":
-            return Polynomial(np.array(given.polynomial) * unit, span, given.origin * position, given.scale * position)
+            return Polynomial(np.array(given.polynomial) * unit, span, given.origin * position,
+                              given.scale * position)
         if name.axis not in ROTARY and (given.repeats is None or given.range is None):
             self._problem("error-model.series", ("components", str(name)), f"a series of slide {name.axis} needs repeats "
                           "and range", "write repeats = pitch in mm and range = [lower, upper]")
@@ -164,7 +166,8 @@ class _Loader:
         count = max(len(given.cosine), len(given.sine))
         waves = [np.array(part or (0.0,) * count) for part in (given.cosine, given.sine)]
         period = 2.0 * np.pi if given.repeats is None else given.repeats * position
-        return Fourier(np.concatenate([[given.mean or 0.0], *waves]) * unit, period, given.origin * position, span)
+        return Fourier(np.concatenate([[given.mean or 0.0], *waves]) * unit, period,
+                       given.origin * position, span)
 
     def _table(self, name: ErrorName, given: CurveModel, position: float) -> Curve | None:
         path = ("components", str(name), "table")
@@ -200,13 +203,14 @@ class _Loader:
                 self._problem("error-model.no-effect", ("location", text), f"{text} moves nothing: the line of a slide "
                               "shifted, or of an axis shifted or turned along itself, is the same line", instead)
 
-    # ---- parallel machines, maps -----------------------------------------------------------------------------------
+    # ---- parallel machines, maps ---------------------------------------------------------------------------
 
     def _rods(self) -> RodErrors | None:
         kinematics = self.machine.kinematics.on_rods
         if kinematics is None:
             for letter in self.checked.legs:
-                self._problem("error-model.legs", ("legs", letter), f"{self.machine.name} has no legs", "take [legs] out")
+                self._problem("error-model.legs", ("legs", letter), f"{self.machine.name} has no legs",
+                              "take [legs] out")
             return None
         slides = kinematics.axis_names[: len(kinematics.legs.points)]
         pairs = self._pairs(slides, gives_rods(kinematics))

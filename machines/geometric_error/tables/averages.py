@@ -40,7 +40,8 @@ class Averaged:
         return result
 
 
-def averaged(table: CsvTable, places: Sequence[str], near: Mapping[str, float] | None = None) -> Averaged | Fault:
+def averaged(table: CsvTable, places: Sequence[str],
+             near: Mapping[str, float] | None = None) -> Averaged | Fault:
     """Rows at the same place, by the columns `places`, as one; cells without a number (NaN) are no readings.
 
     Scatter: s^2 = sum (x - mean)^2 / (N - M), the pooled variance of N readings at M places.

@@ -1,8 +1,8 @@
 """CSV tables with units in their headers: `X [mm], EXX+ [um], EXX- [um]`, or in a row of units below them.
 
-Numbers with a decimal point, separated by commas, semicolons or tabs; between semicolons or tabs a decimal comma will do
-where the table has no point. `#` begins a comment line, lines of words above the header are titles. UTF-8, UTF-16 with its
-mark, or Windows-1252, as spreadsheets save them. Inside mm and rad.
+Numbers with a decimal point, separated by commas, semicolons or tabs; between semicolons or tabs a decimal
+comma will do where the table has no point. `#` begins a comment line, lines of words above the header are
+titles. UTF-8, UTF-16 with its mark, or Windows-1252, as spreadsheets save them. Inside mm and rad.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ class CsvTable:
         return len(self.lines)
 
 
-def read_csv(path: Path, cited: tuple[str, int] = ("", 0), gaps: bool = False) -> tuple[CsvTable | None, list[Diagnostic]]:
+def read_csv(path: Path, cited: tuple[str, int] = ("", 0),
+             gaps: bool = False) -> tuple[CsvTable | None, list[Diagnostic]]:
     """The table of a file; None and what is wrong with it.
 
     Args:
@@ -99,7 +100,8 @@ def read_text(path: Path, cited: tuple[str, int] = ("", 0)) -> tuple[str | None,
     try:
         text = _decoded(read_input(path))
     except FileNotFoundError:
-        return fault("error-table.not-found", f"there is no table {path.name!r}", f"looked in {path.parent or '.'}")
+        return fault("error-table.not-found", f"there is no table {path.name!r}",
+                     f"looked in {path.parent or '.'}")
     except OSError as bad:
         return fault("error-table.unreadable", f"cannot read {path.name[:60]!r}: {reason(bad)}",
                      advice(bad, "name a CSV file"))
@@ -178,7 +180,8 @@ def _no_head(file: str, line: int, head: str, body: Sequence[tuple[int, str]], m
     return []
 
 
-def _head_faults(file: str, line: int, cells: Sequence[str], found: Sequence[re.Match[str] | None]) -> list[Diagnostic]:
+def _head_faults(file: str, line: int, cells: Sequence[str],
+                 found: Sequence[re.Match[str] | None]) -> list[Diagnostic]:
     result = []
     for cell, match in zip(cells, found, strict=True):
         if match is None or not match["name"]:
@@ -230,7 +233,8 @@ def _plain(cells: list[str], count: int) -> list[float] | None:
     return row if len(row) == count and math.isfinite(sum(row)) and not any("_" in cell for cell in cells) else None
 
 
-def _fill(row: Floats, cells: list[str], names: Sequence[str], comma: bool, gaps: bool) -> tuple[str, str] | None:
+def _fill(row: Floats, cells: list[str], names: Sequence[str], comma: bool,
+          gaps: bool) -> tuple[str, str] | None:
     """Put the numbers of a line in `row`; what is wrong and what to do, None for nothing."""
     while len(cells) > len(names) and not cells[-1].strip():
         cells.pop()

@@ -1,7 +1,8 @@
 """One component error as a function of the position of its axis: table, Fourier series or polynomial.
 
-All curves are linear in their parameters: value = basis(x) . values. Positions mm or rad, values mm or rad. Beyond its
-range a curve keeps its end value; `outside` says, and callers refuse such positions unless they are set otherwise.
+All curves are linear in their parameters: value = basis(x) . values. Positions mm or rad, values mm or rad.
+Beyond its range a curve keeps its end value; `outside` says, and callers refuse such positions unless they
+are set otherwise.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Error map: displacement of a point of the tool and turn of the tool on a lattice, as controls hold it.
 
-Coordinates of the lattice are joints (upper-case letters: X Y Z A B C) or the point in the table frame (x y z), any number
-of them; between the nodes the values are linear in each coordinate, and a rotary axis may go round. A map is applied
+Coordinates of the lattice are joints (upper-case letters: X Y Z A B C) or the point in the table frame (x y
+z), any number of them; between the nodes the values are linear in each coordinate, and a rotary axis may go
+round. A map is applied
 after the nominal motion: the point displaced by (dx, dy, dz), the tool turned about it by the rotation vector (rx, ry,
 rz), exactly.
 """
@@ -34,10 +35,10 @@ class ErrorMap:
         nodes: ascending positions along each, mm or rad; of one that goes round within one period, its end left out
         table: (n1, n2, ..., 6) mm and rad
         periods: (D,) mm or rad after which a coordinate repeats, 0 where it does not; () for none
-        length: mm from the gauge point along the tool to the point that is displaced: 0 the gauge point, the length of
-            the tool that was measured with its tip
-        bed: rotary axes between the part and the bed, from the part on: their turns take directions of the machine into
-            those of the table, and the values are along and about the machine's; () where they are the table's
+        length: mm from the gauge point along the tool to the point that is displaced: 0 the gauge point, the
+            length of the tool that was measured with its tip
+        bed: rotary axes between the part and the bed, from the part on: their turns take directions of the
+            machine into those of the table, and the values are along and about the machine's; () where they are the table's
     """
 
     letters: tuple[str, ...]

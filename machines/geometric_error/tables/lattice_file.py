@@ -68,7 +68,8 @@ def _levels_of(letters: Sequence[str], shape: Sequence[int]) -> str:
     return " x ".join(f"{letter} {n}" for letter, n in zip(letters, shape, strict=True))
 
 
-def round_about(lattice: ErrorMap, periods: Mapping[str, float], file: str) -> tuple[ErrorMap | None, list[Diagnostic]]:
+def round_about(lattice: ErrorMap, periods: Mapping[str, float],
+                file: str) -> tuple[ErrorMap | None, list[Diagnostic]]:
     """The lattice with coordinates that go round; what keeps them from it."""
     nodes, table, found = list(lattice.nodes), lattice.table, []
     for letter, period in periods.items():
@@ -130,7 +131,8 @@ def zeroed(error_map: ErrorMap, zero: Mapping[str, float]) -> ErrorMap | tuple[s
     """The map less what it says at the place `zero` (mm or rad by coordinate); or what is wrong, and what to do."""
     letters = error_map.letters
     if set(zero) != set(letters):
-        return (f"zero gives {', '.join(zero)}, the map has {', '.join(letters)}", "give every coordinate of the map once")
+        return (f"zero gives {', '.join(zero)}, the map has {', '.join(letters)}",
+                "give every coordinate of the map once")
     place = np.array([[zero[letter] for letter in letters]])
     if error_map.outside(place, SAME).any():
         return "the place lies outside the map", "; ".join(

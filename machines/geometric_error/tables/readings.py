@@ -1,5 +1,5 @@
-"""Tables as measuring programs deliver them: a column for each run, a file for each approach direction or run, headers of
-their own.
+"""Tables as measuring programs deliver them: a column for each run, a file for each approach direction or
+run, headers of their own.
 
 What comes out are rows of single readings under ISO 230-1 names, NaN where there is none, which `averages` makes means of.
 """
@@ -51,7 +51,8 @@ def by_iso_names(table: CsvTable, name: ErrorName | None) -> CsvTable | Fault:
                          table.head)
         columns[new], unit[new] = values, table.unit[column]
     if name is not None and name.axis not in columns:
-        return Fault("error-import.column", "no column holds positions", f"call it {name.axis} or target", table.head)
+        return Fault("error-import.column", "no column holds positions",
+                     f"call it {name.axis} or target", table.head)
     return CsvTable(table.file, columns, unit, table.lines, table.head)
 
 
@@ -82,8 +83,8 @@ def _of_component(column: str, name: ErrorName) -> str | None:
 
 
 def run_of(column: str) -> tuple[str, str]:
-    """(component with its approach direction, number of the run) of a column as EXX+3; (the column, "") for one of no
-    run."""
+    """(component with its approach direction, number of the run) of a column as EXX+3; (the column, "") for
+    one of no run."""
     found = _OF_RUN.match(column)
     return (found[1], found[2]) if found else (column, "")
 
@@ -119,12 +120,13 @@ def stacked(tables: Sequence[CsvTable]) -> CsvTable:
                for name in names}
     unit = {name: unit for table in reversed(tables) for name, unit in table.unit.items()}
     files = ", ".join(dict.fromkeys(table.file for table in tables))
-    return CsvTable(files, columns, unit, tuple(line for table in tables for line in table.lines), tables[0].head)
+    return CsvTable(files, columns, unit, tuple(line for table in tables for line in table.lines),
+                    tables[0].head)
 
 
 def together(tables: Sequence[CsvTable], average: bool) -> list[CsvTable]:
-    """Tables of one axis as one where they are readings of the same errors (`average`), or the two approach directions of
-    one."""
+    """Tables of one axis as one where they are readings of the same errors (`average`), or the two approach
+    directions of one."""
     groups: list[list[CsvTable]] = []
     for table in tables:
         mine = next((group for group in groups if _belongs(table, group, average)), None)

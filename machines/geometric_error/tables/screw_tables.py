@@ -19,9 +19,9 @@ UNLIKELY = {False: 2.0, True: DEG}
 def to_linuxcnc(name: ErrorName, table: TableCurve, sense: float = 1.0) -> str:
     """A screw compensation file (COMP_FILE with COMP_FILE_TYPE = 0) of a positioning error: nominal, forward, reverse.
 
-    Type 0 holds where the axis really is when it is sent to the nominal position; LinuxCNC adds nominal less actual to
-    the motor's command, linearly between the rows, by the approach direction of the last motion (LinuxCNC, Integrator's
-    manual, INI configuration, [JOINT_n]). mm and degrees.
+    Type 0 holds where the axis really is when it is sent to the nominal position; LinuxCNC adds nominal less
+    actual to the motor's command, linearly between the rows, by the approach direction of the last motion
+    (LinuxCNC, Integrator's manual, INI configuration, [JOINT_n]). mm and degrees.
 
     Args:
         sense: -1 where the axis counts against the direction of ISO 841

@@ -30,7 +30,8 @@ class Fault(NamedTuple):
 
     def at(self, table: CsvTable) -> Diagnostic:
         """The fault at its place in the table, the header where it has none."""
-        return error(self.code, self.message, file=table.file, lines=[self.line or table.head], hint=self.hint)
+        return error(self.code, self.message, file=table.file, lines=[self.line or table.head],
+                     hint=self.hint)
 
 
 def table_curve(name: ErrorName, table: CsvTable, rule: TableRule = "linear", period: float = 0.0,
@@ -98,7 +99,8 @@ def _period_fault(x: Floats, values: list[Floats], period: float, unit: float) -
     """What keeps a table at x (mm or degrees) from repeating."""
     span = float(x[-1] - x[0])
     if span > period * (1.0 + CLOSES):
-        return Fault("error-model.period", f"the table spans {span:g}, more than its period {period:g}", "give one period")
+        return Fault("error-model.period", f"the table spans {span:g}, more than its period {period:g}",
+                     "give one period")
     apart = max(abs(float(v[0] - v[-1])) for v in values) / unit
     if span > period * (1.0 - CLOSES) and apart > CLOSES:
         what = "um" if unit == UNITS["um"] else "arcsec"

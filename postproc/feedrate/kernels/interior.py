@@ -1,9 +1,9 @@
 """Plain loops of `interior.py`, compiled for long motions; `NumpySteps` there is the reference.
 
-Values of LANES neighbouring knots stand together in flat arrays: block b of w starts at b COMMON LANES, joint j of
-block b of v at (b J + j) PER_JOINT LANES, and field f follows at f LANES. Constant distances and unsigned indices
-let the compiler prove that nothing overlaps, so that it turns the loops over lanes into vector instructions; the
-loop over joints stays outside them.
+Values of LANES neighbouring knots stand together in flat arrays: block b of w starts at b COMMON LANES, joint
+j of block b of v at (b J + j) PER_JOINT LANES, and field f follows at f LANES. Constant distances and
+unsigned indices let the compiler prove that nothing overlaps, so that it turns the loops over lanes into
+vector instructions; the loop over joints stays outside them.
 """
 
 from __future__ import annotations

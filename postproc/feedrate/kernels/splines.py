@@ -16,9 +16,9 @@ from toolpaths.compiled import loop
 def spline(knots: Any, degree: Any, c0: Any, c1: Any, c2: Any, c3: Any, s: Any, out: Any) -> None:
     """Joints and three derivatives, out (4, N, J), of a B-spline at s (N,), any order; quick where s rises.
 
-    c0 to c3 are coefficients of the spline and its derivatives. The recursion for the basis functions of one degree
-    passes through those of all lower degrees, which the derivatives need (de Boor; Piegl and Tiller, The NURBS Book,
-    A2.2).
+    c0 to c3 are coefficients of the spline and its derivatives. The recursion for the basis functions of one
+    degree passes through those of all lower degrees, which the derivatives need (de Boor; Piegl and Tiller,
+    The NURBS Book, A2.2).
     """
     joints = c0.shape[1]
     last = knots.shape[0] - degree - 2

@@ -37,9 +37,9 @@ def no_bodies(one: Pass, axis: Floats) -> Touching | None:
 @dataclass(frozen=True)
 @arrays(axis="3", q="n J", sites="* _ _")
 class Candidate:
-    """A pass turned to `axis` (3,) (the CL's own where it is fixed): joints of its rows `q` (n, J) and of the sites of
-    each stretch; `refused` says why the machine cannot run it, else None; `held` is the angle, rad, asked for of the rotary
-    joint that the axis leaves free, NaN where none is; `noted`: see `slim`."""
+    """A pass turned to `axis` (3,) (the CL's own where it is fixed): joints of its rows `q` (n, J) and of the
+    sites of each stretch; `refused` says why the machine cannot run it, else None; `held` is the angle, rad,
+    asked for of the rotary joint that the axis leaves free, NaN where none is; `noted`: see `slim`."""
 
     one: Pass
     axis: Floats
@@ -72,9 +72,9 @@ class Candidate:
     def bound(self) -> float:
         """Least seconds that the cuts can take, whatever the plan: inf where the machine cannot run them.
 
-        From rest to rest no joint is faster than over its own path under its own limits and the velocity that the feed gives
-        it (along a straight pass that is the reach of the polytopes in its direction), and no interval than its velocities
-        and the feed allow.
+        From rest to rest no joint is faster than over its own path under its own limits and the velocity that
+        the feed gives it (along a straight pass that is the reach of the polytopes in its direction), and no
+        interval than its velocities and the feed allow.
         """
         if self.refused:
             return np.inf
@@ -108,7 +108,8 @@ class Candidate:
         result = []
         for stretch, q in zip(self.one.stretches, self.sites, strict=True):
             axis = stretch.axis if self.one.fixed else np.tile(self.axis, (len(q), 1))
-            path = MachinePath.through(stretch.s, np.hstack((q, stretch.tip + own, axis)), np.zeros(len(q), dtype=bool))
+            path = MachinePath.through(stretch.s, np.hstack((q, stretch.tip + own, axis)),
+                                       np.zeros(len(q), dtype=bool))
             run = plan if self.jerky else plan_second_order
             result.append(run(path, self.limits, stretch.feed))
         return tuple(result)
@@ -135,8 +136,8 @@ class Candidate:
 
     @property
     def limiting(self) -> tuple[str, str]:
-        """The axis and the order that cost most of the planned time, ("feed", "") where that does; empty where nothing is
-        cut or the machine states no jerk."""
+        """The axis and the order that cost most of the planned time, ("feed", "") where that does; empty
+        where nothing is cut or the machine states no jerk."""
         return self._planned[1]
 
     @cached_property
@@ -168,8 +169,8 @@ class Candidate:
         return self.machine.axis_names[int(joint)], ORDERS[int(order)]
 
     def slim(self, seconds: float) -> Candidate:
-        """Without joints along the pass, but where its cuts begin: to be reported about, not to be planned; with the
-        `seconds` known of it, NaN where it was not timed."""
+        """Without joints along the pass, but where its cuts begin: to be reported about, not to be planned;
+        with the `seconds` known of it, NaN where it was not timed."""
         first = int(np.argmin(self.one.rapid))
         return replace(self, q=self.q[first:first + 1], sites=(), noted=seconds)
 

@@ -58,11 +58,11 @@ def best_held(search: CandidateSearch, best: Candidate) -> Candidate:
 
 
 def held_angles(one: Pass, machine: Machine, axis: Floats) -> Floats:
-    """Angles (H,) rad of the joint that `axis` (3,) leaves free at which the pass should be fast, the best first; none where
-    it leaves none free.
+    """Angles (H,) rad of the joint that `axis` (3,) leaves free at which the pass should be fast, the best
+    first; none where it leaves none free.
 
-    They are the least sums, over the paths of the pass, of length over cube root of the reach: with its cube root goes the
-    time from rest to rest along a straight path under bounded jerk.
+    They are the least sums, over the paths of the pass, of length over cube root of the reach: with its cube
+    root goes the time from rest to rest along a straight path under bounded jerk.
     """
     joint = _free(one, axis, machine)
     if joint < 0 or not one.stretches:
@@ -71,8 +71,8 @@ def held_angles(one: Pass, machine: Machine, axis: Floats) -> Floats:
 
 
 def common_angles(owns: Sequence[Candidate]) -> Floats:
-    """Angles (H,) rad at which the joint that all these passes leave free, as the CL file has them, should serve them best
-    together; some of them are looked at where they are many."""
+    """Angles (H,) rad at which the joint that all these passes leave free, as the CL file has them, should
+    serve them best together; some of them are looked at where they are many."""
     some = [owns[k] for k in np.unique(np.linspace(0, len(owns) - 1, min(len(owns), _SOME)).astype(np.int64)).tolist()]
     joints = {_free(made.one, made.axis, made.machine) for made in some}
     if len(joints) != 1 or -1 in joints or not all(made.one.stretches for made in some):

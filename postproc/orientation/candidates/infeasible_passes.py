@@ -29,8 +29,8 @@ _SURE = 5.0
 
 
 def out_of_travel(work: PassContext, allowed: AllowedAxes) -> list[Diagnostic]:
-    """Errors, before any search, where travel rules out passes whatever their tool axis: of those whose own axis is outside
-    alike, the one that is farthest is looked at."""
+    """Errors, before any search, where travel rules out passes whatever their tool axis: of those whose own
+    axis is outside alike, the one that is farthest is looked at."""
     alike: dict[tuple[object, str], list[tuple[Pass, Refusal]]] = {}
     for one in work.passes:
         own = turned(one, one.axis, work.machine).refused
@@ -46,7 +46,8 @@ def out_of_travel(work: PassContext, allowed: AllowedAxes) -> list[Diagnostic]:
     return found
 
 
-def _hopeless(work: PassContext, some: list[tuple[Pass, Refusal]], one: Pass, why: str, hint: str) -> Diagnostic:
+def _hopeless(work: PassContext, some: list[tuple[Pass, Refusal]], one: Pass, why: str,
+              hint: str) -> Diagnostic:
     more = f"; the CL's axis is outside alike in {len(some) - 1} more passes" if len(some) > 1 else ""
     lines = [one.line, *(each.line for each, _ in some if each is not one)]
     return error("orient.travel", f"pass {one.number} with the axis of the CL file: {why}{more}", file=work.toolpath.file,

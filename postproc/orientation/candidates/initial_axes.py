@@ -82,8 +82,8 @@ def _apart(axes: Floats, reach: Floats) -> Floats:
 
 
 def around(start: Floats, centre: Floats, step: float) -> Floats:
-    """Axes (M, 3) `step` rad next to `start`: nearer to `centre`, farther, and to both sides at the same angle from it; all
-    round where `start` is the centre."""
+    """Axes (M, 3) `step` rad next to `start`: nearer to `centre`, farther, and to both sides at the same
+    angle from it; all round where `start` is the centre."""
     tilt = float(angle_between(start, centre))
     if tilt < 0.5 * step:
         x, y = across(centre)

@@ -1,8 +1,8 @@
 """Times of one pass under many tool axes, on the knots of one plan: what all axes share is made once.
 
-The joints of every axis are splines through the same sites, so that their derivatives at the knots are one sparse matrix
-times the joints at the sites, and the solver starts from the motion of the axis before. A plan of `timed` has knots of its
-own for each axis; what is chosen here is planned so in the end.
+The joints of every axis are splines through the same sites, so that their derivatives at the knots are one
+sparse matrix times the joints at the sites, and the solver starts from the motion of the axis before. A plan
+of `timed` has knots of its own for each axis; what is chosen here is planned so in the end.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ LONG = 50_000
 
 
 def load_compiler() -> None:
-    """Load the compiler: all candidates are planned by compiled loops, so that a choice between two that are equally fast
-    but for rounding does not hang on what else has been compiled."""
+    """Load the compiler: all candidates are planned by compiled loops, so that a choice between two that are
+    equally fast but for rounding does not hang on what else has been compiled."""
     if available():
         compiled(pentadiagonal)
 
@@ -61,7 +61,8 @@ class Ranking:
 class _Grid:
     """Knots sigma (K,) of one stretch with sites s (N,)."""
 
-    def __init__(self, s: Floats, sigma: Floats, feed: Callable[[Floats], Floats], jerky: bool, method: Method) -> None:
+    def __init__(self, s: Floats, sigma: Floats, feed: Callable[[Floats], Floats], jerky: bool,
+                 method: Method) -> None:
         self.s, self.sigma, self.jerky, self.method = s, sigma, jerky, method
         path = MachinePath.through(s, np.zeros((len(s), 7)), np.zeros(len(s), dtype=bool))
         self.eased = Eased.between(path, float(s[0]), float(s[-1]), PlannerOptions().ease if jerky else 0.0)
@@ -98,8 +99,8 @@ class _Grid:
 
 
 def _chained(fitted: BSpline, s: Floats, at: Floats) -> csr_matrix:
-    """(3K, N): from the coefficients of a spline to its first three derivatives by sigma at s (K,), by the chain rule;
-    `at` (4, K) as of `Eased.parameter`."""
+    """(3K, N): from the coefficients of a spline to its first three derivatives by sigma at s (K,), by the
+    chain rule; `at` (4, K) as of `Eased.parameter`."""
     first, second, third = (_slope(fitted.t, order, s) for order in (1, 2, 3))
     s1, s2, s3 = (diags(values) for values in at[1:])
     return csr_matrix(vstack([s1 @ first, s1 @ s1 @ second + s2 @ first,
@@ -107,8 +108,8 @@ def _chained(fitted: BSpline, s: Floats, at: Floats) -> csr_matrix:
 
 
 def _slope(knots: Floats, order: int, s: Floats) -> csr_matrix:
-    """(K, N): from coefficients to a derivative at s (K,): differences of coefficients (de Boor, A Practical Guide to
-    Splines, 2001, chapter X, formula 15), then values of the basis of lower degree."""
+    """(K, N): from coefficients to a derivative at s (K,): differences of coefficients (de Boor, A Practical
+    Guide to Splines, 2001, chapter X, formula 15), then values of the basis of lower degree."""
     made = csr_matrix(identity(len(knots) - DEGREE - 1))
     for degree in range(DEGREE, DEGREE - order, -1):
         inner = knots[DEGREE - degree:len(knots) - (DEGREE - degree)]

@@ -1,7 +1,7 @@
 """What each order of motion allows along the mean direction of a pass: the reach of its polytope, and the seconds of that.
 
-Velocity, acceleration and jerk have different units; they compare by the time that a straight path as long as the pass is
-takes from rest to rest where only this order is limited. The slowest binds.
+Velocity, acceleration and jerk have different units; they compare by the time that a straight path as long as
+the pass is takes from rest to rest where only this order is limited. The slowest binds.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ def reaches(made: Candidate) -> tuple[Reach, ...]:
 
 
 def feed_of(made: Candidate) -> Reach | None:
-    """The largest feed of the longest stretch, as an order of its own; None where the pass cannot be run or has no
-    direction."""
+    """The largest feed of the longest stretch, as an order of its own; None where the pass cannot be run or
+    has no direction."""
     stretch = made.one.longest
     length = direction_of(stretch)[1]
     if stretch is None or made.refused or not length:

@@ -1,5 +1,6 @@
-"""Axes of greatest reach at every tilt: where a vertex itself is outside travel or limits, or touches something, the best
-that is left lies on such a ridge, which steps in tilt or azimuth alone do not follow. And axes in narrow windows of limits.
+"""Axes of greatest reach at every tilt: where a vertex itself is outside travel or limits, or touches
+something, the best that is left lies on such a ridge, which steps in tilt or azimuth alone do not follow. And
+axes in narrow windows of limits.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ _LEAST = 1.01
 
 
 def best_on_ridge(search: CandidateSearch, best: Candidate) -> Candidate:
-    """The best of a candidate and of axes on ridges, ever farther from the CL's own axis, then finer where that ended; where
-    that finds nothing, of axes that lead and tilt allow."""
+    """The best of a candidate and of axes on ridges, ever farther from the CL's own axis, then finer where
+    that ended; where that finds nothing, of axes that lead and tilt allow."""
     one, allowed = search.one, search.allowed
     tilt = 0.5 * np.pi if len(one.contact) else min(allowed.tilt, 0.5 * np.pi)
     rings = tilt * np.arange(1, max(1, int(np.ceil(tilt / _RING))) + 1) / max(1, int(np.ceil(tilt / _RING)))

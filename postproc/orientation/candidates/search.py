@@ -47,8 +47,8 @@ class PassSearch:
         own, best, swift: the CL's axis, that of the least cuts, that of the least cuts and rapids together
         aimed: the paper's choice for the mean direction, None without a vertex in travel
         gains: seconds as ranked that `best` and `swift` gain over `own`
-        rejected: candidates with their reasons, but those that stand where the best does; ranked times are reported next
-            to the planned one of the best
+        rejected: candidates with their reasons, but those that stand where the best does; ranked times are
+            reported next to the planned one of the best
         unaimed: why there is no `aimed`, None where there is one and where none is looked for
         pruned, planned: how many were discarded by the bound alone, how many timed
     """
@@ -173,15 +173,16 @@ class CandidateSearch:
         lost = [made for made in self.known if id(made) in self.lost and made is not best]
         rejected = tuple(self._noted(made, winner) for made in lost if not self._adjacent(made, best))
         gains = _gain(self.seconds(self.own), self.seconds(best)), _gain(self.whole(self.own), self.whole(self.swift))
-        return PassSearch(self.own, best, self.swift, aimed, gains, rejected, self.pruned, self.planned, unaimed)
+        return PassSearch(self.own, best, self.swift, aimed, gains, rejected, self.pruned,
+                          self.planned, unaimed)
 
     def _adjacent(self, made: Candidate, best: Candidate) -> bool:
         """Whether a slower candidate is the best itself to all that can be reported of it."""
         return made is not self.own and self.lost[id(made)].kind == "slower" and made.same(best.axis, best.held, APART)
 
     def _noted(self, made: Candidate, winner: Candidate) -> Rejection:
-        """Why a candidate is rejected; a time as ranked by as much longer as the winner is when planned in full, and no gain
-        that is not worth to be taken."""
+        """Why a candidate is rejected; a time as ranked by as much longer as the winner is when planned in
+        full, and no gain that is not worth to be taken."""
         lost = self.lost[id(made)]
         if lost.kind != "slower":
             return lost

@@ -94,7 +94,8 @@ def _held(some: Pass, machine: Machine, angles: Floats) -> MissingTravel:
     """The own axis with the joint that it leaves free held at one of `angles` (H,), some of them first."""
     best, at = MissingTravel(np.inf, None, some.axis), 0
     for step in (6, 2, 1) if len(angles) else ():
-        near = range(0, len(angles), step) if step == 6 else (at - 2 * step, at - step, at + step, at + 2 * step)
+        near = range(0, len(angles), step) if step == 6 else (at - 2 * step, at - step, at + step,
+                                                              at + 2 * step)
         for k in near:
             found = _lacks(some, machine, some.axis[None], float(angles[k % len(angles)]))[0]
             best, at = (found, k) if found.size < best.size else (best, at)

@@ -1,8 +1,9 @@
 """Rotary positions that aim a vertex of the polytope along a direction: closed form on a table that turns twice.
 
-In positioned machining the joint rates are G v (see `machines.polytope`). The direction f meets a vertex where every
-linear joint uses the same share of its limit, |G_j f| / l_j equal for all j (equation 6 of Grandguillaume, Lavernhe,
-Tournier 2017 read row by row). Where G cannot be written as on such a table, Newton steps from a grid find the positions.
+In positioned machining the joint rates are G v (see `machines.polytope`). The direction f meets a vertex
+where every linear joint uses the same share of its limit, |G_j f| / l_j equal for all j (equation 6 of
+Grandguillaume, Lavernhe, Tournier 2017 read row by row). Where G cannot be written as on such a table, Newton
+steps from a grid find the positions.
 """
 
 from __future__ import annotations
@@ -100,8 +101,8 @@ def _turns_twice(kin: Kinematics, q: Floats) -> bool:
 def closed_form(table: TwoAxisTable, direction: Floats, limit: Floats) -> Floats:
     """Rotary positions (S, 2) of all eight vertices of the box `limit` (3,), at most 16 over a full turn.
 
-    Rot(first, -t1) f = Rot(second, t2) u, u the unit vector of vertex over rates: the second subproblem of Paden (1986) and
-    Kahan. On a table C on A it is equation 7 of the paper.
+    Rot(first, -t1) f = Rot(second, t2) u, u the unit vector of vertex over rates: the second subproblem of
+    Paden (1986) and Kahan. On a table C on A it is equation 7 of the paper.
     """
     w1, w2 = table.first, table.second
     u = np.linalg.solve(table.rates, box_vertices(limit).T).T

@@ -29,10 +29,12 @@ def is_held(tried: PassSearch) -> bool:
 def held_panel(place: Axes, tried: PassSearch, made: Candidate) -> None:
     """Seconds over the held angle: the line is the least by the reach, marks are the angles tried."""
     best = tried.best
-    joint = free_joint(best.one.kin, best.one.tip[0] + best.one.shift(best.axis), best.axis, best.machine.home)
+    joint = free_joint(best.one.kin, best.one.tip[0] + best.one.shift(best.axis), best.axis,
+                       best.machine.home)
     name = best.machine.axis_names[joint]
     ring = np.linspace(-np.pi, np.pi, RING)
-    place.plot(ring / DEG, least_held(best, joint, ring), color="#999999", linewidth=1.2, label="least by the reach")
+    place.plot(ring / DEG, least_held(best, joint, ring), color="#999999", linewidth=1.2,
+               label="least by the reach")
     timed = [lost for lost in _here(tried) if np.isfinite(lost.made.seconds)]
     rest = [lost for lost in _here(tried) if not np.isfinite(lost.made.seconds)]
     place.plot([_angle(lost.made, joint) for lost in timed], [lost.made.seconds for lost in timed], linestyle="", marker="o",

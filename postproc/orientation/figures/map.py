@@ -52,7 +52,8 @@ def axes_map(sheet: Figure, place: PolarAxes, tried: PassSearch, made: Candidate
             edge = {"edgecolors": "#333333"} if kind == "bound" else {}
             place.scatter(azimuth[tilt <= most], tilt[tilt <= most], marker=mark, s=26, color=colour, linewidths=1.0,
                           label=label, **edge)
-    for it, mark, name, size in ((tried.aimed, "^", "paper", 110), (tried.best, "*", "best", 190), (made, "o", "plan", 150)):
+    for it, mark, name, size in ((tried.aimed, "^", "paper", 110), (tried.best, "*", "best", 190),
+                                 (made, "o", "plan", 150)):
         if it is not None:
             place.scatter(*_polar([it], frame, work), marker=mark, s=size, facecolors="none", edgecolors="#c2453a",
                           linewidths=1.3, label=name, zorder=4)
@@ -62,7 +63,8 @@ def axes_map(sheet: Figure, place: PolarAxes, tried: PassSearch, made: Candidate
     place.legend(loc="upper center", bbox_to_anchor=(0.6, -0.08), ncols=2, fontsize="x-small", frameon=False)
 
 
-def _ground(place: PolarAxes, tried: PassSearch, frame: tuple[Floats, ...], work: PassContext, most: float) -> str:
+def _ground(place: PolarAxes, tried: PassSearch, frame: tuple[Floats, ...], work: PassContext,
+            most: float) -> str:
     """What the reach along the mean direction allows, dark where it is fast; a line for the title."""
     around, out = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, ROUND), np.linspace(0.0, most, OUT))
     least = _least(tried, frame, work, around, out)
@@ -76,7 +78,8 @@ def _ground(place: PolarAxes, tried: PassSearch, frame: tuple[Floats, ...], work
     return f"\nground: least seconds by the reach, {low:.3g} (dark) to {high:.3g}"
 
 
-def _timed(sheet: Figure, place: PolarAxes, timed: list[Candidate], frame: tuple[Floats, ...], work: PassContext) -> None:
+def _timed(sheet: Figure, place: PolarAxes, timed: list[Candidate], frame: tuple[Floats, ...],
+           work: PassContext) -> None:
     """The planned candidates, coloured by their time."""
     if not timed:
         return
@@ -87,7 +90,8 @@ def _timed(sheet: Figure, place: PolarAxes, timed: list[Candidate], frame: tuple
     sheet.colorbar(drawn, ax=place, shrink=0.75, pad=0.12).set_label("planned seconds", fontsize="small")
 
 
-def _least(tried: PassSearch, frame: tuple[Floats, ...], work: PassContext, around: Floats, out: Floats) -> Floats:
+def _least(tried: PassSearch, frame: tuple[Floats, ...], work: PassContext, around: Floats,
+           out: Floats) -> Floats:
     """Least seconds by the reach (M, K) at azimuths, rad, and tilts, degrees (M, K); NaN for a fixed pass."""
     if tried.own.one.fixed:
         return np.full(around.shape, np.nan)
@@ -102,8 +106,8 @@ def _once(made: list[Candidate]) -> list[Candidate]:
 
 
 def _frame(tried: PassSearch, work: PassContext) -> tuple[Floats, Floats, Floats]:
-    """The CL's axis, and the directions of azimuth 0 and 90 degrees square to it, frame of the part: part x, or y where the
-    axis lies along x."""
+    """The CL's axis, and the directions of azimuth 0 and 90 degrees square to it, frame of the part: part x,
+    or y where the axis lies along x."""
     own = work.placement.inverse().directions(tried.own.axis[None])[0]
     first = np.eye(3)[0 if abs(own[0]) < 0.9 else 1]
     x = first - (first @ own) * own

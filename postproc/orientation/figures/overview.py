@@ -61,7 +61,8 @@ def angle_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> No
     number = np.arange(len(picked))
     for name, colour in zip(picked[0].rotary(), COLOURS, strict=False):
         own = _angles([one.own for one in choice.tried], name)
-        place.plot(number, own, color=colour, linestyle=":", linewidth=1.0, drawstyle="steps-mid", label=f"{name}, CL file")
+        place.plot(number, own, color=colour, linestyle=":", linewidth=1.0, drawstyle="steps-mid",
+                   label=f"{name}, CL file")
         place.plot(number, _angles(picked, name), color=colour, linewidth=1.0, drawstyle="steps-mid",
                    marker=_mark(len(picked)), markersize=4.0, label=f"{name}, {plan}")
     place.set_xlim(-0.5, len(picked) - 0.5)
@@ -86,12 +87,14 @@ def gain_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> Non
     sets = {"best of the pass": np.array([one.best.seconds for one in tried]),
             "paper": np.array([np.inf if one.aimed is None else one.aimed.seconds for one in tried]),
             plan: np.array([made.seconds for made in picked])}
-    for (name, made), mark, colour in zip(sets.items(), ("*", "^", "o"), ("#3f8f4f", "#7a4fa0", "#1f5f8b"), strict=True):
+    for (name, made), mark, colour in zip(sets.items(), ("*", "^", "o"), ("#3f8f4f", "#7a4fa0", "#1f5f8b"),
+                                          strict=True):
         place.plot(number, _saved(made, own), label=name, marker=mark if len(own) <= MANY else "", markersize=5.0,
                    linestyle="-" if len(own) > MANY or name == plan else "", linewidth=1.0, color=colour, alpha=0.8)
     fixed = [k for k, one in enumerate(tried) if one.own.one.fixed]
     if fixed:
-        place.plot(fixed, np.zeros(len(fixed)), linestyle="", marker="x", markersize=5.0, color="gray", label="axis is kept")
+        place.plot(fixed, np.zeros(len(fixed)), linestyle="", marker="x", markersize=5.0, color="gray",
+                   label="axis is kept")
     alone = np.flatnonzero(~np.isfinite(own))
     if len(alone):
         place.plot(alone, np.zeros(len(alone)), linestyle="", marker="+", markersize=7.0, color="#c2453a",

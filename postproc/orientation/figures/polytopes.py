@@ -109,8 +109,8 @@ def _solid(place: Axes3D, corners: Floats, colour: str, filled: bool, label: str
 
 
 def hull(corners: Floats) -> tuple[Ints, Ints]:
-    """Triangles (F, 3) of the convex hull of corners (V, 3), and its edges (E, 2), where faces meet at an angle; none where
-    the corners lie in a plane."""
+    """Triangles (F, 3) of the convex hull of corners (V, 3), and its edges (E, 2), where faces meet at an
+    angle; none where the corners lie in a plane."""
     try:
         found = ConvexHull(corners) if len(corners) > 3 else None
     except QhullError:

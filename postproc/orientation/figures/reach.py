@@ -35,7 +35,8 @@ def reach_panel(place: Axes, tried: PassSearch, made: Candidate) -> None:
     place.set_yticks(range(len(kept)), list(kept))
     place.set_ylim(len(kept) - 0.4, -0.6)
     place.set_xlim(0.0, 1.45 * max([place.dataLim.x1, 1e-9]))
-    place.set_xlabel("seconds: bars, the longest cut by one limit alone;\nblack, all cuts as planned", fontsize="small")
+    place.set_xlabel("seconds: bars, the longest cut by one limit alone;\nblack, all cuts as planned",
+                     fontsize="small")
     place.set_title("reach along the mean direction, and the joint that ends it", fontsize="small")
     place.grid(False, axis="y")
     place.legend(loc="upper center", bbox_to_anchor=(0.45, -0.2), ncols=5, fontsize="x-small", frameon=False,

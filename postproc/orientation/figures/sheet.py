@@ -61,8 +61,8 @@ def draw(choice: OrientationChoice, plan: Orientation, passes: Sequence[int], en
 
 
 def most_gaining(choice: OrientationChoice) -> list[int]:
-    """The pass that its best orientation saves most of, first of all one that only another can run; none where nothing can
-    be turned."""
+    """The pass that its best orientation saves most of, first of all one that only another can run; none
+    where nothing can be turned."""
     saved = [one.own.seconds - one.best.seconds if np.isfinite(one.best.seconds) else 0.0 for one in choice.tried]
     free = [k for k, one in enumerate(choice.tried) if not one.own.one.fixed or one.rejected]
     return [max(free, key=lambda k: saved[k])] if free else []
@@ -74,10 +74,12 @@ def _part(sheet: Figure, grid: GridSpec, choice: OrientationChoice, plan: Orient
     gain_panel(sheet.add_subplot(grid[2, :]), choice, plan)
 
 
-def _pass(sheet: Figure, grid: GridSpec, row: int, tried: PassSearch, made: Candidate, work: PassContext) -> None:
+def _pass(sheet: Figure, grid: GridSpec, row: int, tried: PassSearch, made: Candidate,
+          work: PassContext) -> None:
     head = sheet.add_subplot(grid[row, :])
     head.set_axis_off()
-    head.text(0.5, 0.0, plain(_headline(tried)), ha="center", fontweight="bold", fontsize="medium", transform=head.transAxes)
+    head.text(0.5, 0.0, plain(_headline(tried)), ha="center", fontweight="bold", fontsize="medium",
+              transform=head.transAxes)
     box_panel(sheet.add_subplot(grid[row + 1, 0], projection="3d"), tried, work)
     order_panel(sheet.add_subplot(grid[row + 1, 1], projection="3d"), tried, work)
     if is_held(tried):

@@ -76,8 +76,8 @@ class AllowedAxes:
         return noted
 
     def mask(self, one: Pass, axes: Floats) -> Bools:
-        """(M,) True for the unit axes (M, 3) that are inside the limits at every point of a pass; memory for some of them at
-        a time. A few points are looked at first."""
+        """(M,) True for the unit axes (M, 3) that are inside the limits at every point of a pass; memory for
+        some of them at a time. A few points are looked at first."""
         result = np.ones(len(axes), dtype=np.bool_)
         few = np.unique(np.linspace(0, max(len(one.contact) - 1, 0), _FEW).astype(np.int64))
         for planes, offset in self._planes(one):
@@ -134,8 +134,8 @@ def off_centre(limits: OrientationLimits, radius: float) -> float:
 
 
 def lattice(apart: float) -> Floats:
-    """Unit directions (M, 3) spread evenly over the sphere, some `apart` rad from each other (spiral of golden angles:
-    Gonzalez, Math. Geosciences 42 (2010))."""
+    """Unit directions (M, 3) spread evenly over the sphere, some `apart` rad from each other (spiral of
+    golden angles: Gonzalez, Math. Geosciences 42 (2010))."""
     count = max(2, int(np.ceil(4.0 * np.pi / apart**2)))
     k = np.arange(count)
     z = 1.0 - (2.0 * k + 1.0) / count

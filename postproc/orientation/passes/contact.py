@@ -48,13 +48,13 @@ class Contact:
         return Contact(self.normal @ rotation.T, self.travel @ rotation.T, self.line, self.unknown)
 
     def inclination(self, axes: Floats) -> Floats:
-        """Angle (M, K) rad between unit axes (M, 3) and the normals; of a ball of radius R the contact is R sin of it
-        away from the tool axis."""
+        """Angle (M, K) rad between unit axes (M, 3) and the normals; of a ball of radius R the contact is R
+        sin of it away from the tool axis."""
         return np.asarray(np.arccos(np.clip(axes @ self.normal.T, -1.0, 1.0)))
 
     def lead(self, axes: Floats) -> Floats:
-        """Lead (M, K) rad of unit axes (M, 3): in the plane of feed and normal, positive towards the feed; NaN without a
-        feed direction."""
+        """Lead (M, K) rad of unit axes (M, 3): in the plane of feed and normal, positive towards the feed;
+        NaN without a feed direction."""
         return np.asarray(np.arctan2(axes @ self.travel.T, axes @ self.normal.T))
 
     def tilt(self, axes: Floats) -> Floats:

@@ -31,8 +31,8 @@ class Drilled:
     dwell: float
 
     def seconds(self, q: Floats, limits: JointLimits) -> float:
-        """All together, joints (n, J) of the pass straight from rest to rest; the feed is a joint that needs `fed` seconds
-        at its greatest velocity."""
+        """All together, joints (n, J) of the pass straight from rest to rest; the feed is a joint that needs
+        `fed` seconds at its greatest velocity."""
         if not len(self.rows):
             return self.dwell
         with_feed = JointLimits(np.append(limits.velocity, 1.0), np.append(limits.acceleration, np.inf),

@@ -1,5 +1,5 @@
-"""What the set-up's limits of tool axes find in the passes: names that do not exist, normals that are missing, own axes
-outside."""
+"""What the set-up's limits of tool axes find in the passes: names that do not exist, normals that are
+missing, own axes outside."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _NORMALS = ("have the CAM system write surface normals (GOTO with nine numbers),
 
 
 def limit_faults(work: PassContext, file: str = "", tilt: float = np.pi) -> list[Diagnostic]:
-    """Diagnostics of the set-up's `[orientation]` for the passes of a toolpath; `file` is that of the set-up, `tilt` the
-    largest from the surface normals, rad."""
+    """Diagnostics of the set-up's `[orientation]` for the passes of a toolpath; `file` is that of the set-up,
+    `tilt` the largest from the surface normals, rad."""
     limits = work.setup.orientation
     free = [one for one in work.passes if not one.fixed]
     impossible = _too_wide(work, limits, free, file) or _too_steep(work, limits, free, file, tilt)
@@ -53,7 +53,8 @@ def _too_wide(work: PassContext, limits: OrientationLimits, free: list[Pass], fi
                   count=len(bad), hint="a distance below the ball's radius, or off_centre in degrees")]
 
 
-def _too_steep(work: PassContext, limits: OrientationLimits, free: list[Pass], file: str, tilt: float) -> list[Diagnostic]:
+def _too_steep(work: PassContext, limits: OrientationLimits, free: list[Pass], file: str,
+               tilt: float) -> list[Diagnostic]:
     """Passes whose least angle to the normal is above the largest."""
     bad = [one for one in free if len(one.contact) and off_centre(limits, one.radius) > tilt]
     if not bad:

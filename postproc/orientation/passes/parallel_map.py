@@ -1,7 +1,7 @@
 """The same done for every pass, on all cores where there are many; the results do not depend on how many cores there are.
 
-Workers are forked, so that they have passes, machine and bodies without copying; only results travel back, in which these
-are named instead of written (`_Packer`). Where a system cannot fork, one process does it all.
+Workers are forked, so that they have passes, machine and bodies without copying; only results travel back, in
+which these are named instead of written (`_Packer`). Where a system cannot fork, one process does it all.
 """
 
 from __future__ import annotations

@@ -40,8 +40,8 @@ class PassBodies:
     def touches(self, one: Pass, axis: Floats) -> list[Touch]:
         """All pairs that come too near.
 
-        A pass whose axis is another than the file's is come to and left along that axis, down from the safe plane and back
-        up; with the file's own axis it is come to as the file does.
+        A pass whose axis is another than the file's is come to and left along that axis, down from the safe
+        plane and back up; with the file's own axis it is come to as the file does.
         """
         form = self.forms[one.tool]
         if one.fixed or angle_between(axis, one.axis) < _SAME:
@@ -72,8 +72,8 @@ class PassBodies:
 
     @cached_property
     def _drilling(self) -> Bools:
-        """(M,) moves in a hole: a tap is larger than its core, a drill's tip deeper than a flat bottom. The rapid
-        down to the hole is none of them."""
+        """(M,) moves in a hole: a tap is larger than its core, a drill's tip deeper than a flat bottom. The
+        rapid down to the hole is none of them."""
         moves = self.work.moves
         return np.asarray((moves.hole >= 0) & (moves.phase > Phase.APPROACH))
 

@@ -156,7 +156,8 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
     passes = [_pass(number, rows, cutting)
               for number, rows in enumerate(pairwise([*_beginnings(toolpath, moves).tolist(), len(moves)]))]
     unknown = _unknown_cutters(toolpath, passes) if turning else []
-    work = PassContext(toolpath, machine, setup, placement, moves, safe_space(moves, setup, placement), tuple(passes))
+    work = PassContext(toolpath, machine, setup, placement, moves, safe_space(moves, setup, placement),
+                       tuple(passes))
     return (None if unknown else work), [*found, *more, *faults, *unknown]
 
 

@@ -17,8 +17,8 @@ class Refusal:
 
     Attributes:
         kind: "reach": no joints at all; "rods": rods, slides or joints of a parallel machine; "travel": end of travel
-        axis, at, low, high, beyond, unit: of "travel": the joint that is worst outside, where it stands, what it is allowed,
-            by how much it is beyond, in mm or degrees
+        axis, at, low, high, beyond, unit: of "travel": the joint that is worst outside, where it stands, what
+            it is allowed, by how much it is beyond, in mm or degrees
         above: True where it is too high
         missing: of "reach": degrees to the nearest tool axis that the rotary axes reach, 0 where that is not known
     """

@@ -37,8 +37,8 @@ class Surface:
     slack: float
 
     def contact(self, curves: Curves, line: Ints, radius: float) -> Contact:
-        """Where a ball of `radius` mm touches along N cutting moves of CL lines (N,): at their ends, and between them at
-        places no more than a radius, or 5 degrees of an arc, apart."""
+        """Where a ball of `radius` mm touches along N cutting moves of CL lines (N,): at their ends, and
+        between them at places no more than a radius, or 5 degrees of an arc, apart."""
         parts, owner = _parted(curves, radius)
         centres = np.stack((parts.start + radius * parts.axis0, parts.end + radius * parts.axis1), axis=1).reshape(-1, 3)
         places, back = np.unique(centres, axis=0, return_inverse=True)
@@ -49,8 +49,8 @@ class Surface:
 
 def surface_of(setup: SetupFile, placement: Placement, tolerance: float,
                file: str) -> tuple[Surface | None, list[Diagnostic]]:
-    """The part that a set-up names in [bodies], None where it names none; `file` is that of the set-up, `tolerance` that of
-    the CL points, mm."""
+    """The part that a set-up names in [bodies], None where it names none; `file` is that of the set-up,
+    `tolerance` that of the CL points, mm."""
     if setup.bodies is None or setup.bodies.part is None:
         return None, []
     from postproc.collision.mesh import load_mesh
@@ -63,8 +63,8 @@ def surface_of(setup: SetupFile, placement: Placement, tolerance: float,
 def mesh_normals(mesh: Trimesh, centres: Floats, radius: float, slack: float) -> Floats:
     """Unit normals (N, 3) of a part where balls of `radius` about `centres` (N, 3) touch it, NaN where they do not.
 
-    The normal points from the nearest point of the part to the centre; the ball touches where that is `radius` away, `slack`
-    more or less, and the centre is outside.
+    The normal points from the nearest point of the part to the centre; the ball touches where that is
+    `radius` away, `slack` more or less, and the centre is outside.
     """
     from trimesh.proximity import closest_point
 

@@ -1,7 +1,7 @@
 """What lies between two cuts, in seconds: rapids, and where the axis changes retract, unclamp, index, clamp, approach.
 
-The legs are those of `postproc.path.links`, straight in the joints; where one goes straight on from another, as the retract
-axis does above an upright tool, there is no stop between, else each is from rest to rest.
+The legs are those of `postproc.path.links`, straight in the joints; where one goes straight on from another,
+as the retract axis does above an upright tool, there is no stop between, else each is from rest to rest.
 """
 
 from __future__ import annotations
@@ -37,10 +37,11 @@ _STRAIGHT = 1e-3
 @dataclass(frozen=True)
 @arrays(axis="3", first="J", last="J", second="J", last_but_one="J", above_first="J", above_last="J")
 class PassEnds:
-    """A turned pass as its neighbours see it: joints (J,) where it begins, ends and stands above both, and the seconds of
-    its own rapids, of coming down and drawing back; inf where no height above is inside travel. `held` is where the rotary
-    joint `free` stands that the axis leaves free, NaN and -1 where none is. `second`, `last_but_one` are the joints at the
-    other ends of rapids with which it begins and ends, `first` and `last` where there are none."""
+    """A turned pass as its neighbours see it: joints (J,) where it begins, ends and stands above both, and
+    the seconds of its own rapids, of coming down and drawing back; inf where no height above is inside
+    travel. `held` is where the rotary joint `free` stands that the axis leaves free, NaN and -1 where none
+    is. `second`, `last_but_one` are the joints at the other ends of rapids with which it begins and ends,
+    `first` and `last` where there are none."""
 
     axis: Floats
     held: float
@@ -120,7 +121,8 @@ def _changes(work: PassContext) -> Floats:
     return np.bincount(np.searchsorted(starts, at, side="right"), minlength=len(starts) + 1).astype(np.float64)
 
 
-def between(before: list[PassEnds] | None, after: list[PassEnds] | None, work: PassContext, by_home: bool) -> Floats:
+def between(before: list[PassEnds] | None, after: list[PassEnds] | None, work: PassContext,
+            by_home: bool) -> Floats:
     """Seconds (K0, K1) from each end to each beginning; None stands for home."""
     machine = work.machine
     if after is None:
@@ -136,7 +138,8 @@ def between(before: list[PassEnds] | None, after: list[PassEnds] | None, work: P
     spun = _differ(np.array([e.held for e in before])[:, None], np.array([e.held for e in after])[None])
     result = np.where((turn > work.setup.clearance.link_angle * DEG) | spun, linked, straight)
     if work.setup.clearance.index == "home" and machine.retract_axis >= 0:
-        result = np.where(turn > work.setup.clearance.link_angle * DEG, _by_home(before, after, machine), result)
+        result = np.where(turn > work.setup.clearance.link_angle * DEG,
+                          _by_home(before, after, machine), result)
     return np.asarray(result)
 
 
@@ -149,8 +152,8 @@ def _by_home(before: list[PassEnds] | None, after: list[PassEnds], machine: Mach
 
 
 def unwinding(picked: list[PassEnds], work: PassContext, spun: bool) -> float:
-    """Seconds that the return home takes longer for joints of endless travel that have been wound up on the path, where they
-    do not park at the nearest whole turn (`park = "home"`): from pass to pass they go the shortest path.
+    """Seconds that the return home takes longer for joints of endless travel that have been wound up on the
+    path, where they do not park at the nearest whole turn (`park = "home"`): from pass to pass they go the shortest path.
 
     Args:
         spun: False where nothing says the angle of a joint that the axis leaves free, so that it stays where it is
@@ -198,8 +201,8 @@ def _links(row: list[PassEnds], *names: str) -> list[Floats]:
 
 
 def _adjacent(points: list[Floats], behind: bool, machine: Machine) -> Floats:
-    """Seconds (K,) through points (K, J) next to the rapid of the pass, the last leg (`behind`) or the first, which is
-    counted with the pass."""
+    """Seconds (K,) through points (K, J) next to the rapid of the pass, the last leg (`behind`) or the first,
+    which is counted with the pass."""
     one, other = points[-2:] if behind else points[:2]
     own = _each(one, other, machine)
     return np.asarray(_chained(points, machine) - np.where(np.isfinite(own), own, 0.0))

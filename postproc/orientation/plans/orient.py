@@ -71,7 +71,8 @@ def planned_choice(toolpath: Toolpath, machine: Machine, setup: SetupFile, optio
     except PassFault as fault:
         return None, [*found, error("orient.plan", f"no motion could be planned: {fault}", file=toolpath.file,
                                     lines=[fault.line])]
-    found += _unlinked(work, plans.named["auto"], any(np.isfinite(one.seconds) for one in plans.named.values()))
+    found += _unlinked(work, plans.named["auto"],
+                       any(np.isfinite(one.seconds) for one in plans.named.values()))
     if has_errors(found):
         return None, found
     return OrientationChoice(work, tuple(results), table, plans.named, plans.paper), found

@@ -97,14 +97,15 @@ class StateTable:
         cuts = np.array([one.seconds for one in made])
         rapids = np.array([row[k] for row, k in zip(self.rapids, picked, strict=True)])
         links = np.array([link[at] for link, at in zip(self.links, _steps(picked), strict=True)])
-        links[-1] += unwinding([row[k] for row, k in zip(self.edges, picked, strict=True)], self.work, any(picked))
+        links[-1] += unwinding([row[k] for row, k in zip(self.edges, picked, strict=True)], self.work,
+                               any(picked))
         barred = any(bar[at] for bar, at in zip(self.barred, _steps(picked), strict=True))
         return OrientationPlan(tuple(picked), made, cuts, rapids, links,
                                float(np.sum(cuts) + np.sum(rapids) + np.sum(links)), barred)
 
     def without(self, plan: OrientationPlan, links: set[int], passes: set[int]) -> StateTable:
-        """With `links` of a plan (number n leads to pass n, the last one home) and the states of some of its passes barred:
-        these, and those whose axes are within 2 degrees of them."""
+        """With `links` of a plan (number n leads to pass n, the last one home) and the states of some of its
+        passes barred: these, and those whose axes are within 2 degrees of them."""
         barred = [bar.copy() for bar in self.barred]
         near = [[made.same(self.states[n][k].axis, self.states[n][k].held, CLUSTER) for made in self.states[n]]
                 for n, k in enumerate(plan.states)]
@@ -123,8 +124,8 @@ def _steps(picked: list[int]) -> list[tuple[int, int]]:
 def plans_of(table: StateTable) -> Plans:
     """The plans; `auto` chooses among everything the others use, and is the least of them.
 
-    `keep` is the CL file as it is, its time is reported even where its tool touches something; no other plan takes such a
-    state.
+    `keep` is the CL file as it is, its time is reported even where its tool touches something; no other plan
+    takes such a state.
     """
     cost, links, keep = table.costs(), table.open_links(), [0] * len(table.states)
     least = [float(np.where(np.isfinite(c), cut, np.inf).min()) for cut, c in zip(table.cuts, cost, strict=True)]
@@ -133,7 +134,8 @@ def plans_of(table: StateTable) -> Plans:
     wholes = [table.plan(picked) for picked in _wholes(table, keep, cost, links)]
     whole = _least([kept, *wholes])
     auto = _least([kept, per_pass, whole, table.plan(shortest(cost, links)[0])])
-    return Plans({"keep": kept, "per-pass": per_pass, "whole-part": whole, "auto": auto}, table.plan(table.paper))
+    return Plans({"keep": kept, "per-pass": per_pass, "whole-part": whole, "auto": auto},
+                 table.plan(table.paper))
 
 
 def _least(plans: list[OrientationPlan]) -> OrientationPlan:
@@ -161,8 +163,8 @@ def table_of(work: PassContext, results: list[PassSearch], allowed: AllowedAxes,
 
 
 def _wholes(table: StateTable, keep: list[int], cost: list[Floats], links: list[Floats]) -> list[list[int]]:
-    """States of one axis for all passes of one CL axis: group by group the best between what the others take, and the one
-    of least cutting time."""
+    """States of one axis for all passes of one CL axis: group by group the best between what the others take,
+    and the one of least cutting time."""
     groups = groups_of([row[0] for row in table.states])
     found = [[picks for made in table.states[group[0]]
               if min(picks := [index(table.states[k], (made.axis, made.held), -1) for k in group]) >= 0] for group in groups]

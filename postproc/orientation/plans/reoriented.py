@@ -21,8 +21,8 @@ from toolpaths.toolpath import Arcs, Toolpath
 def reoriented(work: PassContext, picked: tuple[Candidate, ...]) -> Toolpath:
     """The CL path with other axes: tips moved by R (axis - axis'), so that the ball stays where it is; arcs with them.
 
-    Where a plan turns anything, every tool along a rotary axis is held as that axis was counted (`Toolpath.spin`), else its
-    angle would follow from its neighbours.
+    Where a plan turns anything, every tool along a rotary axis is held as that axis was counted
+    (`Toolpath.spin`), else its angle would follow from its neighbours.
     """
     path, back = work.toolpath, work.placement.inverse()
     turned = [made for made in picked if not made.one.fixed and angle_between(made.axis, made.one.axis) >= SAME]

@@ -49,7 +49,8 @@ def groupwise(picked: Sequence[int], groups: Sequence[tuple[Sequence[int], Seque
     for members, options in groups:
         adjacent = sorted({n for k in members for n in (k, k + 1)})
 
-        def local(option: Sequence[int], members: Sequence[int] = members, adjacent: Sequence[int] = adjacent) -> float:
+        def local(option: Sequence[int], members: Sequence[int] = members,
+                  adjacent: Sequence[int] = adjacent) -> float:
             for k, pick in zip(members, option, strict=True):
                 result[k] = pick
             at = [0, *result, 0]

@@ -1,9 +1,10 @@
 """How far the tool may stray from its law between the places looked at, where the machine is not the one of the law.
 
-The law of a block (straight tip, straight joints, arc) is that of the machine without errors, as the control holds it. What
-the machine as it is adds to it, E, changes with the joints no faster than `error_rates` says, and by the approach direction
-that joints were moved last. Where E is L-Lipschitz in the time of a piece of length h, it stays within L h / 2 of the
-straight line between its values at both ends. Pieces are looked at in their middle too, so h is half of them.
+The law of a block (straight tip, straight joints, arc) is that of the machine without errors, as the control
+holds it. What the machine as it is adds to it, E, changes with the joints no faster than `error_rates` says,
+and by the approach direction that joints were moved last. Where E is L-Lipschitz in the time of a piece of
+length h, it stays within L h / 2 of the straight line between its values at both ends. Pieces are looked at
+in their middle too, so h is half of them.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ LINE, JOINTS, TIP, CIRCLE = range(4)
 @dataclass(frozen=True)
 @arrays(half="N J", back="N J")
 class _Travel:
-    """Of N pieces and J joints: how far a joint goes in either half, at most (N, J), as speed times time; how much of that
-    it may go back (N, J), 0 where it cannot turn back."""
+    """Of N pieces and J joints: how far a joint goes in either half, at most (N, J), as speed times time; how
+    much of that it may go back (N, J), 0 where it cannot turn back."""
 
     half: Floats
     back: Floats
@@ -34,8 +35,8 @@ class _Travel:
 
 def strays(motion: Motion, executed: BlockPoses, rows: Ints, times: tuple[Floats, Floats, Floats],
            kinds: Ints, tips: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
-    """Bounds (tip (N,) mm, axis (N,) rad) for parts of blocks `rows` (N,) with begin, middle and end `times` (N,), by their
-    laws `kinds` (N,), with the tip at `tips` (N, 3) by that law where they begin and end.
+    """Bounds (tip (N,) mm, axis (N,) rad) for parts of blocks `rows` (N,) with begin, middle and end `times`
+    (N,), by their laws `kinds` (N,), with the tip at `tips` (N, 3) by that law where they begin and end.
 
     0 on a machine that is that of the law, infinity where nothing is known.
     """
@@ -99,9 +100,10 @@ def _of_arcs(motion: Motion, executed: BlockPoses, rows: Ints, part: Floats) -> 
     return path, bend
 
 
-def _of_tips(motion: Motion, executed: BlockPoses, rows: Ints, q: list[Floats], away: Floats) -> tuple[Floats, Floats]:
-    """The same where the tip goes straight, `away` (N,) mm, and rotary axes turn evenly: slides make up for what those move
-    the tip by."""
+def _of_tips(motion: Motion, executed: BlockPoses, rows: Ints, q: list[Floats],
+             away: Floats) -> tuple[Floats, Floats]:
+    """The same where the tip goes straight, `away` (N,) mm, and rotary axes turn evenly: slides make up for
+    what those move the tip by."""
     turning = np.array(executed.control.machine.rotary)
     turn = np.abs(q[2] - q[0])[:, turning].sum(axis=1)
     arm = executed.arm(motion, rows, q[1]) + away

@@ -19,9 +19,9 @@ def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools,
           axis_tolerance: float, grain: tuple[float, float] = (1e-3, 1e-6)) -> tuple[Ints, Ints]:
     """Walk blocks along the reference.
 
-    A move is done by the first block that has come to its end: past the end on a line, the whole sweep on an arc,
-    the final direction where the axis turns; blocks behind it that come nearer to the end are its own too. A move that
-    goes nowhere needs no block.
+    A move is done by the first block that has come to its end: past the end on a line, the whole sweep on an
+    arc, the final direction where the axis turns; blocks behind it that come nearer to the end are its own
+    too. A move that goes nowhere needs no block.
 
     Args:
         tip, axis (E, 3): poses at the ends of the executed blocks
@@ -64,7 +64,8 @@ def _turned(a: Any, b: Any, center: Any, normal: Any) -> Any:
 
 
 @loop(alone=True)
-def _line_done(tip: Any, axis: Any, start: Any, end: Any, axis0: Any, axis1: Any, tol: float, axis_tol: float) -> Any:
+def _line_done(tip: Any, axis: Any, start: Any, end: Any, axis0: Any, axis1: Any, tol: float,
+               axis_tol: float) -> Any:
     """True where a pose has come to the end of a straight move."""
     length = _apart(start, end)
     if _angle(axis0, axis1) > axis_tol and _angle(axis, axis1) > axis_tol:
@@ -77,7 +78,8 @@ def _line_done(tip: Any, axis: Any, start: Any, end: Any, axis0: Any, axis1: Any
 
 
 @loop(alone=True)
-def _nearer(tip: Any, axis: Any, after: Any, axis_after: Any, end: Any, axis1: Any, grain: float, axis_grain: float) -> Any:
+def _nearer(tip: Any, axis: Any, after: Any, axis_after: Any, end: Any, axis1: Any, grain: float,
+            axis_grain: float) -> Any:
     """True where a pose is off the end of its move by more than rounding, and the block after it comes nearer."""
     off, turn = _apart(tip, end), _angle(axis, axis1)
     if off <= grain and turn <= axis_grain:
@@ -128,7 +130,8 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
                 owner[r] = i
             return match, owner
         # Several blocks may end within the tolerance of the end: the move keeps those that come nearer to it.
-        while k < count and _nearer(tip[k - 1], axis[k - 1], tip[k], axis[k], end[i], axis1[i], grain, axis_grain):
+        while k < count and _nearer(tip[k - 1], axis[k - 1], tip[k], axis[k], end[i], axis1[i], grain,
+                                    axis_grain):
             owner[k] = i
             k += 1
         j = k - 1

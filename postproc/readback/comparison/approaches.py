@@ -16,9 +16,9 @@ _RISES = 1e-6
 def leads_down(motion: Motion, moves: Moves, owner: Ints, tip: Floats) -> Bools:
     """(E,) True for blocks by which the tool comes down to a cut that no RAPID leads to, at the feed of that cut.
 
-    Those are the last blocks of a linking move that is fed (`reference.moves.build_moves`): nothing behind them is rapid or
-    rises along the axis of the cut. What is fed before them is a retract whose slides would leave its line in rapid: it is
-    made with the tool and in the states of before, and belongs to no cut.
+    Those are the last blocks of a linking move that is fed (`reference.moves.build_moves`): nothing behind
+    them is rapid or rises along the axis of the cut. What is fed before them is a retract whose slides would
+    leave its line in rapid: it is made with the tool and in the states of before, and belongs to no cut.
 
     Args:
         owner (E,): the move that each block serves; tip (E, 3) mm at the end of each

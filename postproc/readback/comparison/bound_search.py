@@ -20,8 +20,9 @@ _NO_BOUND = 1e20
 @dataclass(frozen=True)
 @arrays(unbounded_rows="U")
 class DeviationBound:
-    """Upper bounds over all blocks: tip (mm), axis (rad), each with the block (row) that has it, -1 where there are none;
-    how many blocks have no bound, because kinematics or law give none (they are only checked at places), and which."""
+    """Upper bounds over all blocks: tip (mm), axis (rad), each with the block (row) that has it, -1 where
+    there are none; how many blocks have no bound, because kinematics or law give none (they are only checked
+    at places), and which."""
 
     tip: float
     axis: float

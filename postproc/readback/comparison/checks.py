@@ -72,7 +72,8 @@ def _above_drilled(motion: Motion, moves: Moves, rows: Ints, m: Ints, tip: Float
     return result
 
 
-def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints, faults: Faults) -> list[Diagnostic]:
+def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints,
+                faults: Faults) -> list[Diagnostic]:
     """Pecks no deeper into the part than the CL file's, and its dwell at the bottom, hole by hole."""
     drill = (owner < len(moves)) & (moves.phase[np.minimum(owner, len(moves) - 1)] == Phase.DRILL)
     rows = np.flatnonzero(drill)
@@ -120,7 +121,8 @@ def _turning_points(depth: Floats) -> Bools:
     return np.asarray((travel[:-1] > 0.0) & (travel[1:] < 0.0))
 
 
-def check_travel(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
+def check_travel(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints,
+                 faults: Faults) -> list[Diagnostic]:
     """Travel of every axis at the ends of all blocks and between them, whatever the blocks are for."""
     limits, machine = executed.control.machine.limits, executed.control.machine
     slack = ROUNDING_SLACK / executed.control.unit
@@ -177,9 +179,9 @@ def check_speeds(motion: Motion, moves: Moves, owner: Ints, match: Ints, seconds
                  tolerance: float, faults: Faults) -> list[Diagnostic]:
     """Moves that the F words run faster than programmed, over the whole move; `seconds` (E,) of each block.
 
-    Chords within the tolerance e of an arc are shorter than its length r s by up to s e / 3: e = c^2 / (8 r) and the arc
-    of a chord c is c (1 + c^2 / (24 r^2)). Where one move ends and the next begins is known to the tolerance only: time that
-    short ones lack may be found next to them, also as feed at the ends of a rapid.
+    Chords within the tolerance e of an arc are shorter than its length r s by up to s e / 3: e = c^2 / (8 r)
+    and the arc of a chord c is c (1 + c^2 / (24 r^2)). Where one move ends and the next begins is known to
+    the tolerance only: time that short ones lack may be found next to them, also as feed at the ends of a rapid.
     """
     cutting = (owner < len(moves)) & (motion.code > 0)
     total = np.bincount(owner[cutting], weights=seconds[cutting], minlength=len(moves) + 1)[:len(moves)]
@@ -188,7 +190,8 @@ def check_speeds(motion: Motion, moves: Moves, owner: Ints, match: Ints, seconds
     slack = shorter / np.where(moves.feed > 0.0, moves.feed, np.inf)
     check = (moves.kind != Kind.RAPID) & ~moves.link & (match >= 0) & (total > 0.0)
     spare = np.pad(np.where(check, np.maximum(total - asked, 0.0), np.where(moves.kind == Kind.RAPID, total, 0.0)), 1)
-    slack += np.minimum(spare[:-2] + spare[2:], 2.0 * tolerance / np.where(moves.feed > 0.0, moves.feed, np.inf))
+    slack += np.minimum(spare[:-2] + spare[2:],
+                        2.0 * tolerance / np.where(moves.feed > 0.0, moves.feed, np.inf))
     fast = np.flatnonzero(check & (total * ALLOWED_SPEED + slack < asked))
     if not len(fast):
         return []
@@ -200,8 +203,8 @@ def check_speeds(motion: Motion, moves: Moves, owner: Ints, match: Ints, seconds
 def block_seconds(motion: Motion, control: Control, by_radius: bool = False) -> Floats:
     """(E,) time of each cutting block at constant feed, s.
 
-    Per minute the length is `Control.feed_length` under the law of the block, that of arcs along the arc, in the units of
-    the feed (degrees where no linear axis moves). Inverse time
+    Per minute the length is `Control.feed_length` under the law of the block, that of arcs along the arc, in
+    the units of the feed (degrees where no linear axis moves). Inverse time
     counts whole blocks, in arcs 1/(minutes per radian) where the control has it so (`by_radius`).
     """
     sweep, result = arc_sweeps(motion, control), np.empty(len(motion))
@@ -236,8 +239,8 @@ def _seconds(motion: Motion, control: Control, by_radius: bool, rows: Ints, swee
 
 def check_links(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, space: SafeSpace, tolerance: float,
            faults: Faults) -> list[Diagnostic]:
-    """Linking blocks, those after the last point too, stay on the line of retract, clear of the path, or on the line of
-    approach; within what corrections of geometric errors change on the path, besides the tolerance."""
+    """Linking blocks, those after the last point too, stay on the line of retract, clear of the path, or on
+    the line of approach; within what corrections of geometric errors change on the path, besides the tolerance."""
     rows = np.flatnonzero((owner == len(moves)) | ((owner < len(moves)) & moves.link[np.minimum(owner, len(moves) - 1)]))
     rows = rows[rows > 0]
     bad = np.zeros(len(rows), dtype=bool)

@@ -21,8 +21,9 @@ TURNS = 1e-6
 
 
 def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults: Faults) -> list[Diagnostic]:
-    """Axes that the program clamps by codes turn only behind the release, and are clamped in cuts through which they stand,
-    before the first row and up to the last; an axis may be free where another turns that shares a code with it.
+    """Axes that the program clamps by codes turn only behind the release, and are clamped in cuts through
+    which they stand, before the first row and up to the last; an axis may be free where another turns that
+    shares a code with it.
 
     `owner` (E,): the move that each row serves. What a block states of clamps acts behind its motion: nobody knows better.
     """
@@ -71,7 +72,8 @@ def _states(code: Canonical, one: ClampCodes) -> Floats:
     return fill(blocks, (number == free).astype(np.float64), code.words.lines, -1.0)
 
 
-def _planes(code: Canonical, state: Floats, letter: str, one: ClampCodes, job: Job, faults: Faults) -> list[Diagnostic]:
+def _planes(code: Canonical, state: Floats, letter: str, one: ClampCodes, job: Job,
+            faults: Faults) -> list[Diagnostic]:
     """Planes that the control may turn the axis for while it is clamped."""
     if not job.controller.plane_turns:
         return []

@@ -51,8 +51,8 @@ class Comparison:
 
     Attributes:
         worst_tip, worst_axis: the worst of the places that were looked at
-        tip_bound, axis_bound: what no block exceeds anywhere, see `deviation_bound`; blocks without a bound count by the
-            places that were looked at
+        tip_bound, axis_bound: what no block exceeds anywhere, see `deviation_bound`; blocks without a bound
+            count by the places that were looked at
         unbounded: how many blocks have no bound, which makes the program checked, not proved
         cuts, bounded_cuts: moves of the CL file at feed, and how many of them have a bound in every block
         executed: what was compared, the words of the program and their motion, so that nothing reads it again
@@ -80,7 +80,8 @@ class Comparison:
     """how much tools may differ from their gauge lengths, where that is not taken up by a register alone"""
 
 
-def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "", planned: bool = False) -> Comparison:
+def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
+            planned: bool = False) -> Comparison:
     """Every block on its stretch of the reference, every move done, in order, as the CL file has it, inside travel.
 
     Faults point into the CL file, or into the program where `gcode` names it. `planned`: its feeds were.
@@ -90,12 +91,14 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "", pla
     tip, axis = _ends(motion, executed)
     words = job.controller.format
     grain = max(1e-3, 1.5 * 10.0**-words.linear_decimals), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
-    number = rewinds(motion, tip, axis, moves.tip, executed.control.rotary, (2.0 * tolerance, 2.0 * axis_tolerance))
+    number = rewinds(motion, tip, axis, moves.tip, executed.control.rotary,
+                     (2.0 * tolerance, 2.0 * axis_tolerance))
     match, owner = _aligned(as_slice(np.flatnonzero(number < 0)), tip, axis, arc_sweeps(motion, executed.control), moves,
                             tolerance, axis_tolerance, grain)
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
-    (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match, owner, tolerance)
+    (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match,
+                                                               owner, tolerance)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
     bound = _bound(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects)
@@ -119,7 +122,8 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "", pla
         diagnostics += check_slow(motion, executed, job, moves, owner, match, tip, seconds, faults)
     diagnostics += check_fed_rapids(motion, executed, job, moves, owner, tip, seconds, down, faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
-    diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance, grain[1] + _kept(job), faults)
+    diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance,
+                                 grain[1] + _kept(job), faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_reach_bounds(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
@@ -153,12 +157,12 @@ def _kept(job: Job) -> float:
 
 
 def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
-    """True (K,) for blocks that leave the tip, (K, 3), where it is although axes move: they take up lost motion, or the last
-    decimal by which the level of a hole differs from that of the hole before.
+    """True (K,) for blocks that leave the tip, (K, 3), where it is although axes move: they take up lost
+    motion, or the last decimal by which the level of a hole differs from that of the hole before.
 
-    With errors, a rapid that a longer one follows, a feed that a longer feed follows, and a rapid between a longer one and a
-    feed (the last part of the path to the plane of a hole) may move it by as much as a level in the air, to which the tool
-    came as part of a hole, may be off by.
+    With errors, a rapid that a longer one follows, a feed that a longer feed follows, and a rapid between a
+    longer one and a feed (the last part of the path to the plane of a hole) may move it by as much as a level
+    in the air, to which the tool came as part of a hole, may be off by.
     """
     travel = np.linalg.norm(np.diff(tip, axis=0, prepend=np.inf), axis=1)
     if job.errors is None:
@@ -177,7 +181,8 @@ def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
 def _aligned(kept: Ints | slice, tip: Floats, axis: Floats, sweep: Floats, moves: Moves, tolerance: float,
              axis_tolerance: float, grain: tuple[float, float]) -> tuple[Ints, Ints]:
     """`align` without the blocks of rewinds, which get no move (M + 1): but for them the tool only rests there."""
-    match, short = align(tip[kept], axis[kept], sweep[kept], moves.curves(), moves.link, tolerance, axis_tolerance, grain)
+    match, short = align(tip[kept], axis[kept], sweep[kept], moves.curves(), moves.link, tolerance,
+                         axis_tolerance, grain)
     owner = np.full(len(tip), len(moves) + 1)
     owner[kept] = short
     return np.where(match >= 0, np.arange(len(tip))[kept][match], match), owner
@@ -210,14 +215,16 @@ def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: F
 
 def _bound(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allowed: tuple[float, float],
            corrects: bool) -> DeviationBound:
-    """Bounds of every block of the moves that are no links. From hole to hole dog-legs are looked at in height alone; so are
-    all paths where geometric errors are corrected: a control that drills the holes takes up lost motion on its path."""
+    """Bounds of every block of the moves that are no links. From hole to hole dog-legs are looked at in
+    height alone; so are all paths where geometric errors are corrected: a control that drills the holes takes
+    up lost motion on its path."""
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
     begin, share = _place(motion, executed, rows, owner, moves)
     free = executed.bent(motion, rows) | corrects
     level = (moves.phase[owner[rows]] == Phase.POSITION) & (motion.code[rows] == 0) & free
     some = as_slice(np.flatnonzero(~level))
-    found = deviation_bound(motion, executed, moves, rows[some], owner[rows[some]], begin[some], share[some], allowed)
+    found = deviation_bound(motion, executed, moves, rows[some], owner[rows[some]], begin[some],
+                            share[some], allowed)
     for corner in (0.0, 0.5, *executed.corners(motion, rows[level]).T) if level.any() else ():
         tip, _ = executed.poses(motion, rows[level], corner)
         height = float(_off_level(moves.curves(owner[rows[level]]), tip).max())
@@ -276,7 +283,8 @@ def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, 
     return tip_off, axis_off
 
 
-def _place(motion: Motion, executed: BlockPoses, rows: Ints, owner: Ints, moves: Moves) -> tuple[Floats, Floats]:
+def _place(motion: Motion, executed: BlockPoses, rows: Ints, owner: Ints,
+           moves: Moves) -> tuple[Floats, Floats]:
     """Where on its move each block (K,) begins, and what part of it it is: by length along arcs, else by count."""
     length = np.ones(len(rows))
     on = np.flatnonzero(((moves.arc >= 0) & ~moves.link)[owner[rows]])

@@ -1,9 +1,10 @@
 """The largest deviation of a program's blocks from the CL file as a bound that holds everywhere, by branch and bound.
 
-Between two places of a block the difference e of the executed pose and a pose of its curve bends by at most M, so that it
-stays within M / 32 of the largest value at the begin, middle and end (interpolation error, see `postproc.path.bound`). M
-comes from the law of the block by Taylor's theorem (`Kinematics.jets`); the values themselves are poses of the
-reader. Blocks whose bound is above the worst that was seen anywhere are divided until bound and worst meet.
+Between two places of a block the difference e of the executed pose and a pose of its curve bends by at most
+M, so that it stays within M / 32 of the largest value at the begin, middle and end (interpolation error, see
+`postproc.path.bound`). M comes from the law of the block by Taylor's theorem (`Kinematics.jets`); the values
+themselves are poses of the reader. Blocks whose bound is above the worst that was seen anywhere are divided
+until bound and worst meet.
 """
 
 from __future__ import annotations
@@ -95,8 +96,8 @@ def _whole(motion: Motion, executed: BlockPoses, ends: _Ends, k: Ints) -> list[P
 
 def _values(motion: Motion, executed: BlockPoses, moves: Moves, ends: _Ends, pieces: Pieces,
             allowed: tuple[float, float]) -> PieceBounds:
-    """Deviations and bounds of pieces: from the nearest points of the curves, where that is outside the tolerance from the
-    places whose axis fits best among those whose tip is near enough, as `Curves.deviation` has it."""
+    """Deviations and bounds of pieces: from the nearest points of the curves, where that is outside the
+    tolerance from the places whose axis fits best among those whose tip is near enough, as `Curves.deviation` has it."""
     rows = ends.rows[pieces.k]
     curves = moves.curves(ends.owner[pieces.k])
     places = pieces.a, 0.5 * (pieces.a + pieces.b), pieces.b
@@ -114,7 +115,8 @@ def _values(motion: Motion, executed: BlockPoses, moves: Moves, ends: _Ends, pie
         k = np.flatnonzero(outside)
         some, there = curves.take(k), [(tip[k], axis[k]) for tip, axis in poses]
         fit = [_best_fit(some, *pose, u[k], _REACH * allowed[0]) for pose, u in zip(there, nearest, strict=True)]
-        other = _compared(some, there, fit, law.take(k), np.zeros(len(k), dtype=bool), np.zeros(len(k), dtype=bool))
+        other = _compared(some, there, fit, law.take(k), np.zeros(len(k), dtype=bool),
+                          np.zeros(len(k), dtype=bool))
         better = _excess(other, allowed) < _excess(found.take(k), allowed)
         found = found.replaced(k[better], other.take(better))
     return found
@@ -134,8 +136,8 @@ def _best_fit(curves: Curves, tip: Floats, axis: Floats, u: Floats, within: floa
 
 def _compared(curves: Curves, poses: list[tuple[Floats, Floats]], u: list[Floats], law: _PieceMotion, even: Bools,
               even_parameter: Bools) -> PieceBounds:
-    """Deviations and bounds of N pieces from the poses of their curves at `u`, where they begin, in their middle, where they
-    end; `even`: the difference of the tips is straight."""
+    """Deviations and bounds of N pieces from the poses of their curves at `u`, where they begin, in their
+    middle, where they end; `even`: the difference of the tips is straight."""
     n = len(even)
     travel = curve_parameter(u[0], np.where(even_parameter, 0.5 * (u[0] + u[2]), u[1]), u[2])
     on = [curves.at(np.clip(v, 0.0, 1.0)) for v in (u[0], np.asarray(travel.value + np.zeros(n)), u[2])]
@@ -162,14 +164,15 @@ def _bend(jet: TaylorVector) -> Floats | float:
 
 def _angle(chord: Floats) -> Floats:
     """The angle between unit vectors `chord` apart; infinity stays."""
-    return np.where(chord < 2.0, 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0)), np.where(np.isinf(chord), np.inf, np.pi))
+    return np.where(chord < 2.0, 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0)),
+                    np.where(np.isinf(chord), np.inf, np.pi))
 
 
 @dataclass(frozen=True)
 @arrays(known="N", straight_tip="N", strays="2 N")
 class _PieceMotion:
-    """Jets of N pieces by the law of their blocks: tip, axis; `known` where there are any; `straight_tip` where the tip is
-    straight and even by the law itself; `strays` (2, N): what the machine may add to it, mm and rad."""
+    """Jets of N pieces by the law of their blocks: tip, axis; `known` where there are any; `straight_tip`
+    where the tip is straight and even by the law itself; `strays` (2, N): what the machine may add to it, mm and rad."""
 
     tip: TaylorVector
     axis: TaylorVector
@@ -277,7 +280,8 @@ def _circle_jets(motion: Motion, executed: BlockPoses, rows: Ints, pieces: Piece
     kept &= lengths(first - tip0) <= SAME
     inside = np.einsum("ni,ni->n", first - middle, cross(n_table, last - middle))
     kept &= np.abs(inside - np.einsum("ni,ni->n", points[0] - centre, cross(normal, points[1] - centre))) < 1e-9 * reach**2
-    part = Curves(first, last, axis0, axis0, np.ones(n, dtype=bool), middle, n_table, sweep * (pieces.b - pieces.a))
+    part = Curves(first, last, axis0, axis0, np.ones(n, dtype=bool), middle, n_table,
+                  sweep * (pieces.b - pieces.a))
     jet = tip_reference(part, TaylorAngle(np.full(n, 0.5), np.ones(n), np.zeros(n)))
     lost = np.where(kept, 0.0, np.inf)
     return TaylorVector(jet.value, jet.first, jet.second, jet.third + lost), TaylorVector(columns.of_rows(axis0))

@@ -14,11 +14,13 @@ class Faults:
     cl: str
     gcode: str = ""
 
-    def warning(self, code: str, message: str, cl_line: int, block_line: int, count: int = 1, hint: str = "") -> Diagnostic:
+    def warning(self, code: str, message: str, cl_line: int, block_line: int, count: int = 1,
+                hint: str = "") -> Diagnostic:
         """A WARNING there."""
         return replace(self.error(code, message, cl_line, block_line, count, hint), severity=Severity.WARNING)
 
-    def error(self, code: str, message: str, cl_line: int, block_line: int, count: int = 1, hint: str = "") -> Diagnostic:
+    def error(self, code: str, message: str, cl_line: int, block_line: int, count: int = 1,
+              hint: str = "") -> Diagnostic:
         """An ERROR at a line of the CL file and a line of the program."""
         if self.gcode:
             where = f" (line {cl_line} of {self.cl})" if cl_line else ""

@@ -26,7 +26,8 @@ def check_spins(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints,
     for number in np.unique(motion.tool[rows]).tolist():
         k = np.flatnonzero(motion.tool[rows] == number)
         at = rows[k]
-        off[k] = spins_off(executed.kinematics(number), executed.joints(motion, at, 1.0), tip[at], axis[at], asked[at])
+        off[k] = spins_off(executed.kinematics(number), executed.joints(motion, at, 1.0), tip[at],
+                           axis[at], asked[at])
     bad = np.flatnonzero(off > tolerance)
     if not len(bad):
         return []

@@ -24,9 +24,10 @@ Gap = tuple[int, int]
 """lines between which a block has to stand, neither counted"""
 
 
-def check_hooks(data: bytes, code: Canonical, motion: Motion, job: Job, owner: Ints, faults: Faults) -> list[Diagnostic]:
-    """Every block of `[hooks]` at its places, by the lines of the program, each line for one place; in a program of several
-    files, or whose lines come back, none is looked for. `owner` (E,): the move that each row serves."""
+def check_hooks(data: bytes, code: Canonical, motion: Motion, job: Job, owner: Ints,
+                faults: Faults) -> list[Diagnostic]:
+    """Every block of `[hooks]` at its places, by the lines of the program, each line for one place; in a
+    program of several files, or whose lines come back, none is looked for. `owner` (E,): the move that each row serves."""
     places = job.hooks.places
     if not places:
         return []
@@ -44,7 +45,8 @@ def check_hooks(data: bytes, code: Canonical, motion: Motion, job: Job, owner: I
             asked.setdefault(_pattern(block, offset), []).extend((gap, place, block) for gap in gaps[place])
     for pattern, wanted in asked.items():
         starts = [m.start() for m in re.finditer(pattern, text) if _begins(text, m.start())]
-        left = unmatched(np.searchsorted(ends, np.array(starts, dtype=np.int64)) + 1, [gap for gap, _, _ in wanted])
+        left = unmatched(np.searchsorted(ends, np.array(starts, dtype=np.int64)) + 1,
+                         [gap for gap, _, _ in wanted])
         missing = dict[tuple[str, str], list[Gap]]()
         for k in left:
             gap, place, block = wanted[k]
@@ -73,8 +75,8 @@ def _begins(text: bytes, start: int) -> bool:
 
 
 def unmatched(lines: Ints, gaps: list[Gap]) -> list[int]:
-    """The gaps for which no line (ascending) is left, each line being in one gap at the most: a line goes to the gap that
-    ends first of those round it, which leaves the fewest."""
+    """The gaps for which no line (ascending) is left, each line being in one gap at the most: a line goes to
+    the gap that ends first of those round it, which leaves the fewest."""
     order = sorted(range(len(gaps)), key=lambda k: gaps[k][0])
     waiting: list[tuple[int, int]] = []
     left, at = list[int](), 0
@@ -110,8 +112,8 @@ def _gaps(code: Canonical, motion: Motion, job: Job, owner: Ints, end: int) -> d
 
 
 def _indexing(motion: Motion, job: Job, rows: Ints, cuts: list[int]) -> tuple[list[Gap], list[Gap]]:
-    """Before and behind the turns of rotary axes between two of the cuts `rows`, whose lines stand between both ends in
-    `cuts`."""
+    """Before and behind the turns of rotary axes between two of the cuts `rows`, whose lines stand between
+    both ends in `cuts`."""
     rotary = np.flatnonzero(np.array(job.machine.rotary))
     degrees = np.concatenate([motion.start[None], motion.end])[:, rotary]
     turns = np.setdiff1d(np.flatnonzero((np.abs(np.diff(degrees, axis=0)) > 1e-6).any(axis=1)), rows)

@@ -1,9 +1,9 @@
 """By how much the length of a tool at the machine may differ from its gauge length before its program fails.
 
-Where only the table turns, the length register takes a difference up and the tip stays where it is. It does not where the
-tool turns and words are axis positions, on platforms whose slides the words are, and under corrections that were made for
-one length. The program is executed once more with all tools longer by `STEP`: how far that takes tips, axes and joints of
-every block is linear in the length where the axis is the same, as it is here.
+Where only the table turns, the length register takes a difference up and the tip stays where it is. It does
+not where the tool turns and words are axis positions, on platforms whose slides the words are, and under
+corrections that were made for one length. The program is executed once more with all tools longer by `STEP`:
+how far that takes tips, axes and joints of every block is linear in the length where the axis is the same, as it is here.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ def with_longer_tools(job: Job) -> Job:
 
 
 def longer_run(code: Canonical, offsets: Offsets, job: Job) -> tuple[Motion, Job, dict[int, float]] | None:
-    """(motion of a program with every tool longer by `STEP`, the job with these tools, lengths by register); None where
-    lengths do not matter."""
+    """(motion of a program with every tool longer by `STEP`, the job with these tools, lengths by register);
+    None where lengths do not matter."""
     if not length_matters(job):
         return None
     more = {register: length + STEP for register, length in offsets.lengths.items()}
@@ -161,8 +161,8 @@ class _Rates:
 
 
 def _room(job: Job, moves: Moves, owner: Ints, k: Ints, tip: Floats, axis: Floats, near: Floats) -> Floats:
-    """(E,) mm that tips of linking moves k (K,) may go: clear of what is cut, or within `near` (K,) on the line of an
-    approach or a retract, whichever is more (as `check_links` has it); infinite in cuts."""
+    """(E,) mm that tips of linking moves k (K,) may go: clear of what is cut, or within `near` (K,) on the
+    line of an approach or a retract, whichever is more (as `check_links` has it); infinite in cuts."""
     clear = job.space.room(tip[k], axis[k]) + job.options.tolerance
     to, before = (np.clip(owner[k] + behind, 0, len(moves) - 1) for behind in (0, -1))
     on = [np.where(there, near - off_line(tip[k], moves.tip[at], moves.axis[at]), 0.0)

@@ -15,7 +15,8 @@ from toolpaths.diagnostics import Diagnostic
 from toolpaths.units import DEG
 
 
-def check_reach_bounds(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
+def check_reach_bounds(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints,
+                       faults: Faults) -> list[Diagnostic]:
     """Blocks that end where a rod, a joint or the platform cannot be; nothing for serial machines."""
     kinematics = executed.control.machine.kinematics
     if not reach.is_checked(kinematics):

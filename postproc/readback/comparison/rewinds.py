@@ -1,7 +1,7 @@
 """Rewinds in a program: the tool leaves the part, axes unwind, it comes back to the very pose. Found from motion alone.
 
-A rewind is known by what no other motion does: the tool stands in one pose twice with rotary axes that stand elsewhere, and
-between the two it moved in rapid.
+A rewind is known by what no other motion does: the tool stands in one pose twice with rotary axes that stand
+elsewhere, and between the two it moved in rapid.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ _MOVED = 1.0
 """degrees: least difference of a rotary axis between the two stands"""
 
 
-def rewinds(motion: Motion, tip: Floats, axis: Floats, stops: Floats, rotary: Ints, grain: tuple[float, float]) -> Ints:
+def rewinds(motion: Motion, tip: Floats, axis: Floats, stops: Floats, rotary: Ints,
+            grain: tuple[float, float]) -> Ints:
     """(E,) number of the rewind that each block belongs to, -1 for none.
 
     Args:
@@ -52,9 +53,10 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angl
             grain: tuple[float, float]) -> tuple[int, int] | None:
     """(first, last) block of the rewind round block k; the pose is that where block first - 1 ends.
 
-    The tool comes back in one run of feed blocks: the next rapid behind them ends the search. On the path it stands in other
-    poses twice too. The innermost that is a position of the CL file counts, for what lies outside it is motion of the CL
-    file; without any the outermost that leaves a cut: high above the part a tool stands in one pose twice as well.
+    The tool comes back in one run of feed blocks: the next rapid behind them ends the search. On the path it
+    stands in other poses twice too. The innermost that is a position of the CL file counts, for what lies
+    outside it is motion of the CL file; without any the outermost that leaves a cut: high above the part a
+    tool stands in one pose twice as well.
     """
     low, high = max(k - _REACH, 1), min(k + _REACH, len(tip))
     stop = np.flatnonzero(~rapid[low:k])

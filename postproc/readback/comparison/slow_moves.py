@@ -33,8 +33,8 @@ def planned_feeds(data: bytes, others: Mapping[str, bytes], gcode: str) -> tuple
 
     `others`: the files of its subprograms, and no more: other files stand in the same folder.
 
-    Feeds that were planned keep acceleration and jerk, which the program does not show: they count as explained only as they
-    were written.
+    Feeds that were planned keep acceleration and jerk, which the program does not show: they count as
+    explained only as they were written.
     """
     head = read_head(data)
     if not head.planned:
@@ -67,9 +67,10 @@ def check_slow(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, own
                seconds: Floats, faults: Faults) -> list[Diagnostic]:
     """Moves that take longer than their programmed feed and the velocities of all axes ask for, once with their count.
 
-    `seconds` (E,) of the blocks at constant feed, `tip` (E, 3) at their ends; pecks feed some of their path again, which
-    counts once. Moves are looked at one by one and together with those at the same feed word, so that the rounding of short
-    ones hides nothing. Taps keep their pitch instead. Feeds that were planned keep more limits, see `feed_words`.
+    `seconds` (E,) of the blocks at constant feed, `tip` (E, 3) at their ends; pecks feed some of their path
+    again, which counts once. Moves are looked at one by one and together with those at the same feed word, so
+    that the rounding of short ones hides nothing. Taps keep their pitch instead. Feeds that were planned keep
+    more limits, see `feed_words`.
     """
     cutting = (owner < len(moves)) & (motion.code > 0)
     length = moves.lengths()
@@ -200,15 +201,16 @@ def _allowed(owner: Ints, cutting: Bools, needs: Floats, tip: Floats, seconds: F
     here = np.flatnonzero(cutting)
     m = owner[here]
     with np.errstate(divide="ignore", invalid="ignore"):
-        part = np.where(whole[m] > STILL, travel[here] / whole[m], np.where(turning[m] > 0.0, needs[here] / turning[m], 1.0))
+        part = np.where(whole[m] > STILL, travel[here] / whole[m],
+                        np.where(turning[m] > 0.0, needs[here] / turning[m], 1.0))
     long = np.fmax(part * asked[m] * again[m], needs[here])
     return np.asarray(np.bincount(m, weights=long, minlength=moves + 1)[:moves] / again)
 
 
 def check_fed_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, owner: Ints, tip: Floats, seconds: Floats,
                      down: Bools, faults: Faults) -> list[Diagnostic]:
-    """Feed moves for rapids, or on the path between operations, that are faster than the axes, or slower than both they
-    and, where they lead `down` (E,) to a cut, its feed."""
+    """Feed moves for rapids, or on the path between operations, that are faster than the axes, or slower than
+    both they and, where they lead `down` (E,) to a cut, its feed."""
     if job.errors is not None and job.errors.corrected_by == "post":
         return []
     m = np.minimum(owner, len(moves) - 1)

@@ -19,8 +19,8 @@ from toolpaths.diagnostics import Diagnostic
 def check_start(code: Canonical, job: Job, faults: Faults) -> list[Diagnostic]:
     """The first motion lifts the tool in machine coordinates, and every axis is stated before the tool comes down.
 
-    Where the control runs the kinematics for the whole program, or no axis lifts the tool by itself, the first motion states
-    every axis.
+    Where the control runs the kinematics for the whole program, or no axis lifts the tool by itself, the
+    first motion states every axis.
     """
     words, names = code.words, job.machine.axis_names
     moves = _stated(words, names, True)

@@ -61,16 +61,18 @@ class _Asked:
         return cls(offset, *map(shared, columns))
 
 
-def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, down: Bools, faults: Faults) -> list[Diagnostic]:
-    """Tool, spindle, coolant, compensation and work offset while cutting, against the CL file and the set-up, in the
-    order of the program; of linking moves only in what leads `down` (E,) to a cut at feed."""
+def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, down: Bools,
+                 faults: Faults) -> list[Diagnostic]:
+    """Tool, spindle, coolant, compensation and work offset while cutting, against the CL file and the set-up,
+    in the order of the program; of linking moves only in what leads `down` (E,) to a cut at feed."""
     rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
     rows = rows[(moves.kind[owner[rows]] != Kind.RAPID) & (~moves.link[owner[rows]] | down[rows])]
     reader = reader_for(job.controller, job.machine.axis_names)
     asked, first, count = _Asked.of(job, reader), dict[str, tuple[int, str]](), Counter[str]()
     for at in range(0, len(rows), CHUNK):
         here = rows[at:at + CHUNK]
-        for what, good, found, wanted, name in _states(motion, job, asked, here, moves.row[owner[here]], reader):
+        for what, good, found, wanted, name in _states(motion, job, asked, here,
+                                                       moves.row[owner[here]], reader):
             bad = np.flatnonzero(~np.asarray(good))
             if len(bad):
                 k = int(bad[0])
@@ -110,8 +112,8 @@ _ORDER = ("tool", "spindle", "spindle speed", "coolant", "length register", "cut
 
 def _states(motion: Motion, job: Job, asked: _Asked, rows: Ints, row: Ints,
             reader: Reader) -> Iterator[tuple[str, Bools, Array, Array, Callable[[Any], str]]]:
-    """(what, True where it is as asked for, what is found, what is wanted, the name of either) in the blocks `rows` (K,),
-    which serve the rows `row` (K,) of the Toolpath."""
+    """(what, True where it is as asked for, what is found, what is wanted, the name of either) in the blocks
+    `rows` (K,), which serve the rows `row` (K,) of the Toolpath."""
     def number(value: float) -> str:
         return f"{value:g}" if np.isfinite(value) and value >= 0 else "none"
     tool, register, direction, rpm = asked.tool[row], asked.register[row], asked.direction[row], asked.rpm[row]
@@ -133,13 +135,14 @@ def _states(motion: Motion, job: Job, asked: _Asked, rows: Ints, row: Ints,
 
 
 def check_lengths(motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
-    """Cutting blocks under a length register that the CL file names for no use of the tool in the spindle: why a program
-    comes nowhere, where its blocks cannot be matched by their places any more."""
+    """Cutting blocks under a length register that the CL file names for no use of the tool in the spindle:
+    why a program comes nowhere, where its blocks cannot be matched by their places any more."""
     named: dict[int, set[int]] = {-1: {-1}}
     for load, register, _ in tool_loads(job.toolpath):
         named.setdefault(load.number, set()).add(register)
     rows = np.flatnonzero(motion.code > 0)
-    pairs, first = np.unique(np.stack([motion.tool[rows], motion.register[rows]], axis=1), axis=0, return_index=True)
+    pairs, first = np.unique(np.stack([motion.tool[rows], motion.register[rows]], axis=1), axis=0,
+                             return_index=True)
     for (tool, held), k in sorted(zip(pairs.tolist(), first.tolist(), strict=True), key=lambda one: one[1]):
         at = rows[k:k + 1]
         wanted = {int(_registers_of(motion, job, at, np.array([one]))[0]) for one in named.get(tool, {held})}
@@ -151,9 +154,10 @@ def check_lengths(motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
 
 
 def _registers_of(motion: Motion, job: Job, rows: Ints, named: Ints) -> Ints:
-    """(K,) length register that should be in force in the blocks `rows`: that which the CL file names (K,); none where axis
-    positions hold the length of the tool already, and where the program calls none. A control that takes the length with
-    every tool change and cannot cancel it has it in force in any case (0 in its table, `tool.length_twice`)."""
+    """(K,) length register that should be in force in the blocks `rows`: that which the CL file names (K,);
+    none where axis positions hold the length of the tool already, and where the program calls none. A control
+    that takes the length with every tool change and cannot cancel it has it in force in any case (0 in its
+    table, `tool.length_twice`)."""
     if job.control.length_on_z or job.controller.keeps_length:
         return named
     joints = np.array([frame.law == "axes" for frame in motion.frames])[motion.frame[rows]]
@@ -161,8 +165,9 @@ def _registers_of(motion: Motion, job: Job, rows: Ints, named: Ints) -> Ints:
 
 
 def _radius_registers(job: Job) -> Floats:
-    """(N,) register of the cutter compensation that holds at every row: that which CUTCOM names, else that of the tool's
-    length where D is modal, the tool where it is not; NaN where the control's code takes none, or before any tool."""
+    """(N,) register of the cutter compensation that holds at every row: that which CUTCOM names, else that of
+    the tool's length where D is modal, the tool where it is not; NaN where the control's code takes none, or
+    before any tool."""
     path, codes = job.toolpath, job.controller.codes
     own = loaded_registers(path) if job.controller.cutter_compensation.modal_register else loaded_tools(path)
     starts, values = [0], [np.nan]

@@ -22,8 +22,8 @@ _STOPS = (("STOP", 0.0), ("OPSTOP", 1.0))
 
 
 def check_stops(code: Canonical, motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
-    """As many stops (M0, M1) as the CL file has, with those that the set-up wants between tools, and no less time of
-    rest."""
+    """As many stops (M0, M1) as the CL file has, with those that the set-up wants between tools, and no less
+    time of rest."""
     result = []
     for word, number in _STOPS:
         lines = [event.line for event in job.toolpath.events if event.word == word]

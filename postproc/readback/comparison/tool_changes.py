@@ -18,7 +18,8 @@ AWAY = 0.01
 """mm or degrees next to home that rounding explains"""
 
 
-def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, faults: Faults) -> list[Diagnostic]:
+def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats,
+                  faults: Faults) -> list[Diagnostic]:
     """Tools are changed at home (by the retract axis, where the machine has one), spindle stopped, coolant off.
 
     `home` (J,) in machine coordinates, mm and degrees. Spindle and coolant count with the words of the block itself.
@@ -48,8 +49,8 @@ def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats, fault
 def correction(job: Job, place: Floats, tool: Ints) -> Floats:
     """(N, J) mm or degrees next to home that the correction of geometric errors explains.
 
-    A retract as high as home is corrected, home itself is not. It is what the machine with errors needs at the places
-    (N, J), its lost motion included.
+    A retract as high as home is corrected, home itself is not. It is what the machine with errors needs at
+    the places (N, J), its lost motion included.
     """
     if job.errors is None or job.errors.corrected_by != "post":
         return np.zeros(place.shape)

@@ -45,7 +45,8 @@ def _needs(code: Canonical, reader: Reader) -> Iterator[Need]:
     """What the dialect has no fixed state for, without what the controller file says of its start."""
     words, known = code.words, _known(reader)
     moves, machine = _moves(words, reader.axes), codes(words, "G", (53,))[0]
-    work, motion = moves[~np.isin(moves, machine)], fill(*codes(words, "G", GROUPS["motion"]), words.lines, -1.0)
+    work, motion = moves[~np.isin(moves, machine)], fill(*codes(words, "G", GROUPS["motion"]),
+                                                         words.lines, -1.0)
     feeds, cycles = moves[motion[moves] != 0], moves[np.isin(motion[moves], CYCLES)]
     arcs = moves[np.isin(motion[moves], _ARCS)]
     heights = np.intersect1d(work, _moves(words, ("Z",)))

@@ -122,7 +122,8 @@ class Reader(ABC):
     def check(self, words: Words, file: str) -> list[Diagnostic]:
         """Codes and words that cannot be executed, as errors."""
         own = (*self.m_codes, *self.switches)
-        found = check_codes(words, self.groups, (*own, *clamp_numbers(self.clamps)), self.letters, self.axes, file)
+        found = check_codes(words, self.groups, (*own, *clamp_numbers(self.clamps)), self.letters,
+                            self.axes, file)
         return [*found, *two_meanings(self.clamps, own, file)]
 
     def read(self, data: bytes | str, file: str = "", others: Mapping[str, bytes] | None = None,
@@ -161,11 +162,12 @@ class Reader(ABC):
 
     def stopped(self, words: Words) -> Words:
         """The words with the blocks before which the control itself has stopped the spindle."""
-        return words if self.stop == "nothing" else added(words, [(b, STANDS, 1.0) for b in _behind_stops(words)])
+        return words if self.stop == "nothing" else added(words,
+                                                          [(b, STANDS, 1.0) for b in _behind_stops(words)])
 
     def cooled(self, words: Words) -> Words:
-        """The words with what flows from each block on that switches coolant, in the order of the codes: a tool change acts
-        before the codes of its block, a stop behind them."""
+        """The words with what flows from each block on that switches coolant, in the order of the codes: a
+        tool change acts before the codes of its block, a stop behind them."""
         blocks, numbers = codes(words, "M", tuple(self.switches))
         events = [(int(b), 1, *self.switches[float(m)]) for b, m in zip(blocks, numbers, strict=True)]
         if self.changes == "spindle and coolant":

@@ -128,7 +128,8 @@ class FanucReader(IsoReader):
     def _bare(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
         assert words.point is not None
         meant = "".join(self.axes) + "IJKRQ"
-        bare = ~words.point & (words.value != 0.0) & np.isin(words.letter, [ord(a) for a in meant + meant.lower()])
+        bare = ~words.point & (words.value != 0.0) & np.isin(words.letter,
+                                                             [ord(a) for a in meant + meant.lower()])
         blocks = words.line[bare]
         if not len(blocks):
             return []
@@ -170,7 +171,8 @@ class FanucReader(IsoReader):
             on = c == 5.1 and block(words, int(b)).get("Q", 0.0) == 1.0
             new.append((int(b), SMOOTH, (float("inf") if fixed is None else fixed) if on else 0.0))
 
-    def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+    def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
+               found: list[Diagnostic]) -> None:
         """Laws, extended work offsets, the reference position, coolant through the tool."""
         for b in codes(words, "G", (self.extended_offset,))[0].tolist():
             number = block(words, b).get("P", 0.0)
@@ -185,7 +187,8 @@ class FanucReader(IsoReader):
         self.machine_moves(words, line, file, found)
         self.taps(words, line, file, found)
 
-    def contour_control(self, stated: dict[str, float], line: int, file: str, found: list[Diagnostic]) -> None:
+    def contour_control(self, stated: dict[str, float], line: int, file: str,
+                        found: list[Diagnostic]) -> None:
         """G5.1 Q1, with R1 to R10 where the control has that, or Q0."""
         if stated.get("Q") not in (0.0, 1.0) or stated.get("R", 1.0) not in range(1, 11):
             said = " ".join(f"{a}{v:g}" for a, v in stated.items()) or "nothing"
@@ -207,7 +210,8 @@ class FanucReader(IsoReader):
                                lines=line[blocks[taps[bare]]][:6].tolist(), count=int(bare.sum()),
                                hint="write M29 S in the block before"))
 
-    def modes(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+    def modes(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
+              found: list[Diagnostic]) -> None:
         """The laws, code by code in running order."""
         register = number_of(words, "H")
         state: FanucState = "axes"
@@ -255,7 +259,8 @@ class FanucReader(IsoReader):
         self.held.append(law)
         return state
 
-    def plane(self, words: Words, drop: Bools, b: int, line: Ints, file: str, found: list[Diagnostic]) -> WordMeaning:
+    def plane(self, words: Words, drop: Bools, b: int, line: Ints, file: str,
+              found: list[Diagnostic]) -> WordMeaning:
         """G68.2 X Y Z I J K: zero of the plane, Euler angles."""
         stated = take(words, drop, b, "XYZIJKPQR")
         if set(stated) & set("PQR"):
@@ -264,7 +269,8 @@ class FanucReader(IsoReader):
         shift = np.array([stated.get(a, 0.0) for a in "XYZ"])
         return WordMeaning("tilted", "G68.2", turned("ZXZ", [stated.get(a, 0.0) for a in "IJK"]), shift)
 
-    def unmoved(self, words: Words, first: int, last: int, line: Ints, file: str, found: list[Diagnostic]) -> None:
+    def unmoved(self, words: Words, first: int, last: int, line: Ints, file: str,
+                found: list[Diagnostic]) -> None:
         """Nothing moves between the plane and the tool's alignment; G53.1 P picks another solution."""
         low, high = np.searchsorted(words.line, [first + 1, last + 1])
         bad = np.isin(words.letter[low:high], [ord(a) for a in (*self.axes, "P")]) & (words.value[low:high] != 0.0)
@@ -273,7 +279,8 @@ class FanucReader(IsoReader):
                                "this reader", file=file, lines=[int(line[words.line[low:high][bad][0]])],
                                hint="write G53.1 alone, right behind G68.2"))
 
-    def reference(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+    def reference(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
+                  found: list[Diagnostic]) -> None:
         """G91 G28 Z0.: rapidly to the reference position, which is the machine's home; through a point is refused."""
         blocks, mode = codes(words, "G", (90, 91))
         motions, motion = codes(words, "G", self.groups["motion"])

@@ -1,9 +1,9 @@
 """Haas mill (NGC): Fanuc's kind, with what the mill operator's manual (96-8210) has of its own.
 
-P of a dwell is ms, or s with a point; L repeats a cycle; I, J, K of G73 and G83 are the first peck, what each next one is
-less by, and the least; G154 P work offsets; M97 P runs a subprogram of the same program from its N; G234 tool centre point
-control, left by G49; G254 dynamic work offset, left by G255: X, Y, Z stay along the machine's axes while the offset follows
-the rotary tables; G187 P E, rounding of corners in mm. Inch
+P of a dwell is ms, or s with a point; L repeats a cycle; I, J, K of G73 and G83 are the first peck, what each
+next one is less by, and the least; G154 P work offsets; M97 P runs a subprogram of the same program from its
+N; G234 tool centre point control, left by G49; G254 dynamic work offset, left by G255: X, Y, Z stay along the
+machine's axes while the offset follows the rotary tables; G187 P E, rounding of corners in mm. Inch
 and metric: setting 9; G20 and G21 only ask for it.
 """
 
@@ -73,7 +73,8 @@ class HaasReader(FanucReader):
         result = {}
         for b, m in zip(*codes(words, "M", (97, 98)), strict=True):
             stated = block(words, int(b))
-            result[int(b)] = Call(int(b), f"{'N' if m == 97 else 'O'}{stated.get('P', -1.0):g}", int(stated.get("L", 1.0)))
+            result[int(b)] = Call(int(b), f"{'N' if m == 97 else 'O'}{stated.get('P', -1.0):g}",
+                                  int(stated.get("L", 1.0)))
         return result
 
     def paths(self, words: Words, new: New) -> None:
@@ -84,7 +85,8 @@ class HaasReader(FanucReader):
         for b in codes(words, "G", (61,))[0].tolist():
             new.append((b, SMOOTH, 0.0))
 
-    def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+    def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
+               found: list[Diagnostic]) -> None:
         """Besides what Fanuc has: the words of G187."""
         for b in codes(words, "G", (187,))[0].tolist():
             take(words, drop, b, "PE")

@@ -75,7 +75,8 @@ class IsoReader(Reader):
         new += [(int(b), REGISTER, float(np.nan_to_num(register[b], nan=-1.0)) if c == 43 else -1.0)
                 for b, c in zip(blocks, code, strict=True)]
 
-    def rests(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+    def rests(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
+              found: list[Diagnostic]) -> None:
         """G4: its word is no axis word, and counts as seconds."""
         for b in codes(words, "G", (4,))[0].tolist():
             low, high = np.searchsorted(words.line, [b, b + 1])
@@ -107,8 +108,8 @@ class IsoReader(Reader):
             new.append((b, SMOOTH, value * (self.millimetres if units[b] == 20 else 1.0)))
 
     def levels(self, words: Words, new: New) -> None:
-        """A fresh LinuxCNC's cycles return to R until G98 is stated (measured on 2.9; later it keeps the mode of the program
-        before)."""
+        """A fresh LinuxCNC's cycles return to R until G98 is stated (measured on 2.9; later it keeps the mode
+        of the program before)."""
         cycles = codes(words, "G", CYCLES)[0]
         if self.controller is None or self.controller.writer != "linuxcnc" or not len(cycles):
             return
@@ -117,8 +118,8 @@ class IsoReader(Reader):
             new.append((int(cycles[0]), "G", 99.0))
 
     def radii(self, words: Words, new: New) -> None:
-        """Where D is not modal, G41 and G42 without it, or with D0, take the radius of the tool in the spindle (LinuxCNC,
-        G-code reference)."""
+        """Where D is not modal, G41 and G42 without it, or with D0, take the radius of the tool in the
+        spindle (LinuxCNC, G-code reference)."""
         blocks, _ = codes(words, "G", (41, 42))
         if self.controller is None or self.controller.cutter_compensation.modal_register or not len(blocks):
             return
@@ -127,7 +128,8 @@ class IsoReader(Reader):
         stated = columns(words, "D")[blocks, 0]
         new += [(b, "D", float(tool[b])) for b in blocks[~(stated > 0.0)].tolist() if tool[b] >= 0]
 
-    def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str, found: list[Diagnostic]) -> None:
+    def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
+               found: list[Diagnostic]) -> None:
         """What a dialect has besides."""
 
     def numbers(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:

@@ -1,9 +1,10 @@
 """Heidenhain TNC 640 Klartext.
 
-From the user's manuals Klartext Programming and Cycle Programming 34059x: L, C with CC, CR, CP, LP; FMAX holds in its block,
-F from block to block; R0, RL, RR; I before an axis for incremental; M91, M99, M128, M129; TOOL CALL takes the length
-with the tool; CYCL DEF by number and Q parameters; FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS; PLANE SPATIAL, turns about
-the fixed X, then Y, then Z, with TURN, MOVE or STAY; LBL, CALL LBL with REP, CALL PGM.
+From the user's manuals Klartext Programming and Cycle Programming 34059x: L, C with CC, CR, CP, LP; FMAX
+holds in its block, F from block to block; R0, RL, RR; I before an axis for incremental; M91, M99, M128, M129;
+TOOL CALL takes the length with the tool; CYCL DEF by number and Q parameters; FUNCTION TCPM F TCP AXIS POS
+PATHCTRL AXIS; PLANE SPATIAL, turns about the fixed X, then Y, then Z, with TURN, MOVE or STAY; LBL, CALL LBL
+with REP, CALL PGM.
 """
 
 from __future__ import annotations
@@ -99,7 +100,8 @@ class KlartextReader(Reader):
             words, more = _in_file(words, rows), [_moved(d, rows) for d in more]
         return ProgramText(words, tuple(statements)), found + more
 
-    def _statement(self, row: str, line: int, new: New, statements: list[DialectStatement], file: str) -> list[Diagnostic]:
+    def _statement(self, row: str, line: int, new: New, statements: list[DialectStatement],
+                   file: str) -> list[Diagnostic]:
         """One block that is no plain L."""
         body = re.sub(r"^\s*\d+\s+", "", row.strip() + " ").strip() if not row.strip().isdigit() else ""
         own = self.controller.program.passive if self.controller is not None else ()
@@ -203,7 +205,8 @@ def _named(body: str) -> DialectStatement | None:
     if match := re.fullmatch(r"(BEGIN|END) PGM (\S+)\s*(MM|INCH)?", body):
         return DialectStatement(f"{match[1]} PGM", (match[2], match[3]))
     if match := re.fullmatch(rf"TOOL CALL(?: (\d+))?(?: ([XYZ]))?((?: (?:S|F|DL|DR|DR2) ?=? ?{_NUMBER})*)", body):
-        return DialectStatement("TOOL CALL", (float(match[1]) if match[1] else None, match[2]), _keyed(match[3]))
+        return DialectStatement("TOOL CALL", (float(match[1]) if match[1] else None, match[2]),
+                                _keyed(match[3]))
     if match := re.fullmatch(r"CYCL DEF (\d+)(?:\.(\d+))?\b(.*)", body):
         if match[2] is None and not re.fullmatch(rf"[^=]*?(?:\s*Q\d+\s*=\s*{_NUMBER}\s*)*", match[3]):
             return None
@@ -211,7 +214,8 @@ def _named(body: str) -> DialectStatement | None:
         return DialectStatement("CYCL DEF", (float(match[1]), float(match[2]) if match[2] else None, match[3].strip()),
                                 values)
     if match := re.fullmatch(r"CYCL CALL(?: POS)?(.*)", body):
-        return DialectStatement("CYCL CALL" + (" POS" if " POS" in body else ""), (match[1].replace("POS", "").strip(),))
+        return DialectStatement("CYCL CALL" + (" POS" if " POS" in body else ""),
+                                (match[1].replace("POS", "").strip(),))
     if match := re.fullmatch(r"LBL \"?([^\"]+?)\"?", body):
         return DialectStatement("LBL", (match[1],))
     if match := re.fullmatch(r"CALL LBL \"?([^\"\s]+)\"?(?: REP ?(\d+))?", body):

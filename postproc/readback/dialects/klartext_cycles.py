@@ -1,8 +1,8 @@
 """Drilling cycles of TNC 640 (Cycle Programming 34059x): Q parameters to levels.
 
-Q200 set-up clearance above Q203 the surface, Q201 depth (negative), Q204 second set-up clearance. Rapidly to Q203 + Q200,
-feed Q206 to Q203 + Q201, out to the second set-up clearance where it is the higher one. Pecks of Q202 count from the
-surface.
+Q200 set-up clearance above Q203 the surface, Q201 depth (negative), Q204 second set-up clearance. Rapidly to
+Q203 + Q200, feed Q206 to Q203 + Q201, out to the second set-up clearance where it is the higher one. Pecks of
+Q202 count from the surface.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ NEEDED = {number: tuple(f"Q{n}" for n in names) for number, names in {
     205: (200, 201, 206, 202, 203, 204, 212, 205, 258, 259, 257, 256, 211, 379, 253),
     206: (200, 201, 206, 211, 203, 204), 207: (200, 201, 239, 203, 204),
     240: (200, 343, 201, 344, 206, 211, 203, 204)}.items()}
-"""parameters that a cycle must state (Cycle Programming 34059x); those that later software added (Q395, Q208 of cycle 205)
-have their old meaning where they are not stated"""
+"""parameters that a cycle must state (Cycle Programming 34059x); those that later software added (Q395, Q208
+of cycle 205) have their old meaning where they are not stated"""
 Q = dict[str, float]
 Made = tuple[Drill | None, str]
 
@@ -104,8 +104,8 @@ def _deep(q: Q, speed: float) -> Made:
 
 
 def _tap(q: Q, speed: float, rigid: bool) -> Made:
-    """206 with a floating chuck at the feed Q206, 207 at the pitch Q239 (negative: left-hand) times the speed; out as it
-    came in."""
+    """206 with a floating chuck at the feed Q206, 207 at the pitch Q239 (negative: left-hand) times the
+    speed; out as it came in."""
     plane, bottom, out = _levels(q)
     feed = abs(q.get("Q239", 0.0)) * speed if rigid else q.get("Q206", 0.0)
     if not feed > 0.0:

@@ -124,7 +124,7 @@ class KlartextRun:
         low, high = np.searchsorted(self.words.line, [first + 1, last])
         return bool(high > low)
 
-    # ---- contours -----------------------------------------------------------------------------------------------
+    # ---- contours ------------------------------------------------------------------------------------------
 
     def place(self, b: int, keys: dict[str, float]) -> dict[str, float] | None:
         """Coordinates in keys, those with I counted from the last position."""
@@ -232,13 +232,14 @@ class KlartextRun:
         angle = math.radians(s.keys.get("PA", now[1] + s.keys.get("IPA", 0.0)))
         self.states(b, {"X": self.pole["X"] + r * math.cos(angle), "Y": self.pole["Y"] + r * math.sin(angle), **rest})
 
-    # ---- tools and cycles ---------------------------------------------------------------------------------------
+    # ---- tools and cycles ----------------------------------------------------------------------------------
 
     def tool(self, b: int, s: DialectStatement) -> None:
         """TOOL CALL n Z S: the tool, its length and its speed; without n the speed alone."""
         number = s.number(0)
         if s.args[1] not in (None, "Z") or any(s.keys.get(k, 0.0) != 0.0 for k in ("DL", "DR", "DR2")):
-            self.fault("gcode.tool", b, "TOOL CALL with another axis than Z, or with DL or DR", "TOOL CALL n Z S")
+            self.fault("gcode.tool", b, "TOOL CALL with another axis than Z, or with DL or DR",
+                       "TOOL CALL n Z S")
         if "S" in s.keys:
             self.new.append((b, "S", s.keys["S"]))
             self.speed[b:] = s.keys["S"]
@@ -257,7 +258,8 @@ class KlartextRun:
             seconds = re.search(r"([-+]?\d+\.?\d*)\s*$", str(s.args[2])) if part == 1.0 else None
             self.new += [(b, REST, float(seconds[1]))] if seconds else []
             if part == 1.0 and not seconds:
-                self.fault("gcode.dwell", b, "CYCL DEF 9.1 lacks its time", "CYCL DEF 9.1 DWELL 0.5 (seconds)")
+                self.fault("gcode.dwell", b, "CYCL DEF 9.1 lacks its time",
+                           "CYCL DEF 9.1 DWELL 0.5 (seconds)")
         elif number == 32.0:
             self.new += [(b, SMOOTH, s.keys.get("T", 0.0) or math.inf)] if part == 1.0 else []
         else:
@@ -287,12 +289,13 @@ class KlartextRun:
         self.new.append((b, CALL, float(self.cycle)))
         self.track.lost(b, "Z")
 
-    # ---- laws ---------------------------------------------------------------------------------------------------
+    # ---- laws ----------------------------------------------------------------------------------------------
 
     def enter(self, b: int, state: InterpolationMode, law: WordMeaning) -> None:
         """A law in force from block b on."""
         if state != "axes" and self.state != "axes" and law.name != "axes":
-            self.fault("gcode.mode", b, f"{law.code} while another mode is on", "leave the mode that is on first")
+            self.fault("gcode.mode", b, f"{law.code} while another mode is on",
+                       "leave the mode that is on first")
         if law.name == "axes" and state == "tilted":
             return
         if state != self.state:
@@ -305,7 +308,8 @@ class KlartextRun:
         """FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS: F at the tip, rotary positions linear."""
         strange = set(s.args) - _TCPM
         if strange or s.args[:4] != ("F", "TCP", "AXIS", "POS") or s.args[4:6] != ("PATHCTRL", "AXIS"):
-            self.fault("gcode.mode", b, "FUNCTION TCPM of another kind", "FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS")
+            self.fault("gcode.mode", b, "FUNCTION TCPM of another kind",
+                       "FUNCTION TCPM F TCP AXIS POS PATHCTRL AXIS")
         self.enter(b, "tcp", WordMeaning("tcp", s.name))
 
     def plane(self, b: int, s: DialectStatement) -> None:
@@ -313,7 +317,8 @@ class KlartextRun:
         strange = {str(a) for a in s.args if not re.match(r"(SP[ABC]|DIST|ABST|F)[-+]?\d", str(a))} - _PLANE
         if strange or not {"SPA", "SPB", "SPC"} <= set(s.keys) or s.keys.get("DIST", 0.0) != 0.0:
             what = ", ".join(sorted(strange)) or "a part of its angles, or DIST"
-            self.fault("gcode.mode", b, f"PLANE SPATIAL with {what}", "PLANE SPATIAL SPA SPB SPC TURN FMAX TABLE ROT")
+            self.fault("gcode.mode", b, f"PLANE SPATIAL with {what}",
+                       "PLANE SPATIAL SPA SPB SPC TURN FMAX TABLE ROT")
             return
         rotation = turned("XYZ", [s.keys[k] for k in ("SPA", "SPB", "SPC")], fixed=True)
         asked: RotaryDirection = next((_CHOICES[str(a)] for a in s.args if str(a) in _CHOICES), "nearest")

@@ -1,8 +1,8 @@
 """Siemens SINUMERIK 840D sl, milling.
 
-From the programming manuals Fundamentals, Job Planning and Cycles: X=IC(), X=AC(), CR=, I=AC(), TURN=; G54 to G57, G505 to
-G599; T, M6 and D; SUPA; G4 F; MCALL with CYCLE81 to CYCLE86; TRAORI with ORIAXES, left by TRAFOOF; SD42940 as a
-statement of its own; CYCLE800 with turns
+From the programming manuals Fundamentals, Job Planning and Cycles: X=IC(), X=AC(), CR=, I=AC(), TURN=; G54 to
+G57, G505 to G599; T, M6 and D; SUPA; G4 F; MCALL with CYCLE81 to CYCLE86; TRAORI with ORIAXES, left by
+TRAFOOF; SD42940 as a statement of its own; CYCLE800 with turns
 about X, Y, Z as _MODE orders them; CYCLE832; subprograms by their names or L numbers, M17, RET.
 """
 
@@ -108,7 +108,8 @@ class SiemensReader(Reader):
         """Codes and words; relative and forced ones count as plain."""
         letter = words.letter & 127
         small = (letter >= 97) & (letter <= 122)
-        plain = Words(np.where(small, letter - 32, letter).astype(np.uint8), words.value, words.line, words.lines)
+        plain = Words(np.where(small, letter - 32, letter).astype(np.uint8), words.value, words.line,
+                      words.lines)
         return super().check(plain.take(plain.letter != ord(STATEMENT)), file)
 
     def structure(self, text: ProgramText, file: str) -> tuple[Structure, list[Diagnostic]]:

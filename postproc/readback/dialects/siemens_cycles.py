@@ -1,7 +1,8 @@
 """CYCLE81 to CYCLE86 of SINUMERIK (Programming Manual Cycles): parameters by their place.
 
-All begin with RTP (retraction), RFP (reference), SDIS (safety), DP (depth) or DPR (depth below RFP). The tool goes rapidly
-to RFP + SDIS, feeds to the depth and leaves for RTP. CYCLE83: FDEP or FDPR first peck, DAM less for each next, DTB, DTS,
+All begin with RTP (retraction), RFP (reference), SDIS (safety), DP (depth) or DPR (depth below RFP). The tool
+goes rapidly to RFP + SDIS, feeds to the depth and leaves for RTP. CYCLE83: FDEP or FDPR first peck, DAM less
+for each next, DTB, DTS,
 FRF, VARI (0 breaks chips: up by VRT, 1 mm by default; 1 leaves the hole, then stops DIS1 before the last depth: 0.6 mm down
 to 30 mm depth, a fiftieth of the depth, 7 mm at the most, beyond).
 """

@@ -25,8 +25,8 @@ from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 
 LENGTH_AXIS = "$SC_TOOL_LENGTH_CONST"
-"""SD42940: 17 keeps the tool length along Z in every plane, from the next D on (NC programming, tool length and plane
-change); otherwise it turns with G18 and G19"""
+"""SD42940: 17 keeps the tool length along Z in every plane, from the next D on (NC programming, tool length
+and plane change); otherwise it turns with G18 and G19"""
 _SEQUENCE = {1: "X", 2: "Y", 3: "Z"}
 
 
@@ -97,7 +97,8 @@ class SiemensRun:
     def enter(self, b: int, state: InterpolationMode, law: WordMeaning) -> None:
         """A law in force from block b on."""
         if state != "axes" and self.state != "axes":
-            self.fault("gcode.mode", b, f"{law.code} while another mode is on", "leave the mode that is on first")
+            self.fault("gcode.mode", b, f"{law.code} while another mode is on",
+                       "leave the mode that is on first")
         if state == "tcp" and self.turning_without_axes(b):
             self.fault("gcode.mode", b, "TRAORI with rotary words, but without ORIAXES",
                        "state ORIMKS ORIAXES: rotary axes linear")
@@ -121,7 +122,8 @@ class SiemensRun:
         length = [value for at, value in self.length if at <= b]
         low, high = np.searchsorted(self.words.line, [b, b + 1])
         if length and length[-1] >= 0.0 and ord("Z") in self.words.letter[low:high]:
-            self.fault("gcode.machine_position", b, "SUPA with a tool length in force", "write D0 next to SUPA")
+            self.fault("gcode.machine_position", b, "SUPA with a tool length in force",
+                       "write D0 next to SUPA")
 
     def turned_lengths(self) -> None:
         """G18 and G19 turn the length of the tool in force out of Z, and under TRAORI its direction."""
@@ -138,7 +140,8 @@ class SiemensRun:
         for bad, what, hint in ((turned_plane & turns & ~oriented, "tool length", f"state {LENGTH_AXIS}=17 before D1"),
                                 (turned_plane & oriented, "tool's direction", "arcs in G17 only under TRAORI")):
             if bad.any():
-                self.fault("gcode.tool_length", int(bad.argmax()), f"G18 or G19 turns the {what} out of Z", hint)
+                self.fault("gcode.tool_length", int(bad.argmax()),
+                           f"G18 or G19 turns the {what} out of Z", hint)
 
     def swivel(self, b: int, s: DialectStatement) -> None:
         """CYCLE800(_FR, _TC, _ST, _MODE, _X0, _Y0, _Z0, _A, _B, _C, _X1, _Y1, _Z1, _DIR, _FR_I, _DMODE)."""
@@ -166,7 +169,8 @@ class SiemensRun:
         """Each block that moves calls the cycle of the MCALL in force."""
         if not modal:
             return
-        held = fill(np.array([m[0] for m in modal]), np.array([float(m[1]) for m in modal]), self.words.lines, -1.0)
+        held = fill(np.array([m[0] for m in modal]), np.array([float(m[1]) for m in modal]),
+                    self.words.lines, -1.0)
         moves = np.unique(self.words.line[np.isin(self.words.letter & 95, [ord(a) for a in self.axes])])
         self.new += [(int(b), CALL, float(held[b])) for b in moves[held[moves] >= 0.0]]
 

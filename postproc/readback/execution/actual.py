@@ -36,8 +36,8 @@ class ActualBlockPoses(BlockPoses):
     motion: Motion = field(kw_only=True)
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
-        """(tip, axis) (K, 3) of the blocks `rows` at fraction t, errors in, by the approach direction that each axis last
-        moved."""
+        """(tip, axis) (K, 3) of the blocks `rows` at fraction t, errors in, by the approach direction that
+        each axis last moved."""
         near, q, approach = self._at(motion, rows, t)
         tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
         for number in np.unique(motion.tool[rows]).tolist():
@@ -129,8 +129,8 @@ class ActualBlockPoses(BlockPoses):
 
     @cached_property
     def _curved(self) -> Bools:
-        """(E,) blocks whose joints may turn back on the path: arcs, and those whose words are the tip while an
-        axis turns."""
+        """(E,) blocks whose joints may turn back on the path: arcs, and those whose words are the tip while
+        an axis turns."""
         motion, turning = self.motion, self.control.rotary
         by_tip = np.array([frame.law == "tcp" for frame in motion.frames])[motion.frame] | (self.control.base == "tcp")
         turns = motion.end[:, turning] != begins(motion, np.arange(len(motion)))[:, turning]
@@ -138,15 +138,15 @@ class ActualBlockPoses(BlockPoses):
 
     @cached_property
     def _last(self) -> Floats:
-        """(1 + E, T) the approach directions of the joints in `_bidirectional` before the program and at the ends of its
-        blocks."""
+        """(1 + E, T) the approach directions of the joints in `_bidirectional` before the program and at the
+        ends of its blocks."""
         every = self._steps(self.motion, np.arange(len(self.motion)), 1.0)
         none = np.zeros((1, len(self._bidirectional)))
         return np.concatenate([none, every.walked().at(none)])
 
     def _approach(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
-        """(K, J) from which direction each joint is where it is; one that has turned back has taken up what it loses by
-        shares."""
+        """(K, J) from which direction each joint is where it is; one that has turned back has taken up what
+        it loses by shares."""
         approach = np.zeros((len(rows), len(self.control.machine.axis_names)))
         if self._bidirectional:
             approach[:, self._bidirectional] = self._steps(motion, rows, t).at(self._last[rows])
@@ -206,8 +206,8 @@ class ActualBlockPoses(BlockPoses):
 
 
 def _turning(before: Floats, middle: Floats, after: Floats) -> Floats:
-    """Joints (N, J) where they turn back between three places as far apart in time, by the parabola through them; those
-    that do not are in the middle."""
+    """Joints (N, J) where they turn back between three places as far apart in time, by the parabola through
+    them; those that do not are in the middle."""
     slope, bend = 0.5 * (after - before), 0.5 * (after + before) - middle
     with np.errstate(divide="ignore", invalid="ignore"):
         there = np.where(2.0 * np.abs(bend) > np.abs(slope), -0.5 * slope / bend, 0.0)

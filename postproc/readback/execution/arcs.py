@@ -22,8 +22,8 @@ def centres(start: Floats, end: Floats, plane: Array, ccw: Bools, relative: Floa
             slack: float) -> tuple[Floats, dict[int, str]]:
     """(centres (K, 3), what is wrong with arc k) of arcs between start and end (K, 3).
 
-    A centre is given from the start, in coordinates (K, 3), or by the radius (K,), whose sign says the arc of more
-    than half a turn (-). `slack`: mm by which the radius may differ between the ends.
+    A centre is given from the start, in coordinates (K, 3), or by the radius (K,), whose sign says the arc of
+    more than half a turn (-). `slack`: mm by which the radius may differ between the ends.
     """
     center = np.where(np.isfinite(absolute), absolute, start + np.nan_to_num(relative))
     bad: dict[int, str] = {}
@@ -70,7 +70,8 @@ def whole_turns(rows: MotionRows, arcs: Ints, turns: Array, start: Floats, plane
     for k in np.flatnonzero(turns > 0).tolist():
         row, count = int(at[arcs[k]]), int(turns[k])
         i, j = PLANE_COLUMNS[int(plane[k])]
-        part = _last_turn(start[k][[i, j]], rows.end[arcs[k]][xyz[[i, j]]], rows.center[arcs[k]][[i, j]], bool(ccw[k]))
+        part = _last_turn(start[k][[i, j]], rows.end[arcs[k]][xyz[[i, j]]], rows.center[arcs[k]][[i, j]],
+                          bool(ccw[k]))
         before = np.array(rows.end[arcs[k]])
         before[xyz] = start[k]
         share = 1.0 / (count + part)

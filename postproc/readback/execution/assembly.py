@@ -1,8 +1,8 @@
 """The assembly mode of a parallel machine, followed from block to block: where its platform is, not where it could be.
 
-The joints of such a machine have several poses. Read-back begins at home, in the mode there, and takes at every block
-the pose nearest the one before it; long blocks are walked in steps that no two modes can be mistaken in. The CL file
-has no say in it.
+The joints of such a machine have several poses. Read-back begins at home, in the mode there, and takes at
+every block the pose nearest the one before it; long blocks are walked in steps that no two modes can be
+mistaken in. The CL file has no say in it.
 """
 
 from __future__ import annotations
@@ -45,8 +45,9 @@ def ends(kin: Kinematics, q: Floats, home: Floats) -> Floats:
 def walk(kin: Kinematics, q0: Floats, q1: Floats, pose: Floats) -> Floats:
     """Pose (N, 6) at joints q1 (N, J), reached straight in the joints from q0 where it is `pose` (N, 6).
 
-    The rotary axes are outside the closed loops: no turn changes the mode, so that the steps are those of the slides.
-    Where a block leaves what the machine can reach the walk ends, NaN; so does one longer than any machine (LONGEST).
+    The rotary axes are outside the closed loops: no turn changes the mode, so that the steps are those of the
+    slides. Where a block leaves what the machine can reach the walk ends, NaN; so does one longer than any
+    machine (LONGEST).
     """
     result, at = np.array(pose), np.array(q0)
     count = np.where(np.isfinite(result).all(axis=1), steps(kin, q0, q1, np.inf), 1)

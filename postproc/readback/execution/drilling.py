@@ -95,7 +95,8 @@ def _repeated(state: SectionState, n: int, drill: Drill, begun: Floats, target: 
     return result
 
 
-def _called(state: SectionState, n: int, begun: Floats, target: Floats, z: int, drill: Drill) -> list[CycleLeg]:
+def _called(state: SectionState, n: int, begun: Floats, target: Floats, z: int,
+            drill: Drill) -> list[CycleLeg]:
     """The move of the block itself, then the cycle where it ends."""
     own: list[CycleLeg] = []
     absolute, step = state.columns[n, z], state.steps[n, z]

@@ -94,7 +94,8 @@ class Motion:
         return self.coolant & MIST > 0
 
 
-def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets, file: str = "") -> tuple[Motion, list[Diagnostic]]:
+def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets,
+        file: str = "") -> tuple[Motion, list[Diagnostic]]:
     """The motion of a program that starts with the machine at home."""
     words = code.words
     modal = modal_state(words)
@@ -118,7 +119,8 @@ def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets, file: str =
     return _motion(words, modal, rows, code, tuple(used), offsets, rests, section.call), placed(found, code.files)
 
 
-def _stretches(words: Words, modal: Modal, laws: tuple[WordMeaning, ...]) -> list[tuple[int, int, WordMeaning | None, int]]:
+def _stretches(words: Words, modal: Modal,
+               laws: tuple[WordMeaning, ...]) -> list[tuple[int, int, WordMeaning | None, int]]:
     """(first, one past the last block, law, length register) of stretches under one law."""
     n = words.lines
     law = fill(*words.pick(LAW), n, -1.0).astype(np.int64)
@@ -171,7 +173,8 @@ def _motion(words: Words, modal: Modal, rows: MotionRows, code: Canonical, used:
                   pitch=pitch, floating=floating, frames=used, **state)
 
 
-def _threads(modal: Modal, rows: MotionRows, feed: Floats, call: Floats, code: Canonical) -> tuple[Floats, Bools]:
+def _threads(modal: Modal, rows: MotionRows, feed: Floats, call: Floats,
+             code: Canonical) -> tuple[Floats, Bools]:
     """(mm per turn of taps (E,), negative for left-hand ones, NaN for other rows; floating (E,)): G84 and G74 by F and S."""
     if not rows.hole.any():
         return repeated(np.nan, len(rows.block)), repeated(False, len(rows.block))

@@ -1,7 +1,7 @@
 """Coordinates that the words of a block are in, and the machine position that the control makes of them.
 
-Under "axes" both are the same. Under "tcp" X, Y, Z are the tip in the work offset fixed to the table, under "tilted" the
-tip in the frame of a plane; rotary words are rotary positions under every law.
+Under "axes" both are the same. Under "tcp" X, Y, Z are the tip in the work offset fixed to the table, under
+"tilted" the tip in the frame of a plane; rotary words are rotary positions under every law.
 """
 
 from __future__ import annotations
@@ -73,7 +73,8 @@ class FrameTable:
         first: dict[tuple[int, float], int] = {}
         keys = [(id(f.control), f.kinematics.tool_length) if f.kinematics is not None else (0, 0.0) for f in frames]
         owner = [first.setdefault(key, k) for k, key in enumerate(keys)]
-        return cls(np.array(owner), frames, np.stack([f.rotation for f in frames]), np.stack([f.origin for f in frames]))
+        return cls(np.array(owner), frames, np.stack([f.rotation for f in frames]),
+                   np.stack([f.origin for f in frames]))
 
     def coordinates(self, number: Ints, position: Floats) -> Floats:
         """(N, J) what the words would say at machine positions (N, J) (mm, degrees) in the frames `number` (N,)."""
@@ -129,8 +130,8 @@ def frame_of(law: WordMeaning, control: Control | None, length: float, position:
              found: list[Diagnostic] | None) -> ExecutionFrame:
     """The frame of a law entered at machine position (J,), with a tool of that length; `at` is file and line.
 
-    A law that the machine cannot have, and rotary axes that do not stand as the control would put them, are errors; None
-    for `found` asks for the frame alone.
+    A law that the machine cannot have, and rotary axes that do not stand as the control would put them, are
+    errors; None for `found` asks for the frame alone.
     """
     checked, (file, line) = found is not None, at
     found = [] if found is None else found
@@ -144,7 +145,8 @@ def frame_of(law: WordMeaning, control: Control | None, length: float, position:
     kin = kin.with_tool(length)
     if law.name == "tcp":
         rotation, origin = entered(control, kin, position / control.unit)
-        off = max(float(np.abs(rotation - np.eye(3)).max()) / DEG, float(np.abs(origin - control.origin).max()))
+        off = max(float(np.abs(rotation - np.eye(3)).max()) / DEG,
+                  float(np.abs(origin - control.origin).max()))
         if control.entry_frame == "either" and off > ENTRY_SLACK:
             found.append(_two_frames(law, control, position, file, line))
         if control.entry_frame != "entry":
@@ -157,7 +159,8 @@ def frame_of(law: WordMeaning, control: Control | None, length: float, position:
     return ExecutionFrame("tilted", control, kin, rotation, control.origin + law.shift)
 
 
-def _wrong_pose(law: WordMeaning, control: Control, kin: Kinematics, q: Floats, file: str, line: int) -> list[Diagnostic]:
+def _wrong_pose(law: WordMeaning, control: Control, kin: Kinematics, q: Floats, file: str,
+                line: int) -> list[Diagnostic]:
     """The rotary positions that the control picks for the plane against those in force."""
     assert law.rotation is not None
     names = control.machine.axis_names
@@ -177,11 +180,12 @@ def _wrong_pose(law: WordMeaning, control: Control, kin: Kinematics, q: Floats, 
 
 
 def entered(control: Control, kin: Kinematics, q: Floats) -> tuple[Floats, Floats]:
-    """(rotation (3, 3), origin (3,) mm) seen from the table of the work offset's frame as it lies in the machine with the
-    tables at zero, where the tables stand as in joints q (J,): of the mode by the tip under the reading "entry".
+    """(rotation (3, 3), origin (3,) mm) seen from the table of the work offset's frame as it lies in the
+    machine with the tables at zero, where the tables stand as in joints q (J,): of the mode by the tip under
+    the reading "entry".
 
-    The slides run along the axes of the machine; the tip is t0(rotaries) + R s as the table sees it, t1 + s as the machine
-    does, t1 being t0 with the tables at zero.
+    The slides run along the axes of the machine; the tip is t0(rotaries) + R s as the table sees it, t1 + s
+    as the machine does, t1 being t0 with the tables at zero.
     """
     at = np.stack([q, q])
     at[:, control.slides] = 0.0
@@ -230,7 +234,8 @@ def _lead(control: Control) -> int:
     return int(tilts.argmax())
 
 
-def _pose_error(law: WordMeaning, control: Control, stands: Floats, picked: Floats, file: str, line: int) -> Diagnostic:
+def _pose_error(law: WordMeaning, control: Control, stands: Floats, picked: Floats, file: str,
+                line: int) -> Diagnostic:
     letters = [control.machine.axis_names[j] for j in control.rotary]
 
     def text(values: Floats) -> str:

@@ -15,8 +15,9 @@ from toolpaths.shapes import arrays
 class Offsets:
     """What the control holds: work offset (J,) in machine coordinates, column of Z, tool lengths by register.
 
-    `control` is needed where a program uses laws of its own; `rises_first`: a canned cycle brings a tool that is below its
-    plane, or below the level where the cycle ends, up before it is over the hole (RS274/NGC, see `cycles.legs`);
+    `control` is needed where a program uses laws of its own; `rises_first`: a canned cycle brings a tool that
+    is below its plane, or below the level where the cycle ends, up before it is over the hole (RS274/NGC, see
+    `cycles.legs`);
     `arc_slack`: mm by which the radius may differ between the ends of an arc.
     """
 

@@ -32,7 +32,8 @@ class BlockPoses:
     kinematics: Callable[[int], Kinematics]
     lengths: dict[int, float]
     before: Floats | None = None
-    _asked: list[tuple[Motion, Ints, BlockMotions]] = field(default_factory=list, init=False, repr=False, compare=False)
+    _asked: list[tuple[Motion, Ints, BlockMotions]] = field(default_factory=list, init=False, repr=False,
+                                                            compare=False)
 
     def _approaches(self, motion: Motion, rows: Ints) -> BlockMotions:
         """Those of the blocks asked for last are kept: the same ones are asked for at several fractions."""
@@ -78,8 +79,8 @@ class BlockPoses:
         return q
 
     def lawful(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
-        """(tip, axis) (K, 3) where the law of the blocks has the tool: on the machine without errors, as the control holds
-        it."""
+        """(tip, axis) (K, 3) where the law of the blocks has the tool: on the machine without errors, as the
+        control holds it."""
         tip, axis = self.nominal(motion, rows, t)
         numbers, other = motion.frame[rows], self._other_pivots(motion, rows)
         if other.any():
@@ -162,7 +163,8 @@ class BlockPoses:
             return kin.forward(position / self.control.unit)
         return kin.forward(self._held(position, offset))
 
-    def _followed(self, motion: Motion, rows: Ints, position: Floats, kin: Kinematics) -> tuple[Floats, Floats]:
+    def _followed(self, motion: Motion, rows: Ints, position: Floats,
+                  kin: Kinematics) -> tuple[Floats, Floats]:
         assert self.before is not None
         near = self.before[rows].copy()
         near[:, :3] -= kin.tool_length * near[:, 3:]
@@ -199,8 +201,8 @@ def _whole(t: float | Floats) -> bool:
 @dataclass(frozen=True)
 @arrays(rows="K", before="K J", end="K J", frame="K", first="K J", last="K J")
 class BlockMotions:
-    """Blocks `rows` (K,) with what of their motion does not depend on the fraction: machine coordinates (K, J) at both ends,
-    and the coordinates of their frames there."""
+    """Blocks `rows` (K,) with what of their motion does not depend on the fraction: machine coordinates (K,
+    J) at both ends, and the coordinates of their frames there."""
 
     motion: Motion
     control: Control

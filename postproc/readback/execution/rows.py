@@ -23,9 +23,9 @@ INCH = 25.4
 class BlockSection:
     """Blocks `first` and on (N), as their words and modal state have them.
 
-    `columns`, `steps` (N, J) are absolute and relative axis words, `relative`, `absolute` (N, 3) centres of arcs from the
-    start and in coordinates, `extra` (N, 7) the words Z, R, Q, P, I, J, K of a cycle, `deep` (N, 3) z, r and turns,
-    `repeats` and `call` (N,) as stated; NaN where a block states none.
+    `columns`, `steps` (N, J) are absolute and relative axis words, `relative`, `absolute` (N, 3) centres of
+    arcs from the start and in coordinates, `extra` (N, 7) the words Z, R, Q, P, I, J, K of a cycle, `deep`
+    (N, 3) z, r and turns, `repeats` and `call` (N,) as stated; NaN where a block states none.
     """
 
     first: int
@@ -71,8 +71,8 @@ class BlockSection:
 @dataclass(frozen=True)
 @arrays(block="R", code="int8: R", end="R J", center="R 3", frame="R", hole="R", feed="R", dwell="R")
 class MotionRows:
-    """R rows of motion: block, code, end (R, J) in machine coordinates, centre (R, 3) in those of the frame, number of the
-    frame; hole, feed (NaN: the F word in force), rest of cycles."""
+    """R rows of motion: block, code, end (R, J) in machine coordinates, centre (R, 3) in those of the frame,
+    number of the frame; hole, feed (NaN: the F word in force), rest of cycles."""
 
     block: Ints
     code: Array

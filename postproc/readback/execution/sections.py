@@ -38,7 +38,8 @@ def run_section(section: BlockSection, frame: ExecutionFrame, number: int, posit
     parts: list[MotionRows] = []
     for first in range(0, len(moving), size):
         part = slice(first, first + size)
-        rows, start = _rows(section.cut(first, first + size), frame, number, start, moving[part], code, offsets, file, found)
+        rows, start = _rows(section.cut(first, first + size), frame, number, start, moving[part], code,
+                            offsets, file, found)
         parts.append(rows)
     rows = MotionRows.joined(parts, len(position))
     _still(rows, position, frame, code.line, file, found)

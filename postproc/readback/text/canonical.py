@@ -1,8 +1,8 @@
 """The canonical text that every dialect is translated into: words in letters and numbers, laws and cycles as objects.
 
-Capitals are absolute axis words, small letters the same words counted from where the block begins; I, J, K are centres
-in the coordinates of the block, i, j, k from its start. G and M numbers are those of NIST RS274/NGC; what NIST has no
-number for has a sign of its own:
+Capitals are absolute axis words, small letters the same words counted from where the block begins; I, J, K
+are centres in the coordinates of the block, i, j, k from its start. G and M numbers are those of NIST
+RS274/NGC; what NIST has no number for has a sign of its own:
 """
 
 from __future__ import annotations
@@ -83,8 +83,8 @@ class WordMeaning:
 
     Attributes:
         name: "axes", "tcp" or "tilted"; code: as the program writes it
-        rotation (3, 3), shift (3,): of a tilted plane; columns are X', Y', Z' seen from the table, shift from the work
-            offset's zero, mm; rotation None: the tool's frame where the rotary axes stand
+        rotation (3, 3), shift (3,): of a tilted plane; columns are X', Y', Z' seen from the table, shift from
+            the work offset's zero, mm; rotation None: the tool's frame where the rotary axes stand
         choice: how the control picks the rotary positions: the nearest, or those with the first tilting axis at + or -
     """
 
@@ -102,8 +102,8 @@ class Drill:
     Attributes:
         plane: where feed begins; bottom; out: where the cycle leaves the tool
         bottoms: of each peck, the last one is `bottom`
-        style: "drill"; "break": between pecks it lifts by `relief`; "peck": out to the plane, rapidly back to `relief`
-            before the last depth; "feed_out": out to the plane at feed
+        style: "drill"; "break": between pecks it lifts by `relief`; "peck": out to the plane, rapidly back to
+            `relief` before the last depth; "feed_out": out to the plane at feed
         relief: mm; dwell: s at the bottom; feed, feed_out: mm/min, NaN: the F word in force
         tap: "rigid" where the control couples feed and spindle, "floating" where a chuck makes up; "" for what does not tap
         pitch: mm per turn of a tap, negative for a left-hand one; NaN: by feed, speed and sense of the spindle
@@ -127,8 +127,8 @@ class Drill:
 class Canonical:
     """B blocks in the order in which the control runs them; words count blocks from 1.
 
-    `line` (B + 1,) is the line that a block stands in; lines of further files count on from those before. `files`: their
-    names, and the lines that stand before each; empty for one file.
+    `line` (B + 1,) is the line that a block stands in; lines of further files count on from those before.
+    `files`: their names, and the lines that stand before each; empty for one file.
     """
 
     words: Words

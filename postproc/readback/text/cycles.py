@@ -24,8 +24,8 @@ def legs(drill: Drill, start: Floats, target: Floats, z: int, first: float | Non
 
     `z` is the column of the tool's axis. `first`: the level where the sequence of cycles began, on controls that leave the
     level of the last hole on the path: where it is below the plane they first go to the plane; from there or lower they
-    travel aslant to where the cycle ends (LinuxCNC 2.9, as its interpreter shows). Others travel at the level where the
-    tool stands.
+    travel aslant to where the cycle ends (LinuxCNC 2.9, as its interpreter shows). Others travel at the level
+    where the tool stands.
     """
     level, result, nothing = float(start[z]), [], float("nan")
     if first is not None:
@@ -80,7 +80,8 @@ def unfit(drill: Drill) -> tuple[str, str] | None:
     return (f"of more than {MOST} pecks", "state a larger peck") if len(drill.bottoms) > MOST else None
 
 
-def pecks(plane: float, bottom: float, first: float, less: float = 0.0, least: float = 0.0) -> tuple[float, ...]:
+def pecks(plane: float, bottom: float, first: float, less: float = 0.0,
+          least: float = 0.0) -> tuple[float, ...]:
     """Depths of pecks below `plane`: `first` mm, then each by `less` mm less, `least` mm at least; the last is `bottom`.
 
     More than MOST end there: `unfit` refuses them.
@@ -128,7 +129,8 @@ class Sticky:
         bottom = plane + z * scale if relative else z * scale + shift
         out = plane if to_plane else max(plane, self.initial)
         if tapered:
-            bottoms = pecks(plane, bottom, first * scale, np.nan_to_num(less) * scale, np.nan_to_num(least) * scale)
+            bottoms = pecks(plane, bottom, first * scale, np.nan_to_num(less) * scale,
+                            np.nan_to_num(least) * scale)
         else:
             bottoms = pecks(plane, bottom, q * scale) if code in (73, 83) else (bottom,)
         rest = dwell if code not in (81, 85) and np.isfinite(dwell) else 0.0

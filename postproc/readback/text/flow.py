@@ -41,7 +41,8 @@ class Structure:
     calls: dict[int, Call] = field(default_factory=dict)
 
 
-def expand(texts: list[ProgramText], structures: list[Structure], file: str) -> tuple[ProgramText, Ints, list[Diagnostic]]:
+def expand(texts: list[ProgramText], structures: list[Structure],
+           file: str) -> tuple[ProgramText, Ints, list[Diagnostic]]:
     """(text whose lines are blocks in running order, line of each block (B + 1,) counted through all files, faults).
 
     The first file holds the main program; the names of all files are one list, the calling file's own come first.

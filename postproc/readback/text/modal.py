@@ -134,8 +134,9 @@ def modal_state(words: Words) -> Modal:
 
 
 def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
-    """Words without codes that the controller file calls passive, and what stands behind them in their blocks: all words of
-    a macro call up to the next G code, of others up to the next code those that are no axis, feed, speed, tool, register."""
+    """Words without codes that the controller file calls passive, and what stands behind them in their
+    blocks: all words of a macro call up to the next G code, of others up to the next code those that are no
+        axis, feed, speed, tool, register."""
     drop = np.zeros(len(words.letter), dtype=bool)
     for code in passive:
         if not code[1:2].isdigit():
@@ -146,7 +147,8 @@ def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
             ends = np.isin(words.letter[k + 1:stop], [ord("G")] if code in MACROS else [ord("G"), ord("M")])
             stop = k + 1 + int(np.flatnonzero(ends)[0]) if ends.any() else stop
             drop[k] = True
-            drop[k + 1:stop] |= True if code in MACROS else np.isin(words.letter[k + 1:stop], _ARGUMENTS[code[0]])
+            drop[k + 1:stop] |= True if code in MACROS else np.isin(words.letter[k + 1:stop],
+                                                                    _ARGUMENTS[code[0]])
     return words.take(~drop)
 
 

@@ -1,7 +1,7 @@
 """Words of modulo axes executed as the control turns them: positions that count every turn in the place of the words.
 
-Fanuc B-63534EN 20.2 (ROA, RAB, 1260); LinuxCNC, INI file, WRAPPED_ROTARY; Siemens Programming Manual Fundamentals, DC, ACP,
-ACN; Heidenhain, M126 and M127. Before the first word of an axis the machine stands at home.
+Fanuc B-63534EN 20.2 (ROA, RAB, 1260); LinuxCNC, INI file, WRAPPED_ROTARY; Siemens Programming Manual
+Fundamentals, DC, ACP, ACN; Heidenhain, M126 and M127. Before the first word of an axis the machine stands at home.
 """
 
 from __future__ import annotations
@@ -100,7 +100,8 @@ def _turn(step: Floats) -> Floats:
     return np.asarray(np.where((result > TURN - LEAST) | (result < LEAST), 0.0, result))
 
 
-def _faults(axis: _Axis, rule: Array, half: Bools, letter: str, roll: Rollover, line: Ints, file: str) -> list[Diagnostic]:
+def _faults(axis: _Axis, rule: Array, half: Bools, letter: str, roll: Rollover, line: Ints,
+            file: str) -> list[Diagnostic]:
     """Words that the control would refuse, or whose direction nothing says."""
     stated = ~axis.relative
     most = TURN + LEAST if roll.whole else TURN - LEAST

@@ -112,7 +112,8 @@ def delta_truth(seed: int) -> tuple[ErrorModel, ErrorModel]:
     frame = rod_frame(kin)  # type: ignore[arg-type]
     zero = RodErrors.none(kin.axis_names, rod_names(frame, kin.axis_names))
     rng = np.random.default_rng(seed)
-    values = np.where([".rail." in n or n.endswith(".length") for n in zero.names], rng.normal(size=60) * 0.03, 0.0)
+    values = np.where([".rail." in n or n.endswith(".length") for n in zero.names],
+                      rng.normal(size=60) * 0.03, 0.0)
     return ErrorModel(rods=zero.with_values(values)), ErrorModel(rods=zero)
 
 
@@ -123,7 +124,8 @@ def test_slides_of_a_delta_from_measured_poses_and_what_that_gains() -> None:
     q, rng = joints(kin, 120, 5), np.random.default_rng(6)
     w = truth.on(kin).coordinates(q)
     read = truth.on(kin).place(w)[0] - w
-    wanted = ("X.rail", "Y.rail", "Z.rail", "X1.length", "Y1.length", "Z1.length", "X2.length", "Y2.length", "Z2.length")
+    wanted = ("X.rail", "Y.rail", "Z.rail", "X1.length", "Y1.length", "Z1.length", "X2.length", "Y2.length",
+              "Z2.length")
     measured = Measurements("position", q, read + 5e-4 * rng.normal(size=read.shape), 5e-4, zeroed=False)
     found = fit(start, kin, measured, wanted)
     assert found.result.converged

@@ -125,7 +125,7 @@ def test_groups_that_cannot_be_distinguished() -> None:
     assert fixed.supported and fixed.values == pytest.approx([2.0, 0.0, 1.0, 0.0])
 
 
-# ---- mounting ------------------------------------------------------------------------------------------------------
+# ---- mounting ----------------------------------------------------------------------------------------------
 
 BENCH = Bench(12, 80.0, 120.0, np.array([15.0, -8.0, 0.0]))
 
@@ -186,7 +186,7 @@ def test_all_six_errors_from_reversal_with_mounting_and_indexer() -> None:
         fit_rotary(BENCH, read, sigma, 6)
 
 
-# ---- all six, on the axis where it is ------------------------------------------------------------------------------
+# ---- all six, on the axis where it is ----------------------------------------------------------------------
 
 FRAMES = {("mikron-ucp710", "C"): ([1, 0, 0], [0, -1, 0], [0, 0, -1]),
           ("mikron-ucp710", "A"): ([0, 1, 0], [0, 0, -1], [-1, 0, 0]),

@@ -111,7 +111,8 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("toml", "csv", "code", "file", "line", "word"), [b[1:] for b in BAD], ids=[b[0] for b in BAD])
+@pytest.mark.parametrize(("toml", "csv", "code", "file", "line", "word"), [b[1:] for b in BAD],
+                         ids=[b[0] for b in BAD])
 def test_what_is_wrong_is_reported(tmp_path: Path, toml: str, csv: bytes, code: str, file: str, line: int,
                                    word: str) -> None:
     (tmp_path / "e.toml").write_text(toml)
@@ -185,7 +186,8 @@ def test_legs_of_a_machine_on_rods_are_no_axes(tmp_path: Path) -> None:
 def test_a_large_lattice_in_any_order_is_read(tmp_path: Path) -> None:
     mesh = np.stack([m.ravel() for m in np.meshgrid(*(np.linspace(0, 300, 31),) * 3, indexing="ij")], axis=1)
     rows = np.random.default_rng(0).permutation(np.column_stack([mesh, 0.1 * mesh]))
-    np.savetxt(tmp_path / "x.csv", rows, "%.6g", ",", header="X [mm],Y [mm],Z [mm],dx [um],dy [um],dz [um]", comments="")
+    np.savetxt(tmp_path / "x.csv", rows, "%.6g", ",", header="X [mm],Y [mm],Z [mm],dx [um],dy [um],dz [um]",
+               comments="")
     table, _ = read_csv(tmp_path / "x.csv")
     assert table is not None and len(table) == 31**3
     found, faults = map_from_csv(table)

@@ -1,5 +1,5 @@
-"""Exchange of error models: any curves as tables with their covariance, LinuxCNC's files both directions, tables of
-others."""
+"""Exchange of error models: any curves as tables with their covariance, LinuxCNC's files both directions,
+tables of others."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from toolpaths.units import DEG
 SAMPLES = Path(__file__).parents[3] / "samples" / "errors"
 
 
-# ---- tables ----------------------------------------------------------------------------------------------------------
+# ---- tables ------------------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "nutating-head", "h4a-c-table"])
 def test_curves_become_tables_that_lose_what_is_reported_and_keep_the_uncertainty(name: str) -> None:
@@ -110,7 +110,7 @@ def test_what_cannot_be_a_table_is_refused() -> None:
         to_screws(flat, machine, {"X": 1.0}, 1.0, 1.0)
 
 
-# ---- LinuxCNC ----------------------------------------------------------------------------------------------------------
+# ---- LinuxCNC ----------------------------------------------------------------------------------------------
 
 def as_linuxcnc(machine: Machine, texts: dict[str, str], q: Floats, approach: float) -> Floats:
     """Motor positions of commanded joints q, as LinuxCNC makes them: plus nominal less actual, linear between rows."""
@@ -133,7 +133,8 @@ def test_linuxcnc_with_the_files_leaves_the_rest(name: str, approach: float) -> 
     kin = machine.kinematics
     assert isinstance(kin, Serial)
     full = model(kin, 3)
-    bidirectional = TableCurve(np.linspace(-900.0, 900.0, 9), np.linspace(-0.02, 0.03, 18) ** 2 * 30.0, both=True)
+    bidirectional = TableCurve(np.linspace(-900.0, 900.0, 9),
+                               np.linspace(-0.02, 0.03, 18) ** 2 * 30.0, both=True)
     rest = tuple(c for c in full.axes.components if str(c.name) != "EXX")
     full = replace(full, axes=replace(full.axes, components=(*rest, component("EXX", bidirectional))))
     screws = to_screws(full, machine, {}, 1e-4, 0.02 * ARCSEC)
@@ -150,7 +151,8 @@ def test_linuxcnc_with_the_files_leaves_the_rest(name: str, approach: float) -> 
     assert np.abs(axis - wanted[1]).max() < 2e-7
 
 
-@pytest.mark.parametrize(("angle", "step", "turns"), [(0.1, 0.0, 2.0), (0.1, 4.0, 1.0), (0.1, 2.0, 0.5), (0.003, 0.0, 1.0)])
+@pytest.mark.parametrize(("angle", "step", "turns"),
+                         [(0.1, 0.0, 2.0), (0.1, 4.0, 1.0), (0.1, 2.0, 0.5), (0.003, 0.0, 1.0)])
 def test_an_axis_that_goes_round_has_rows_over_as_many_turns_as_there_are_rows(angle: float, step: float,
                                                                                turns: float) -> None:
     machine = machines.load("mikron-ucp710")
@@ -226,7 +228,7 @@ def test_ini_lines_name_the_joint() -> None:
 STEPS = {"X": 200.0, "Y": 200.0, "Z": 200.0, "A": 90.0 * DEG, "C": 60.0 * DEG}
 
 
-# ---- tables of others ------------------------------------------------------------------------------------------------
+# ---- tables of others --------------------------------------------------------------------------------------
 
 def test_tables_per_axis_come_back_with_location_and_covariance(tmp_path: Path) -> None:
     machine = machines.load("mikron-ucp710")
@@ -368,7 +370,8 @@ def test_faults_of_screw_files(tmp_path: Path, text: str, code: str) -> None:
     assert found is None and [d.code for d in faults] == [code] and faults[0].hint and faults[0].file.endswith("x.comp")
     none, faults = read_sources([f"B={tmp_path / 'x.comp'}"], machines.load("mill-3axis"), ImportOptions())
     assert none is None and faults[0].code == "error-model.axis"
-    leaning, faults = read_sources([f"B={tmp_path / 'x.comp'}"], machines.load("nutating-head"), ImportOptions())
+    leaning, faults = read_sources([f"B={tmp_path / 'x.comp'}"], machines.load("nutating-head"),
+                                   ImportOptions())
     assert leaning is None and "B of nutating-head leans" in faults[0].message
     rods, faults = read_sources([f"X={tmp_path / 'x.comp'}"], machines.load("uranesx"), ImportOptions())
     assert rods is None and faults[0].code == "error-model.axis" and "it has none" in faults[0].hint

@@ -42,7 +42,8 @@ def test_what_a_model_says_of_its_uncertainty_is_seen(drawn: tuple[ErrorModel, b
     assert svg.count(b"<image") > bare.count(b"<image") == 4  # sections and their scales
 
 
-def test_an_arrow_is_drawn_with_its_length_and_no_panel_is_empty(drawn: tuple[ErrorModel, bytes], tmp_path: Path) -> None:
+def test_an_arrow_is_drawn_with_its_length_and_no_panel_is_empty(drawn: tuple[ErrorModel, bytes],
+                                                                 tmp_path: Path) -> None:
     machine = machines.load("mikron-ucp710")
 
     def seen(svg: bytes) -> tuple[list[str], int]:
@@ -59,7 +60,8 @@ def test_an_arrow_is_drawn_with_its_length_and_no_panel_is_empty(drawn: tuple[Er
     assert of_file() == ([], 1)
 
 
-@pytest.mark.parametrize(("value", "part"), [(9.99, 5.0), (10.0, 10.0), (0.3, 0.2), (0.0, 0.0), (float("nan"), 0.0)])
+@pytest.mark.parametrize(("value", "part"),
+                         [(9.99, 5.0), (10.0, 10.0), (0.3, 0.2), (0.0, 0.0), (float("nan"), 0.0)])
 def test_arrows_that_are_reported_are_round(value: float, part: float) -> None:
     assert _round_part(value) == pytest.approx(part)
 
@@ -78,7 +80,8 @@ def test_sections_go_over_the_ends_of_what_is_looked_at() -> None:
         q, one, two = section(machine, *ranges(model, machine), 0, 2, 5)
         tip, _ = machine.kinematics.forward(q)
         at = (tip - tip[0]).reshape(5, 5, 3)
-        assert q.shape == (25, len(machine.axis_names)) and np.allclose(np.abs(at[0, :, 0]), np.abs(one - one[0]), atol=1e-9)
+        assert q.shape == (25, len(machine.axis_names)) and np.allclose(np.abs(at[0, :, 0]),
+                                                                        np.abs(one - one[0]), atol=1e-9)
         assert np.allclose(at[:, 0, 2], two - two[0], atol=1e-9)
 
 

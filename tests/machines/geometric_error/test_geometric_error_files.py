@@ -140,7 +140,8 @@ TABLE_FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "code", "line"), [f[1:] for f in TABLE_FAULTS], ids=[f[0] for f in TABLE_FAULTS])
+@pytest.mark.parametrize(("old", "new", "code", "line"), [f[1:] for f in TABLE_FAULTS],
+                         ids=[f[0] for f in TABLE_FAULTS])
 def test_faults_of_tables(tmp_path: Path, old: str, new: str, code: str, line: int | None) -> None:
     assert old in TABLE
     found, diagnostics = load_checked(put(tmp_path, GOOD, TABLE.replace(old, new, 1)), mikron())
@@ -235,12 +236,13 @@ def test_the_schema_knows_the_tables() -> None:
             "base"} <= set(error_model_schema()["properties"])  # type: ignore[call-overload]
 
 
-# ---- LinuxCNC ------------------------------------------------------------------------------------------------------
+# ---- LinuxCNC ----------------------------------------------------------------------------------------------
 
 def test_linuxcnc_table_round_trip_both_kinds() -> None:
     name = parse("EXX")
     assert name is not None
-    table = TableCurve(np.array([-100.0, 0.0, 250.0]), np.array([0.01, 0.0, -0.02, 0.013, 0.001, -0.03]), both=True)
+    table = TableCurve(np.array([-100.0, 0.0, 250.0]),
+                       np.array([0.01, 0.0, -0.02, 0.013, 0.001, -0.03]), both=True)
     text = to_linuxcnc(name, table)
     assert text.splitlines()[0] == "-100.000000000 -99.990000000 -99.987000000"
     back, _ = from_linuxcnc(text, name)
@@ -278,7 +280,7 @@ def empty(letters: tuple[str, ...], nodes: tuple[Floats, ...], **how: object) ->
     return ErrorMap(letters, nodes, np.zeros((*map(len, nodes), 6)), **how)  # type: ignore[arg-type]
 
 
-# ---- maps ----------------------------------------------------------------------------------------------------------
+# ---- maps --------------------------------------------------------------------------------------------------
 
 def test_a_map_of_a_mill_loses_little_and_less_when_it_is_finer() -> None:
     kin = machines.load("mill-3axis").kinematics
@@ -299,7 +301,8 @@ def test_a_map_holds_at_its_nodes_with_any_tool_and_reads_back(tmp_path: Path) -
     kin = machine.kinematics
     full = model(kin, 5)
     actual, nominal = full.on(kin), full.zero().on(kin)
-    nodes = (np.array([-100.0, 50.0]), np.array([0.0, 10.0, 30.0]), np.linspace(-0.5, 0.5, 3), np.array([0.1, 1.0]))
+    nodes = (np.array([-100.0, 50.0]), np.array([0.0, 10.0, 30.0]), np.linspace(-0.5, 0.5, 3),
+             np.array([0.1, 1.0]))
     made = map_of(actual, nominal, empty(("X", "Z", "A", "C"), nodes), np.array([0.0, 20.0, 0.0, 0.0, 0.0]))
     back = load(save(ErrorModel(map=made, name="m"), tmp_path)[0], machine)
     assert back.map is not None and back.map.table == pytest.approx(made.table, abs=1e-11)

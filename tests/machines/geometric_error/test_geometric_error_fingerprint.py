@@ -95,7 +95,8 @@ def test_whatever_is_corrected_otherwise_has_another(text: str, table: str, tmp_
 
 
 @pytest.mark.parametrize("sample", SAMPLES, ids=lambda s: s[1])
-def test_a_model_written_and_read_keeps_it_and_any_value_counts(sample: tuple[str, str], tmp_path: Path) -> None:
+def test_a_model_written_and_read_keeps_it_and_any_value_counts(sample: tuple[str, str],
+                                                                tmp_path: Path) -> None:
     machine = machines.load(sample[1])
     model = load(Path("samples/errors") / sample[0], machine)
     save(replace(model, name="copy"), tmp_path)

@@ -33,7 +33,8 @@ def off(found: ErrorModel, machine: str, letter: str, angle: float) -> tuple[Flo
 
 @pytest.mark.parametrize(("machine", "letter", "bed"), [("mikron-ucp710", "C", "moving"), ("mikron-ucp710", "A", "moving"),
                                                         ("fork-head-ab", "B", "fixed"), ("nutating-head", "C", "fixed")])
-def test_the_probe_that_stands_on_the_bed_is_the_default(tmp_path: Path, machine: str, letter: str, bed: str) -> None:
+def test_the_probe_that_stands_on_the_bed_is_the_default(tmp_path: Path, machine: str, letter: str,
+                                                         bed: str) -> None:
     """A radial error along y (C, B: x) of the bed; a table's turns with the part, a head's does not."""
     direction = "Y" if letter == "A" else "X"
     toml = f"[components.E{direction}{letter}]\nmean = 10.0\n"
@@ -49,7 +50,8 @@ def test_a_constant_of_one_frame_is_a_wave_of_the_other(tmp_path: Path) -> None:
     """e_moving = R(q)^T e_fixed with the turn R of the axis: what a reader of another convention converts by."""
     fixed = model(tmp_path, "mikron-ucp710", '[components.EXC]\ncosine = [10.0]\n[components.EYC]\nsine = [10.0]\n'
                                              '[reference.C]\nframe = "fixed"\n')
-    moving = model(tmp_path, "mikron-ucp710", '[components.EXC]\nmean = 10.0\n[reference.C]\nframe = "moving"\n')
+    moving = model(tmp_path, "mikron-ucp710",
+                   '[components.EXC]\nmean = 10.0\n[reference.C]\nframe = "moving"\n')
     for angle in (0.0, 0.4, 2.0, -3.0):
         one, two = (off(m, "mikron-ucp710", "C", angle)[0] for m in (fixed, moving))
         np.testing.assert_allclose(one, two, atol=1e-12)

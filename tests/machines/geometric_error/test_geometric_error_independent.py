@@ -46,7 +46,8 @@ class Case:
         """(N, 6) tip and axis."""
         return np.concatenate(self.kin.forward(self.q), axis=1)
 
-    def poses(self, q: Floats, approach: Floats | None = None, errors: Errors | None = None) -> tuple[Floats, Floats]:
+    def poses(self, q: Floats, approach: Floats | None = None,
+              errors: Errors | None = None) -> tuple[Floats, Floats]:
         """(tip, axis) by the second implementation."""
         known = Errors(self.file) if errors is None else errors
         approaches = np.zeros(q.shape) if approach is None else approach

@@ -45,7 +45,8 @@ def test_lost_motion_of_axes() -> None:
     names = ("X", "Y", "Z")
     assert errors.bidirectional(names) == [0, 1]
     q = np.array([[100.0, -100.0, 0.0], [0.0, 100.0, 0.0]])
-    np.testing.assert_allclose(errors.gaps(names, q, [0, 1, 2]), [[0.002, 0.004, GRAIN[0]], [0.003, 0.002, GRAIN[0]]])
+    np.testing.assert_allclose(errors.gaps(names, q, [0, 1, 2]),
+                               [[0.002, 0.004, GRAIN[0]], [0.003, 0.002, GRAIN[0]]])
 
 
 def test_lost_motion_of_an_axis_named_after_another() -> None:

@@ -39,7 +39,8 @@ def loaded(folder: Path, table: str, keys: str = "") -> tuple[ErrorModel | None,
 def test_a_coordinate_of_the_point_that_is_outside_counts_for_the_slides_that_move_it() -> None:
     ends = (np.array([-100.0, 100.0]),) * 3
     trunnion = "mikron-ucp710"
-    for name, turn, wanted in (("mill-3axis", [], "Z"), (trunnion, [0.0, 0.3], "Z"), (trunnion, [0.5, 0.3], "YZ")):
+    for name, turn, wanted in (("mill-3axis", [], "Z"), (trunnion, [0.0, 0.3], "Z"),
+                               (trunnion, [0.5, 0.3], "YZ")):
         machine = machines.load(name)
         actual = ErrorModel(map=random_map(("x", "y", "z"), ends)).on(machine.kinematics)
         assert isinstance(actual, ActualByMap)
@@ -54,7 +55,7 @@ def test_nodes_of_one_place_ask_for_no_closer_look() -> None:
     assert given.detail(("X", "Y", "Z", "C")) == pytest.approx([0.1, 0.1, 0.1, 0.5])
 
 
-# ---- round about -----------------------------------------------------------------------------------------------------
+# ---- round about -------------------------------------------------------------------------------------------
 
 ROUND = "C [deg],dx [um],dy [um],dz [um]\n0,1,2,3\n90,5,2,3\n200,9,2,3\n360,1,2,3\n"
 
@@ -85,12 +86,13 @@ def test_a_map_goes_round_a_rotary_axis(tmp_path: Path) -> None:
     ("", "", "zero = { X = 1.0 }", "error-map.zero", "the map has C"),
     ("", "", "zero = { C = 400.0 }", "error-map.zero", "outside"),
     ("", "", 'directions = "bed"', "file.range", "directions")])
-def test_faults_of_what_a_map_states(tmp_path: Path, old: str, new: str, keys: str, code: str, word: str) -> None:
+def test_faults_of_what_a_map_states(tmp_path: Path, old: str, new: str, keys: str, code: str,
+                                     word: str) -> None:
     found, faults = loaded(tmp_path, ROUND.replace(old, new, 1), keys)
     assert found is None and faults[0].code == code and word in str(faults[0]), faults
 
 
-# ---- what it states --------------------------------------------------------------------------------------------------
+# ---- what it states ----------------------------------------------------------------------------------------
 
 def test_zero_and_sign_of_a_measured_map(tmp_path: Path) -> None:
     table = "X [mm],Y [mm],dx [um],dy [um],dz [um]\n0,0,1,2,3\n10,0,2,2,3\n0,5,1,2,3\n10,5,1,2,4\n"
@@ -166,7 +168,7 @@ def test_sensitivity_is_the_derivative_by_every_value(bed: tuple[str, ...]) -> N
         assert (up[1] - down[1]) / (2 * step) == pytest.approx(np.cross(columns[:, 3:, k], axis), abs=1e-8)
 
 
-# ---- made from a model ---------------------------------------------------------------------------------------------
+# ---- made from a model -------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize(("name", "letters"), [("mikron-ucp710", "XYZ"), ("mikron-ucp710", "xyz"), ("head-table", "xzC"),
                                                ("uranesx", "xyz"), ("h4a-c-table", "xyzC"), ("h4a-spindle-axis", "xyz")])
@@ -228,7 +230,7 @@ def test_a_linear_error_needs_two_nodes() -> None:
     assert made.table.shape == (2, 2, 2, 6) and loss.tip_worst < 1e-5
 
 
-# ---- rows -----------------------------------------------------------------------------------------------------------
+# ---- rows --------------------------------------------------------------------------------------------------
 
 def test_scattered_rows_are_reported_before_memory_is_asked_for(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
@@ -263,7 +265,8 @@ def test_the_uncertainty_of_more_parameters_than_are_held_is_left_out_and_report
     assert some is not None and some.covariance is not None and not faults
     assert some.covariance[0, [0, 7]] == pytest.approx([9e-6, 1e-6]) and np.count_nonzero(some.covariance) == 4
     monkeypatch.setattr("machines.geometric_error.files.covariance.MOST", 11)
-    for keys, code in (("[sigma]\nnode = 0.5\n", "error-model.sigma"), (covariance, "error-model.covariance")):
+    for keys, code in (("[sigma]\nnode = 0.5\n", "error-model.sigma"),
+                       (covariance, "error-model.covariance")):
         found, faults = loaded(tmp_path, table, keys)
         assert found is not None and found.map is not None and found.covariance is None
         assert [(d.code, d.severity, d.lines) for d in faults] == [(code, Severity.WARNING, (3,))]

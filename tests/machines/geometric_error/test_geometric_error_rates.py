@@ -77,8 +77,8 @@ def with_two_directions(kin: Kinematics, letters: Sequence[str] = ()) -> SerialE
 
 
 def worst_share(kin: Kinematics, model: ErrorModel, sizes: Sequence[float] = (1e-3, 1.0, 30.0)) -> float:
-    """The largest difference by its bound, along straight steps of random length from random poses, with approach directions
-    that change; infinite where there is no bound."""
+    """The largest difference by its bound, along straight steps of random length from random poses, with
+    approach directions that change; infinite where there is no bound."""
     actual, q, worst = model.on(kin), joints(kin, STEPS, 7), 0.0
     rng, rotary = np.random.default_rng(9), np.array(kin.rotary)
     for size in sizes:
@@ -169,7 +169,8 @@ def test_no_error_of_a_map_changes_faster(name: str) -> None:
         assert worst_share(kin, ErrorModel(map=ErrorMap(letters, nodes, table, **how))) <= BOUND  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("text", "letter", "turning"), [("EXX", "X", False), ("EBX", "X", True), ("EAC", "C", True)])
+@pytest.mark.parametrize(("text", "letter", "turning"),
+                         [("EXX", "X", False), ("EBX", "X", True), ("EAC", "C", True)])
 def test_a_single_error_reaches_its_bound(text: str, letter: str, turning: bool) -> None:
     """Nothing else moves the tip: the bound is the slope itself, times the arm where it turns."""
     kin = kinematics("mikron-ucp710")

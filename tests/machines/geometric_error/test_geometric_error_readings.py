@@ -63,7 +63,8 @@ SAME = {
 
 
 @pytest.mark.parametrize("files", SAME.values(), ids=SAME)
-def test_readings_in_any_layout_are_the_same_means_and_uncertainty(files: dict[str, str], tmp_path: Path) -> None:
+def test_readings_in_any_layout_are_the_same_means_and_uncertainty(files: dict[str, str],
+                                                                   tmp_path: Path) -> None:
     model, noted = read(tmp_path, files, ImportOptions(average=True))
     assert means(model) == [2.0, 12.0, 6.0, 16.0]
     up, down = pooled(SPREAD[:2]), pooled(SPREAD[2:])
@@ -93,13 +94,15 @@ TARGETS = "target [mm];run 1+ [um];run 1- [um];run 2+ [um];run 2- [um]\n0;1;5;3;
     ("target", "Position"), ("target", "Y"), ("run ", ""), ("run ", "Error "), ("run ", "EYY"),
     ("+", "\u2191"), ("0;1;5;3;7\n100;11;14;13;18\n", "100;11;14;13;18\n0;1;5;3;7\n")])
 def test_targets_and_runs_are_of_the_component_that_is_named(old: str, new: str, tmp_path: Path) -> None:
-    model, noted = read(tmp_path, {"laser.csv": TARGETS.replace(old, new)}, ImportOptions(average=True), "EYY=laser.csv")
+    model, noted = read(tmp_path, {"laser.csv": TARGETS.replace(old, new)}, ImportOptions(average=True),
+                        "EYY=laser.csv")
     assert means(model) == [2.0, 12.0, 6.0, 16.0], noted
     assert model is not None and [str(c.name) for c in model.axes.components] == ["EYY"]
 
 
 def test_one_run_of_a_component_needs_no_average(tmp_path: Path) -> None:
-    model, noted = read(tmp_path, {"laser.csv": "target [mm],error [um]\n0,1\n100,2\n"}, ImportOptions(), "EYX=laser.csv")
+    model, noted = read(tmp_path, {"laser.csv": "target [mm],error [um]\n0,1\n100,2\n"}, ImportOptions(),
+                        "EYX=laser.csv")
     assert means(model) == [1.0, 2.0] and not noted
     assert model is not None and str(model.axes.components[0].name) == "EYX"
 
@@ -186,7 +189,8 @@ FAULTS = [
      "EA0Y")]
 
 
-@pytest.mark.parametrize(("files", "how", "code", "place", "word"), [f[1:] for f in FAULTS], ids=[f[0] for f in FAULTS])
+@pytest.mark.parametrize(("files", "how", "code", "place", "word"), [f[1:] for f in FAULTS],
+                         ids=[f[0] for f in FAULTS])
 def test_what_is_wrong_with_readings(files: dict[str, str], how: ImportOptions, code: str, place: str, word: str,
                                      tmp_path: Path) -> None:
     model, faults = read(tmp_path, files, how)
@@ -207,15 +211,18 @@ def test_what_is_wrong_with_readings(files: dict[str, str], how: ImportOptions, 
     ("EYY=laser.csv", "target", "run 7+", "error-import.column", "no column holds positions")])
 def test_what_is_wrong_with_the_columns_of_a_component(source: str, old: str, new: str, code: str, word: str,
                                                        tmp_path: Path) -> None:
-    model, faults = read(tmp_path, {"laser.csv": TARGETS.replace(old, new)}, ImportOptions(average=True), source)
+    model, faults = read(tmp_path, {"laser.csv": TARGETS.replace(old, new)},
+                         ImportOptions(average=True), source)
     assert model is None
     assert faults[0].code == code and word in str(faults[0])
 
 
 @pytest.mark.parametrize(("unit", "large", "severity"), [
     ("mm", False, "ERROR"), ("mm", True, "WARNING"), ("m", True, "ERROR"), ("um", False, ""), ("um", True, "")])
-def test_a_wrong_unit_is_noticed_when_it_comes_in(unit: str, large: bool, severity: str, tmp_path: Path) -> None:
-    model, noted = read(tmp_path, {"a.csv": f"X [mm],EXX [{unit}]\n-500,0\n500,2.5\n"}, ImportOptions(large=large))
+def test_a_wrong_unit_is_noticed_when_it_comes_in(unit: str, large: bool, severity: str,
+                                                  tmp_path: Path) -> None:
+    model, noted = read(tmp_path, {"a.csv": f"X [mm],EXX [{unit}]\n-500,0\n500,2.5\n"},
+                        ImportOptions(large=large))
     assert (model is None) == (severity == "ERROR")
     assert [(d.code, d.severity.name) for d in noted] == ([("error-model.large", severity)] if severity else [])
     assert model is None or model.large == large

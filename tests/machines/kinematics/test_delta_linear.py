@@ -40,7 +40,8 @@ def test_forward_of_inverse_is_identity_over_the_workspace(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_every_choice_of_roots_is_a_pose_of_the_machine(name: str) -> None:
     kinematics = delta(name).with_tool(40.0)
-    every = LinearDelta(kinematics.legs, kinematics.platform, kinematics.workspace, tool_length=40.0, all_roots=True)
+    every = LinearDelta(kinematics.legs, kinematics.platform, kinematics.workspace, tool_length=40.0,
+                        all_roots=True)
     tip = poses(kinematics, 2000)
     q = every.inverse(tip, up(len(tip)))
     assert q.shape == (8, len(tip), 3) and every.branches == 8

@@ -228,7 +228,7 @@ def test_v4_times_the_platform_is_the_full_constraint_matrix() -> None:
     np.testing.assert_allclose(np.abs(full / product), 1.0, rtol=1e-9)
 
 
-# ---- machine files that must be refused -----------------------------------------------------------------------------
+# ---- machine files that must be refused --------------------------------------------------------------------
 
 def changed(tmp_path: Path, text: str) -> list[Diagnostic]:
     file = tmp_path / "bad.toml"

@@ -5,8 +5,8 @@ import pytest
 
 import machines
 
-# LinuxCNC 2.9.0~pre1, motion simulated with its own modules at standstill: programmed tip (G43, tool 75.5 mm long)
-# and joints X Y Z, A or B, C in mm and degrees; pins: offsets 20 and 10, rotation point 5, -3, 7.
+# LinuxCNC 2.9.0~pre1, motion simulated with its own modules at standstill: programmed tip (G43, tool 75.5 mm
+# long) and joints X Y Z, A or B, C in mm and degrees; pins: offsets 20 and 10, rotation point 5, -3, 7.
 XYZAC = [
     (-124.30525, -78.956848, 90.38234), (79.319416618, 147.114106293, 67.780148571, -44.40412, 209.861002),
     (24.648611, -121.761407, -20.061918), (-92.693072597, -7.455885437, -2.025793008, 53.18647, -63.6436),

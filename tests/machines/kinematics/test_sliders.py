@@ -19,7 +19,8 @@ def test_rods_keep_their_length_with_every_root() -> None:
     assert q.shape == (16, 500, 4)
     for branch in q:
         rods = joints - legs.carriages(branch)
-        np.testing.assert_allclose(np.linalg.norm(rods, axis=2), np.broadcast_to(legs.lengths, (500, 4)), atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(rods, axis=2),
+                                   np.broadcast_to(legs.lengths, (500, 4)), atol=1e-9)
 
 
 def test_own_roots_come_first_and_changed_ones_in_binary_order() -> None:

@@ -97,7 +97,8 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "change", "code", "line"), [f[1:] for f in FAULTS], ids=[f[0] for f in FAULTS])
+@pytest.mark.parametrize(("name", "change", "code", "line"), [f[1:] for f in FAULTS],
+                         ids=[f[0] for f in FAULTS])
 def test_faults_are_named_and_nothing_is_written(folder: Path, name: str, change: tuple[str, str] | None, code: str,
                                                  line: int | None) -> None:
     text = (folder / name).read_text()

@@ -46,7 +46,7 @@ def noted(folder: Path, source: str, code: int = 0) -> tuple[str, str]:
     return done.stdout, done.stderr
 
 
-# ---- README and schema -----------------------------------------------------------------------------------------
+# ---- README and schema -------------------------------------------------------------------------------------
 
 def test_every_command_of_the_readme_runs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
@@ -85,7 +85,7 @@ def test_readme_and_schema_say_what_every_column_is() -> None:
     assert all(field.description for field in MeasurementModel.model_fields.values())
 
 
-# ---- the account ---------------------------------------------------------------------------------------------------------
+# ---- the account -------------------------------------------------------------------------------------------
 
 def test_only_what_was_asked_for_is_listed_with_as_many_digits_as_are_known(folder: Path) -> None:
     """Three of four parameters of the start; the ball and the bar as they were simulated."""
@@ -124,7 +124,8 @@ def test_what_is_not_known_is_said_to_be_so(folder: Path) -> None:
     assert last.startswith("not known, 0 in the model: EXC.mean, EXC.cos1, EXC.sin1, ") and "EZC.cos1" not in last
     parameters = json.loads((folder / "f.json").read_text())["parameters"]
     assert parameters["EXC.cos1"]["sigma"] is None and parameters["EZC.cos2"]["sigma"] > 0.0
-    for name, value in (("EZC.cos2", 1.5), ("EZC.sin2", -0.5), ("EAC.cos2", 1.0), ("ECC.cos1", 2.0), ("ECC.sin1", 4.0)):
+    for name, value in (("EZC.cos2", 1.5), ("EZC.sin2", -0.5), ("EAC.cos2", 1.0), ("ECC.cos1", 2.0),
+                        ("ECC.sin1", 4.0)):
         p = parameters[name]
         assert abs(p["value"] - value) < 4.0 * p["sigma"], name
 
@@ -150,7 +151,7 @@ def test_an_infinite_condition_number_is_called_so() -> None:
         "weighted residual 1.000e+05 before, 5.000 with nothing found of the machine, 0.9939 after"]
 
 
-# ---- names and columns ---------------------------------------------------------------------------------------------------
+# ---- names and columns -------------------------------------------------------------------------------------
 
 def test_a_wrong_name_is_answered_with_those_near_it(folder: Path) -> None:
     (folder / "screw-start.toml").write_text((folder / "screw-start.toml").read_text()
@@ -174,8 +175,8 @@ def test_values_that_are_not_reported_are_named_once_and_shortly(folder: Path) -
 
 
 def test_readings_from_one_side_are_off_unless_the_table_says_so(folder: Path) -> None:
-    """X always forwards: 3 um of lost motion show as 1.5 um of the place of C, and not where the approach directions are
-    reported."""
+    """X always forwards: 3 um of lost motion show as 1.5 um of the place of C, and not where the approach
+    directions are reported."""
     (folder / "start.toml").write_text('base = "screw-truth.toml"\n[location]\nEX0C = 0.0\nEY0C = 0.0\n')
     (folder / "probe.toml").write_text((folder / "probe.toml").read_text().replace("EC0Y", "EX0C", 1))
     machine = machines.load("mikron-ucp710")

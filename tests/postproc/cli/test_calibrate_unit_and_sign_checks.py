@@ -173,7 +173,8 @@ def test_what_is_large_is_taken_where_the_file_says_so(folder: Path) -> None:
     assert "large = true" not in (folder / "probe-m.toml").read_text()
 
 
-@pytest.mark.parametrize(("kind", "column"), [("reversal", "reading"), ("laser", "reading"), ("ball_bar", "distance")])
+@pytest.mark.parametrize(("kind", "column"),
+                         [("reversal", "reading"), ("laser", "reading"), ("ball_bar", "distance")])
 def test_more_noise_than_stated_is_refused_and_taken_where_it_is_asked_for(kind: str, column: str, folder: Path) -> None:
     """The hint is followed; the model's covariance grows by what is left, and its file says so."""
     rng, table = np.random.default_rng(5), folder / f"{kind}.csv"
@@ -195,8 +196,8 @@ def test_more_noise_than_stated_is_refused_and_taken_where_it_is_asked_for(kind:
 
 
 def test_uncertainty_that_is_stated_as_it_is_makes_a_rough_fit_good(folder: Path) -> None:
-    """Too little explained is refused at the stated uncertainty, and taken at the true one; the uncertainty found grows by
-    as much."""
+    """Too little explained is refused at the stated uncertainty, and taken at the true one; the uncertainty
+    found grows by as much."""
     rng = np.random.default_rng(3)
     noisy = rows(lambda r: r.update({k: r[k] + 200.0 * rng.normal() for k in ("dx", "dy", "dz")}))
     (folder / "probe.csv").write_text(noisy((folder / "probe.csv").read_text()))

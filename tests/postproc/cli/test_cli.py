@@ -67,7 +67,8 @@ def test_verify_and_inspect_keys(tmp_path: Path) -> None:
     assert {"points", "rapids", "arcs", "cycles", "operations", "tools", "units", "five_axis", "length_mm", "extents",
             "unknown_words", "diagnostics"} <= set(d)
     want = json.loads((SAMPLES / "expected_counts.json").read_text())["pocket.cls"]
-    assert (d["points"], d["arcs"], d["rapids"], d["five_axis"]) == (want["points"], want["arcs"], want["rapids"], False)
+    assert (d["points"], d["arcs"], d["rapids"], d["five_axis"]) == (want["points"], want["arcs"],
+                                                                     want["rapids"], False)
     assert d["extents"]["x"] == pytest.approx(want["extents_mm"]["x"], abs=1e-3)
 
 
@@ -258,7 +259,8 @@ def test_a_range_without_an_error_model_is_wrong_use(command: list[str]) -> None
     assert run.exit_code == 2 and "--error-model-beyond" in run.output
 
 
-def test_an_output_that_is_full_is_reported(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_output_that_is_full_is_reported(monkeypatch: pytest.MonkeyPatch,
+                                            capsys: pytest.CaptureFixture[str]) -> None:
     def full() -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 

@@ -85,7 +85,8 @@ def test_check_refuses_with_the_line(tmp_path: Path, text: str, machine: str, wo
 
 
 def test_tables_per_axis_go_out_and_come_back(tmp_path: Path) -> None:
-    found = figures("to-tables", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path, "--loss", 1, "--angle-loss", 1)
+    found = figures("to-tables", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path, "--loss", 1,
+                    "--angle-loss", 1)
     names = {Path(x).name for x in found["files"]}
     tables = {f"mikron-ucp710-{x}.csv" for x in ("X", "Y", "Z", "A", "C", "location", "covariance")}
     assert names == {*tables, "mikron-ucp710.toml"}
@@ -103,7 +104,8 @@ def test_tables_per_axis_go_out_and_come_back(tmp_path: Path) -> None:
 
 
 def test_linuxcnc_goes_out_with_the_rest_and_comes_back(tmp_path: Path) -> None:
-    done = run("to-linuxcnc", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path / "comp", "--rest", tmp_path / "rest.toml")
+    done = run("to-linuxcnc", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path / "comp", "--rest",
+               tmp_path / "rest.toml")
     assert "the post-processor must not do it again" in done.stderr and "rest.toml" in done.stderr
     assert "lost: the covariance of what these files hold, as they have no place for it" in done.stdout
     volume = figures("check", MIKRON, "-m", "mikron-ucp710")["volume"]
@@ -118,7 +120,8 @@ def test_linuxcnc_goes_out_with_the_rest_and_comes_back(tmp_path: Path) -> None:
     assert "[components.ECC]\npolynomial = [0.0]" in (tmp_path / "rest.toml").read_text()
     assert rest.covariance is not None and len(rest.covariance) == len(rest.names)
     screws = [f"{x}={tmp_path}/comp/mikron-ucp710-{x}.comp" for x in "XYZ"]
-    run("import", *screws, "-m", "mikron-ucp710", "-o", tmp_path / "all.toml", "--into", tmp_path / "rest.toml")
+    run("import", *screws, "-m", "mikron-ucp710", "-o", tmp_path / "all.toml", "--into",
+        tmp_path / "rest.toml")
     whole = load(tmp_path / "all.toml", machine)
     q = np.random.default_rng(0).uniform(-200.0, 200.0, (50, 5)) * [1, 1, 1, 0.002, 0.01]
     for name in ("EXX", "EYY", "EZZ"):
@@ -148,9 +151,11 @@ def test_a_map_goes_out_and_comes_back(tmp_path: Path) -> None:
 
 
 def test_a_loss_is_kept_or_refused(tmp_path: Path) -> None:
-    found = figures("to-map", SAMPLES / "uranesx.toml", "-m", "uranesx", "-o", tmp_path / "u.toml", "--loss", 0.5)
+    found = figures("to-map", SAMPLES / "uranesx.toml", "-m", "uranesx", "-o", tmp_path / "u.toml",
+                    "--loss", 0.5)
     assert 0.05 < found["lattice"]["tip_worst_um"] <= 0.5 and list(found["nodes"]) == ["x", "y", "z"]
-    done = run("to-map", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path / "n.toml", "--over", "XYZAC", "--loss", 0.01, code=1)
+    done = run("to-map", MIKRON, "-m", "mikron-ucp710", "-o", tmp_path / "n.toml", "--over", "XYZAC",
+               "--loss", 0.01, code=1)
     assert "takes more than 200000 nodes" in done.stderr and not (tmp_path / "n.toml").exists()
 
 
@@ -161,7 +166,8 @@ def test_outputs_never_replace_inputs(tmp_path: Path) -> None:
     done = run("to-tables", model, "-m", "mikron-ucp710", "-o", tmp_path / "e", code=1)
     assert "error-export.input" in done.stderr
     table = tmp_path / "e" / "mikron-ucp710-X.csv"
-    run("import", table, "-m", "mikron-ucp710", "-o", tmp_path / "e" / "mikron-ucp710.toml", "--into", model, code=1)
+    run("import", table, "-m", "mikron-ucp710", "-o", tmp_path / "e" / "mikron-ucp710.toml", "--into",
+        model, code=1)
     run("import", table, "-m", "mikron-ucp710", "-o", tmp_path / "e" / "other.toml", "--into", model)
     run("import", table, "-m", "mikron-ucp710", "-o", table, code=2)
     run("to-map", model, "-m", "mikron-ucp710", "-o", model, code=2)
@@ -179,7 +185,8 @@ def test_a_fault_writes_nothing(tmp_path: Path) -> None:
 
 def test_errors_taken_in_keep_the_uncertainty_of_the_others_and_report_whose_is_gone(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text("X [mm],EXX [um],EAX [arcsec]\n-355,1,2\n355,2,3\n")
-    done = run("import", tmp_path / "x.csv", "-m", "mikron-ucp710", "-o", tmp_path / "e.toml", "--into", MIKRON)
+    done = run("import", tmp_path / "x.csv", "-m", "mikron-ucp710", "-o", tmp_path / "e.toml",
+               "--into", MIKRON)
     assert "uncertainty unknown of EAX, EXX" in done.stdout
     found = load(tmp_path / "e.toml", machines.load("mikron-ucp710"))
     assert found.covariance is not None
@@ -205,7 +212,8 @@ def test_large_errors_are_refused_everywhere_and_stay_meant(tmp_path: Path) -> N
     assert "errors above 1 mm are refused" in refused.stderr and "--large if it is so" in refused.stderr
     assert "--large says that it is so" in run(*source, "--large").stderr
     assert "EXX is up to 2.5 mm" in run("check", tmp_path / "e.toml", "-m", "mill-3axis").stderr
-    run("import", tmp_path / "y.csv", "-m", "mill-3axis", "-o", tmp_path / "all.toml", "--into", tmp_path / "e.toml")
+    run("import", tmp_path / "y.csv", "-m", "mill-3axis", "-o", tmp_path / "all.toml", "--into",
+        tmp_path / "e.toml")
     run("to-map", tmp_path / "all.toml", "-m", "mill-3axis", "-o", tmp_path / "map.toml")
     run("to-tables", tmp_path / "all.toml", "-m", "mill-3axis", "-o", tmp_path / "t")
     for model in (tmp_path / "all.toml", tmp_path / "map.toml", tmp_path / "t/all.toml"):
@@ -232,7 +240,8 @@ def test_import_reports_ranges_that_are_none_of_the_machine(tmp_path: Path) -> N
     for text, noted in (("X [mm],EXX [um]\n-300000,0\n300000,5\n", "error-model.travel"),
                         ("X [mm],EXX [um]\n-0.3,0\n0.3,5\n", "the model holds from -0.3 to 0.3")):
         (tmp_path / "x.csv").write_text(text)
-        for command in (["import", tmp_path / "x.csv", "-o", tmp_path / "e.toml"], ["check", tmp_path / "e.toml"]):
+        for command in (["import", tmp_path / "x.csv", "-o", tmp_path / "e.toml"],
+                        ["check", tmp_path / "e.toml"]):
             assert noted in run(*command, "-m", "mill-3axis").stderr
 
 
@@ -247,7 +256,8 @@ def test_a_covariance_that_is_given_counts_before_the_scatter(tmp_path: Path) ->
 
 
 def test_sample_readings_become_models(tmp_path: Path) -> None:
-    run("import", SAMPLES / "runs-mill-3axis-X.csv", "-m", "mill-3axis", "-o", tmp_path / "x.toml", "--average")
+    run("import", SAMPLES / "runs-mill-3axis-X.csv", "-m", "mill-3axis", "-o", tmp_path / "x.toml",
+        "--average")
     found = load(tmp_path / "x.toml", machines.load("mill-3axis"))
     assert found.covariance is not None and len(found.names) == 22
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx(0.0005 / np.sqrt(5), rel=0.3)
@@ -283,12 +293,15 @@ def test_what_cannot_be_had_is_refused(tmp_path: Path, arguments: tuple[str, ...
 
 def test_a_map_stays_within_what_was_measured(tmp_path: Path) -> None:
     (tmp_path / "e.toml").write_text("[components.EXA]\npolynomial = [3, 1]\nrange = [0, 30]\n")
-    done = run("to-map", tmp_path / "e.toml", "-m", "mikron-ucp710", "-o", tmp_path / "m.toml", "--at", "A=45", code=1)
+    done = run("to-map", tmp_path / "e.toml", "-m", "mikron-ucp710", "-o", tmp_path / "m.toml", "--at",
+               "A=45", code=1)
     assert "beyond what was measured of A" in done.stderr
-    run("to-map", tmp_path / "e.toml", "-m", "mikron-ucp710", "-o", tmp_path / "m.toml", "--over", "ZA", "--step", "A=10")
+    run("to-map", tmp_path / "e.toml", "-m", "mikron-ucp710", "-o", tmp_path / "m.toml", "--over", "ZA",
+        "--step", "A=10")
     found = load(tmp_path / "m.toml", machines.load("mikron-ucp710")).map
     assert found is not None and np.degrees(found.nodes[1]) == pytest.approx([0.0, 10.0, 20.0, 30.0])
-    again = figures("to-map", tmp_path / "m.toml", "-m", "mikron-ucp710", "-o", tmp_path / "again.toml", "--over", "ZA")
+    again = figures("to-map", tmp_path / "m.toml", "-m", "mikron-ucp710", "-o", tmp_path / "again.toml",
+                    "--over", "ZA")
     assert again["nodes"] == {"Z": 2, "A": 4} and again["lattice"]["tip_worst_um"] < 1e-6  # the map's own nodes
 
 
@@ -309,7 +322,8 @@ WRONG = [("to-map", "-o", "m.toml", "--over", "XQ"), ("to-map", "-o", "m.toml", 
 
 
 @pytest.mark.parametrize("arguments", WRONG, ids=[" ".join(w) for w in WRONG])
-def test_wrong_use_is_exit_code_2(tmp_path: Path, arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_wrong_use_is_exit_code_2(tmp_path: Path, arguments: tuple[str, ...],
+                                  monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     run(arguments[0], MIKRON, "-m", "mikron-ucp710", *arguments[1:], code=2)
     assert list(tmp_path.iterdir()) == []

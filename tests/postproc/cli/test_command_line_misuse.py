@@ -71,7 +71,8 @@ def test_json_numbers_are_short(tmp_path: Path) -> None:
 
 def test_json_to_a_place_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    for arguments in (["convert", POCKET, *MILL, "-o", tmp_path / "p.ngc"], ["machine", "list"], ["inspect", POCKET]):
+    for arguments in (["convert", POCKET, *MILL, "-o", tmp_path / "p.ngc"], ["machine", "list"],
+                      ["inspect", POCKET]):
         got = run(*arguments, "--json", tmp_path / "file" / "s.json")
         assert got.exit_code == 1 and "file.write" in got.stderr and isinstance(got.exception, SystemExit)
 
@@ -83,7 +84,7 @@ def test_a_failed_conversion_says_that_the_output_stays(tmp_path: Path) -> None:
     assert got.exit_code == 1 and f"{out} is left as it was" in got.stdout and out.read_text() == "old"
 
 
-# ---- set-up files ----------------------------------------------------------------------------------------------------
+# ---- set-up files ------------------------------------------------------------------------------------------
 
 
 def with_setup(folder: Path, text: str, *lines: str) -> tuple[int, str]:

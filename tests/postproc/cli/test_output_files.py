@@ -38,14 +38,16 @@ def shop(tmp_path: Path) -> Path:
 
 
 def convert(shop: Path, *more: str | Path) -> Result:
-    return run("convert", shop / "part.cls", *MIKRON, "-o", shop / "out" / "main.nc", "--setup", shop / "shop.toml", *more)
+    return run("convert", shop / "part.cls", *MIKRON, "-o", shop / "out" / "main.nc", "--setup",
+               shop / "shop.toml", *more)
 
 
 def texts(folder: Path) -> dict[str, bytes]:
     return {p.name: p.read_bytes() for p in folder.iterdir()}
 
 
-def test_programs_subprograms_and_figures_are_one_transaction(shop: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_programs_subprograms_and_figures_are_one_transaction(shop: Path,
+                                                              monkeypatch: pytest.MonkeyPatch) -> None:
     json = shop / "s.json"
     assert convert(shop, "--json", json).exit_code == 0
     before, figures = texts(shop / "out"), json.read_bytes()
@@ -92,7 +94,8 @@ def test_machine_and_controller_files_are_not_replaced(shop: Path) -> None:
     (shop / "m.toml").write_text('base = "mikron-ucp710"\n')
     (shop / "c.toml").write_text('base = "fanuc-30i"\n')
     for file in ("m.toml", "c.toml"):
-        got = run("convert", shop / "part.cls", "-m", shop / "m.toml", "-c", shop / "c.toml", "-o", shop / file)
+        got = run("convert", shop / "part.cls", "-m", shop / "m.toml", "-c", shop / "c.toml", "-o",
+                  shop / file)
         assert got.exit_code == 2 and "the output would replace the" in got.stderr.replace("\n", " ")
 
 
@@ -150,7 +153,8 @@ def test_verify_says_when_the_set_up_is_another(tmp_path: Path) -> None:
 def test_fingerprints_follow_meshes_not_names(tmp_path: Path) -> None:
     mesh = "solid s\nendsolid s\n"
     marks = []
-    for folder, name, text in (("a", "part.stl", mesh), ("b", "other.stl", mesh), ("c", "part.stl", mesh + "\n")):
+    for folder, name, text in (("a", "part.stl", mesh), ("b", "other.stl", mesh),
+                               ("c", "part.stl", mesh + "\n")):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / name).write_text(text)
         file = tmp_path / folder / "s.toml"
@@ -161,7 +165,8 @@ def test_fingerprints_follow_meshes_not_names(tmp_path: Path) -> None:
     assert marks[0] == marks[1] != marks[2] and all(re.fullmatch("[0-9a-f]{8}", mark) for mark in marks)
 
 
-def test_a_killed_run_is_reported_by_verify_and_put_right_by_convert(shop: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_killed_run_is_reported_by_verify_and_put_right_by_convert(shop: Path,
+                                                                     monkeypatch: pytest.MonkeyPatch) -> None:
     assert convert(shop).exit_code == 0
     out = shop / "out"
     run_of_dead = f"postproc-{interrupted_runs._where()}-999999999-1-00000000"

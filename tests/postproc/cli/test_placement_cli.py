@@ -66,7 +66,8 @@ gauge_length = 100.0
 def test_the_written_file_loads_and_reproduces_the_seconds(tmp_path: Path) -> None:
     """S2 is S with [part] replaced, comments kept; the planned seconds are those that were said, and it is proved."""
     source, target = small(tmp_path, TEXT), tmp_path / "s2.toml"
-    text = run(cl_file(tmp_path), "-m", "mill-3axis", "--setup", source, "-o", target, "--json", tmp_path / "f.json")
+    text = run(cl_file(tmp_path), "-m", "mill-3axis", "--setup", source, "-o", target, "--json",
+               tmp_path / "f.json")
     assert "planned time saved: " in text
     said = json.loads((tmp_path / "f.json").read_text())
     written = target.read_text()
@@ -151,11 +152,13 @@ def test_figure(tmp_path: Path) -> None:
     source, cl = small(tmp_path, TEXT.replace("turns = [0, 30]", "x = [380, 480]\ny = [0, 100]")), cl_file(tmp_path)
     images = []
     for name in ("a.svg", "b.svg", "a.png"):
-        run(cl, "-m", "mill-3axis", "--setup", source, "-o", tmp_path / "s2.toml", "--figure", tmp_path / name)
+        run(cl, "-m", "mill-3axis", "--setup", source, "-o", tmp_path / "s2.toml", "--figure",
+            tmp_path / name)
         images.append((tmp_path / name).read_bytes())
     assert images[0] == images[1]
     assert [image[:4] for image in images] == [b"<?xm", b"<?xm", b"\x89PNG"]
-    run(cl, "-m", "mill-3axis", "--setup", source, "-o", tmp_path / "s2.toml", "--figure", tmp_path / "a.pdf", code=2)
+    run(cl, "-m", "mill-3axis", "--setup", source, "-o", tmp_path / "s2.toml", "--figure",
+        tmp_path / "a.pdf", code=2)
 
 
 def test_the_ground_of_the_figure_is_travel() -> None:
@@ -219,7 +222,8 @@ def test_the_sample(tmp_path: Path) -> None:
     """The sample's set-up on the mill gains what turning the box by 45 degrees gives passes along y: here the first 3."""
     lines, first = PART.read_text().splitlines(), tmp_path / "three.cls"
     first.write_text("\n".join([*lines[:217], lines[-1], ""]))
-    text = run(first, "-m", "mill-3axis", "--setup", MILL, "-o", tmp_path / "s2.toml", "--json", tmp_path / "f.json")
+    text = run(first, "-m", "mill-3axis", "--setup", MILL, "-o", tmp_path / "s2.toml", "--json",
+               tmp_path / "f.json")
     said = json.loads((tmp_path / "f.json").read_text())
     assert said["best"]["cutting_s"] / said["now"]["cutting_s"] == pytest.approx(2 ** (-1 / 6), abs=0.01)
     assert said["best"]["turn_deg"] % 90.0 == pytest.approx(45.0, abs=2.0)
@@ -240,7 +244,8 @@ def test_a_place_that_cannot_be_converted_is_passed_over(monkeypatch: pytest.Mon
         return result.with_found([error("test.no", "not there")]) if len(asked) == 1 else result
 
     monkeypatch.setattr(pipeline, "convert", convert_but_first)
-    choice, found = place(passes((1.0, 0.0)), machine("mill-3axis"), setup_of(x=(-50.0, 50.0), turns=[0.0, 30.0]))
+    choice, found = place(passes((1.0, 0.0)), machine("mill-3axis"),
+                          setup_of(x=(-50.0, 50.0), turns=[0.0, 30.0]))
     assert choice is not None and len(asked) == 2
     assert any(d.code == "place.passed_over" and "not there" in d.message for d in found)
     assert choice.part == asked[1].part  # type: ignore[attr-defined]

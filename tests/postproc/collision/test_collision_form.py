@@ -89,7 +89,8 @@ FLAT = ToolSetup(gauge_length=100.0, flute_length=20.0)
     ((10.0, 1.0, 4.0, 1.0, 0.0, 5.0, 75.0), [(4.0, 1.0, 4.0, 1.0, 1.0), (4.996195, 0.912844, 6.666104, 20.0, 0.0)]),
     ((14.6586, 8.0, 0.0, 8.0, 0.0, 5.0, 50.0), [(0.0, 8.0, 0.0, 8.0, 8.0), (7.969558, 7.302754, 9.080423, 20.0, 0.0)]),
 ])
-def test_all_seven_parameters_of_cutter_count(params: tuple[float, ...], rows: list[tuple[float, ...]]) -> None:
+def test_all_seven_parameters_of_cutter_count(params: tuple[float, ...],
+                                              rows: list[tuple[float, ...]]) -> None:
     made, found = form(Tool(7, diameter=params[0], corner_radius=params[1], cutter=params))
     assert not found and made.exact and made.of(CUTTER) == pytest.approx(np.array(rows), abs=1e-5)
 
@@ -157,7 +158,8 @@ def test_a_gap_below_a_holders_mesh_is_reported(tmp_path: Path) -> None:
         setup = FLAT.model_copy(update={"holder_mesh": "h.stl", "shank": shank})
         _, found = tool_form(7, mill, setup, str(tmp_path / "s.toml"))
         assert [noted in str(d) for d in found] == ([True] if noted else [])
-    _, found = tool_form(7, mill, ToolSetup(gauge_length=100.0, holder_mesh="h.stl"), str(tmp_path / "s.toml"))
+    _, found = tool_form(7, mill, ToolSetup(gauge_length=100.0, holder_mesh="h.stl"),
+                         str(tmp_path / "s.toml"))
     assert [d.code for d in found] == ["collision.unchecked"] and "below the holder at 60 mm" in found[0].message
 
 

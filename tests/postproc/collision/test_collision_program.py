@@ -50,7 +50,8 @@ def line(*extra: str) -> Toolpath:
                     *extra, head=HEAD)
 
 
-def converted(path: Toolpath, setup: Path, name: str = "mikron-ucp710", controller: str = "linuxcnc") -> PostResult:
+def converted(path: Toolpath, setup: Path, name: str = "mikron-ucp710",
+              controller: str = "linuxcnc") -> PostResult:
     return postproc.convert(path, machine(name), controller=controller, setup=setup)
 
 
@@ -143,7 +144,8 @@ def test_the_rapid_down_to_a_hole_is_no_drilling(tmp_path: Path) -> None:
     """Holes are said to begin on z = 0, the part's top is at 30: the drill comes down through it at rapid."""
     hole = ["CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3,RTRCTO,50", "GOTO/0,0,0", "CYCLE/OFF", "RAPID", "GOTO/0,0,60"]
     path = toolpath("RAPID", "GOTO/0,0,50", *hole, head=["UNITS/MM", "CUTTER/6,0", *HEAD[2:]])
-    tool = TOOL.replace("gauge", "tip_angle = 118.0\ngauge").replace("flute_length = 30.0", "flute_length = 70.0")
+    tool = TOOL.replace("gauge", "tip_angle = 118.0\ngauge").replace("flute_length = 30.0",
+                                                                     "flute_length = 70.0")
     found = collisions(converted(path, setup_file(tmp_path, block(tmp_path, 30.0), tool)).diagnostics)
     assert [d.code for d in found] == ["collision.gouge"]
     assert converted(path, setup_file(tmp_path, block(tmp_path, 2.5), tool)).ok

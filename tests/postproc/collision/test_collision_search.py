@@ -33,7 +33,8 @@ def block() -> TriangleSolid:
 def travel(*tips: tuple[float, float, float], axis: tuple[float, float, float] = UP) -> Swept:
     points = np.array(tips)
     n = len(points) - 1
-    return Swept(np.stack((points[:-1], points[1:]), axis=1), np.tile(np.array(axis), (n, 2, 1)), np.arange(n))
+    return Swept(np.stack((points[:-1], points[1:]), axis=1), np.tile(np.array(axis), (n, 2, 1)),
+                 np.arange(n))
 
 
 @pytest.mark.parametrize("piece", [BALL, CYLINDER, BULL, CONE])
@@ -134,7 +135,8 @@ def random_case(rng: np.random.Generator) -> tuple[Swept, Floats]:
     tips = rng.uniform(-50.0, 50.0, (6, 3))
     axes = np.array([0.0, 0.0, 1.0]) + rng.uniform(-0.6, 0.6, (6, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    moving = Swept(np.stack((tips[:-1], tips[1:]), axis=1), np.stack((axes[:-1], axes[1:]), axis=1), np.arange(5))
+    moving = Swept(np.stack((tips[:-1], tips[1:]), axis=1), np.stack((axes[:-1], axes[1:]), axis=1),
+                   np.arange(5))
     r0, r1, r2 = rng.uniform(1.0, 10.0, 3)
     return moving, np.array([[r0, r0, r0, r0, r0], [r1, 10.0, r2, 60.0, 0.0]])
 
@@ -151,7 +153,8 @@ def test_compiled_loops_find_what_numpy_finds(monkeypatch: pytest.MonkeyPatch) -
         for fast in (True, False):
             monkeypatch.setattr(search, "wanted", lambda *_, fast=fast: fast)
             found.append(nearest(body, moving, pieces, 2.0))
-        assert found[0].distance == pytest.approx(found[1].distance, abs=EXACT + 2.0 * PART * (2.0 - found[0].distance))
+        assert found[0].distance == pytest.approx(found[1].distance,
+                                                  abs=EXACT + 2.0 * PART * (2.0 - found[0].distance))
         assert (found[0].place < 0) == (found[1].place < 0)
         near += found[0].place >= 0
     assert 5 < near < 25

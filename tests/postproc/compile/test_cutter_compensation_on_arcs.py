@@ -107,7 +107,7 @@ def test_the_keys_of_a_shops_file_allow_it(tmp_path: Path) -> None:
     assert "G41\n" in good(convert(toolpath(*ROUND), "mill-3axis", shop)).text
 
 
-# ---- verify ---------------------------------------------------------------------------------------------------------
+# ---- verify ------------------------------------------------------------------------------------------------
 
 
 def spoilt(controller: str, old: str, new: str, lines: list[str]) -> list[str]:
@@ -140,7 +140,7 @@ def test_verify_reports_an_arc_behind_the_end(controller: str) -> None:
     assert any(t.startswith("verify.cutcom_arc") and "ends" in t for t in noted), noted
 
 
-# ---- the register -----------------------------------------------------------------------------------------------------
+# ---- the register ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("controller", NAMES)
@@ -184,7 +184,7 @@ def test_linuxcnc_takes_the_tool_in_the_spindle() -> None:
     assert "is 1, it should be 3" in "".join(spoilt("linuxcnc", "G41 D3\n", "G41\n", named))
 
 
-# ---- no tool ----------------------------------------------------------------------------------------------------------
+# ---- no tool -----------------------------------------------------------------------------------------------
 
 
 TURNS = {"spindle": {"rpm": 1000}}
@@ -197,7 +197,8 @@ MEASURED = SetupFile.model_validate({"output": {**TURNS, "tool_call": False}})
     ("fanuc-30i", "mikron-ucp710", "G43.4 H7"), ("haas-ngc", "trunnion-bc", "G234 H7"),
     ("linuxcnc", "mikron-ucp710", "G43 H7"),
     ("siemens-840d", "mikron-ucp710", "TRAORI"), ("heidenhain-tnc640", "mikron-ucp710", "TOOL CALL 7 Z")])
-def test_a_file_without_a_tool_is_written_with_the_number_of_the_set_up(controller: str, name: str, code: str) -> None:
+def test_a_file_without_a_tool_is_written_with_the_number_of_the_set_up(controller: str, name: str,
+                                                                        code: str) -> None:
     """Its register is that of the number; without one the file is refused in every mode, the tool's first line named."""
     path = toolpath(*BARE, head=["UNITS/MM"])
     for output in ("auto", "axes"):

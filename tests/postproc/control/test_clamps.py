@@ -141,7 +141,8 @@ def test_a_program_without_clamps_is_refused_by_the_reader() -> None:
 
 
 @pytest.mark.parametrize("controller", ["fanuc-30i", "heidenhain-tnc640"])
-def test_the_second_witness_follows_the_codes_by_itself(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_second_witness_follows_the_codes_by_itself(controller: str,
+                                                        monkeypatch: pytest.MonkeyPatch) -> None:
     """Codes that the reader sees and the text does not hold: the witness alone can find them missing."""
     result = converted(controller, "auto")
     assert result.job is not None and result.comparison is not None and result.source is not None
@@ -209,7 +210,8 @@ def along_a_cone() -> Toolpath:
                                                     ("heidenhain-tnc640", "auto"), ("linuxcnc", "auto"),
                                                     ("generic-iso", "auto")])
 @pytest.mark.parametrize("name", SHARED)
-def test_axes_that_share_a_code_are_freed_and_clamped_together(name: str, controller: str, output: str) -> None:
+def test_axes_that_share_a_code_are_freed_and_clamped_together(name: str, controller: str,
+                                                               output: str) -> None:
     result = postproc.convert(along_a_cone(), sharing(SHARED[name]), controller, SETUP,
                               Options(output=output))  # type: ignore[arg-type]
     assert result.ok, [str(d) for d in result.diagnostics]
@@ -247,7 +249,8 @@ def test_an_operation_that_is_taken_up_states_its_clamps() -> None:
     lines = ["UNITS/MM", *(line for k in (1, 2) for line in (
         f"TOOL PATH/OP{k},TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW", "RAPID",
         point(45 * axis, axis), "FEDRAT/MMPM,500", point(30 * axis, axis), "RAPID", point(45 * axis, axis), "END-OF-PATH"))]
-    result = postproc.convert(toolpath(*lines, head=[]), clamping(), "fanuc-30i", setup, Options(output="axes"))
+    result = postproc.convert(toolpath(*lines, head=[]), clamping(), "fanuc-30i", setup,
+                              Options(output="axes"))
     assert result.ok, [str(d) for d in result.diagnostics]
     for part in result.text.split("(OP")[1:]:
         assert re.search(r"M11\b", part) and part.index("M11") < part.index("A40.") < part.index("M10")
@@ -263,7 +266,8 @@ def test_clamps_take_the_time_that_the_machine_file_says() -> None:
     assert times[1] - times[0] == pytest.approx(more, rel=1e-6)
 
 
-@pytest.mark.parametrize(("name", "closing", "opening"), [("one pair", 1, 1), ("one release", 2, 1), ("one clamp", 1, 2)])
+@pytest.mark.parametrize(("name", "closing", "opening"),
+                         [("one pair", 1, 1), ("one release", 2, 1), ("one clamp", 1, 2)])
 def test_plans_count_each_code_of_axes_that_share_one(name: str, closing: int, opening: int) -> None:
     """C alone turns: the codes of both axes are stated; without codes the machine clamps at once."""
     q = np.zeros((2, 5))
@@ -274,7 +278,7 @@ def test_plans_count_each_code_of_axes_that_share_one(name: str, closing: int, o
     assert (shared - own, still - own) == pytest.approx((2.0 * closing + 3.0 * opening - 5.0, 0.0))
 
 
-# ---- machine files ---------------------------------------------------------------------------------------------------
+# ---- machine files -----------------------------------------------------------------------------------------
 
 def own(folder: Path, axis: str, *lines: str) -> Path:
     (folder / "own.toml").write_text("\n".join(['base = "mikron-ucp710"', f"[axes.{axis}]", *lines]) + "\n")

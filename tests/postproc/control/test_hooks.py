@@ -1,5 +1,5 @@
-"""Blocks of the shop round tool calls, indexing moves, operations and stops: written, read back as what they are, refused
-where they would change what the proof stands on."""
+"""Blocks of the shop round tool calls, indexing moves, operations and stops: written, read back as what they
+are, refused where they would change what the proof stands on."""
 
 from __future__ import annotations
 
@@ -129,7 +129,8 @@ def test_blocks_of_the_set_up_take_the_place_of_the_machines() -> None:
     ("siemens-840d", "TRAFOOF", (), "hooks.code"), ("siemens-840d", "CYCLE977(1)", (), "hooks.code"),
     ("siemens-840d", "R1=5", (), "hooks.code"), ("heidenhain-tnc640", "L Z+0 R0 FMAX M91", (), "hooks.code"),
     ("heidenhain-tnc640", "TCH PROBE 412", (), "hooks.code"), ("heidenhain-tnc640", "M13", ("M13",), "hooks.passive")])
-def test_what_moves_or_changes_a_state_is_refused(controller: str, block: str, passive: tuple[str, ...], code: str) -> None:
+def test_what_moves_or_changes_a_state_is_refused(controller: str, block: str, passive: tuple[str, ...],
+                                                  code: str) -> None:
     machine = replace(clamping(), hooks=HooksModel(before_index=(block,), passive=passive))
     result = postproc.convert(work(), machine, controller, SETUP, Options(output="axes"))
     assert result.text == "" and code in codes(result.diagnostics)
@@ -156,7 +157,7 @@ def test_a_passive_code_hides_no_other_word_of_its_block() -> None:
         assert verdict(result, re.sub(r"(?m)^(G1 .*)$", rf"{moved}\n\1", result.text, count=1)), moved
 
 
-# ---- stops between tools ---------------------------------------------------------------------------------------------
+# ---- stops between tools -----------------------------------------------------------------------------------
 
 def stopping(path: Toolpath, controller: str, on: bool = True) -> PostResult:
     setup = SETUP.model_copy(update={"output": OutputSettings(stop_between_tools=on)})
@@ -176,7 +177,8 @@ def test_an_optional_stop_between_tools_with_all_stated_behind_it(controller: st
 
 
 def test_where_the_file_stops_there_itself_no_second_stop_is_written() -> None:
-    path = toolpath("RAPID", "GOTO/0,0,40", "GOTO/0,0,30", "OPSTOP", "LOADTL/2", "RAPID", "GOTO/0,0,40", "GOTO/0,0,20")
+    path = toolpath("RAPID", "GOTO/0,0,40", "GOTO/0,0,30", "OPSTOP", "LOADTL/2", "RAPID", "GOTO/0,0,40",
+                    "GOTO/0,0,20")
     result = stopping(path, "fanuc-30i")
     assert result.ok and len(re.findall(r"(?m)^M1$", result.text)) == 1
 

@@ -42,7 +42,7 @@ def with_blocks(controller: str, *blocks: str, passive: tuple[str, ...] = ()) ->
     return check_hooks(replace(job, machine=machine, controller=with_shop(spec, machine, job.setup)))
 
 
-# ---- passive codes -----------------------------------------------------------------------------------------------------
+# ---- passive codes -----------------------------------------------------------------------------------------
 
 def texts(values: object) -> Iterator[str]:
     if isinstance(values, str):
@@ -124,7 +124,8 @@ def test_a_name_that_is_the_beginning_of_a_statement_hides_it(controller: str, n
     ("siemens-840d", "L9000 X5", "L9000"), ("siemens-840d", "CYCLE977(1) M30", "CYCLE977"),
     ("heidenhain-tnc640", "TCH PROBE 412 M30", "TCH PROBE"), ("fanuc-30i", "M31;G0X10.", "M31"),
     ("fanuc-30i", "M31 %", "M31"), ("fanuc-30i", "(" + 120 * "A" + ")", "M31")])
-def test_a_passive_code_takes_no_word_with_it_that_means_something(controller: str, block: str, passive: str) -> None:
+def test_a_passive_code_takes_no_word_with_it_that_means_something(controller: str, block: str,
+                                                                   passive: str) -> None:
     found = with_blocks(controller, block, passive=(passive,))
     assert [d.code for d in found] == ["hooks.code"] and found[0].hint
 
@@ -136,7 +137,7 @@ def test_arguments_of_passive_codes(text: str, passive: str, left: str) -> None:
     assert "".join(map(chr, words.letter[words.line == 1])) == left[1:] and np.count_nonzero(words.line == 2) == 2
 
 
-# ---- texts -------------------------------------------------------------------------------------------------------------
+# ---- texts -------------------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize("block", [
     "({tool_number:3.2f})", "({operation!r})", "({operation!x})", "{tool_number:{operation}}", "({operation:03d})", "({0})",
@@ -170,7 +171,8 @@ def test_numbers_with_zeros_and_names_that_are_cut() -> None:
     assert filled("({operation})", values, 12) == f"({'O' * 10})" and filled("M31 ({operation})", values, 3) == "M31 ()"
     with pytest.raises(ValueError, match="no number"):
         filled("{work_offset:02d}", values | {"work_offset": "G59.1"})
-    assert not with_blocks("fanuc-30i", "(T{tool_number:03d} {work_offset:03d})", "({operation} " + "A" * 90 + ")")
+    assert not with_blocks("fanuc-30i", "(T{tool_number:03d} {work_offset:03d})",
+                           "({operation} " + "A" * 90 + ")")
     job = job_of("linuxcnc")
     hooks = HooksModel(before_stop=("({work_offset:02d})",))
     found = check_hooks(replace(job, setup=job.setup.model_copy(update={"work_offset_code": "G59.1", "hooks": hooks})))

@@ -122,7 +122,7 @@ def test_the_golden_five_axis_piece_by_tip(tmp_path: Path) -> None:
     follows(convert(path, "head-table", shop(tmp_path)), axis_within=9e-4)
 
 
-# ---- sections ----------------------------------------------------------------------------------------------------
+# ---- sections ----------------------------------------------------------------------------------------------
 
 
 def names(result: object, k: int) -> list[str]:
@@ -169,7 +169,7 @@ def test_compensation_ends_inside_its_plane(tmp_path: Path) -> None:
     assert "cutcom.tilted" in codes(lost.diagnostics)
 
 
-# ---- asked for ---------------------------------------------------------------------------------------------------
+# ---- asked for ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "output", "more", "word"), [
@@ -199,7 +199,7 @@ def test_a_controller_without_modes_writes_axis_positions() -> None:
     assert result.ok and [s.law for s in result.program.sections] == ["axes"]
 
 
-# ---- angles ------------------------------------------------------------------------------------------------------
+# ---- angles ------------------------------------------------------------------------------------------------
 
 
 def test_angles_of_known_frames() -> None:
@@ -224,7 +224,7 @@ def test_angles_name_the_rotation_again(convention: str) -> None:
         assert np.abs(rotation_of(convention, angles_of(convention, frame)) - frame).max() < 1e-9
 
 
-# ---- operations --------------------------------------------------------------------------------------------------
+# ---- operations --------------------------------------------------------------------------------------------
 
 
 def operations(*pieces: list[str]) -> toolpaths.toolpath.Toolpath:
@@ -325,7 +325,7 @@ def test_a_controller_without_subprograms_refuses_them(tmp_path: Path) -> None:
     assert "output.subprograms" in codes(found)
 
 
-# ---- block skip --------------------------------------------------------------------------------------------------
+# ---- block skip --------------------------------------------------------------------------------------------
 
 
 def skipping(*inside: str) -> list[str]:
@@ -334,7 +334,8 @@ def skipping(*inside: str) -> list[str]:
 
 
 def test_skipped_blocks_and_what_follows_them() -> None:
-    result = convert(toolpath(*skipping("STOP", "GOTO/10,5,5", "GOTO/10,10,5", "COOLNT/OFF")), "mill-3axis", "generic-iso")
+    result = convert(toolpath(*skipping("STOP", "GOTO/10,5,5", "GOTO/10,10,5", "COOLNT/OFF")), "mill-3axis",
+                     "generic-iso")
     p = result.program
     rows = np.flatnonzero(p.skip)
     assert p.words[rows].tolist() == [[10, 5, 5], [10, 10, 5]] or len(rows) == 2

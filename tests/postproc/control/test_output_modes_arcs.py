@@ -46,7 +46,8 @@ def frame_of(name: str) -> np.ndarray:
     """Columns X', Y', Z' of the plane that a machine takes for AXIS."""
     x = np.cross([0.0, 1.0, 0.0], AXIS)
     with TemporaryDirectory() as folder:
-        result = convert(toolpath(*circle(AXIS, x / np.linalg.norm(x), 1.0), head=[]), name, shop(Path(folder)))
+        result = convert(toolpath(*circle(AXIS, x / np.linalg.norm(x), 1.0), head=[]), name,
+                         shop(Path(folder)))
     return np.asarray(next(s.plane.rotation for s in result.program.sections if s.plane is not None))
 
 
@@ -57,7 +58,8 @@ SWEEPS = 0.7, 2.5, 4.9, 2.0 * np.pi
 @pytest.mark.parametrize(("name", "plane", "sweep"), [
     (name, plane, SWEEPS[(k + plane + other) % 4]) for k, name in enumerate(FRAMES) for plane in (17, 18, 19)
     for other in (0, 2)])
-def test_arcs_stay_arcs_in_every_plane_of_a_tilted_frame(name: str, plane: int, sweep: float, tmp_path: Path) -> None:
+def test_arcs_stay_arcs_in_every_plane_of_a_tilted_frame(name: str, plane: int, sweep: float,
+                                                         tmp_path: Path) -> None:
     """Of the plane's own axes one is the normal; every sampled point keeps its distance from the centre, in order."""
     frame = frame_of(name)
     third = {17: 2, 18: 1, 19: 0}[plane]
@@ -107,7 +109,7 @@ def test_arcs_become_lines_where_a_mode_has_none(tmp_path: Path) -> None:
         assert not any(b.code == 2 for b in blocks) and sum(b.code == 1 for b in blocks) > 20
 
 
-# ---- cycles ------------------------------------------------------------------------------------------------------
+# ---- cycles ------------------------------------------------------------------------------------------------
 
 
 def holes(axis: np.ndarray) -> list[str]:
@@ -129,8 +131,10 @@ def test_cycles_are_native_in_planes_only(name: str, output: str, count: int, tm
 
 
 @pytest.mark.parametrize(("cycles", "count"), [("true", 2), ("false", 0)])
-def test_an_upright_tool_drills_natively_in_tip_mode_where_that_may_be(cycles: str, count: int, tmp_path: Path) -> None:
-    result = made(tmp_path, holes(np.array([0, 0, 1.0])), "mikron-ucp710", "tcp", TCP + f"cycles = {cycles}\n")
+def test_an_upright_tool_drills_natively_in_tip_mode_where_that_may_be(cycles: str, count: int,
+                                                                       tmp_path: Path) -> None:
+    result = made(tmp_path, holes(np.array([0, 0, 1.0])), "mikron-ucp710", "tcp",
+                  TCP + f"cycles = {cycles}\n")
     assert len(result.program.holes) == count
 
 
@@ -146,7 +150,7 @@ def test_a_tap_in_tip_mode_is_refused(tmp_path: Path) -> None:
     assert "cycle.not_native" not in codes(made(tmp_path, lines, "mikron-ucp710", "tilted").diagnostics)
 
 
-# ---- rapids ------------------------------------------------------------------------------------------------------
+# ---- rapids ------------------------------------------------------------------------------------------------
 
 DOG = '[kinematics]\nrapids = "dog-leg"\n'
 
@@ -214,7 +218,7 @@ def test_linking_moves_are_clear_along_their_dog_legs(tmp_path: Path) -> None:
         assert (clear | (np.abs(on_axis) < 0.02)).all()
 
 
-# ---- feeds -------------------------------------------------------------------------------------------------------
+# ---- feeds -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.covering
@@ -240,7 +244,8 @@ def test_a_turning_cut_takes_its_time_by_every_rule(name: str, output: str, tmp_
     assert want > np.linalg.norm(np.diff(tips[1:], axis=0), axis=1).sum() / (500 / 60) * 0.99
 
 
-@pytest.mark.parametrize(("rule", "value"), [("length", 600 / (12 * 2.5)), ("radius", 600 / 12), ("refuse", 600.0)])
+@pytest.mark.parametrize(("rule", "value"),
+                         [("length", 600 / (12 * 2.5)), ("radius", 600 / 12), ("refuse", 600.0)])
 def test_inverse_time_in_arcs(rule: str, value: float, tmp_path: Path) -> None:
     """600 mm/min on 12 mm radius through 2.5 rad: 1/min of the block, per radian, or per minute."""
     lines = circle(np.array([0, 0, 1.0]), np.array([1.0, 0, 0]), 2.5, axis=np.array([0, 0, 1.0]))
@@ -259,7 +264,7 @@ def test_fast_arcs_in_planes_are_held_by_the_slides(tmp_path: Path) -> None:
     assert result.program.feed[k] <= slowest * (1 + 1e-9) and "feed.reduced" in codes(result.diagnostics)
 
 
-# ---- travel ------------------------------------------------------------------------------------------------------
+# ---- travel ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", FRAMES)
@@ -279,7 +284,7 @@ def test_extents_know_the_quadrants_of_tilted_arcs(name: str, tmp_path: Path) ->
         assert np.abs(high[k, :3] - q[:, :3].max(axis=0)).max() < 1e-3
 
 
-# ---- tolerance and pivots ----------------------------------------------------------------------------------------
+# ---- tolerance and pivots ----------------------------------------------------------------------------------
 
 
 def test_a_fixed_amount_of_smoothing_is_taken_from_the_tolerance(tmp_path: Path) -> None:

@@ -1,5 +1,5 @@
-"""Registers and names as the shop has them: further work offsets, length and radius registers by a rule, number and name of
-the program."""
+"""Registers and names as the shop has them: further work offsets, length and radius registers by a rule,
+number and name of the program."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ def offset(controller: str, code: str) -> PostResult:
 
 
 @pytest.mark.parametrize(("controller", "code", "written", "other"), FURTHER)
-def test_further_work_offsets_are_written_and_read_back(controller: str, code: str, written: str, other: str) -> None:
+def test_further_work_offsets_are_written_and_read_back(controller: str, code: str, written: str,
+                                                        other: str) -> None:
     result = offset(controller, code)
     assert result.ok and written in result.text, [str(d) for d in result.diagnostics]
     wrong = result.text.replace("Q339=+12 ", other) if code.startswith("preset") else re.sub(
@@ -80,7 +81,7 @@ def test_what_further_offsets_need_is_said_where_they_are_used() -> None:
     assert "NUM_USER_FRAMES" not in offset("siemens-840d", "G54").text + offset("siemens-840d", "G59").text
 
 
-# ---- registers by a rule ---------------------------------------------------------------------------------------------
+# ---- registers by a rule -----------------------------------------------------------------------------------
 
 @cache
 def ruled(length: int, radius: int | None) -> Machine:
@@ -151,7 +152,7 @@ def test_keys_of_a_machine_file(tmp_path: Path) -> None:
             machines.load(file)
 
 
-# ---- number and name of the program ------------------------------------------------------------------------------------
+# ---- number and name of the program ------------------------------------------------------------------------
 
 @pytest.mark.parametrize(("controller", "there"), [
     ("fanuc-30i", "%\nO4711\n"), ("haas-ngc", "%\nO4711\n"), ("heidenhain-tnc640", "0 BEGIN PGM BRACKET_7 MM\n")])

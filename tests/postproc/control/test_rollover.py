@@ -1,5 +1,5 @@
-"""Modulo (roll-over) rotary axes: words inside one turn, run by each control's own rule, in plan, text, reader, time and
-second witness alike."""
+"""Modulo (roll-over) rotary axes: words inside one turn, run by each control's own rule, in plan, text,
+reader, time and second witness alike."""
 
 from __future__ import annotations
 
@@ -59,14 +59,16 @@ def winding(sense: float = 1.0) -> Toolpath:
 
 
 @cache
-def converted(controller: str, rule: str, sense: float = 1.0, output: str = "axes", low: float = 0.0) -> PostResult:
+def converted(controller: str, rule: str, sense: float = 1.0, output: str = "axes",
+              low: float = 0.0) -> PostResult:
     return postproc.convert(winding(sense), rolling(rule, low), controller, TOOLS,
                             Options(output=output))  # type: ignore[arg-type]
 
 
 @cache
 def counting(controller: str, sense: float = 1.0, park: str = "turn") -> PostResult:
-    return postproc.convert(winding(sense), rolling(modulo=False, park=park), controller, TOOLS, Options(output="axes"))
+    return postproc.convert(winding(sense), rolling(modulo=False, park=park), controller, TOOLS,
+                            Options(output="axes"))
 
 
 def errors(result: PostResult) -> set[str]:
@@ -161,10 +163,11 @@ def test_the_time_is_that_of_the_way_that_the_control_takes() -> None:
     assert rolled is not None and plain is not None and rolled.seconds == pytest.approx(plain.seconds, rel=1e-3)
 
 
-# ---- ignoring an option is caught ------------------------------------------------------------------------------------
+# ---- ignoring an option is caught --------------------------------------------------------------------------
 
 @pytest.mark.parametrize(("controller", "rule"), [("linuxcnc", "sign"), ("siemens-840d", "shortest")])
-def test_a_writer_that_ignores_it_is_caught(controller: str, rule: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_writer_that_ignores_it_is_caught(controller: str, rule: str,
+                                            monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Writer, "rolled", lambda self, axis, rows: [
         f"C{text}" for text in self.number_text(self.program.words[rows, axis], 4)])
     result = postproc.convert(winding(), rolling(rule), controller, TOOLS, Options(output="axes"))
@@ -172,7 +175,8 @@ def test_a_writer_that_ignores_it_is_caught(controller: str, rule: str, monkeypa
 
 
 @pytest.mark.parametrize(("controller", "rule"), [("linuxcnc", "sign"), ("fanuc-30i", "sign")])
-def test_a_writer_that_forgets_the_sign_is_caught(controller: str, rule: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_writer_that_forgets_the_sign_is_caught(controller: str, rule: str,
+                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     whole = Rollover.words
     monkeypatch.setattr(Rollover, "words", lambda self, degrees, before: (np.abs(whole(self, degrees, before)[0]),
                                                                           np.zeros(len(degrees), dtype=bool)))
@@ -215,7 +219,7 @@ def test_tip_modes_enter_at_the_nearest_whole_turn() -> None:
     assert seconds[True] <= seconds[False] + 0.01
 
 
-# ---- the readers, word by word ---------------------------------------------------------------------------------------
+# ---- the readers, word by word -----------------------------------------------------------------------------
 
 def positions(controller: str, rolls: Rollover, *blocks: str) -> tuple[list[float], set[str]]:
     """Where C stands behind each of its words, by the reader of the control alone."""
@@ -259,11 +263,12 @@ def test_words_as_the_makers_pages_have_them(controller: str, rolls: Rollover, b
     ("siemens-840d", STATED, ["G1 A=DC(10) F100"]),
     ("heidenhain-tnc640", SHORT, ["L C+10 F100", "L C+20"]),
 ])
-def test_what_the_control_refuses_or_nothing_says_is_refused(controller: str, rolls: Rollover, blocks: list[str]) -> None:
+def test_what_the_control_refuses_or_nothing_says_is_refused(controller: str, rolls: Rollover,
+                                                             blocks: list[str]) -> None:
     assert "gcode.rollover" in positions(controller, rolls, *blocks)[1]
 
 
-# ---- machine files ---------------------------------------------------------------------------------------------------
+# ---- machine files -----------------------------------------------------------------------------------------
 
 def with_c(folder: Path, *lines: str, axis: str = "C") -> Path:
     text = '\n'.join(['base = "mikron-ucp710"', f"[axes.{axis}]", *lines])
@@ -285,7 +290,8 @@ def test_keys_of_a_machine_file(tmp_path: Path) -> None:
     ("A", ["modulo = true"], ["modulo = true", 'travel = "unlimited"']),
     ("A", ['park = "home"'], []), ("X", ["modulo = true"], []),
 ])
-def test_keys_that_contradict_each_other_are_refused(axis: str, lines: list[str], right: list[str], tmp_path: Path) -> None:
+def test_keys_that_contradict_each_other_are_refused(axis: str, lines: list[str], right: list[str],
+                                                     tmp_path: Path) -> None:
     with pytest.raises(DiagnosticError) as fault:
         machines.load(with_c(tmp_path, *lines, axis=axis))
     assert all((d.hint or "write " in d.message) and d.lines for d in fault.value.diagnostics)
@@ -314,7 +320,8 @@ def test_haas_counts_turns_unless_the_machine_file_says_so() -> None:
     ("linuxcnc", 'zero_negative = "-360"', "", "C-360"), ("fanuc-30i", 'rules = ["none"]', "machine.rollover", ""),
     ("linuxcnc", 'needs = { sign = "OWN WORDS {axes}" }', "", "OWN WORDS C"),
 ])
-def test_each_key_of_a_controller_file_counts(base: str, key: str, code: str, shown: str, tmp_path: Path) -> None:
+def test_each_key_of_a_controller_file_counts(base: str, key: str, code: str, shown: str,
+                                              tmp_path: Path) -> None:
     shop = tmp_path / "shop.toml"
     shop.write_text(f'base = "{base}"\n[rollover]\n{key}\n')
     path = toolpath("RAPID", "GOTO/0,40,60,0,0.6,0.8", "FEDRAT/MMPM,500", "GOTO/0,10,20,0,0.6,0.8", "RAPID",

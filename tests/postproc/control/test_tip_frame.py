@@ -46,7 +46,8 @@ def at_entry(result: PostResult) -> dict[str, float]:
     raise AssertionError("no G43.4")
 
 
-@pytest.mark.parametrize(("machine", "tables"), [("trunnion-bc", "BC"), ("mikron-ucp710", "AC"), ("head-table", "C")])
+@pytest.mark.parametrize(("machine", "tables"),
+                         [("trunnion-bc", "BC"), ("mikron-ucp710", "AC"), ("head-table", "C")])
 def test_the_tables_stand_at_zero_where_the_mode_is_entered(machine: str, tables: str) -> None:
     result = swept(FANUC, machine)
     entry = at_entry(result)
@@ -68,8 +69,8 @@ def test_the_program_is_right_under_both_readings(tmp_path: Path, machine: str, 
 
 @pytest.mark.parametrize("machine", MACHINES)
 def test_entered_with_turned_tables_the_readings_differ(tmp_path: Path, machine: str) -> None:
-    """The usual entry: proved where the frame is known to be the table's, refused where it is not known, and wrong under the
-    other reading."""
+    """The usual entry: proved where the frame is known to be the table's, refused where it is not known, and
+    wrong under the other reading."""
     usual = swept(shop_file(tmp_path, '[modes.tcp]\nframe = "table"\n', FANUC), machine)
     assert at_entry(usual)["C"] != 0.0
     either = swept(FANUC, machine)

@@ -35,7 +35,8 @@ def test_built_in_files_name_their_sources(name: str) -> None:
 @pytest.mark.parametrize("name", NEW)
 def test_a_shop_file_changes_its_keys_and_no_others(name: str, tmp_path: Path) -> None:
     base, _ = controller_values(name)
-    file = shop(tmp_path, f'base = "{name}"', "[arcs]", "largest_radius = 500.0", "[format]", "feed_decimals = 1")
+    file = shop(tmp_path, f'base = "{name}"', "[arcs]", "largest_radius = 500.0", "[format]",
+                "feed_decimals = 1")
     values, origins = controller_values(str(file))
     assert {k for k in base if base[k] != values[k]} == {"arcs.largest_radius", "format.feed_decimals"}
     assert origins["arcs.largest_radius"] == "shop.toml:3" and origins["format.feed_decimals"] == "shop.toml:5"
@@ -100,7 +101,8 @@ def test_a_radius_register_that_is_not_written_is_said(name: str) -> None:
 
 def test_lengths_that_would_count_twice_are_said() -> None:
     made = program([step("rapid", X=1.0)], {0: LOAD})
-    for name, expected in (("heidenhain-tnc640", {"tool.length_twice"}), ("siemens-840d", set()), ("fanuc-30i", set())):
+    for name, expected in (("heidenhain-tnc640", {"tool.length_twice"}), ("siemens-840d", set()),
+                           ("fanuc-30i", set())):
         spec, _ = load_controller(name)
         assert spec is not None
         assert {d.code for d in unwritable(spec, made, (), "a.cls", length_offsets=False)} == expected

@@ -29,8 +29,9 @@ OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "
           "subprogram_files.place", "subprogram_files.file",
           *(f"rollover.{key}" for key in ("default", "rules", "shortest", "positive", "negative", "zero_negative", "on",
                                           "needs"))}
-"""keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py, test_compensated_arcs.py,
-test_parts.py, test_rollover.py, test_hooks_refused.py, test_output_quality.py and test_output_modes*.py show what they do"""
+"""keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py,
+test_compensated_arcs.py, test_parts.py, test_rollover.py, test_hooks_refused.py, test_output_quality.py and
+test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states"""
 OTHER: dict[str, Any] = {

@@ -29,7 +29,7 @@ SAMPLES = Path("samples")
 GRAIN = 1e-4
 
 
-# ---- the walk ---------------------------------------------------------------------------------------------------------
+# ---- the walk ----------------------------------------------------------------------------------------------
 
 def no_motion(*shape: int) -> Floats:
     """Shift, low and high that leave the approach directions as they are."""
@@ -38,7 +38,8 @@ def no_motion(*shape: int) -> Floats:
     return result
 
 
-def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float, single: bool = False) -> BlockEnds:
+def random_ends(rng: np.random.Generator, blocks: int, lossy: int, near: float,
+                single: bool = False) -> BlockEnds:
     """Ends that are some micrometres off, joints that lose 1 to 6 um, steps around that."""
     i, size = np.arange(lossy), (blocks, lossy)
     gap = np.tile(rng.uniform(1e-3, 6e-3, lossy), (blocks, 1))
@@ -95,8 +96,8 @@ def test_the_walk_interpreted_and_compiled_is_the_one_of_numpy(lossy: int, made:
 def costs(ends: BlockEnds, steps: Floats) -> tuple[Floats, Floats]:
     """(N,) mm that the tip is off by after steps (N, 3) in the block of `ends`, and with what the next begins off by.
 
-    From the play operator: the approach direction 0 takes up a step by 2 / gap of it, held between -1 and 1; approach
-        directions count by their share.
+    From the play operator: the approach direction 0 takes up a step by 2 / gap of it, held between -1 and 1;
+        approach directions count by their share.
     """
     approach = np.clip(ends.last[0] + 2.0 * steps @ ends.back[0].T / ends.gap[0], -1.0, 1.0)
     off = np.linalg.norm(ends.off[0] + approach @ ends.by_approach[0].T + steps @ ends.tip_rates[0].T, axis=1)
@@ -127,7 +128,7 @@ def test_words_stay_where_rounding_leaves_as_much() -> None:
     assert walk(replace(still, off=still.off + np.array([0.0, 4e-4, 0.0]))).any()
 
 
-# ---- whole programs ----------------------------------------------------------------------------------------------------
+# ---- whole programs ----------------------------------------------------------------------------------------
 
 def converted(sample: str | Path, machine: str, controller: str, model: str | Path, output: str = "auto",
               setup: SetupFile | None = None) -> PostResult:
@@ -159,7 +160,7 @@ def test_points_are_inside_the_bound_where_every_slide_loses_motion(sample: str,
     assert "geometric_errors.bound" not in {d.code for d in result.diagnostics}
 
 
-# ---- rapids ------------------------------------------------------------------------------------------------------------
+# ---- rapids ------------------------------------------------------------------------------------------------
 
 def strong(folder: Path) -> Path:
     """Slides that are 600 um off at 400 mm, lose 60 um and lean by 80 arcsec."""
@@ -185,10 +186,12 @@ def back_and_forth(slanting: bool) -> str:
 @pytest.mark.covering
 @pytest.mark.parametrize("controller", ["fanuc-30i", "linuxcnc"])
 @pytest.mark.parametrize("slanting", [True, False])
-def test_rapids_that_begin_by_turning_back_get_one_point(controller: str, slanting: bool, tmp_path: Path) -> None:
+def test_rapids_that_begin_by_turning_back_get_one_point(controller: str, slanting: bool,
+                                                         tmp_path: Path) -> None:
     """Whether every axis runs at its own speed (Fanuc) or not; slanting ones are then feeds, which get points as needed."""
     (tmp_path / "s.apt").write_text(back_and_forth(slanting))
-    result = converted(tmp_path.resolve() / "s.apt", "mill-3axis", controller, strong(tmp_path), setup=load_setup(None)[0])
+    result = converted(tmp_path.resolve() / "s.apt", "mill-3axis", controller, strong(tmp_path),
+                       setup=load_setup(None)[0])
     found = after_formatting(result)
     assert result.ok and found is not None and result.path is not None and result.job is not None
     assert found.tip.max() <= found.tip_bound
@@ -202,7 +205,7 @@ def test_rapids_that_begin_by_turning_back_get_one_point(controller: str, slanti
         assert 0.05 < np.abs(path.q[first] - path.q[first - 1]).max() < 0.3  # taken up on the spot, 60 um per axis
 
 
-# ---- holes -------------------------------------------------------------------------------------------------------------
+# ---- holes -------------------------------------------------------------------------------------------------
 
 def cycle_blocks(text: str) -> int:
     """Holes that a Fanuc program drills in canned cycles."""
@@ -221,8 +224,8 @@ NEAR, LEANING, STEEP = "[location]\nEX0S = 30\n", "[location]\nEA0Z = 200\n", \
 @pytest.mark.parametrize(("errors", "whole"), [(NEAR, True), (LEANING, False), (STEEP, False)],
                          ids=["near", "leaning", "steep"])
 def test_holes_corrected_block_by_block_are_no_cycles(errors: str, whole: bool, tmp_path: Path) -> None:
-    """Where Z leans by 1 um per mm no cycle can follow the hole; where Z is 2 um per mm too long one could be written, but
-    its pecks would be of another length."""
+    """Where Z leans by 1 um per mm no cycle can follow the hole; where Z is 2 um per mm too long one could be
+    written, but its pecks would be of another length."""
     (tmp_path / "e.toml").write_text(errors)
     result, plain = (converted("five_faces.cls", "mikron-ucp710", "fanuc-30i", model, "axes")
                      for model in (tmp_path / "e.toml", ""))

@@ -79,7 +79,8 @@ def test_what_is_right_on_one_machine_is_wrong_on_the_other(corrected: bool, tmp
     (tmp_path / "a.ngc").write_text(result.text)
     path, found = toolpaths.read(SAMPLES / "five_faces.cls")
     options = Options(setup=str(SAMPLES / "tools.setup.toml"), error_model="" if corrected else MIKRON)
-    crossed = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", options=options, diagnostics=found)
+    crossed = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", options=options,
+                     diagnostics=found)
     assert not crossed.ok and any(d.code.startswith("verify.") for d in crossed.diagnostics)
     same = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", None,
                   replace(options, error_model=model), found)
@@ -169,7 +170,8 @@ def mill(tmp_path: Path, toml: str, table: str = "", part: str = "") -> PostResu
     path, found = toolpaths.read(tmp_path / "s.apt")
     (tmp_path / "part.toml").write_text(part)
     setup, _ = load_setup(str(tmp_path / "part.toml"))
-    return postproc.convert(path, "mill-3axis", "linuxcnc", setup, Options(error_model=str(tmp_path / "e.toml")), found)
+    return postproc.convert(path, "mill-3axis", "linuxcnc", setup,
+                            Options(error_model=str(tmp_path / "e.toml")), found)
 
 
 def test_lost_motion_is_taken_up_where_the_axis_turns_back(tmp_path: Path) -> None:
@@ -184,14 +186,15 @@ def test_arcs_survive_a_squareness_error_and_not_a_wavy_guide(tmp_path: Path) ->
     square = mill(tmp_path, "[location]\nEA0Z = 20\n")
     assert square.ok and square.compensation is not None and square.compensation.resolved == 0
     assert any(line.startswith(("G2", "G3")) or " G2 " in line or " G3 " in line for line in blocks(square))
-    wavy = mill(tmp_path, '[components.EYX]\ntable = "x.csv"\n', "X [mm], EYX [um]\n-500, 0\n-20, 0\n0, 15\n20, 0\n500, 0\n")
+    wavy = mill(tmp_path, '[components.EYX]\ntable = "x.csv"\n',
+                "X [mm], EYX [um]\n-500, 0\n-20, 0\n0, 15\n20, 0\n500, 0\n")
     assert wavy.ok and wavy.compensation is not None and wavy.compensation.resolved == 1
     assert wavy.comparison is not None and wavy.comparison.worst_tip < LOOSE * SHARE * 0.01 + 1e-4
 
 
 def test_rewinds_are_proved_on_the_machine_with_errors(tmp_path: Path) -> None:
-    """Several rewinds in one cut: on its approach direction out the correction turns the tool by an arc second, no unwinding
-    in the cut."""
+    """Several rewinds in one cut: on its approach direction out the correction turns the tool by an arc
+    second, no unwinding in the cut."""
     machine = str(SAMPLES / "joints" / "limited_c.toml")
     model = written(tmp_path, replace(load(MIKRON, machines.load("mikron-ucp710")), machine=""))
     lines = (SAMPLES / "joints" / "spiral_50.cls").read_text().splitlines()
@@ -236,7 +239,8 @@ def test_the_centre_of_an_arc_goes_with_its_ends(tmp_path: Path, monkeypatch: py
         assert got == pytest.approx(wanted, abs=2e-5)
 
 
-def test_the_centre_of_an_arc_is_as_far_from_both_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_centre_of_an_arc_is_as_far_from_both_ends(tmp_path: Path,
+                                                       monkeypatch: pytest.MonkeyPatch) -> None:
     """A quarter whose ends move unlike: halfway with both, the centre would be 1.5 um farther from one of them."""
     quarter = SQUARE.replace("GOTO/40,0,0\nGOTO/-40,0,0\nCIRCLE", "CIRCLE").replace(HALF, QUARTER)
     monkeypatch.setitem(globals(), "SQUARE", quarter)

@@ -1,5 +1,5 @@
-"""Holes corrected as a whole: all at once as one by one, at several heights, in planes, tapped, and what stays a cycle;
-approach directions of joints in blocks that are nearly straight."""
+"""Holes corrected as a whole: all at once as one by one, at several heights, in planes, tapped, and what
+stays a cycle; approach directions of joints in blocks that are nearly straight."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ HEIGHTS = (0, -4, 0, 0, -4, 0, 5, 0)
 PLACES = ((-28, -29), (-25, 18), (2, 21), (50, 28), (-37, -52), (56, -58), (49, -28), (-9, 47))
 
 
-# ---- runs --------------------------------------------------------------------------------------------------------------
+# ---- runs --------------------------------------------------------------------------------------------------
 
 def test_runs_are_those_of_a_loop() -> None:
     rng = np.random.default_rng(5)
@@ -61,7 +61,7 @@ def test_blocks_compose_as_one_after_the_other() -> None:
     assert not np.isfinite(found[1:, 1]).any() and np.isfinite(found[1:, 2]).all()
 
 
-# ---- programs ----------------------------------------------------------------------------------------------------------
+# ---- programs ----------------------------------------------------------------------------------------------
 
 def drilled(folder: Path, machine: str, controller: str, cycle: str, tilted: bool = False, seed: int = 2,
             model: str = "") -> PostResult:
@@ -118,7 +118,8 @@ def test_the_tool_is_lifted_before_it_crosses(tmp_path: Path) -> None:
                                    "BRKCHP,DEPTH,12,CLEAR,2,RETURN,20,STEP,4,MMPM,180",
                                    "BORE,DEPTH,8,CLEAR,3,RETURN,3,MMPM,100"])
 @pytest.mark.parametrize("tilted", [False, True])
-def test_holes_at_several_heights_are_proved(cycle: str, controller: str, tilted: bool, tmp_path: Path) -> None:
+def test_holes_at_several_heights_are_proved(cycle: str, controller: str, tilted: bool,
+                                             tmp_path: Path) -> None:
     """Some stay cycles, some are written out; a cycle behind one that is written out begins at its own level."""
     result = checked(drilled(tmp_path, "mikron-ucp710" if tilted else "mill-3axis", controller, cycle, tilted))
     assert result.program is not None and result.compensation is not None
@@ -134,8 +135,8 @@ def test_holes_in_planes_of_printed_angles_stay_cycles(controller: str, tmp_path
 
 
 def test_what_a_level_is_off_by_is_taken_up_before_a_feed_and_at_its_beginning() -> None:
-    """The last part of the approach direction to a plane, and the first of a cut behind a hole; not in the middle of
-    cuts."""
+    """The last part of the approach direction to a plane, and the first of a cut behind a hole; not in the
+    middle of cuts."""
     approach = [100.0, 10.0, 0.005, 20.0, 0.005, 20.0, 0.005, 0.005, 20.0, 0.02, 20.0, 0.005]
     motion = SimpleNamespace(code=np.array([0, 0, 0, 1, 1, 1, 1, 0, 1, 1, 1, 1]))
     job = SimpleNamespace(errors=True, options=Options(), rounding=SimpleNamespace(tip=1e-4))
@@ -148,8 +149,8 @@ def test_what_a_level_is_off_by_is_taken_up_before_a_feed_and_at_its_beginning()
 @pytest.mark.parametrize("two_directions", [False, True])
 def test_taps_have_planes_of_their_own_and_are_come_to_from_afar(controller: str, two_directions: bool,
                                                                  tmp_path: Path) -> None:
-    """A table that sinks by 0.06 um per mm and a Z that leans by 40 arcsec: 11 um across at the level that the tool comes
-    from, up to 6 um between the planes; neither is the bottom's to settle."""
+    """A table that sinks by 0.06 um per mm and a Z that leans by 40 arcsec: 11 um across at the level that
+    the tool comes from, up to 6 um between the planes; neither is the bottom's to settle."""
     (tmp_path / "z.csv").write_text("Z [mm], EZZ+ [um], EZZ- [um]\n-500, 0, 3\n500, 1, 4\n")
     text = '[location]\nEA0Z = 40\n[components.EZX]\npolynomial = [0, 0.06]\nrange = [-300, 300]\n'
     (tmp_path / "e.toml").write_text(text + ('[components.EZZ]\ntable = "z.csv"\n' if two_directions else ""))
@@ -184,7 +185,8 @@ def test_slides_of_other_letters_lose_motion_too(tmp_path: Path) -> None:
     checked(postproc.convert(path, str(tmp_path / "uvw.toml"), "linuxcnc", options=options, diagnostics=found))
 
 
-def test_blocks_that_are_nearly_straight_need_no_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_that_are_nearly_straight_need_no_pieces(tmp_path: Path,
+                                                        monkeypatch: pytest.MonkeyPatch) -> None:
     """The words are those that pieces of all blocks lead to; some blocks are not straight enough to go without."""
     model, texts, counts = both_directions_of_all(tmp_path, "mikron-ucp710", 3), [], []
     runs = backlash_words._runs
@@ -199,8 +201,8 @@ def test_blocks_that_are_nearly_straight_need_no_pieces(tmp_path: Path, monkeypa
 
 
 def test_blocks_of_a_hole_are_moved_as_far_as_its_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """So are their joints: else the approach directions behind the first block would be those of a hole that was moved
-    back."""
+    """So are their joints: else the approach directions behind the first block would be those of a hole that
+    was moved back."""
     seen: list[BlockEnds] = []
 
     def kept(ends: BlockEnds) -> tuple[Floats, Floats]:

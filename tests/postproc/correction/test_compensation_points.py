@@ -41,13 +41,15 @@ CASES = [("five_faces.cls", "mikron-ucp710", "fanuc-30i", "tools"),
 @cache
 def converted(sample: str, machine: str, controller: str, setup: str) -> PostResult:
     path, found = toolpaths.read(SAMPLES / sample)
-    options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"), error_model=str(SAMPLES / f"errors/{machine}.toml"))
+    options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"),
+                      error_model=str(SAMPLES / f"errors/{machine}.toml"))
     return postproc.convert(path, machine, controller, options=options, diagnostics=found)
 
 
 @pytest.mark.covering
 @pytest.mark.parametrize(("sample", "machine", "controller", "setup"), CASES)
-def test_points_are_inside_the_rounding_of_their_words(sample: str, machine: str, controller: str, setup: str) -> None:
+def test_points_are_inside_the_rounding_of_their_words(sample: str, machine: str, controller: str,
+                                                       setup: str) -> None:
     result = converted(sample, machine, controller, setup)
     found = after_formatting(result)
     assert result.ok and found is not None and result.job is not None and len(found.points) > 10
@@ -246,5 +248,6 @@ def test_a_tool_is_changed_at_home_but_for_what_the_model_corrects_there(tmp_pat
     path, found = toolpaths.read(SAMPLES / "five_faces.cls")
     for away, good in ((0.0, True), (0.03, True), (0.3, False)):
         (tmp_path / "a.ngc").write_text(result.text.replace("G53 G0 Z250\n", f"G53 G0 Z{250.0 - away:g}\n"))
-        noted = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", options=result.options, diagnostics=found)
+        noted = verify(tmp_path / "a.ngc", path, "mikron-ucp710", "linuxcnc", options=result.options,
+                       diagnostics=found)
         assert ("verify.tool_change" not in {d.code for d in noted.diagnostics}) == good

@@ -1,7 +1,7 @@
 """Corrected programs of every control, read and put on the machine with errors a second time, against the CL file.
 
-The words are read by `independent_reader`, the machine and its errors come from their files by `independent_machine`; of
-the product only the CL points and the bound that it prints are taken.
+The words are read by `independent_reader`, the machine and its errors come from their files by
+`independent_machine`; of the product only the CL points and the bound that it prints are taken.
 """
 
 from __future__ import annotations

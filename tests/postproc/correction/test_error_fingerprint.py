@@ -53,7 +53,8 @@ def model(tmp_path: Path) -> Path:
 def written(model: Path, controller: str = "linuxcnc") -> Path:
     program = model.parent / "part.nc"
     program.with_suffix(".apt").write_text(PART)
-    made = run("convert", program.with_suffix(".apt"), *common(controller), "--error-model", model, "-o", program)
+    made = run("convert", program.with_suffix(".apt"), *common(controller), "--error-model", model,
+               "-o", program)
     assert made.exit_code == 0, made.output
     return program
 
@@ -65,7 +66,8 @@ def verified(program: Path, model: Path, controller: str = "linuxcnc") -> Result
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_every_controller_keeps_the_fingerprint(controller: str, model: Path) -> None:
     program = written(model, controller)
-    stated = re.search(r"fingerprint of the geometric errors ([0-9a-f]{8})\b", program.read_text(), re.IGNORECASE)
+    stated = re.search(r"fingerprint of the geometric errors ([0-9a-f]{8})\b", program.read_text(),
+                       re.IGNORECASE)
     assert stated and f"fingerprint {stated[1].lower()}" in run("errors", "check", model, "-m", "mikron-ucp710").output
     same = verified(program, model, controller)
     assert same.exit_code == 0 and not noted(same, "verify.error_model")

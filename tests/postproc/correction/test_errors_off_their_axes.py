@@ -30,8 +30,10 @@ frame = "{1}"
 
 @pytest.mark.covering
 @pytest.mark.parametrize("frame", ["fixed", "moving"])
-@pytest.mark.parametrize(("machine", "letter"), [("nutating-head", "B"), ("fork-head-ab", "A"), ("mikron-ucp710", "C")])
-def test_first_order_of_turns_about_a_point_off_the_axis(machine: str, letter: str, frame: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("machine", "letter"),
+                         [("nutating-head", "B"), ("fork-head-ab", "A"), ("mikron-ucp710", "C")])
+def test_first_order_of_turns_about_a_point_off_the_axis(machine: str, letter: str, frame: str,
+                                                         tmp_path: Path) -> None:
     (tmp_path / "e.toml").write_text(OFF_ITS_LINE.format(letter, frame))
     built = machines.load(machine)
     model, kin = load(tmp_path / "e.toml", built), built.kinematics.with_tool(80.0)
@@ -45,8 +47,8 @@ def test_first_order_of_turns_about_a_point_off_the_axis(machine: str, letter: s
 
 
 def lost_motion(folder: Path, gap: float, tilt: float = 0.0) -> str:
-    """Tables with two approach directions for X, Y, Z, their turn about y too, and a wavy straightness that keeps every axis
-    moving."""
+    """Tables with two approach directions for X, Y, Z, their turn about y too, and a wavy straightness that
+    keeps every axis moving."""
     x = np.linspace(-600.0, 600.0, 41)
     text = ""
     for k, letter in enumerate("XYZ"):

@@ -15,8 +15,8 @@ AROUND = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
 MOST = 6
 """joints that any machine has at most"""
 DIRECTIONS = np.array(list(product((0.0, 1.0, -1.0), repeat=MOST)))[:, ::-1].copy()
-"""(3^6, 6) approach directions that are tried, the first 3^T of the first T joints being all theirs; 0 where that before
-stays"""
+"""(3^6, 6) approach directions that are tried, the first 3^T of the first T joints being all theirs; 0 where
+that before stays"""
 STAYS = 1.0 - np.abs(DIRECTIONS)
 
 
@@ -64,8 +64,8 @@ def _ended(n: Any, case: Any) -> Any:
 
 
 def _costs(n: Any, case: Any) -> Any:
-    """(N,) mm that the tip is off by after steps n (N, 3), and the weighted parts of what the next block begins off by and
-    of a plain reading."""
+    """(N,) mm that the tip is off by after steps n (N, 3), and the weighted parts of what the next block
+    begins off by and of a plain reading."""
     ended, goes_on, later, by_approach = _ended(n, case), case[6], case[8], case[4]
     approach = np.minimum(np.maximum(ended + later[0], later[1]), later[2])
     tip = case[3] + approach @ by_approach + n @ case[2]
@@ -84,8 +84,8 @@ def _nearest(tip: Any, case: Any) -> Any:
 
 
 def _toward(n: Any, cost: Any, case: Any) -> Any:
-    """The nearest steps for the approach directions that the steps n (1, 3) make, those of the next, as long as it comes
-    nearer."""
+    """The nearest steps for the approach directions that the steps n (1, 3) make, those of the next, as long
+    as it comes nearer."""
     while True:
         later = case[8]
         approach = np.minimum(np.maximum(_ended(n, case) + later[0], later[1]), later[2])
@@ -97,8 +97,8 @@ def _toward(n: Any, cost: Any, case: Any) -> Any:
 
 
 def _by_approach(n: Any, cost: Any, case: Any) -> Any:
-    """The nearest steps for every approach direction that is one of both or that before, where that comes nearer than n (1,
-    3)."""
+    """The nearest steps for every approach direction that is one of both or that before, where that comes
+    nearer than n (1, 3)."""
     lossy = len(case[5])
     approaches = DIRECTIONS[:3 ** lossy, :lossy] + case[10] * STAYS[:3 ** lossy, :lossy]
     others = _nearest(case[3] + approaches @ case[4], case)

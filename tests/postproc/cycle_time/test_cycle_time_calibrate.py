@@ -49,7 +49,8 @@ def log_of(b: MotionBlocks, truth: CycleTimeModel, rng: np.random.Generator) -> 
 
 
 def fit(truth: CycleTimeModel, rng: np.random.Generator) -> CalibratedModel:
-    made, found = calibrate(finishing(0), log_of(finishing(0), truth, rng), model("lookahead"), "log.csv", machine())
+    made, found = calibrate(finishing(0), log_of(finishing(0), truth, rng), model("lookahead"),
+                            "log.csv", machine())
     assert made is not None and not found
     return made
 

@@ -139,7 +139,8 @@ def test_wider_corners_and_quicker_blocks_are_faster() -> None:
 
 
 def test_window_of_few_blocks_is_slower() -> None:
-    b = blocks(f"{HEAD}\nF30000\n" + "\n".join(f"G1 X{0.2 * i:.1f}" for i in range(1, 500)), controller="generic-iso")
+    b = blocks(f"{HEAD}\nF30000\n" + "\n".join(f"G1 X{0.2 * i:.1f}" for i in range(1, 500)),
+               controller="generic-iso")
     near, far = (total(b, timed(b, model("lookahead").model_copy(update={"lookahead": n, "block_time": 0.0})))
                  for n in (5, 5000))
     peak = timed(b, model("lookahead").model_copy(update={"lookahead": 5, "block_time": 0.0})).peak.max()
@@ -169,7 +170,8 @@ def test_merged_lines_stay_within_the_chain_tolerance() -> None:
     merged, rows = merge(b)
     assert len(merged) < len(b) / 3 and rows[-1] == len(b) - 1
     assert np.diff(np.concatenate([[-1], rows])).max() <= 101
-    for start, end, first, last in zip(merged.start, merged.end, np.concatenate([[0], rows[:-1] + 1]), rows, strict=True):
+    for start, end, first, last in zip(merged.start, merged.end, np.concatenate([[0], rows[:-1] + 1]), rows,
+                                       strict=True):
         chord = (end - start)[:2]
         off = b.end[first:last, :2] - start[:2]
         across = np.abs(off[:, 0] * chord[1] - off[:, 1] * chord[0]) / np.linalg.norm(chord)

@@ -26,7 +26,8 @@ def converted(name: str, machine: str, **options: object) -> PostResult:
     return result
 
 
-@pytest.mark.parametrize(("name", "machine"), [("pocket.cls", "mill-3axis"), ("tool_axis_tour.apt", "mikron-ucp710")])
+@pytest.mark.parametrize(("name", "machine"),
+                         [("pocket.cls", "mill-3axis"), ("tool_axis_tour.apt", "mikron-ucp710")])
 def test_passes_take_what_the_plan_takes(name: str, machine: str) -> None:
     result = converted(name, machine, feed="planned")
     blocks, ideal = from_conversion(result), model("ideal")

@@ -110,7 +110,8 @@ def test_tip_of_a_controls_own_mode_runs_at_the_feed() -> None:
     fanuc, _ = load_controller("fanuc-30i")
     assert fanuc is not None
     path, found = toolpaths.read(SAMPLES / "tool_axis_tour.apt")
-    result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", TOOLS, postproc.Options(output="tcp"), found)
+    result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", TOOLS,
+                              postproc.Options(output="tcp"), found)
     if not result.ok:
         pytest.skip("; ".join(str(d) for d in result.diagnostics))
     b = from_conversion(result)
@@ -147,6 +148,7 @@ def test_cycles_return_to_r_until_linuxcnc_is_reported_otherwise() -> None:
 def test_faults_of_a_program_are_reported() -> None:
     spec, _ = load_controller("linuxcnc")
     assert spec is not None
-    for text, code in (("G1 X1\nM2\n", "gcode.feed"), ("M2\n", "gcode.no_motion"), ("F100 G1 Q\nM2\n", "gcode.syntax")):
+    for text, code in (("G1 X1\nM2\n", "gcode.feed"), ("M2\n", "gcode.no_motion"),
+                       ("F100 G1 Q\nM2\n", "gcode.syntax")):
         made, found = from_gcode(text.encode(), machine(), spec, SetupFile(), "a.ngc")
         assert made is None and code in [d.code for d in found], [str(d) for d in found]

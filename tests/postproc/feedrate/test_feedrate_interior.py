@@ -48,7 +48,8 @@ def test_tied_ends_follow_the_law_and_join_smoothly() -> None:
     law = rest_law((sigma[:REST + 1] - sigma[0]) / 15.0, 15.0)
     np.testing.assert_allclose(x[:, :REST + 1], 7.0 * law, rtol=1e-10, atol=1e-12)
     law = rest_law((sigma[-1] - sigma[::-1][:REST + 1]) / 15.0, 15.0)
-    np.testing.assert_allclose(x[:, ::-1][:, :REST + 1], 7.0 * law * [[1.0], [-1.0], [1.0]], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(x[:, ::-1][:, :REST + 1], 7.0 * law * [[1.0], [-1.0], [1.0]],
+                               rtol=1e-10, atol=1e-12)
     part = rest_basis(sigma, 15.0, 20, 41)
     np.testing.assert_array_equal(part.stencil, basis.stencil[:, :, 20:41])
     assert part.tied == (1, 1)
@@ -92,7 +93,8 @@ def test_twice_the_knots_change_the_time_little() -> None:
     times = []
     for dt in (4e-3, 1e-3):
         eased = Eased.between(bezier(), 0.0, 80.0, 25.0)
-        grid = MotionKnots(eased, mesh(eased, MIKRON, lambda s: np.full(len(s), np.inf), Spacing(dt)), MIKRON, unlimited)
+        grid = MotionKnots(eased, mesh(eased, MIKRON, lambda s: np.full(len(s), np.inf), Spacing(dt)),
+                           MIKRON, unlimited)
         problem = grid.problem()
         times.append(float(np.sum(problem.weight * problem.basis.values(solve_problem(problem, NumpySteps).c)[0] ** -0.5)))
     assert times[0] == pytest.approx(times[1], rel=5e-4)
@@ -103,7 +105,8 @@ def test_twice_the_knots_change_the_time_little() -> None:
 def test_one_to_nine_joints(joints: int) -> None:
     """Compiled as numpy, within the limits, and a joint that stands still changes nothing."""
     rng = np.random.default_rng(joints)
-    spline = make_interp_spline(np.linspace(0.0, 100.0, 20), np.cumsum(rng.normal(size=(20, joints)) * 4.0, axis=0), k=5)
+    spline = make_interp_spline(np.linspace(0.0, 100.0, 20),
+                                np.cumsum(rng.normal(size=(20, joints)) * 4.0, axis=0), k=5)
     limits = JointLimits(*(value * np.ones(joints) for value in (500.0, 2500.0, 5e4)))
     problem = uniform(SplinePath(spline.t, spline.c), 300, limits).problem()
     plain, fast = solve_problem(problem, NumpySteps), solve_problem(problem, PackedSteps)

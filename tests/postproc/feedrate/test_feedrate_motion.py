@@ -45,7 +45,8 @@ def test_at_places(made: Plan) -> None:
     samples = made.trajectory()
     some = made.at(samples.s[50:-50:7])
     for name in ("q", "qd", "qdd", "t"):
-        np.testing.assert_allclose(getattr(some, name), getattr(samples, name)[50:-50:7], rtol=1e-5, atol=1e-4)
+        np.testing.assert_allclose(getattr(some, name), getattr(samples, name)[50:-50:7],
+                                   rtol=1e-5, atol=1e-4)
     bound, other = some.binding(MIKRON), samples.binding(MIKRON)
     assert np.mean(bound.axis == other.axis[50:-50:7]) > 0.98
     with pytest.raises(ValueError, match="not all on the path"):
@@ -171,7 +172,8 @@ def test_limits_at_the_tool_hold_by_length() -> None:
         assert np.mean(samples.binding(made.limits).axis == 3) > 0.5
         assert made.shares.limits[:, 3].sum() == pytest.approx(made.seconds, rel=1e-3)
         assert samples.tool is not None
-        np.testing.assert_allclose(np.linalg.norm(samples.qdd, axis=1), samples.tool[:, 1], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(samples.qdd, axis=1), samples.tool[:, 1],
+                                   rtol=1e-9, atol=1e-9)
 
 
 def test_second_order_limits_at_the_tool() -> None:
@@ -236,7 +238,8 @@ def test_normal_at_an_inflection_comes_from_the_next_derivative() -> None:
 
 def test_tool_on_a_straight_line_gives_nothing_away() -> None:
     """Tip acceleration and jerk along a line: the same as those limits on one joint."""
-    one = plan(PolynomialPath([[0.0, 1.0]], 80.0), JointLimits(np.array([1e9]), np.array([1000.0]), np.array([20000.0])))
+    one = plan(PolynomialPath([[0.0, 1.0]], 80.0),
+               JointLimits(np.array([1e9]), np.array([1000.0]), np.array([20000.0])))
 
     class Line(PolynomialPath):
         def tip(self, s: Floats) -> Derivatives:

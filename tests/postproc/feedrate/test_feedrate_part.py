@@ -1,5 +1,5 @@
-"""Test part of the orientation paper (Grandguillaume, Lavernhe, Tournier 2017, equation 8 and section IV): bicubic patch,
-ball-end mill of 16 mm, passes in planes Xp, three axes with a jerk of 5 m/s3 each and no other limit."""
+"""Test part of the orientation paper (Grandguillaume, Lavernhe, Tournier 2017, equation 8 and section IV):
+bicubic patch, ball-end mill of 16 mm, passes in planes Xp, three axes with a jerk of 5 m/s3 each and no other limit."""
 
 from __future__ import annotations
 
@@ -79,7 +79,8 @@ def seconds(polynomials: Floats, end: float, turn: Floats, options: PlannerOptio
     return plan(PolynomialPath((turn @ polynomials).tolist(), end), LIMITS, options=options).seconds
 
 
-@pytest.mark.parametrize(("options", "close"), [(PlannerOptions(), 0.005), (PlannerOptions(strict=True), 0.01)])
+@pytest.mark.parametrize(("options", "close"),
+                         [(PlannerOptions(), 0.005), (PlannerOptions(strict=True), 0.01)])
 def test_pass_0_as_printed(options: PlannerOptions, close: float) -> None:
     """0.7268 s at A = C = 0."""
     polynomials, end, _ = programmed(0.0)

@@ -18,7 +18,8 @@ def test_eased_derivatives_are_those_of_the_eased_path() -> None:
     sigma, h = np.array([0.5, 4.0, 9.9, 15.0, eased.end - 9.0, eased.end - 0.5]), 1e-3
     for order in range(3):
         change = eased.derivatives(sigma + h)[order] - eased.derivatives(sigma - h)[order]
-        np.testing.assert_allclose(eased.derivatives(sigma)[order + 1], change / (2.0 * h), rtol=2e-5, atol=2e-6)
+        np.testing.assert_allclose(eased.derivatives(sigma)[order + 1], change / (2.0 * h),
+                                   rtol=2e-5, atol=2e-6)
 
 
 def test_eased_ends_inverse_and_joints() -> None:
@@ -30,7 +31,8 @@ def test_eased_ends_inverse_and_joints() -> None:
     sigma = np.linspace(0.0, eased.end, 50)
     np.testing.assert_allclose(eased.sigma(eased.parameter(sigma)[0]), sigma, atol=1e-4)
     inside = np.array([10.0, eased.end - 10.0])
-    np.testing.assert_allclose(eased.derivatives(inside - 1e-9).d3q, eased.derivatives(inside + 1e-9).d3q, atol=1e-8)
+    np.testing.assert_allclose(eased.derivatives(inside - 1e-9).d3q,
+                               eased.derivatives(inside + 1e-9).d3q, atol=1e-8)
     assert np.all(np.isin(np.round(eased.breaks, 9), np.round(inside, 9)))
 
 

@@ -40,7 +40,8 @@ def test_straight_line_under_jerk_alone() -> None:
                                                       (3.0, 5.0, 200.0, 50000.0),
                                                       (900.0, 500.0, 900.0, 5000.0)])
 def test_straight_line_under_all_limits(length: float, v: float, a: float, j: float) -> None:
-    made = plan(PolynomialPath([[0.0, 1.0]], length), JointLimits(*(np.array([value]) for value in (v, a, j))))
+    made = plan(PolynomialPath([[0.0, 1.0]], length),
+                JointLimits(*(np.array([value]) for value in (v, a, j))))
     assert made.seconds == pytest.approx(s_curve(length, v, a, j), rel=2e-3)
 
 
@@ -142,7 +143,8 @@ def test_what_binds_is_what_limits() -> None:
 def stitched(method: Method) -> tuple[Plan, Plan]:
     path = zigzag(300.0)
     knots = uniform(path, 3000).sigma
-    return plan(path, MIKRON, knots=knots), plan(path, MIKRON, options=PlannerOptions(method=method), knots=knots)
+    return plan(path, MIKRON, knots=knots), plan(path, MIKRON, options=PlannerOptions(method=method),
+                                                 knots=knots)
 
 
 @pytest.mark.numeric
@@ -170,7 +172,8 @@ def test_windows_that_stop_early_are_slow_not_wrong(monkeypatch: pytest.MonkeyPa
     report = solved(grid, Method(window=800, overlap=100))
     assert not report.solved and report.mismatch > 0.1
     assert grid.problem().ratios(report.c).max() < 1.0
-    again = plan(path, MIKRON, knots=grid.sigma, options=PlannerOptions(method=Method(window=800, overlap=100)))
+    again = plan(path, MIKRON, knots=grid.sigma,
+                 options=PlannerOptions(method=Method(window=800, overlap=100)))
     assert again.solved and again.seconds == pytest.approx(plan(path, MIKRON, knots=grid.sigma).seconds, rel=1e-3)
 
 
@@ -243,7 +246,8 @@ def test_feeds_of_blocks_by_their_edges() -> None:
 
 def test_where_tightening_is_in_vain_the_best_is_kept() -> None:
     """A jerk so high that the motion is one of second order: strict stays next to V/A + S/V."""
-    made = plan(PolynomialPath([[0.0, 1.0]], 100.0), JointLimits(*np.array([[500.0], [2500.0], [5e8]])), options=STRICT)
+    made = plan(PolynomialPath([[0.0, 1.0]], 100.0), JointLimits(*np.array([[500.0], [2500.0], [5e8]])),
+                options=STRICT)
     assert made.usage().worst <= 1.0 and made.seconds < 1.06 * 0.4
 
 

@@ -14,7 +14,8 @@ from postproc.feedrate.rest_to_rest import PointToPointMode, rest_seconds, rest_
 from tests.postproc.feedrate_kit import MIKRON
 from tests.source import ROOT, nodes, product
 
-LIMITS = JointLimits(np.array([100.0, 50.0, 3.0]), np.array([1000.0, 800.0, 20.0]), np.array([5000.0, 60000.0, 300.0]))
+LIMITS = JointLimits(np.array([100.0, 50.0, 3.0]), np.array([1000.0, 800.0, 20.0]),
+                     np.array([5000.0, 60000.0, 300.0]))
 
 
 def moves(count: int, seed: int = 5) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
@@ -71,7 +72,8 @@ def test_laws() -> None:
 
 
 def test_samples_are_derivatives_of_each_other() -> None:
-    made = rest_to_rest(np.zeros(5), np.array([300.0, -20.0, 1.0, 0.4, 0.0]), MIKRON, PointToPointMode.SYNCHRONISED)
+    made = rest_to_rest(np.zeros(5), np.array([300.0, -20.0, 1.0, 0.4, 0.0]), MIKRON,
+                        PointToPointMode.SYNCHRONISED)
     for low, high in ((made.q, made.qd), (made.qd, made.qdd)):
         slope = (low[2:] - low[:-2]) / 2e-3
         np.testing.assert_allclose(slope, high[1:-1], atol=2e-3 * np.abs(high).max() + 1e-9)

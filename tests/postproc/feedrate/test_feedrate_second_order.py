@@ -23,7 +23,8 @@ from toolpaths.arrays import Floats
 
 def planned(path: SplinePath, sigma: Floats, kernel: bool) -> Floats:
     at = Derivatives(*(order(sigma) for order in path._orders))  # to the last bit the same for both
-    return second_order(sigma, at.dq, at.d2q, MIKRON.acceleration, squared_speed(at.dq, MIKRON.velocity), kernel)
+    return second_order(sigma, at.dq, at.d2q, MIKRON.acceleration,
+                        squared_speed(at.dq, MIKRON.velocity), kernel)
 
 
 def toppra_time(path: SplinePath, sigma: Floats, unit: float = 10.0) -> float:
@@ -125,7 +126,8 @@ def test_straight_line(velocity: float, seconds: float) -> None:
     assert made.seconds == pytest.approx(seconds, rel=2e-4)
     samples = made.trajectory()
     assert samples.q[0, 0] == 0.0 and samples.q[-1, 0] == pytest.approx(50.0, abs=1e-12)
-    np.testing.assert_allclose(np.diff(samples.q[:, 0]) / 1e-3, 0.5 * (samples.qd[1:, 0] + samples.qd[:-1, 0]), atol=1.1)
+    np.testing.assert_allclose(np.diff(samples.q[:, 0]) / 1e-3,
+                               0.5 * (samples.qd[1:, 0] + samples.qd[:-1, 0]), atol=1.1)
     used = samples.usage(limits)
     assert max(used.velocity[0], used.acceleration[0]) <= 1.0 + 1e-6 and used.jerk[0] == 0.0
 

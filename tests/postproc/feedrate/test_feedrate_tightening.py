@@ -26,7 +26,8 @@ def test_compiled_ratios_equal_numpy() -> None:
     at = random_path(1).derivatives(rng.uniform(0.0, 100.0, 50))
     x = rng.normal(size=(3, 50)) * 1000.0
     x[0] = np.abs(x[0])
-    np.testing.assert_allclose(worst_ratios(at, x, MIKRON, True), worst_ratios(at, x, MIKRON, False), rtol=1e-12)
+    np.testing.assert_allclose(worst_ratios(at, x, MIKRON, True),
+                               worst_ratios(at, x, MIKRON, False), rtol=1e-12)
 
 
 def test_tightening_lowers_what_is_seen_between_knots() -> None:

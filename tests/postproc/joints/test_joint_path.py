@@ -26,7 +26,8 @@ def limits_of(name: str, **travel: tuple[float, float]) -> Limits:
     return replace(m.limits, lower=lower, upper=upper)
 
 
-def run(name: str, axis: np.ndarray, limits: Limits | None = None, start: np.ndarray | None = None) -> np.ndarray:
+def run(name: str, axis: np.ndarray, limits: Limits | None = None,
+        start: np.ndarray | None = None) -> np.ndarray:
     """Rotary joints of a run in degrees; the tip moves a little so that poses differ."""
     m = machine(name)
     tip = np.linspace(0, 1, len(axis))[:, None] * [10.0, 5.0, 0.0]
@@ -54,7 +55,7 @@ def test_wrap_is_into_the_half_open_turn() -> None:
     assert np.allclose(wrap(turns), [0, np.pi, np.pi, np.pi, 0.1, 0], atol=1e-12)
 
 
-# ---- windings --------------------------------------------------------------------------------------------------------
+# ---- windings ----------------------------------------------------------------------------------------------
 
 
 def brute(branches: np.ndarray, limits: Limits, start: np.ndarray) -> tuple[float, np.ndarray] | None:
@@ -119,7 +120,7 @@ def test_nearest_winding_to_where_the_machine_stands() -> None:
     assert abs(q[0, 1] - 14 * 180) <= 180
 
 
-# ---- the free axis ---------------------------------------------------------------------------------------------------
+# ---- the free axis -----------------------------------------------------------------------------------------
 
 
 def test_free_axis_begins_where_the_run_will_need_it() -> None:
@@ -140,7 +141,7 @@ def test_free_axis_of_a_run_along_the_pole_stays_at_the_start() -> None:
     assert np.allclose(run("mikron-ucp710", np.tile([0, 0, 1.0], (6, 1)), start=start)[:, 1], 1.234 / DEG)
 
 
-# ---- near the pole ---------------------------------------------------------------------------------------------------
+# ---- near the pole -----------------------------------------------------------------------------------------
 
 
 def continued(name: str, axis: np.ndarray, q: np.ndarray, steps: int) -> np.ndarray:
@@ -158,7 +159,8 @@ def continued(name: str, axis: np.ndarray, q: np.ndarray, steps: int) -> np.ndar
     return np.array(ends)
 
 
-@pytest.mark.parametrize(("name", "miss"), [("mikron-ucp710", 0.5), ("mikron-ucp710", 0.01), ("head-table", -0.5)])
+@pytest.mark.parametrize(("name", "miss"),
+                         [("mikron-ucp710", 0.5), ("mikron-ucp710", 0.01), ("head-table", -0.5)])
 def test_next_to_the_pole_the_branch_is_followed_not_jumped(name: str, miss: float) -> None:
     """Points 2 degrees apart on both sides, none near the pole: C has to swing half a turn on one branch."""
     axis = over(np.arange(-9.0, 10.0, 2.0), miss, phi=25)
@@ -206,7 +208,7 @@ def test_many_random_walks_near_the_pole_have_no_jump() -> None:
         assert np.abs(d).max() < 0.02
 
 
-# ---- no solution -----------------------------------------------------------------------------------------------------
+# ---- no solution -------------------------------------------------------------------------------------------
 
 
 def test_poses_out_of_reach_are_nan_and_the_others_go_on() -> None:
@@ -224,8 +226,8 @@ def test_poses_out_of_reach_are_nan_and_the_others_go_on() -> None:
 
 def test_a_way_through_the_hole_at_the_pole_of_axes_that_are_not_square_ends(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With C out of square by 0.001, directions within 0.001 of its own cannot be taken: who follows a branch across them
-    in ever smaller steps never arrives."""
+    """With C out of square by 0.001, directions within 0.001 of its own cannot be taken: who follows a branch
+    across them in ever smaller steps never arrives."""
     file = tmp_path / "measured.toml"
     file.write_text('base = "mikron-ucp710"\n[kinematics.axes.C]\ndirection = [0.001, 0, 0.9999995]\n')
     m = machines.load(file)

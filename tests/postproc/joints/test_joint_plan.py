@@ -72,7 +72,8 @@ def apart(limits: Limits, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (np.abs(step) / limits.velocity).max(axis=2)
 
 
-def brute(runs: list[PoseRun], limits: Limits, start: np.ndarray, side: tuple[int, int] | None = None) -> Cost:
+def brute(runs: list[PoseRun], limits: Limits, start: np.ndarray,
+          side: tuple[int, int] | None = None) -> Cost:
     """Bellman forwards over every pose with every branch, every turn from -3 to 3, and a rewind at every pose."""
     cost, at = np.zeros(1, dtype=np.int64), start[None]
     after = cost

@@ -35,7 +35,8 @@ def cone(turns: float, step: float, tilt: float = 25.0) -> list[str]:
 
 
 def run(lines: list[str], m: Machine, setup: SetupFile | None = None, **options: object) -> PostResult:
-    result = postproc.convert(toolpath(*lines), m, setup=setup or tool_setup(), options=postproc.Options(**options))
+    result = postproc.convert(toolpath(*lines), m, setup=setup or tool_setup(),
+                              options=postproc.Options(**options))
     assert result.ok, [str(d) for d in result.diagnostics]
     return result
 
@@ -116,9 +117,10 @@ travel = [-720, 720]
 @pytest.mark.covering
 @pytest.mark.parametrize(("base", "sign"), [("trunnion-bc", "-"), ("trunnion-bc", ""), ("head-table", "")])
 @pytest.mark.parametrize("seed", range(3))
-def test_nutating_axes_pass_the_direction_of_the_table(base: str, sign: str, seed: int, tmp_path: Path) -> None:
-    """With a nutating axis the table turns while the tool is tilted along a great circle: at the pole it stands where both
-    sides of the path need it, not where it stood at the points before."""
+def test_nutating_axes_pass_the_direction_of_the_table(base: str, sign: str, seed: int,
+                                                       tmp_path: Path) -> None:
+    """With a nutating axis the table turns while the tool is tilted along a great circle: at the pole it
+    stands where both sides of the path need it, not where it stood at the points before."""
     file = tmp_path / "nutated.toml"
     file.write_text(NUTATED.format(base=base, z=sign))
     rng = np.random.default_rng(seed)

@@ -58,7 +58,8 @@ def test_script_reproduces_the_files(tmp_path: Path) -> None:
     ("singular_pass", "mikron-ucp710", "tools.setup.toml", 0), ("full_sphere", "mikron-ucp710", "tools.setup.toml", 0),
     ("turned_over", "mikron-ucp710", "joints/turned_over.setup.toml", 0),
     ("spiral_50", "mikron-ucp710", "tools.setup.toml", 0), ("spiral_50", str(LIMITED), "tools.setup.toml", 25)])
-def test_sample_reads_back_and_the_bound_covers_what_is_read(name: str, machine: str, setup: str, rewinds: int) -> None:
+def test_sample_reads_back_and_the_bound_covers_what_is_read(name: str, machine: str, setup: str,
+                                                             rewinds: int) -> None:
     result = good(converted(name, machine, setup))
     noted = as_dict(result, "")
     assert noted["rewinds"] == rewinds
@@ -77,7 +78,7 @@ def test_turned_over_part_lies_on_its_back() -> None:
     assert not flat.ok
 
 
-# ---- rewinds -----------------------------------------------------------------------------------------------------
+# ---- rewinds -----------------------------------------------------------------------------------------------
 
 
 def linking_poses(result: PostResult) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -160,7 +161,7 @@ def test_the_reader_accepts_a_rewind_only_clear_of_the_part(height: str) -> None
     assert codes == set() if height == "114.0161" else codes >= {"verify.rewind"} if height else codes
 
 
-# ---- singular directions -------------------------------------------------------------------------------------------
+# ---- singular directions -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("machine", ["mikron-ucp710", "trunnion-bc", "head-table"])

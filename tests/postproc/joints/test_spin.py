@@ -121,7 +121,8 @@ def test_the_read_back_sees_another_angle(tmp_path: Path) -> None:
 def test_what_no_axis_can_hold_is_refused() -> None:
     """A leaning tool leaves no joint free, a machine of three axes has none, limited travel may not reach it."""
     lines = ["MULTAX", *(line + ",0,0.6,0.8" if line.startswith("GOTO") else line for line in LINES)]
-    result = postproc.convert(held(0.5, 0.5, 0.5, lines=lines), machine("mikron-ucp710"), "linuxcnc", setup_of(""))
+    result = postproc.convert(held(0.5, 0.5, 0.5, lines=lines), machine("mikron-ucp710"), "linuxcnc",
+                              setup_of(""))
     assert "axis.spin" in codes(result.diagnostics) and not result.ok
     result = postproc.convert(held(0.5, 0.5, 0.5), machine("mill-3axis"), "linuxcnc", setup_of(""))
     assert codes(d for d in result.diagnostics if d.severity >= 2) == {"axis.spin"}

@@ -167,7 +167,8 @@ def test_the_sample_is_clear_as_it_is_and_not_with_a_longer_holder(tmp_path: Pat
     bodies = bodies_of(path, file)
     assert all(bodies.touching(one, one.axis) is None for one in bodies.work.passes[::3])
     thick = {index: replace(form, pieces=form.pieces * [3.0, 0.1, 3.0, 0.1, 1.0]) for index, form in bodies.forms.items()}
-    assert PassBodies(bodies.work, bodies.bodies, thick).touching(bodies.work.passes[0], bodies.work.passes[0].axis)
+    assert PassBodies(bodies.work, bodies.bodies, thick).touching(bodies.work.passes[0],
+                                                                  bodies.work.passes[0].axis)
 
 
 def test_the_samples_are_what_their_script_writes(tmp_path: Path) -> None:

@@ -44,7 +44,8 @@ def test_normals_from_the_part() -> None:
     assert np.einsum("ni,ni->n", at.normal[::2], link[:-1]).min() > np.cos(1.0 * DEG)
 
 
-@pytest.mark.parametrize(("off", "touches"), [(0.0, True), (0.045, True), (-0.03, True), (0.08, False), (-0.08, False)])
+@pytest.mark.parametrize(("off", "touches"),
+                         [(0.0, True), (0.045, True), (-0.03, True), (0.08, False), (-0.08, False)])
 def test_a_ball_off_the_part_has_no_normal(off: float, touches: bool) -> None:
     tip = np.array([[0.0, 5.0, 140.0 + off]])
     at = sphere().contact(lines_of(tip, tip + 1e-3 * X), np.array([1]), 8.0)
@@ -66,6 +67,8 @@ def test_long_moves_and_arcs_are_looked_at_between_their_ends() -> None:
     at = sphere().contact(arc, np.array([1]), 8.0)
     assert len(at) == 144 and np.ptp(np.arctan2(at.travel[:, 1], at.travel[:, 0])) > 6.0
     assert np.abs(at.normal[:, 2] - 0.8).max() < 0.01
-    plate = Surface(trimesh.creation.box(extents=(100.0, 100.0, 10.0)), Placement(np.eye(3), np.zeros(3)), 0.01)
-    at = plate.contact(lines_of(np.array([[-20.0, 0.0, 5.0]]), np.array([[20.0, 0.0, 5.0]])), np.array([1]), 8.0)
+    plate = Surface(trimesh.creation.box(extents=(100.0, 100.0, 10.0)),
+                    Placement(np.eye(3), np.zeros(3)), 0.01)
+    at = plate.contact(lines_of(np.array([[-20.0, 0.0, 5.0]]), np.array([[20.0, 0.0, 5.0]])),
+                       np.array([1]), 8.0)
     assert len(at) == 10 and np.allclose(at.normal, Z)

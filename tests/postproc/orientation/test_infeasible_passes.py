@@ -116,7 +116,8 @@ def test_an_axis_inside_travel_is_found_and_tried() -> None:
 def test_a_joint_that_the_tool_leaves_free_may_bring_it_inside() -> None:
     """A flat cutter at X = 360: the C table turned by some 20 to 40 degrees has it inside X and Y."""
     head = ["UNITS/MM", "CUTTER/16,0", *BALL[2:]]
-    path = toolpath("RAPID", "GOTO/-5,0,9", "RAPID", "GOTO/-5,0,0", "GOTO/5,0,0", "RAPID", "GOTO/5,0,9", head=head)
+    path = toolpath("RAPID", "GOTO/-5,0,9", "RAPID", "GOTO/-5,0,0", "GOTO/5,0,0", "RAPID",
+                    "GOTO/5,0,9", head=head)
     m = machine("mikron-ucp710")
     for x, inside in ((370.0, True), (500.0, False)):
         work, _ = work_of(path, m, at(x), Options())

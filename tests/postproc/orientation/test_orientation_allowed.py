@@ -55,7 +55,8 @@ def leaning(lead: float, tilt: float, feed: Floats = X, normal: Floats = Z) -> F
     return np.asarray(axis / np.linalg.norm(axis))
 
 
-def oriented(path: Toolpath, limits: SetupFile, **options: object) -> tuple[OrientationChoice | None, list[Diagnostic]]:
+def oriented(path: Toolpath, limits: SetupFile,
+             **options: object) -> tuple[OrientationChoice | None, list[Diagnostic]]:
     return orient(path, machine("mikron-ucp710"), limits, Options(**options))
 
 
@@ -94,8 +95,10 @@ def test_the_feed_of_a_slope_lies_in_its_tangent_plane() -> None:
     none, both = np.zeros(1), np.array([[Z, Z]])
     line = Curves(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.2]]), Z[None], Z[None], none.astype(bool), np.zeros((1, 3)),
                   np.zeros((1, 3)), none)
-    np.testing.assert_allclose(contact_of(line, both, np.array([[1, 2]])).travel, np.tile(X, (2, 1)), atol=1e-12)
-    down = Curves(np.zeros((1, 3)), -Z[None], Z[None], Z[None], none.astype(bool), np.zeros((1, 3)), np.zeros((1, 3)), none)
+    np.testing.assert_allclose(contact_of(line, both, np.array([[1, 2]])).travel,
+                               np.tile(X, (2, 1)), atol=1e-12)
+    down = Curves(np.zeros((1, 3)), -Z[None], Z[None], Z[None], none.astype(bool), np.zeros((1, 3)),
+                  np.zeros((1, 3)), none)
     at = contact_of(down, both, np.array([[1, 2]]))
     assert len(at) == 2 and np.isnan(at.travel).all()
     limits = OrientationLimits(lead=(5.0, 10.0), off_centre=10.0)
@@ -119,7 +122,8 @@ def test_points_without_normal_do_not_count() -> None:
     ({"contact_radius": 4.0}, leaning(29.0, 0.0),
      "tilt 29.000 degrees from the surface normal at line 10, allowed 30.000 to 60.000"),
     ({}, leaning(0.0, 70.0), "tilt 70.000 degrees from the surface normal at line 10, allowed 60.000")])
-def test_a_refusal_says_where_what_and_what_is_allowed(keys: dict[str, object], axis: Floats, noted: str) -> None:
+def test_a_refusal_says_where_what_and_what_is_allowed(keys: dict[str, object], axis: Floats,
+                                                       noted: str) -> None:
     setup = limited(**keys)
     one = only_pass(along_x(), setup)
     assert str(AllowedAxes(60.0 * DEG, None, setup.orientation).refused(one, axis) or "") == noted

@@ -46,9 +46,11 @@ def quick(name: str, clamp: float = 0.05) -> Machine:
     return replace(machine(name), timing=Timing(0.0, clamp, clamp))
 
 
-def written(name: str, path: Toolpath, controller: str = "linuxcnc", plan: Orientation = "auto") -> PostResult:
+def written(name: str, path: Toolpath, controller: str = "linuxcnc",
+            plan: Orientation = "auto") -> PostResult:
     """Converted with a plan, and read back."""
-    result = postproc.convert(path, quick(name), controller, setup_of(name), Options(orient=plan, max_tilt=40.0))
+    result = postproc.convert(path, quick(name), controller, setup_of(name),
+                              Options(orient=plan, max_tilt=40.0))
     assert result.ok and result.comparison is not None, [str(d) for d in result.diagnostics]
     return result
 
@@ -129,7 +131,8 @@ def test_between_two_walls_the_tool_leans_as_far_as_it_can() -> None:
     one, allowed = work.passes[0], AllowedAxes(60.0 * DEG, bodies)
     a, c = (g.ravel() * DEG for g in np.meshgrid(np.arange(10.0, 45.0, 3.5), np.arange(30.0, 60.0, 5.0)))
     axes = np.column_stack([np.sin(a) * np.sin(c), -np.sin(a) * np.cos(c), np.cos(a)])
-    grid = turned_all(one, np.vstack([axes, -axes * [1.0, 1.0, -1.0]]), machine("mikron-ucp710"), allowed.touching)
+    grid = turned_all(one, np.vstack([axes, -axes * [1.0, 1.0, -1.0]]), machine("mikron-ucp710"),
+                      allowed.touching)
     least = next(each.seconds for each in sorted(grid, key=lambda each: each.seconds) if not each.touching)
     assert found.best.seconds < 1.002 * least
 

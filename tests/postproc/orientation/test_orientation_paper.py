@@ -73,8 +73,8 @@ def test_newton_finds_the_closed_form(direction: tuple[float, float, float]) -> 
 
 
 def test_every_solution_turns_a_vertex_into_the_direction() -> None:
-    """Equation 7 of the paper: f along J v with J = Rz(C) Rx(A), two solutions of each vertex that f rises less than
-    it can be turned to, and the reach there is the vertex."""
+    """Equation 7 of the paper: f along J v with J = Rz(C) Rx(A), two solutions of each vertex that f rises
+    less than it can be turned to, and the reach there is the vertex."""
     rng, kin = np.random.default_rng(9), machine("mikron-ucp710").kinematics
     limit = np.array([5000.0, 4000.0, 6000.0])
     size = float(np.linalg.norm(limit))

@@ -47,9 +47,9 @@ def strips() -> Toolpath:
     pytest.param("head-table", {"park": "home"}, marks=pytest.mark.slow)],
     ids=["whole-turn", "home", "modulo", "head-table"])
 def test_a_plan_takes_as_long_as_its_program(name: str, counts: dict[str, Any]) -> None:
-    """From home to home with the tool change: `keep` winds C up, which the travel home undoes only where C parks at home
-    and counts its turns. The program rounds corners between rapids, the count stops there, so that it is above by some
-    percent at most."""
+    """From home to home with the tool change: `keep` winds C up, which the travel home undoes only where C
+    parks at home and counts its turns. The program rounds corners between rapids, the count stops there, so
+    that it is above by some percent at most."""
     m, (setup, _) = machine(name), load_setup(SAMPLES / "tools.setup.toml")
     m = replace(m, turns=tuple(replace(turns, **counts) if m.endless[j] else turns for j, turns in enumerate(m.turns)))
     assert setup is not None

@@ -89,11 +89,13 @@ def test_verify_chooses_the_same(tmp_path: Path) -> None:
     _, result, _ = refused()
     file = tmp_path / "p.ngc"
     file.write_text(result.text)
-    verified = pipeline.verify(file, strips([0.0] * POSTED), quick(), "linuxcnc", adjacent(*POSTS), Options(orient="auto"))
+    verified = pipeline.verify(file, strips([0.0] * POSTED), quick(), "linuxcnc", adjacent(*POSTS),
+                               Options(orient="auto"))
     assert verified.ok, [str(d) for d in verified.diagnostics]
 
 
-@pytest.mark.parametrize(("plan", "count"), [("per-pass", 2), pytest.param("whole-part", POSTED, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("plan", "count"),
+                         [("per-pass", 2), pytest.param("whole-part", POSTED, marks=pytest.mark.slow)])
 def test_other_plans_avoid_it_too(plan: Orientation, count: int) -> None:
     result = converted(strips([0.0] * count), adjacent(*POSTS), plan)
     assert result.ok and result.choice is not None and not result.choice.plans[plan].barred
@@ -112,7 +114,8 @@ def test_the_program_that_proved_is_not_made_again(monkeypatch: pytest.MonkeyPat
     path, setup = strips([0.0] * 2), adjacent()
     result = converted(path, setup)
     assert result.ok and len(made) == 1 and "planned" in result.text
-    planned = postproc.convert(path, quick(), "linuxcnc", setup, Options(orient="auto", feed="planned", smooth=True))
+    planned = postproc.convert(path, quick(), "linuxcnc", setup,
+                               Options(orient="auto", feed="planned", smooth=True))
     assert planned.ok and len(made) == 3 and [one.feed for one in made[1:]] == ["programmed", "planned"]
 
 
@@ -176,8 +179,8 @@ def test_only_auto_becomes_another_plan() -> None:
 
 @pytest.mark.parametrize(("offset", "whole"), [(0, False), (2, True)])
 def test_lines_of_errors_say_what_is_barred(offset: int, whole: bool) -> None:
-    """The first rapid of a pass is the path to it: that is barred from where it came. Its cut is the pass: however it is
-    come to, it is."""
+    """The first rapid of a pass is the path to it: that is barred from where it came. Its cut is the pass:
+    however it is come to, it is."""
     one, first = some().work.passes[5], some().plans["auto"]
     line = int(some().work.moves.line[one.rows[0] + offset])
     control = Control("auto", turned=fault("travel.outside", line), once=True)

@@ -119,7 +119,8 @@ def test_vertices_of_any_table() -> None:
 
 def test_neighbours_of_an_axis() -> None:
     centre = np.array([0.0, 0.0, 1.0])
-    np.testing.assert_allclose(angle_between(around(centre, centre, 0.1), centre), np.full(8, 0.1), atol=1e-12)
+    np.testing.assert_allclose(angle_between(around(centre, centre, 0.1), centre),
+                               np.full(8, 0.1), atol=1e-12)
     start = np.array([np.sin(0.5), 0.0, np.cos(0.5)])
     adjacent = around(start, centre, 0.1)
     np.testing.assert_allclose(angle_between(adjacent, centre), [0.4, 0.6, 0.5, 0.5], atol=1e-12)
@@ -175,7 +176,8 @@ def test_the_pass_before_lends_its_axis() -> None:
     passes = work(toolpaths.read(SAMPLES / "test_part.cls")[0], m).passes
     for one, other in itertools.pairwise(passes[:3]):
         before = tried(one, m, AllowedAxes(60.0 * DEG))
-        alone, lent = tried(other, m, AllowedAxes(60.0 * DEG)), tried(other, m, AllowedAxes(60.0 * DEG), before)
+        alone, lent = tried(other, m, AllowedAxes(60.0 * DEG)), tried(other, m,
+                                                                      AllowedAxes(60.0 * DEG), before)
         assert lent.best.seconds < alone.best.seconds * 1.002
         assert lent.swift.seconds + lent.swift.rapids < (alone.swift.seconds + alone.swift.rapids) * 1.002
 
@@ -210,8 +212,8 @@ def test_auto_is_the_least_of_all_on_every_machine(name: str, walls: bool) -> No
 
 
 def test_axes_that_the_machine_does_not_have_are_refused() -> None:
-    """A machine of four axes cannot lean in x: within 60 degrees it leans in y instead, within 10 there is nothing, which is
-    said once for all passes, with their lines."""
+    """A machine of four axes cannot lean in x: within 60 degrees it leans in y instead, within 10 there is
+    nothing, which is said once for all passes, with their lines."""
     path = strips([90.0] * 3, axis="0.6,0,0.8")
     choice, found = orient(path, machine("mill-4axis"), SetupFile(), Options())
     assert choice is not None and all(abs(made.axis[0]) < 1e-12 for made in choice.plans["auto"].picked)

@@ -18,7 +18,8 @@ MACHINES = ["mikron-ucp710", "trunnion-bc", "head-table", "fork-head-ab"]
 
 def lines(start: np.ndarray, end: np.ndarray, axis0: np.ndarray, axis1: np.ndarray) -> Curves:
     n = len(start)
-    return Curves(start, end, axis0, axis1, np.zeros(n, dtype=bool), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n))
+    return Curves(start, end, axis0, axis1, np.zeros(n, dtype=bool), np.zeros((n, 3)), np.zeros((n, 3)),
+                  np.zeros(n))
 
 
 def ends(name: str, curves: Curves) -> tuple[np.ndarray, np.ndarray]:
@@ -202,7 +203,8 @@ def test_jump_of_the_joints_is_named_not_hidden() -> None:
     """From one branch to the other nothing between keeps the tip: the curve is broken."""
     name = "mikron-ucp710"
     m = machine(name)
-    curves = lines(np.array([[30.0, 0, 0]]), np.array([[31.0, 0, 0]]), tilted(30, 40)[None], tilted(31, 40)[None])
+    curves = lines(np.array([[30.0, 0, 0]]), np.array([[31.0, 0, 0]]), tilted(30, 40)[None],
+                   tilted(31, 40)[None])
     b0 = m.kinematics.inverse(curves.start, curves.axis0)
     b1 = m.kinematics.inverse(curves.end, curves.axis1)
     control = Control(m, "axes", np.zeros(3))

@@ -120,7 +120,8 @@ def linked(result: PostResult) -> list[list[Step]]:
 
 def test_leaves_and_comes_along_the_tool_axis() -> None:
     a, b = tilted(70, 10), tilted(60, 130)
-    path = toolpath("RAPID", *goto([45 * a], [a]), *goto([40 * a], [a]), "RAPID", *goto([45 * b], [b]), *goto([40 * b], [b]))
+    path = toolpath("RAPID", *goto([45 * a], [a]), *goto([40 * a], [a]), "RAPID", *goto([45 * b], [b]),
+                    *goto([40 * b], [b]))
     for name in MACHINES:
         result = good(convert(path, name))
         steps = execute(result)
@@ -140,7 +141,8 @@ def test_distance_of_the_setup_is_where_the_tool_leaves_to() -> None:
     setup = SetupFile.model_validate({"clearance": {"centre": (0, 0, 0), "distance": 120.0},
                                       "tools": tool_setup().model_dump()["tools"]})
     a, b = tilted(70, 10), tilted(60, 130)
-    path = toolpath("RAPID", *goto([45 * a], [a]), *goto([40 * a], [a]), "RAPID", *goto([45 * b], [b]), *goto([40 * b], [b]))
+    path = toolpath("RAPID", *goto([45 * a], [a]), *goto([40 * a], [a]), "RAPID", *goto([45 * b], [b]),
+                    *goto([40 * b], [b]))
     for name in MACHINES:
         result = good(convert(path, name, setup=setup))
         steps = execute(result)
@@ -152,7 +154,8 @@ def test_distance_of_the_setup_is_where_the_tool_leaves_to() -> None:
 
 
 def test_tool_is_changed_at_home_only() -> None:
-    for file, name in (("five_faces.cls", "mikron-ucp710"), ("pocket.cls", "mill-3axis"), ("five_tilted.cls", "head-table")):
+    for file, name in (("five_faces.cls", "mikron-ucp710"), ("pocket.cls", "mill-3axis"),
+                       ("five_tilted.cls", "head-table")):
         result = sample(file, name)
         z = result.machine.axis_names.index("Z")
         steps = execute(result)

@@ -34,7 +34,7 @@ def sample(file: str, name: str, setup_name: str) -> PostResult:
     return good(converted(file, name, setup_name))
 
 
-# ---- the tip stays on the path -----------------------------------------------------------------------------------
+# ---- the tip stays on the path -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "file", "moves"), [
@@ -76,7 +76,7 @@ def test_words_are_the_letters_of_the_machine() -> None:
     assert "U" not in sample("pocket.cls", "uranesx", "delta").text.split("G54\n")[1]
 
 
-# ---- what does not fit is refused --------------------------------------------------------------------------------
+# ---- what does not fit is refused --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("file", "name", "code", "words"), [
@@ -110,7 +110,7 @@ def test_a_tilted_pass_on_a_delta_is_refused_and_the_message_says_what_serves() 
     assert served.comparison.worst_tip < 0.01
 
 
-# ---- clearances at and between points -----------------------------------------------------------------------------
+# ---- clearances at and between points ----------------------------------------------------------------------
 
 
 def with_file(folder: Path, text: str) -> Machine:
@@ -139,7 +139,8 @@ def post_in_the_path(tmp_path: Path) -> Machine:
 LEVEL = SetupFile.model_validate({"tools": {"1": {"gauge_length": 100.0}}, "clearance": {"distance": 30.0}})
 
 
-def passing(machine_: Machine, along: list[float], outwards: float = 0.0, tolerance: float = 0.01) -> PostResult:
+def passing(machine_: Machine, along: list[float], outwards: float = 0.0,
+            tolerance: float = 0.01) -> PostResult:
     """A straight cut 100 mm below the platform's middle through places along ALONG, the part moved towards slide Y."""
     origin = outwards * np.array([-0.5, np.sqrt(0.75), 0.0]) - [0.0, 0.0, 100.0]
     placed = LEVEL.model_copy(update={"part": PartPlacement(origin=tuple(origin.tolist()))})
@@ -196,7 +197,7 @@ def test_rods_of_an_h4a_count_between_points(tmp_path: Path) -> None:
     assert at.values[:, pair].min() - between.values[0, pair] > 25.0
 
 
-# ---- assembly modes ----------------------------------------------------------------------------------------------
+# ---- assembly modes ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["uranesx", "delta-hybrid", *H4A])
@@ -218,7 +219,8 @@ def test_walking_keeps_the_mode_it_starts_in(name: str) -> None:
     np.testing.assert_allclose(there[0], np.hstack(kin.forward((m.home + step)[None]))[0], atol=1e-6)
 
 
-def in_small_steps(m: Machine, q0: np.ndarray, q1: np.ndarray, near: np.ndarray, count: int = 200) -> np.ndarray:
+def in_small_steps(m: Machine, q0: np.ndarray, q1: np.ndarray, near: np.ndarray,
+                   count: int = 200) -> np.ndarray:
     """Pose (1, 6) at q1 (J,), followed from `near` at q0 (J,)."""
     for share in np.linspace(0.0, 1.0, count + 1)[1:]:
         near = np.hstack(m.kinematics.forward((q0 + share * (q1 - q0))[None], near))
@@ -227,8 +229,8 @@ def in_small_steps(m: Machine, q0: np.ndarray, q1: np.ndarray, near: np.ndarray,
 
 @pytest.mark.parametrize(("name", "turn"), [("h4a-c-table", 9.0), ("h4a-spindle-axis", 1.2)])
 def test_a_turning_axis_changes_no_mode(name: str, turn: float) -> None:
-    """Off the middle, the rotary axis turns far with some of the slides: what is found is what small steps lead to, in every
-    mode that they lead back from."""
+    """Off the middle, the rotary axis turns far with some of the slides: what is found is what small steps
+    lead to, in every mode that they lead back from."""
     m, compared = machine(name), 0
     tip, axis = m.kinematics.forward(m.home[None])
     here = m.kinematics.inverse(tip + np.array([150.0, 100.0, 0.0]), axis, near=m.home)[0, 0]
@@ -238,7 +240,8 @@ def test_a_turning_axis_changes_no_mode(name: str, turn: float) -> None:
         want = in_small_steps(m, here, there, pose[None])
         if np.isfinite(want).all() and np.abs(in_small_steps(m, there, here, want) - pose).max() < 1e-6:
             compared += 1
-            np.testing.assert_allclose(assembly.walk(m.kinematics, here[None], there[None], pose[None]), want, atol=1e-6)
+            np.testing.assert_allclose(assembly.walk(m.kinematics, here[None], there[None], pose[None]),
+                                       want, atol=1e-6)
     assert compared >= 2
 
 
@@ -290,7 +293,8 @@ def codes_are_errors(found: set[str]) -> bool:
     return bool(found & {"verify.tip", "verify.not_reached"})
 
 
-@pytest.mark.parametrize(("name", "setup_name", "letter"), [("delta-parallel-x", "delta", "X"), ("h4a-c-table", "h4a", "Y")])
+@pytest.mark.parametrize(("name", "setup_name", "letter"),
+                         [("delta-parallel-x", "delta", "X"), ("h4a-c-table", "h4a", "Y")])
 def test_a_leg_on_its_other_root_is_caught(name: str, setup_name: str, letter: str) -> None:
     """One word in the middle of the text put to the leg's other solution for the same pose."""
     result = sample("inch_plate.apt", name, setup_name)
@@ -313,7 +317,7 @@ def test_a_leg_on_its_other_root_is_caught(name: str, setup_name: str, letter: s
     assert codes_are_errors(codes(found))
 
 
-# ---- feed --------------------------------------------------------------------------------------------------------
+# ---- feed --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("file", "name", "setup_name"), [
@@ -363,7 +367,7 @@ def test_a_block_that_moves_u_alone_is_measured_by_u() -> None:
     np.testing.assert_array_equal(control.feed_length(steps), [5.0, 9.0, 50.0, 0.0])
 
 
-# ---- where the control owns the kinematics -----------------------------------------------------------------------
+# ---- where the control owns the kinematics -----------------------------------------------------------------
 
 
 def test_joint_program_of_the_same_machine_without_the_controls_kinematics(tmp_path: Path) -> None:

@@ -21,5 +21,6 @@ def passing_by(first: int, last: int, points: int = 30_000) -> str:
 
 def test_short_moves_past_a_pole_are_not_too_fast() -> None:
     path, found = toolpaths.read_bytes(passing_by(26_600, 26_720))
-    result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", options=Options(output="tcp"), diagnostics=found)
+    result = postproc.convert(path, "mikron-ucp710", "fanuc-30i", options=Options(output="tcp"),
+                              diagnostics=found)
     assert result.ok, [str(d) for d in result.diagnostics]

@@ -59,7 +59,8 @@ def test_bulge_of_an_arc_counts(sense: int, upper: bool) -> None:
     assert on(narrow(Y=(-500, 9.5) if not upper else (-9.5, 500)), *half_circle(sense, upper)).ok, "the other side is free"
 
 
-@pytest.mark.parametrize(("plane", "letter"), [([0, 1, 0], "X"), ([0, 1, 0], "Z"), ([1, 0, 0], "Y"), ([1, 0, 0], "Z")])
+@pytest.mark.parametrize(("plane", "letter"),
+                         [([0, 1, 0], "X"), ([0, 1, 0], "Z"), ([1, 0, 0], "Y"), ([1, 0, 0], "Z")])
 def test_bulge_in_the_upright_planes(plane: list[float], letter: str) -> None:
     """Full circles of radius 10 in ZX and YZ, begun at 45 degrees, so that each end of each axis is a bulge."""
     n = np.array(plane, dtype=float)
@@ -91,7 +92,8 @@ def test_rapids_and_lines_and_linking_moves_count() -> None:
 
 def test_no_room_above_the_part_is_refused() -> None:
     """Cutting 10 mm below the end of Z: no linking move fits above it."""
-    result = on(machine("mill-3axis"), "RAPID", "GOTO/0,0,390,0,0,1", "FEDRAT/MMPM,9", "GOTO/1,0,390", "END-OF-PATH")
+    result = on(machine("mill-3axis"), "RAPID", "GOTO/0,0,390,0,0,1", "FEDRAT/MMPM,9", "GOTO/1,0,390",
+                "END-OF-PATH")
     assert codes(result.diagnostics) & {"travel.exceeded", "link.blocked"} and not result.text
 
 

@@ -44,7 +44,8 @@ def test_calls_grow_no_faster_than_the_file(kind: str) -> None:
     assert (many - more) / 22 < MOST.get(kind, np.inf), "each is worked out by itself"
 
 
-@pytest.mark.parametrize(("machine", "controller"), [("mill-3axis", "linuxcnc"), ("mikron-ucp710", "linuxcnc")])
+@pytest.mark.parametrize(("machine", "controller"),
+                         [("mill-3axis", "linuxcnc"), ("mikron-ucp710", "linuxcnc")])
 def test_links_by_home_together_are_those_made_one_by_one(machine: str, controller: str,
                                                          monkeypatch: pytest.MonkeyPatch) -> None:
     together, done = home_links.add_home_links, []

@@ -22,7 +22,8 @@ NX = ["UNITS/MM", "TOOL PATH/A,TOOL,T", "TLDATA/MILL,10,0,80,0,0", "MSYS/0,0,0,1
 
 @pytest.mark.parametrize("name", ["inch", "mm"])
 def test_a_tnc_program_may_bear_any_name(name: str) -> None:
-    path, found = toolpaths.read_bytes("\n".join([*HEAD, *OVER, "GOTO/9,0,5", "FINI"]).encode(), file=f"{name}.cls")
+    path, found = toolpaths.read_bytes("\n".join([*HEAD, *OVER, "GOTO/9,0,5", "FINI"]).encode(),
+                                       file=f"{name}.cls")
     assert not has_errors(found)
     assert f"BEGIN PGM {name.upper()} MM" in good(convert(path, "mill-3axis", "heidenhain-tnc640")).text
 
@@ -49,7 +50,7 @@ def test_a_turn_on_the_spot_is_not_slow(controller: str) -> None:
         assert "verify.slow" not in codes(result.diagnostics)
 
 
-# ---- arcs and the room about them ------------------------------------------------------------------------------------
+# ---- arcs and the room about them --------------------------------------------------------------------------
 
 
 def made(*lines: str, controller: str = "linuxcnc") -> PostResult:
@@ -90,12 +91,13 @@ def arcs_of(rng: np.random.Generator) -> tuple[Moves, np.ndarray]:
     numbers = ",".join(f"{v:.9f}" for v in (*centre, *-normal, radius, 0.03, 0.5, 10, 0))
     axis = ",".join(f"{v:.9f}" for v in normal)
     rows = [",".join(f"{v:.9f}" for v in p) for p in (dense[0] + 5 * normal, dense[0], dense[-1])]
-    result = made(f"GOTO/{rows[0]},{axis}", "FEDRAT/MMPM,600", f"GOTO/{rows[1]}", f"CIRCLE/{numbers}", f"GOTO/{rows[2]}")
+    result = made(f"GOTO/{rows[0]},{axis}", "FEDRAT/MMPM,600", f"GOTO/{rows[1]}", f"CIRCLE/{numbers}",
+                  f"GOTO/{rows[2]}")
     assert result.job is not None and len(result.job.moves.arcs) == 1
     return result.job.moves, np.vstack([dense, dense[:1] + 5 * normal])
 
 
-# ---- every form at once ----------------------------------------------------------------------------------------------
+# ---- every form at once ------------------------------------------------------------------------------------
 
 PIECES = [
     ["GOTO/0,0,0", "CUTCOM/LEFT,7", "GOTO/10,0,0", "GOTO/10,10,0", "CUTCOM/OFF", "GOTO/0,20,0"],
@@ -123,7 +125,8 @@ def leaning(lines: list[str], axis: np.ndarray) -> list[str]:
 
 
 @pytest.mark.covering
-@pytest.mark.parametrize("output", [{}, {"restart": True}, {"subprograms": True}], ids=["plain", "restart", "subprograms"])
+@pytest.mark.parametrize("output", [{}, {"restart": True}, {"subprograms": True}],
+                         ids=["plain", "restart", "subprograms"])
 @pytest.mark.parametrize(("controller", "machine"), [
     *product(["linuxcnc", "generic-iso", "fanuc-30i", "siemens-840d", "heidenhain-tnc640"], ["mikron-ucp710"]),
     ("haas-ngc", "trunnion-bc"), ("fanuc-30i", "head-table"), ("linuxcnc", "linuxcnc-xyzac-trt")])

@@ -39,7 +39,8 @@ def level():
 @cache
 def tilted():
     up = np.array([[0.0, 0.0, 40.0]])
-    return toolpath("RAPID", *goto(TIPS[:1] + up, AXES[:1]), *goto(TIPS, AXES), "RAPID", *goto(TIPS[-1:] + up, AXES[-1:]))
+    return toolpath("RAPID", *goto(TIPS[:1] + up, AXES[:1]), *goto(TIPS, AXES), "RAPID",
+                    *goto(TIPS[-1:] + up, AXES[-1:]))
 
 
 @cache
@@ -140,10 +141,12 @@ def test_the_sample_works_in_every_command(tmp_path, part: str) -> None:
 
 def test_the_sample_is_placed_and_analysed(tmp_path, part: str) -> None:
     (tmp_path / "setup.toml").write_text(OFF + "[placement]\nx = [-20, 20]\ny = [-20, 20]\n")
-    assert "place" in run("place", part, "--setup", str(tmp_path / "setup.toml"), "-o", str(tmp_path / "placed.toml"))
+    assert "place" in run("place", part, "--setup", str(tmp_path / "setup.toml"), "-o",
+                          str(tmp_path / "placed.toml"))
     assert (tmp_path / "placed.toml").exists()
     for words in (["analyse"], ["show"], ["check"]):
-        done = CliRunner().invoke(app, ["machine", *words, str(SAMPLE.with_suffix(".toml"))], env={FILES: str(SAMPLE)})
+        done = CliRunner().invoke(app, ["machine", *words, str(SAMPLE.with_suffix(".toml"))],
+                                  env={FILES: str(SAMPLE)})
         assert done.exit_code == 0 and "scissors" in done.output, done.output
 
 

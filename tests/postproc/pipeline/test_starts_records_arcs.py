@@ -21,7 +21,8 @@ def converted(text: str, machine: str = "mill-3axis", controller: str | Path = "
               tolerance: float = 0.01) -> postproc.PostResult:
     path, found = toolpaths.read_bytes(HEAD + text + "FINI\n", file="t.apt")
     options = postproc.Options(tolerance=tolerance)
-    return postproc.convert(path, machines.load(machine), controller, setup=TOOLS, options=options, diagnostics=found)
+    return postproc.convert(path, machines.load(machine), controller, setup=TOOLS, options=options,
+                            diagnostics=found)
 
 
 def blocks(result: postproc.PostResult) -> list[str]:
@@ -93,6 +94,7 @@ def test_points_closer_than_the_words_can_say(tmp_path: Path) -> None:
     shop = tmp_path / "coarse.toml"
     shop.write_text('base = "linuxcnc"\n[format]\nlinear_decimals = 2\n')
     points = "".join(f"GOTO/{0.004 * k:.4f},{0.003 * (k % 3):.4f},0\n" for k in range(1, 300))
-    result = converted("RAPID\nGOTO/0,0,5\nFEDRAT/100,MMPM\nGOTO/0,0,0\n" + points, controller=shop, tolerance=0.05)
+    result = converted("RAPID\nGOTO/0,0,5\nFEDRAT/100,MMPM\nGOTO/0,0,0\n" + points, controller=shop,
+                       tolerance=0.05)
     blocks(result)
     assert result.comparison.worst_tip < 0.02

@@ -107,7 +107,7 @@ def test_back_and_forth_on_one_line() -> None:
     assert [s.end[0] for s in execute(result) if s.kind == "feed"] == x
 
 
-# ---- states around tool changes --------------------------------------------------------------------------------------
+# ---- states around tool changes ----------------------------------------------------------------------------
 
 
 def test_spindle_stands_at_every_tool_change() -> None:
@@ -125,7 +125,8 @@ def test_spindle_stands_at_every_tool_change() -> None:
 
 
 def test_spindle_and_coolant_go_on_with_the_next_tool() -> None:
-    path = toolpath("COOLNT/ON", "RAPID", "GOTO/0,0,5", "GOTO/1,0,5", "LOADTL/2", "RAPID", "GOTO/0,0,5", "GOTO/1,0,5")
+    path = toolpath("COOLNT/ON", "RAPID", "GOTO/0,0,5", "GOTO/1,0,5", "LOADTL/2", "RAPID", "GOTO/0,0,5",
+                    "GOTO/1,0,5")
     blocks = body(good(convert(path, "mill-3axis")).text)
     at = blocks.index("T2 M6")
     assert blocks[at:at + 4] == ["T2 M6", "G43 H2", "S1000 M3", "M8"]

@@ -38,7 +38,8 @@ def passes(link: tuple[float, float], count: int = 3, length: float = 80.0, feed
         for word, tip in (("RAPID", adjacent + up), ("RAPID", adjacent), ("", along + adjacent),
                           ("RAPID", along + adjacent + up)):
             lines += [word] * bool(word) + ["GOTO/{:.6f},{:.6f},{:.6f}".format(*tip)]
-    path, found = toolpaths.read_bytes("\n".join([*HEAD, f"FEDRAT/MMPM,{feed}", *lines, "FINI"]).encode(), file="passes.apt")
+    path, found = toolpaths.read_bytes("\n".join([*HEAD, f"FEDRAT/MMPM,{feed}", *lines, "FINI"]).encode(),
+                                       file="passes.apt")
     assert not has_errors(found), found
     return path
 
@@ -53,7 +54,8 @@ def jerk_only(m: Machine) -> Machine:
     return replace(m, limits=replace(m.limits, velocity=free, acceleration=free, jerk=np.where(m.rotary, 1e12, 5000.0)))
 
 
-def setup_of(origin: tuple[float, float, float] = (0.0, 0.0, 0.0), length: float = 100.0, **limits: object) -> SetupFile:
+def setup_of(origin: tuple[float, float, float] = (0.0, 0.0, 0.0), length: float = 100.0,
+             **limits: object) -> SetupFile:
     return SetupFile(part=PartPlacement(origin=origin), placement=PlacementLimits.model_validate(limits),
                      tools={"1": ToolSetup(gauge_length=length)})
 
@@ -71,8 +73,8 @@ def refused(path: Toolpath, m: Machine, setup: SetupFile) -> Diagnostic:
 
 
 def test_turning_aims_a_vertex_of_the_box_along_the_passes() -> None:
-    """Under jerk alone, J on each slide, a straight path D takes (32 D/J)^(1/3) along an axis; along the diagonal of X and
-    Y each goes D/sqrt(2): 2^(-1/6) of it."""
+    """Under jerk alone, J on each slide, a straight path D takes (32 D/J)^(1/3) along an axis; along the
+    diagonal of X and Y each goes D/sqrt(2): 2^(-1/6) of it."""
     m = jerk_only(machine("mill-3axis"))
     choice = placed(passes((1.0, 0.0), 1, feed=STEADY), m, setup_of(turn=(0.0, 90.0)))
     assert choice.found.now.cutting == pytest.approx(np.cbrt(32 * 80 / 5000.0), rel=1e-3)
@@ -140,13 +142,15 @@ def test_limits_and_table_hold() -> None:
 def test_a_part_beyond_its_table_is_reported() -> None:
     """It is within travel where it stands now, and still refused; the limits alone would let it stay."""
     table = PlaceBox(low=(-100.0, -60.0, -50.0), high=(100.0, 60.0, 50.0))
-    choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup_of((60.0, 0.0, 0.0), x=(-90.0, 90.0), table=table))
+    choice = placed(passes((1.0, 0.0)), machine("mill-3axis"),
+                    setup_of((60.0, 0.0, 0.0), x=(-90.0, 90.0), table=table))
     assert str(choice.found.now.refused) == "the part stands 40.000 mm beyond the table in x"
     assert choice.best.place[0] <= 20.0
 
 
 def test_steps_keep_to_the_bores() -> None:
-    choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup_of((300.0, 0.0, 0.0), x=(-110.0, 400.0), step=25.0))
+    choice = placed(passes((1.0, 0.0)), machine("mill-3axis"),
+                    setup_of((300.0, 0.0, 0.0), x=(-110.0, 400.0), step=25.0))
     assert (choice.best.place[0] + 110.0) / 25.0 == pytest.approx(round((choice.best.place[0] + 110.0) / 25.0), abs=1e-9)
     assert choice.best.seconds < choice.found.now.seconds
 
@@ -167,7 +171,8 @@ def test_the_same_again() -> None:
 
 def test_among_equals_the_roomiest() -> None:
     """Home is 200 mm away in X, so that up to that Y costs no time: the part goes where Y has most travel left."""
-    choice = placed(passes((1.0, 0.0)), machine("mill-3axis"), setup_of((200.0, 90.0, 0.0), y=(-100.0, 100.0)))
+    choice = placed(passes((1.0, 0.0)), machine("mill-3axis"),
+                    setup_of((200.0, 90.0, 0.0), y=(-100.0, 100.0)))
     assert choice.best.place[1] == pytest.approx(-1.0, abs=2.0)
     m = choice.work.machine
     good = [one for one in choice.known if np.isfinite(one.seconds) and choice.space.holds(one.place)]
@@ -234,7 +239,8 @@ def tried_at(x: float, seconds: float) -> TimedPlace:
                       np.inf)
 
 
-@pytest.mark.parametrize(("good_from", "taken", "failures"), [(-1.0, 0.0, 0), (250.0, 300.0, 1), (np.inf, 7.0, 6)])
+@pytest.mark.parametrize(("good_from", "taken", "failures"),
+                         [(-1.0, 0.0, 0), (250.0, 300.0, 1), (np.inf, 7.0, 6)])
 def test_places_that_cannot_be_converted_are_left(good_from: float, taken: float, failures: int) -> None:
     """After a failure the farthest place is next, not the neighbour; at last the part stays where it is."""
     known = [tried_at(25.0 * k, 1.0 + 0.01 * k) for k in range(13)]

@@ -39,7 +39,8 @@ def slow() -> Machine:
 
 def timer_of(setup: SetupFile, m: Machine, space: Space, least: float = 0.05) -> Timer:
     """A new one."""
-    work, _ = work_of(passes((1.0, 0.0), 2, 120.0), m, setup.model_copy(update={"part": PartPlacement()}), Options())
+    work, _ = work_of(passes((1.0, 0.0), 2, 120.0), m,
+                      setup.model_copy(update={"part": PartPlacement()}), Options())
     assert work is not None
     return Timer(work, space, least)
 
@@ -61,14 +62,16 @@ def test_as_good_as_a_grid(count: int) -> None:
 
 
 def test_from_outside_the_workspace() -> None:
-    choice = placed(passes((1.0, 0.0), 2, 120.0), machine(DELTA), setup_of((200.0, 0.0, -270.0), x=(-250.0, 250.0)))
+    choice = placed(passes((1.0, 0.0), 2, 120.0), machine(DELTA),
+                    setup_of((200.0, 0.0, -270.0), x=(-250.0, 250.0)))
     assert "reach" in str(choice.found.now.refused)
     assert (choice.best.margins(choice.work.machine) > 0.0).all()
     assert choice.best.singular >= 0.05
 
 
 def test_nowhere_in_the_workspace() -> None:
-    fault = refused(passes((1.0, 0.0), 2, 120.0), machine(DELTA), setup_of((200.0, 0.0, -270.0), x=(190.0, 250.0)))
+    fault = refused(passes((1.0, 0.0), 2, 120.0), machine(DELTA),
+                    setup_of((200.0, 0.0, -270.0), x=(190.0, 250.0)))
     assert fault.code == "place.none"
     assert "workspace x lacks 60 mm" in fault.message
     joints = SetupFile().joints.model_copy(update={"singular_distance": 0.6})
@@ -128,7 +131,8 @@ def test_most_margin_of_slabs_in_any_direction() -> None:
     """Rows as they are where rotary joints turn: nowhere in the box is the least of all margins greater."""
     rng = np.random.default_rng(9)
     for _ in range(5):
-        slabs = Slabs(rng.normal(size=(300, 3)), rng.uniform(20.0, 200.0, 300), rng.integers(0, 3, 300), ("X", "Y", "Z"))
+        slabs = Slabs(rng.normal(size=(300, 3)), rng.uniform(20.0, 200.0, 300), rng.integers(0, 3, 300),
+                      ("X", "Y", "Z"))
         low, high = np.array([-80.0, -50.0, 0.0]), np.array([60.0, 50.0, 30.0])
         centre, margin, what = slabs.deepest(low, high)
         assert ((centre >= low) & (centre <= high)).all()
@@ -153,8 +157,8 @@ def test_poses_that_stand_for_all_keep_their_distance() -> None:
 
 
 def test_a_place_that_only_its_links_make_worse_is_not_taken() -> None:
-    """On the UraneSX the cuts of the sample get faster away from [part], the links of the program longer: it is the program
-    that counts, and the part stays."""
+    """On the UraneSX the cuts of the sample get faster away from [part], the links of the program longer: it
+    is the program that counts, and the part stays."""
     setup, found = load_setup(SAMPLES / "delta.setup.toml")
     assert setup is not None and not found
     limits = PlacementLimits(x=(-100.0, 100.0), turns=[0.0])

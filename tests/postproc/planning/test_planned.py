@@ -154,7 +154,8 @@ def test_steady_feed_is_that_of_the_slowest_place_of_a_block() -> None:
     limits = limits_of(machine("mill-3axis"))
     arc = np.flatnonzero(result.path.code == 2)
     radius = 1.0
-    bound = min((limits.jerk[:2].min() * radius**2) ** (1.0 / 3.0), (limits.acceleration[:2].min() * radius) ** 0.5)
+    bound = min((limits.jerk[:2].min() * radius**2) ** (1.0 / 3.0),
+                (limits.acceleration[:2].min() * radius) ** 0.5)
     assert len(arc) == 1 and made.needed[arc[0]] >= 0.99 * 0.5 * np.pi * radius / bound
 
 

@@ -56,7 +56,8 @@ def seconds(steps: list[Step], before: Floats) -> Floats:
                      for step, part in zip(steps, length, strict=True)])
 
 
-def worst_ratios(path: Smooth, kin: Kinematics, near: Floats, s: Floats, speed: Floats, limits: JointLimits) -> Floats:
+def worst_ratios(path: Smooth, kin: Kinematics, near: Floats, s: Floats, speed: Floats,
+                 limits: JointLimits) -> Floats:
     """(N,) worst ratio to any limit at places s (N,) run over at constant ds/dt, by differences of the inverse."""
     places = s[:, None] + STENCIL * np.array([-1.5, -0.5, 0.5, 1.5])
     tip, axis = path.at(places.ravel())
@@ -86,7 +87,8 @@ def test_words_keep_every_limit_anywhere_in_their_block(mode: str) -> None:
     kin = job.kinematics(int(job.moves.tool[one.move[0]]))
     worst = np.zeros(len(steps))
     for part in np.linspace(0.0, 1.0, 9):
-        s = np.clip(one.begin + part * (one.ends - one.begin), 2.0 * STENCIL, one.smooth.s[-1] - 2.0 * STENCIL)
+        s = np.clip(one.begin + part * (one.ends - one.begin), 2.0 * STENCIL,
+                    one.smooth.s[-1] - 2.0 * STENCIL)
         worst = np.maximum(worst, worst_ratios(one.smooth, kin, result.path.q[one.block], s, speed,
                                                joint_limits(machine("mikron-ucp710").limits)))
     assert worst.max() < 1.01 and np.median(worst) > 0.6

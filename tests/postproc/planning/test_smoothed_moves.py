@@ -56,8 +56,8 @@ def moved(result: PostResult) -> Floats:
 @pytest.mark.covering(count=3)
 @pytest.mark.parametrize("seed", [1, 6, 7, 70, 71])
 def test_what_converts_without_converts_with(seed: int) -> None:
-    """Points nearer to each other than smoothing moves them passed for their neighbours: the rapid behind the pass then
-    stood for its last cut."""
+    """Points nearer to each other than smoothing moves them passed for their neighbours: the rapid behind the
+    pass then stood for its last cut."""
     path = passes(dense(seed))
     for name in ("head-table", "linuxcnc-xyzac-trt"):
         good(convert(path, name))
@@ -122,7 +122,8 @@ def test_a_pass_whose_proof_fails_is_taken_back_and_named(monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("lines", [[], [3]])
-def test_all_passes_are_taken_back_where_the_proof_names_none(lines: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_passes_are_taken_back_where_the_proof_names_none(lines: list[int],
+                                                              monkeypatch: pytest.MonkeyPatch) -> None:
     failing(monkeypatch, lambda text, call: lines if "points smoothed" in text else None)
     result = good(convert(passes(wavy(0.0)), "mikron-ucp710", smooth=True))
     assert "smooth.taken_back" in codes(result.diagnostics)

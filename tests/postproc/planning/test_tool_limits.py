@@ -1,5 +1,5 @@
-"""Limits of a tool in the set-up (tip_acceleration, tip_jerk, axis_rate): kept by planned feeds and by the planned motion,
-measured on the CL curve with the feeds of the words; named where feeds are not planned."""
+"""Limits of a tool in the set-up (tip_acceleration, tip_jerk, axis_rate): kept by planned feeds and by the
+planned motion, measured on the CL curve with the feeds of the words; named where feeds are not planned."""
 
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ def largest(result: PostResult) -> dict[str, float]:
     speed = (one.ends - one.begin) / seconds(steps, before)
     found: dict[str, float] = dict.fromkeys(STATED, 0.0)
     for part in np.linspace(0.0, 1.0, 9):
-        s = np.clip(one.begin + part * (one.ends - one.begin), 2.0 * STENCIL, one.smooth.s[-1] - 2.0 * STENCIL)
+        s = np.clip(one.begin + part * (one.ends - one.begin), 2.0 * STENCIL,
+                    one.smooth.s[-1] - 2.0 * STENCIL)
         turn, bend, third = at_the_tool(one.smooth, s)
         here = {"axis_rate": turn * speed, "tip_acceleration": bend * speed**2, "tip_jerk": third * speed**3}
         for name, values in here.items():

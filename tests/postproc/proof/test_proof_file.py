@@ -97,7 +97,8 @@ def test_the_proof_says_what_the_figures_say(shop: Path, tmp_path: Path) -> None
     assert figures["proof"] == {"file": str(shop / f"p.ngc{ENDING}"), "unchanged": True, "changed": []}
     assert "are those of the proof" in got.stdout
     back = proof["read_back"]
-    assert (back["blocks"], back["blocks_without_bound"]) == (figures["blocks"], figures["blocks_without_bound"])
+    assert (back["blocks"], back["blocks_without_bound"]) == (figures["blocks"],
+                                                              figures["blocks_without_bound"])
     assert (back["cuts"], back["cuts_bounded"]) == (figures["cuts"], figures["cuts_bounded"])
     assert proof["proved"] == figures["proved"] and back["cuts"] == 3 and proof["statement"] in got.stdout
     assert back["sampled"]["tip_mm"] == pytest.approx(figures["sampled_tip_deviation_mm"], abs=1e-8)
@@ -132,7 +133,8 @@ def test_verify_names_the_input_that_changed(shop: Path, tmp_path: Path, what: s
     folder = tmp_path / "copy"
     shutil.copytree(shop, folder)
     change(folder)
-    got = run("verify", folder / "p.ngc", folder / "part.apt", *options(folder), *more, "--json", tmp_path / "v.json")
+    got = run("verify", folder / "p.ngc", folder / "part.apt", *options(folder), *more, "--json",
+              tmp_path / "v.json")
     figures = json.loads((tmp_path / "v.json").read_text())
     assert got.exit_code == 0, got.output  # the program is right under the input as it is
     assert figures["proof"]["changed"] == [what] and not figures["proof"]["unchanged"]
@@ -152,7 +154,8 @@ def test_the_hint_of_a_changed_input_is_followed(shop: Path, tmp_path: Path) -> 
     shutil.copy(folder / "p.ngc", tmp_path / "p.ngc")
     for sub in folder.glob("*.SPF"):
         shutil.copy(sub, tmp_path / sub.name)
-    named = run("verify", tmp_path / "p.ngc", folder / "part.apt", *options(folder), "--proof", folder / f"p.ngc{ENDING}")
+    named = run("verify", tmp_path / "p.ngc", folder / "part.apt", *options(folder), "--proof",
+                folder / f"p.ngc{ENDING}")
     assert named.exit_code == 0 and "are those of the proof" in named.stdout
 
 
@@ -182,12 +185,14 @@ def test_what_is_no_proof_is_said_so(shop: Path, tmp_path: Path, damage: bytes) 
     (folder / f"p.ngc{ENDING}").write_bytes(damage)
     by_itself = run("verify", folder / "p.ngc", folder / "part.apt", *options(folder))
     assert by_itself.exit_code == 0 and "warning [proof.damaged]" in by_itself.stderr
-    named = run("verify", folder / "p.ngc", folder / "part.apt", *options(folder), "--proof", folder / f"p.ngc{ENDING}")
+    named = run("verify", folder / "p.ngc", folder / "part.apt", *options(folder), "--proof",
+                folder / f"p.ngc{ENDING}")
     assert named.exit_code == 1 and "error [proof.damaged]" in named.stderr and "Traceback" not in named.output
     assert "or verify without this file" in named.stderr
     (folder / f"p.ngc{ENDING}").unlink()
     assert "proof." not in run("verify", folder / "p.ngc", folder / "part.apt", *options(folder)).stderr
-    missing = run("verify", folder / "p.ngc", folder / "part.apt", *options(folder), "--proof", folder / "none.json")
+    missing = run("verify", folder / "p.ngc", folder / "part.apt", *options(folder), "--proof",
+                  folder / "none.json")
     assert missing.exit_code == 1 and "proof.open" in missing.stderr
 
 
@@ -218,11 +223,12 @@ def test_program_and_proof_are_written_together_or_not_at_all(shop: Path, tmp_pa
     assert without.exit_code == 0 and "warning [proof.older]" in without.stderr
 
 
-# ---- the line -------------------------------------------------------------------------------------------------------
+# ---- the line ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", sorted(builtin_files()))
-def test_the_line_of_the_head_is_a_comment_and_short_enough(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_line_of_the_head_is_a_comment_and_short_enough(name: str,
+                                                            monkeypatch: pytest.MonkeyPatch) -> None:
     path = toolpath(*CUT)
     whole = good(convert(path, "mill-3axis", name))
     monkeypatch.setattr("postproc.pipeline.stages.with_statement", lambda written, *given: (written, []))
@@ -238,7 +244,8 @@ def test_the_line_of_the_head_is_a_comment_and_short_enough(name: str, monkeypat
 def test_the_line_is_never_cut_short(name: str) -> None:
     """A million cuts and many things that were not compared: their number instead of their names."""
     controller, _ = load_controller(name)
-    comparison = replace(good(convert(toolpath(*CUT), "mill-3axis")).comparison, cuts=1_000_000, bounded_cuts=1_000_000)
+    comparison = replace(good(convert(toolpath(*CUT), "mill-3axis")).comparison, cuts=1_000_000,
+                         bounded_cuts=1_000_000)
     said = Said(("9 arcs",), tuple(f"records of the form {n}" for n in range(12)))
     assert controller is not None
     for one, other in ((comparison, "; 12 not read twice"), (replace(comparison, bounded_cuts=999_999, unbounded=5),

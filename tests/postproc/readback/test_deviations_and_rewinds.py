@@ -21,7 +21,8 @@ def tilted(degrees: float) -> np.ndarray:
 
 def line(start: np.ndarray, end: np.ndarray, axis0: np.ndarray = UP, axis1: np.ndarray = UP) -> Curves:
     zero = np.zeros((1, 3))
-    return Curves(start[None], end[None], axis0[None], axis1[None], np.zeros(1, dtype=bool), zero, zero, np.zeros(1))
+    return Curves(start[None], end[None], axis0[None], axis1[None], np.zeros(1, dtype=bool), zero, zero,
+                  np.zeros(1))
 
 
 @pytest.mark.parametrize("name", ["h4a_dome.cls", "tool_axis_tour.apt"])

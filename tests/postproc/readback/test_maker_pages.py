@@ -1,7 +1,8 @@
 """What reader and writers share, against the makers' pages: programs by hand, and what the page says that they do.
 
-Nothing here is taken from the project's own tables: numbers are worked out from the rule, codes typed from the page that
-stands next to them (the letters are those of `postproc/readback/SHARED.md` and `postproc/controllers/README.md`).
+Nothing here is taken from the project's own tables: numbers are worked out from the rule, codes typed from
+the page that stands next to them (the letters are those of `postproc/readback/SHARED.md` and
+`postproc/controllers/README.md`).
 """
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ def test_planes_and_the_sense_of_arcs(dialect: str, plane: str, arc: str, axes: 
     *((d, "M8", FLOOD) for d in (*G_CODED, TNC)), *((d, "M7", MIST) for d in (FANUC, SIEMENS, ISO, NGC, TNC)),
     (HAAS, "M88", THROUGH), (HAAS, "M83", AIR)])
 def test_codes_of_coolant(dialect: str, code: str, flows: int) -> None:
-    """N 3.6.4: M7 mist, M8 flood, M9 both off. H1: M88 and M89 coolant through the spindle, M83 and M84 air jet; T7: M08
-    coolant on, M09 off."""
+    """N 3.6.4: M7 mist, M8 flood, M9 both off. H1: M88 and M89 coolant through the spindle, M83 and M84 air
+    jet; T7: M08 coolant on, M09 off."""
     off = {"M88": "M89", "M83": "M84"}.get(code, "M9")
     if dialect == TNC:
         body = f"TOOL CALL 1 Z S500\nL X+1 Y+0 Z+9 R0 FMAX {code}\nL X+2 R0 F100\nL X+3 {off}\nL X+4\n"
@@ -78,8 +79,8 @@ def test_codes_of_coolant(dialect: str, code: str, flows: int) -> None:
 @pytest.mark.parametrize(("dialect", "stop"), [(TNC, "both"), (HAAS, "both"), (FANUC, "both"), (SIEMENS, "both"),
                                                (ISO, "both"), (NGC, "neither")])
 def test_a_stop_switches_off_what_the_maker_says(dialect: str, stop: str) -> None:
-    """T7, table of M functions: M00 stops program run and spindle and switches coolant off; H1: M00 stops the spindle and
-    turns coolant off. On the others the builder decides: the safe form. LinuxCNC's M0 only pauses."""
+    """T7, table of M functions: M00 stops program run and spindle and switches coolant off; H1: M00 stops the
+    spindle and turns coolant off. On the others the builder decides: the safe form. LinuxCNC's M0 only pauses."""
     if dialect == TNC:
         body = "TOOL CALL 1 Z S500\nL X+1 Y+0 Z+9 R0 FMAX M3\nL M8\nL X+2 R0 F100\nM0\nL X+3\n"
     else:
@@ -119,8 +120,8 @@ def test_units() -> None:
     (FANUC, "G53 G0 Z300.", "G0 X1. Y0."), (HAAS, "G53 G0 Z300.", "G0 X1. Y0."), (NGC, "G53 G0 Z300.", "G0 X1. Y0."),
     (SIEMENS, "G0 SUPA D0 Z300", "G0 X1 Y0"), (TNC, "L Z+300 R0 FMAX M91", "L X+1 Y+0 FMAX")])
 def test_machine_coordinates_are_for_one_block(dialect: str, up: str, above: str) -> None:
-    """S6 p. 3-42: G53 and SUPA suppress work offsets in their block alone; T7: M91, coordinates in the positioning block are
-    from the machine datum; F5 14.1.2, H1: G53 for one block."""
+    """S6 p. 3-42: G53 and SUPA suppress work offsets in their block alone; T7: M91, coordinates in the
+    positioning block are from the machine datum; F5 14.1.2, H1: G53 for one block."""
     low = "L Z+9 FMAX\n" if dialect == TNC else "Z9.\n"
     call = "TOOL CALL 3 Z S500\n" if dialect == TNC else ""
     motion = good(dialect, program(dialect, f"{call}{up}\n{above}\n{low}"))
@@ -144,8 +145,8 @@ def test_no_built_in_file_has_passive_codes() -> None:
 @pytest.mark.parametrize(("dialect", "second", "eighth"), [
     (FANUC, "G55", "G54.1 P2"), (HAAS, "G55", "G154 P2"), (SIEMENS, "G55", "G506"), (NGC, "G55", "G59.2")])
 def test_names_of_work_offsets(dialect: str, second: str, eighth: str) -> None:
-    """F1: G54 to G59, then G54.1 P1; H1: G154 P1; S1: G54 to G57, then G505 (G58 and G59 are programmable offsets); N: G59.1
-    to G59.3. The set-up counts G54 to G59, G59.1 to G59.3."""
+    """F1: G54 to G59, then G54.1 P1; H1: G154 P1; S1: G54 to G57, then G505 (G58 and G59 are programmable
+    offsets); N: G59.1 to G59.3. The set-up counts G54 to G59, G59.1 to G59.3."""
     names = spec(dialect).program.work_offsets
     assert names.get("G55", "G55") == second
     eighth = eighth if dialect in (FANUC, HAAS, NGC) else names["G59.2"]
@@ -164,15 +165,15 @@ def test_names_of_work_offsets_on_a_tnc() -> None:
     (HAAS, "G187 P3 E0.02\n", 0.02), (NGC, "G64 P0.02 Q0.01\n", 0.03), (SIEMENS, "CYCLE832(0.02,_ORI_FINISH,0.05)\n", 0.02),
     (FANUC, "G05.1 Q1\n", 0.002)])
 def test_smoothing_is_what_the_program_says(dialect: str, on: str, blend: float) -> None:
-    """H1: E of G187 is corner rounding in mm; LinuxCNC: P and Q of G64 together (measured); S4 3.25: first parameter of
-    CYCLE832. Under G05.1 Q1 it is a parameter of the control, which the controller file states."""
+    """H1: E of G187 is corner rounding in mm; LinuxCNC: P and Q of G64 together (measured); S4 3.25: first
+    parameter of CYCLE832. Under G05.1 Q1 it is a parameter of the control, which the controller file states."""
     motion = good(dialect, program(dialect, f"{on}G0 X1. Y0. Z9.\n"))
     assert motion.blend[-1] == pytest.approx(blend)
 
 
 def test_only_generic_iso_has_states_of_its_own() -> None:
-    """States at the beginning of a program are parameters everywhere (3402 on Fanuc): no built-in file takes any for given
-    but the arc centres of ISO 6983-1."""
+    """States at the beginning of a program are parameters everywhere (3402 on Fanuc): no built-in file takes
+    any for given but the arc centres of ISO 6983-1."""
     assert {name: spec(name).start.codes for name in builtin_files() if spec(name).start.codes} == {ISO: ("G91.1",)}
 
 
@@ -194,8 +195,8 @@ def test_the_radius_register_is_modal(dialect: str, modal: bool) -> None:
 
 @pytest.mark.parametrize(("dialect", "relief"), [(FANUC, 0.5), (HAAS, 1.27), (TNC, 0.2), (SIEMENS, 0.6)])
 def test_relief_of_pecks(dialect: str, relief: float) -> None:
-    """Parameters 5114 and 5115 (F2), as assumed; settings 22 and 52 (H1), 0.05 in; T3 cycle 200: 0.2 mm; S3 CYCLE83: 0.6 mm
-    for depths of up to 30 mm."""
+    """Parameters 5114 and 5115 (F2), as assumed; settings 22 and 52 (H1), 0.05 in; T3 cycle 200: 0.2 mm; S3
+    CYCLE83: 0.6 mm for depths of up to 30 mm."""
     assert spec(dialect).cycles.peck_relief == relief
 
 

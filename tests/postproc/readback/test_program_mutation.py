@@ -1,7 +1,8 @@
 """Programs spoilt in one place: the read-back must refuse every one of them.
 
-What may be changed without harm is left out on purpose: the path above the safe planes, pecks on the path to a bottom,
-feeds that an axis limit had reduced below the programmed one, and blocks that linearising put in with room to spare.
+What may be changed without harm is left out on purpose: the path above the safe planes, pecks on the path to
+a bottom, feeds that an axis limit had reduced below the programmed one, and blocks that linearising put in
+with room to spare.
 """
 
 from __future__ import annotations
@@ -63,7 +64,8 @@ def replaced(lines: list[str], i: int, block: str) -> list[str]:
     return [*lines[:i], block, *lines[i + 1:]]
 
 
-def numbers(result: PostResult, letters: str, steps: tuple[float, ...], rows: list[int]) -> Iterator[tuple[str, list[str]]]:
+def numbers(result: PostResult, letters: str, steps: tuple[float, ...],
+            rows: list[int]) -> Iterator[tuple[str, list[str]]]:
     lines = result.text.splitlines()
     for i in rows:
         for m in re.finditer(rf"([{letters}])(-?[\d.]+)", lines[i]):
@@ -195,7 +197,8 @@ def test_wrong_preamble(old: str, new: str) -> None:
 
 def test_rapid_into_uncut_metal() -> None:
     """Pecks in single moves: the rapid back into the hole may end above the last depth, not below it."""
-    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100,STEP,5", "GOTO/10,0,0")
+    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100,STEP,5",
+                    "GOTO/10,0,0")
     result = good(convert(path, "mill-3axis"))
     lines = result.text.splitlines()
     for old, new, bad in (("Z-1.746", "Z-11.9", True), ("Z-1.746", "Z-2.1", True), ("Z-6.746", "Z-7.5", True),
@@ -235,7 +238,7 @@ def test_linking_moves_through_the_part() -> None:
     assert found(result, replaced(lines, row, "Z-20"))
 
 
-# ---- every kind of change, on every control and in every mode --------------------------------------------------------
+# ---- every kind of change, on every control and in every mode ----------------------------------------------
 
 OFF_AXES = """\
 [part]

@@ -36,7 +36,7 @@ def ends(text: str, letters: tuple[str, ...] = XYZ) -> list[list[float]]:
     return motion.end.tolist()
 
 
-# ---- by hand ---------------------------------------------------------------------------------------------------------
+# ---- by hand -----------------------------------------------------------------------------------------------
 
 
 def test_offsets_and_lengths() -> None:
@@ -113,8 +113,8 @@ def test_rises_to_the_plane_before_it_travels() -> None:
     ("G0 Z1\nG98 G81 X50 Z-2 R3 F100\nX10 R20\nX20 R3\n",
      [(50, 20), (10, 20), (10, -2), (10, 20), (10, 3), (20, 3), (20, -2), (20, 3)])])
 def test_the_level_on_the_way_to_the_next_hole(text: str, travel: list[tuple[float, float]]) -> None:
-    """As LinuxCNC's interpreter goes (rs274 of 2.9): aslant to where the cycle ends unless the tool stands above the plane,
-    to the plane first where the sequence began below it; G80 begins a sequence again."""
+    """As LinuxCNC's interpreter goes (rs274 of 2.9): aslant to where the cycle ends unless the tool stands
+    above the plane, to the plane first where the sequence began below it; G80 begins a sequence again."""
     motion, _ = read("G0 X0 Y0 Z50\n" + text)
     found = [(round(float(e[0]) - 10, 3), round(float(e[2]) - 30, 3)) for e in motion.end]
     assert found[found.index((50, -2)) + 2:] == travel
@@ -136,7 +136,7 @@ def test_lower_case_blanks_numbers_and_comments() -> None:
     assert ends(text) == [[11.5, 22, 400], [11.5, 22, 29.5], [13, 24, 29.5]]
 
 
-# ---- against the own executor ----------------------------------------------------------------------------------------
+# ---- against the own executor ------------------------------------------------------------------------------
 
 
 def random_program(rng: np.random.Generator) -> str:
@@ -201,7 +201,7 @@ def test_random_programs_as_the_own_executor_runs_them(seed: int) -> None:
             assert motion.feed[k] == s.feed and motion.inverse[k] == s.inverse, where
 
 
-# ---- what is refused -------------------------------------------------------------------------------------------------
+# ---- what is refused ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("text", "code"), [
@@ -230,7 +230,7 @@ def test_nothing_at_all() -> None:
     assert len(motion) == 0 and not found
 
 
-# ---- the walk --------------------------------------------------------------------------------------------------------
+# ---- the walk ----------------------------------------------------------------------------------------------
 
 
 def random_walk(rng: np.random.Generator, moves: int) -> tuple:
@@ -314,7 +314,8 @@ def test_a_move_is_not_done_before_its_axis_is_there() -> None:
     def at(degrees: float) -> np.ndarray:
         return np.array([np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))])
     tip, axis = np.array([[10.0, 0, 0], [10.005, 0, 0]]), np.array([at(4.925), at(5.0)])
-    match, _ = align.align(tip, axis, np.full(2, np.nan), line_move(at(5.0)), np.array([False]), 0.01, np.radians(0.05))
+    match, _ = align.align(tip, axis, np.full(2, np.nan), line_move(at(5.0)), np.array([False]), 0.01,
+                           np.radians(0.05))
     assert match.tolist() == [1]
 
 

@@ -42,8 +42,8 @@ def read(lines: list[str]) -> Toolpath:
 @pytest.mark.parametrize("controller", ["linuxcnc", "haas-ngc", "fanuc-30i", "heidenhain-tnc640"])
 @pytest.mark.parametrize("index", ["plane", "home"])
 def test_a_ring_of_tilted_holes_is_no_rewind(controller: str, index: str) -> None:
-    """Home and the retract are the same pose with C half a turn on, the whole program between them; so is Z home, where
-    axes are indexed there."""
+    """Home and the retract are the same pose with C half a turn on, the whole program between them; so is Z
+    home, where axes are indexed there."""
     setup = setup_of((SAMPLES / "tools.setup.toml").read_text() + f'\n[clearance]\nindex = "{index}"\n')
     result = good(convert(ring(), "mikron-ucp710", controller, setup=setup))
     assert result.comparison is not None
@@ -71,7 +71,8 @@ def test_blocks_stand_on_a_helix_by_their_length(monkeypatch: pytest.MonkeyPatch
     sweeps[[0, 61]] = 2.0 * np.pi
     monkeypatch.setattr(compare, "arc_sweeps", lambda motion, control: sweeps)
     up = np.array([[0.0, 0.0, 1.0]])
-    curves = Curves(points[:1], points[-1:], up, up, np.array([True]), np.zeros((1, 3)), up, np.array([6.0 * np.pi]))
+    curves = Curves(points[:1], points[-1:], up, up, np.array([True]), np.zeros((1, 3)), up,
+                    np.array([6.0 * np.pi]))
     moves = SimpleNamespace(arc=np.array([0]), link=np.array([False]), curves=curves.take)
     begin, share = compare._place(None, executed, np.arange(62), np.zeros(62, dtype=int), moves)  # type: ignore[arg-type]
     np.testing.assert_allclose(begin[[1, 61]], [1 / 3, 2 / 3], atol=1e-3)

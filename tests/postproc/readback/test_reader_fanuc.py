@@ -137,7 +137,8 @@ def test_subprograms_of_the_same_file_run_as_often_as_asked() -> None:
 
 
 def test_subprograms_of_other_files() -> None:
-    motion = good(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\nX9.\n"), others={"O77.nc": b"%\nO0077\nX3.\nM99\n%\n"})
+    motion = good(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\nX9.\n"),
+                  others={"O77.nc": b"%\nO0077\nX3.\nM99\n%\n"})
     assert words(motion)[1:] == [[3, 0, 0], [9, 0, 0]]
 
 
@@ -219,7 +220,8 @@ def test_modes_need_a_machine_that_has_them() -> None:
     assert "gcode.mode" in faults(FANUC, program("G43.4 H1 Z5.\nG49\n"), "delta-coplanar")
 
 
-@pytest.mark.parametrize(("dialect", "on", "off"), [(FANUC, "G0 G43.4 H1 Z50.", "G49"), (HAAS, "G0 G234 H1 Z50.", "G49")])
+@pytest.mark.parametrize(("dialect", "on", "off"),
+                         [(FANUC, "G0 G43.4 H1 Z50.", "G49"), (HAAS, "G0 G234 H1 Z50.", "G49")])
 def test_machine_moves_inside_a_mode_are_refused(dialect: str, on: str, off: str) -> None:
     text = program(f"T1 M6\n{on}\nG53 G0 Z400.\n{off}\n")
     assert faults(dialect, text, "mikron-ucp710") == {"gcode.machine_position": [7]}

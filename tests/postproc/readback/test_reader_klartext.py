@@ -215,4 +215,5 @@ def test_inches_are_refused() -> None:
 
 def test_polar_end_is_turned_about_the_pole() -> None:
     motion = good(TNC, program(START + "L F100\nL X+3 Y+1\nCC X+1 Y+1\nCP IPA+30 DR+\n"))
-    assert np.allclose(words(motion)[-1][:2], [1 + 2 * math.cos(math.pi / 6), 1 + 2 * math.sin(math.pi / 6)], atol=1e-4)
+    assert np.allclose(words(motion)[-1][:2],
+                       [1 + 2 * math.cos(math.pi / 6), 1 + 2 * math.sin(math.pi / 6)], atol=1e-4)

@@ -75,7 +75,8 @@ def rot(rotary: dict[str, float], plus: str = "") -> str:
     return " ".join(f"{a}{v:{plus}.6f}" for a, v in rotary.items())
 
 
-def in_plane(dialect: str, name: str, rotary: dict[str, float], points: np.ndarray = PLANE_POINTS, off: float = 0.0) -> str:
+def in_plane(dialect: str, name: str, rotary: dict[str, float], points: np.ndarray = PLANE_POINTS,
+             off: float = 0.0) -> str:
     """A tilted plane at a rotary position, entered, cut in and left; `off` degrees spoil its first angle."""
     named = angles(dialect, matrix_of(name, rotary))
     named[0] += off
@@ -143,7 +144,8 @@ def tips_of(motion: Motion, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("dialect", [FANUC, SIEMENS, TNC])
 @pytest.mark.parametrize(("name", "rotary"), [*TABLES, *HEADS])
-def test_points_of_a_plane_are_where_its_frame_has_them(dialect: str, name: str, rotary: dict[str, float]) -> None:
+def test_points_of_a_plane_are_where_its_frame_has_them(dialect: str, name: str,
+                                                        rotary: dict[str, float]) -> None:
     motion = good(dialect, in_plane(dialect, name, rotary), name)
     tip, axis = tips_of(motion, name)
     r = matrix_of(name, rotary)
@@ -178,7 +180,8 @@ TIPS = np.array([[0.0, 0, 30], [5, 3, 1], [-20, 14, -3], [40, 4, 0]])
 
 @pytest.mark.parametrize("dialect", [FANUC, HAAS, SIEMENS, TNC])
 @pytest.mark.parametrize(("name", "rotary"), [*TABLES, *HEADS])
-def test_tip_words_are_the_tip_whatever_the_rotary_axes_do(dialect: str, name: str, rotary: dict[str, float]) -> None:
+def test_tip_words_are_the_tip_whatever_the_rotary_axes_do(dialect: str, name: str,
+                                                           rotary: dict[str, float]) -> None:
     turning = [{a: v * (1.0 - 0.2 * k) for a, v in rotary.items()} for k in range(len(TIPS))]
     motion = good(dialect, by_tip(dialect, TIPS, turning), name)
     tip, _ = tips_of(motion, name)
@@ -221,7 +224,8 @@ def test_between_two_turned_poses_the_tip_runs_straight_by_tip_and_not_by_axes(d
 
 @pytest.mark.parametrize("dialect", [FANUC, SIEMENS, TNC])
 @pytest.mark.parametrize(("name", "rotary"), TABLES)
-def test_a_plane_next_to_the_rotary_position_is_an_error(dialect: str, name: str, rotary: dict[str, float]) -> None:
+def test_a_plane_next_to_the_rotary_position_is_an_error(dialect: str, name: str,
+                                                         rotary: dict[str, float]) -> None:
     assert set(faults(dialect, in_plane(dialect, name, rotary, off=0.2), name)) == {"gcode.plane_pose"}
     assert faults(dialect, in_plane(dialect, name, rotary, off=1e-3), name) == {}
 

@@ -14,7 +14,8 @@ from toolpaths.toolpath import Kind
 TOLERANCE = np.radians(0.05)
 
 
-def moves_of(*lines: str, head: list[str] | None = None, setup: SetupFile | None = None) -> tuple[Moves, list[Diagnostic]]:
+def moves_of(*lines: str, head: list[str] | None = None,
+             setup: SetupFile | None = None) -> tuple[Moves, list[Diagnostic]]:
     return build_moves(toolpath(*lines, head=head), setup or SetupFile(), TOLERANCE)
 
 
@@ -26,7 +27,7 @@ def legs(*cycle_and_holes: str, before: str = "GOTO/0,0,50") -> list[tuple[float
             for k in range(1, len(moves))]
 
 
-# ---- feeds -----------------------------------------------------------------------------------------------------------
+# ---- feeds -------------------------------------------------------------------------------------------------
 
 
 def test_feed_per_minute_in_mm_per_second() -> None:
@@ -67,7 +68,7 @@ def test_cutting_without_a_feed_is_refused_with_the_line() -> None:
     assert len(moves) == 3
 
 
-# ---- links -----------------------------------------------------------------------------------------------------------
+# ---- links -------------------------------------------------------------------------------------------------
 
 
 def test_rows_that_link() -> None:
@@ -115,7 +116,7 @@ def test_opposite_axes_are_refused_unless_linked() -> None:
     assert not rapid
 
 
-# ---- cycles ----------------------------------------------------------------------------------------------------------
+# ---- cycles ------------------------------------------------------------------------------------------------
 
 DRILL = "CYCLE/DRILL,DEPTH,12,MMPM,100,CLEAR,3"
 
@@ -150,7 +151,8 @@ def test_tool_below_the_plane_rises_before_it_travels() -> None:
     assert got[2] == (10, 0, -12, "DRILL", "FEED")
 
 
-@pytest.mark.parametrize(("kind", "out"), [("BORE", "FEED"), ("REAM", "FEED"), ("TAP", "FEED"), ("DRILL", "RAPID")])
+@pytest.mark.parametrize(("kind", "out"),
+                         [("BORE", "FEED"), ("REAM", "FEED"), ("TAP", "FEED"), ("DRILL", "RAPID")])
 def test_boring_leaves_at_feed_up_to_the_plane(kind: str, out: str) -> None:
     got = legs(f"CYCLE/{kind},DEPTH,12,RAPTO,3,RTRCTO,AUTO,MMPM,100", "GOTO/10,0,0")
     retract = [p for p in got if p[3] == "RETRACT"]
@@ -208,7 +210,8 @@ def test_cycle_feed_and_rapids_of_holes() -> None:
 
 
 def test_rows_count_and_curves_join() -> None:
-    moves, _ = moves_of("RAPID", "GOTO/0,0,50", DRILL, "GOTO/10,0,0", "CYCLE/OFF", "RAPID", "GOTO/5,5,50", "GOTO/5,5,0")
+    moves, _ = moves_of("RAPID", "GOTO/0,0,50", DRILL, "GOTO/10,0,0", "CYCLE/OFF", "RAPID", "GOTO/5,5,50",
+                        "GOTO/5,5,0")
     assert moves.row.tolist() == [0, 1, 1, 1, 1, 2, 3]
     curves = moves.curves()
     assert np.array_equal(curves.start[1:], moves.tip[:-1]) and np.array_equal(curves.end, moves.tip)

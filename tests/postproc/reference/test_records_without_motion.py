@@ -16,7 +16,8 @@ HEAD = ["UNITS/MM", "LOADTL/1", "FEDRAT/MMPM,600"]
 CUT = ["RAPID", "GOTO/0,0,5", "GOTO/9,0,5"]
 
 
-def made(*lines: str, head: list[str] | None = None, name: str = "mill-3axis", **options: object) -> PostResult:
+def made(*lines: str, head: list[str] | None = None, name: str = "mill-3axis",
+         **options: object) -> PostResult:
     return convert(toolpath(*lines, head=HEAD if head is None else head), name, **options)
 
 
@@ -32,7 +33,7 @@ def holes(record: str, *before: str) -> PostResult:
                 "CYCLE/OFF", "RAPID", "GOTO/20,0,50")
 
 
-# ---- cycles ----------------------------------------------------------------------------------------------------------
+# ---- cycles ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["REVERS", "SHIFT", "BORE7", "BORE8", "BORE9", "MILL", "CIRCUL", "THREAD"])
@@ -63,7 +64,7 @@ def test_dwell_in_revolutions_is_written_in_seconds() -> None:
     assert [d.lines[0] for d in found if d.code == "cycle.dwell"] == [8]
 
 
-# ---- spindle ---------------------------------------------------------------------------------------------------------
+# ---- spindle -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("record", "want"), [
@@ -107,7 +108,7 @@ def test_a_retract_that_nothing_is_cut_after_is_reported(after: list[str]) -> No
     assert "event.not_carried_out" in codes(result.diagnostics)
 
 
-# ---- tools -----------------------------------------------------------------------------------------------------------
+# ---- tools -------------------------------------------------------------------------------------------------
 
 NX = ["UNITS/MM", "FEDRAT/MMPM,600", "SPINDL/RPM,1000,CLW"]
 
@@ -135,7 +136,7 @@ def test_the_same_tool_again_with_another_length_register() -> None:
     assert result.job is not None and result.job.register_lengths() == {1: 120.0, 21: 120.0}
 
 
-# ---- text put in -----------------------------------------------------------------------------------------------------
+# ---- text put in -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("record", "block"), [
@@ -164,7 +165,7 @@ def test_a_speed_alone_does_not_start_the_spindle() -> None:
     assert refused(made(*CUT[:2], "INSERT/S100", "GOTO/20,0,5"), "insert.refused") == 6
 
 
-# ---- coolant, compensation, states ------------------------------------------------------------------------------------
+# ---- coolant, compensation, states -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("word", "code"), [("THRU", "coolant.through"), ("AIR", "coolant.air"), ("TAP", "coolant.word"),
@@ -220,7 +221,7 @@ def test_feeds_of_a_control_that_runs_the_tip_are_those_of_the_file() -> None:
     assert set(re.findall(r"F[\d.]+", "\n".join(body(result.text)))) == {"F1500"}
 
 
-# ---- reading ---------------------------------------------------------------------------------------------------------
+# ---- reading -----------------------------------------------------------------------------------------------
 
 
 def test_a_path_that_was_read_with_errors_is_not_converted() -> None:

@@ -28,8 +28,8 @@ FEDRAT/MMPM,250
 CUT = "GOTO/20,10,5\nGOTO/30,10,5\nEND-OF-PATH\nFINI\n"
 CHANGE = "LOAD/TOOL,2\nSPINDL/RPM,1000,CLW\n"
 STATES = "SPINDL/RPM,1500,CLW\nCOOLNT/MIST\n"
-# kind, what states where the tool leaves the hole to, what stands between CYCLE/OFF and the cut, control: every pair of two
-# columns is in it but for those of the tool change and the control.
+# kind, what states where the tool leaves the hole to, what stands between CYCLE/OFF and the cut, control:
+# every pair of two columns is in it but for those of the tool change and the control.
 CASES = [
     ("DRILL", "RTRCTO,10,", "", 0), ("DRILL", "RETURN,10,", "RAPID\n", 1), ("DRILL", "", STATES, 2),
     ("DRILL", "RTRCTO,AUTO,", CHANGE, 3), ("DRILL", "RTRCTO,1,", "", 4), ("DRILL", "RTRCTO,3,", "RAPID\n", 5),
@@ -85,14 +85,16 @@ def test_the_cut_begins_where_the_hole_was_left_to(kind: str, out: str, between:
 @pytest.mark.parametrize("cut", ["GOTO/20,0,20\n", "GOTO/20,0,11\n", "GOTO/20,0,70\n", "GOTO/20,0,-5\n"])
 @pytest.mark.parametrize(("kind", "out", "control"), [
     ("DRILL", "RTRCTO,10,", "fanuc-30i"), ("BORE", "RTRCTO,10,", "haas-ngc"), ("BORE", "RTRCTO,AUTO,", "linuxcnc")])
-def test_a_cut_along_the_axis_of_the_hole_is_no_way_out_of_it(kind: str, out: str, control: str, cut: str) -> None:
+def test_a_cut_along_the_axis_of_the_hole_is_no_way_out_of_it(kind: str, out: str, control: str,
+                                                              cut: str) -> None:
     """Up, down and back into the hole: the rapid of the retract counts with the hole, the rest is a cut at its own feed."""
     result = converted(cl(kind, out, STATES, cut + CUT), control)
     assert result.ok, [str(d) for d in result.diagnostics]
 
 
 @pytest.mark.parametrize("between", ["", CHANGE])
-def test_a_cut_from_another_level_is_seen_by_the_second_witness(between: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cut_from_another_level_is_seen_by_the_second_witness(between: str,
+                                                                monkeypatch: pytest.MonkeyPatch) -> None:
     """The reader takes 10 mm for 20: the read-back agrees with the program, the second witness has the record's number."""
     old = toolpaths.cl.cycles._made
     monkeypatch.setattr(toolpaths.cl.cycles, "_made", lambda b, v: replace(old(b, v), retract=20.0))

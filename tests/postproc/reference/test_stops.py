@@ -47,8 +47,8 @@ def path_of(case: str) -> Toolpath:
 
 
 def standing_cuts(text: str, stops: bool = True, switch: bool = False) -> list[str]:
-    """Blocks that cut while the spindle stands, by a walk of its own through the words; stops stop it where `stops`, blocks
-    with / are left out where `switch` is on."""
+    """Blocks that cut while the spindle stands, by a walk of its own through the words; stops stop it where
+    `stops`, blocks with / are left out where `switch` is on."""
     turning, cutting, found = False, False, []
     for raw in text.splitlines():
         block = re.sub(r"\(.*?\)|;.*|^\s*%.*", "", raw).strip()
@@ -80,7 +80,8 @@ KINDS = (*CONTROLLERS[3:5], CONTROLLERS[0]), (*CONTROLLERS[3:5], CONTROLLERS[2])
 
 
 @pytest.mark.covering
-@pytest.mark.parametrize(("case", "controller"), [(case, name) for k, case in enumerate(CASES) for name in KINDS[k % 4]])
+@pytest.mark.parametrize(("case", "controller"),
+                         [(case, name) for k, case in enumerate(CASES) for name in KINDS[k % 4]])
 def test_nothing_is_cut_with_a_standing_spindle(case: str, controller: str) -> None:
     text = good(convert(path_of(case), "mikron-ucp710", controller, OFF_AXIS)).text
     for stops in (True, False):

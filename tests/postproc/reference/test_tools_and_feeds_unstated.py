@@ -52,7 +52,8 @@ def errors(result: postproc.PostResult) -> list[str]:
 
 @pytest.mark.parametrize("name", ["mill-3axis", "mikron-ucp710", "linuxcnc-xyzac-trt"])
 def test_the_length_of_tool_0_is_not_in_the_spindle_before_the_first_tool(name: str) -> None:
-    with_it, without = converted(HEAD + CUT, name), converted(HEAD + CUT, name, of=setup(tools={"1": {"gauge_length": 100}}))
+    with_it, without = converted(HEAD + CUT, name), converted(HEAD + CUT, name,
+                                                              of=setup(tools={"1": {"gauge_length": 100}}))
     assert not errors(with_it) and blocks_of(with_it) == blocks_of(without) != []
 
 
@@ -83,7 +84,8 @@ def test_the_feed_of_the_set_up_is_that_of_what_the_file_states_none_for(control
     program = tmp_path / "p.nc"
     program.write_text(result.text)
     assert postproc.verify(program, path, machine("mill-3axis"), controller, setup=of).ok
-    other = postproc.verify(program, path, machine("mill-3axis"), controller, setup=setup(output={"feed": 200.0}))
+    other = postproc.verify(program, path, machine("mill-3axis"), controller,
+                            setup=setup(output={"feed": 200.0}))
     assert "verify.feed" in {d.code for d in other.diagnostics}
 
 
@@ -243,7 +245,8 @@ def test_a_length_next_to_the_tool_is_no_register() -> None:
 
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "heidenhain-tnc640"])
-def test_the_estimate_takes_what_the_read_back_has_executed(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_estimate_takes_what_the_read_back_has_executed(controller: str,
+                                                            monkeypatch: pytest.MonkeyPatch) -> None:
     result = converted(HEAD + CUT + HOLE.replace("CLEAR", "MMPM,100,CLEAR"), controller=controller)
     assert result.ok and result.job is not None and result.comparison is not None
     code, motion, _ = source._executed(result.text.encode(), result.controller, result.job.control,
@@ -272,5 +275,6 @@ def test_a_tool_of_the_set_up_that_the_file_does_not_use_is_reported() -> None:
 
 def test_chosen_tool_axes_see_the_numbers_of_the_set_up() -> None:
     path, _ = toolpaths.read_bytes((TWO + "FINI\n").encode())
-    work, found = work_of(path, machine("mikron-ucp710"), setup(tool_numbers=NAMES), postproc.Options(), turning=False)
+    work, found = work_of(path, machine("mikron-ucp710"), setup(tool_numbers=NAMES), postproc.Options(),
+                          turning=False)
     assert work is not None and not found and {t.number for t in work.toolpath.tools} == {1, 2}

@@ -94,7 +94,7 @@ def test_a_number_without_a_load_is_loaded() -> None:
     assert "T1 M6" in result.text.splitlines() and "tool.loaded" in {d.code for d in result.diagnostics}
 
 
-# ---- measured into the work offset -----------------------------------------------------------------------------------
+# ---- measured into the work offset -------------------------------------------------------------------------
 
 
 MEASURED = "[output]\ntool_call = false\n[part]\norigin = [20.0, -15.0, 10.0]\n"
@@ -122,8 +122,10 @@ def test_a_measured_tool_is_not_called(name: str, controller: str, tmp_path: Pat
     assert "verify.state" in {d.code for d in other.diagnostics}, "a program without tool call and length is no other"
 
 
-@pytest.mark.parametrize(("number", "low", "touches"), [("0", 30.0, False), ("0", 8.0, True), ("3", 8.0, True)])
-def test_its_form_is_compared_with_part_and_fixtures(number: str, low: float, touches: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("number", "low", "touches"),
+                         [("0", 30.0, False), ("0", 8.0, True), ("3", 8.0, True)])
+def test_its_form_is_compared_with_part_and_fixtures(number: str, low: float, touches: bool,
+                                                     tmp_path: Path) -> None:
     """A holder of diameter 60 from 20 mm over the tip on, 10 mm from a clamp 3 mm beyond the end of the cut."""
     text = MEASURED.split("[part]")[0] + f"""[tools.{number}]
 gauge_length = 100
@@ -176,7 +178,8 @@ def test_where_it_cannot_be_right_it_is_refused(name: str, controller: str, head
     (["TPRINT/EM", "TLDATA/MILL,20,0,75,0,0"], ["TPRINT/EM", "TLDATA/MILL,6,0,75,0,0"]),
     (["TPRINT/EM", "TLDATA/MILL,20,0,75,0,0"], ["TPRINT/EM", "TLDATA/MILL,20,0,60,0,0"]),
     (["CUTTER/10,0,5,0,0,0,38"], ["CUTTER/10,0,5,0,0,0,90"])])
-def test_two_tools_of_one_name_are_not_measured_as_one(one: list[str], other: list[str], tmp_path: Path) -> None:
+def test_two_tools_of_one_name_are_not_measured_as_one(one: list[str], other: list[str],
+                                                       tmp_path: Path) -> None:
     """Other diameters, lengths and heights: both tools are named by their first lines; the same form again is one tool."""
     of = setup_of(MEASURED + LENGTH, tmp_path)
     begin = ["UNITS/MM", *SPINDLE, *one, *CUT]
@@ -195,7 +198,7 @@ def test_modes_that_need_the_length_cannot_be_had(mode: str, tmp_path: Path) -> 
     assert [d.code for d in found] == ["output.mode"] and "tool_call = false" in found[0].message
 
 
-# ---- the length state in the read-back -------------------------------------------------------------------------------
+# ---- the length state in the read-back ---------------------------------------------------------------------
 
 TWO = toolpath("LOADTL/1", *SPINDLE, *CUT, "LOADTL/2", *CUT, head=["UNITS/MM"])
 LENGTHS = {"different": {"tools": {"1": {"gauge_length": 100.0}, "2": {"gauge_length": 130.0}}}, "not stated": {}}
@@ -204,7 +207,8 @@ LENGTHS = {"different": {"tools": {"1": {"gauge_length": 100.0}, "2": {"gauge_le
 @pytest.mark.covering
 @pytest.mark.parametrize("lengths", LENGTHS)
 @pytest.mark.parametrize("controller", CONTROLLERS)
-def test_a_program_without_the_length_or_with_another_one_fails(controller: str, lengths: str, tmp_path: Path) -> None:
+def test_a_program_without_the_length_or_with_another_one_fails(controller: str, lengths: str,
+                                                                tmp_path: Path) -> None:
     """On a table machine, whose words are the same for every length: each block that puts one in force, lost and changed."""
     setup = SetupFile.model_validate(LENGTHS[lengths])
     lines = good(convert(TWO, "mikron-ucp710", controller, setup, output="axes")).text.splitlines()
@@ -224,7 +228,7 @@ def test_a_program_without_the_length_or_with_another_one_fails(controller: str,
             assert not found.ok and {"verify.state", "verify.tool"} & {d.code for d in found.diagnostics}, edit
 
 
-# ---- inspect ---------------------------------------------------------------------------------------------------------
+# ---- inspect -----------------------------------------------------------------------------------------------
 
 
 def test_inspect_shows_which_tools_lack_a_number_or_a_spindle(tmp_path: Path) -> None:

@@ -65,7 +65,8 @@ def test_without_it_the_hints_of_travel_errors_name_it() -> None:
 @pytest.mark.parametrize(("part", "named"), [
     ({}, True), ({"origin": [0, 0, 50]}, True), ({"origin": [-2000, 0, 0]}, False),
     ({"system": True, "origin": [2000, 0, 0]}, False)])
-def test_a_system_far_away_is_named_where_part_does_nothing_about_it(part: dict[str, object], named: bool) -> None:
+def test_a_system_far_away_is_named_where_part_does_nothing_about_it(part: dict[str, object],
+                                                                     named: bool) -> None:
     lines = [line.replace(MSYS, "MSYS/1500,0,0,1,0,0,0,1,0") for line in LINES]
     result = convert(path(lines), "mikron-ucp710", "linuxcnc", setup(**part))
     noted = [d for d in result.diagnostics if d.severity is Severity.ERROR]
@@ -120,7 +121,7 @@ def test_it_is_the_system_that_is_the_work_offset() -> None:
     assert other.part.origin == (297.0, -393.0, 3.0) and other.part.x_axis == (0.0, 1.0, 0.0)
 
 
-# ---- commands -------------------------------------------------------------------------------------------------------
+# ---- commands ----------------------------------------------------------------------------------------------
 
 
 def test_the_sample_is_converted_verified_and_timed(tmp_path: Path) -> None:

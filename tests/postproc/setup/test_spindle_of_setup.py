@@ -44,8 +44,10 @@ def switched(text: str) -> list[str]:
     return re.findall(r"(?:S\d+ )?M[34]\b|\bM[589]\b|\bM7\b|\bM0\b|T\d M6", "\n".join(blocks))
 
 
-@pytest.mark.parametrize(("controller", "name"), list(zip(CONTROLLERS, ("mill-3axis", "fork-head-ab") * 3, strict=True)))
-def test_each_tool_has_its_own_and_the_rest_that_of_output(name: str, controller: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("controller", "name"),
+                         list(zip(CONTROLLERS, ("mill-3axis", "fork-head-ab") * 3, strict=True)))
+def test_each_tool_has_its_own_and_the_rest_that_of_output(name: str, controller: str,
+                                                           tmp_path: Path) -> None:
     of = setup({"spindle": {"rpm": 4000}, "coolant": "flood"},
                t2={"spindle": {"rpm": 900, "direction": "CCLW"}, "coolant": "off"})
     result = good(made(TWO, of, controller, name))
@@ -62,7 +64,8 @@ def test_each_tool_has_its_own_and_the_rest_that_of_output(name: str, controller
     assert [d.code for d in other.diagnostics if d.severity is Severity.ERROR] == ["verify.setup", "verify.state"]
 
 
-@pytest.mark.parametrize(("controller", "name"), list(zip(CONTROLLERS, ("head-table", "mikron-ucp710") * 3, strict=True)))
+@pytest.mark.parametrize(("controller", "name"),
+                         list(zip(CONTROLLERS, ("head-table", "mikron-ucp710") * 3, strict=True)))
 def test_without_either_it_is_refused_and_the_hint_helps(name: str, controller: str, tmp_path: Path) -> None:
     found = errors(made(TWO, controller=controller, name=name))
     assert [d.code for d in found] == ["spindle.not_started"] and found[0].lines == (6, 7, 13, 14)

@@ -77,7 +77,8 @@ def program(block: str) -> str:
     ("G83 Z-5 R2 Q0.00000001 F100", "gcode.cycle"), ("G81 X1 Z-5 R2 F100 L1000000000", "gcode.cycle"),
     ("G81 Z2 R2 F100", "gcode.cycle"), ("G81 Z5 R2 F100", "gcode.cycle")])
 @pytest.mark.parametrize("name", ["linuxcnc", "haas-ngc"])
-def test_what_no_control_runs_is_refused_before_it_costs_time_or_memory(name: str, block: str, code: str) -> None:
+def test_what_no_control_runs_is_refused_before_it_costs_time_or_memory(name: str, block: str,
+                                                                        code: str) -> None:
     assert code in refused(name, program(block))
 
 

@@ -34,7 +34,8 @@ def test_every_line_is_read_back(style: str) -> None:
 @pytest.mark.parametrize("style", STYLES)
 def test_what_a_head_does_not_say_is_not_read(style: str) -> None:
     assert read_head(text(BEGIN, style)) == Head(True, None, "", False, None, None, False, "")
-    assert read_head(text(["another post", "source x"], style)) == Head(False, None, "", False, None, None, False, "")
+    assert read_head(text(["another post", "source x"], style)) == Head(False, None, "", False, None,
+                                                                        None, False, "")
     more = [words.corrected_by_control("mill.toml"), words.setup_line("", ""), words.feeds_line()]
     head = read_head(text([*BEGIN, *more], style))
     assert head.by_control and head.corrected is None and head.feeds == "" and not head.planned

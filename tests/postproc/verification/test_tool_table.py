@@ -89,7 +89,8 @@ def test_verify_takes_the_lengths_of_the_table(tmp_path: Path) -> None:
     program, table = tmp_path / "part.nc", tmp_path / "tools.tbl"
     assert run("convert", str(CL), *given, "-o", str(program))[0] == 0
     verify = ("verify", str(program), str(CL), *given, "--tool-table", str(table))
-    for length, right in (("120", True), ("120.01", True), ("119.99", True), ("120.06", False), ("95.5", False)):
+    for length, right in (("120", True), ("120.01", True), ("119.99", True), ("120.06", False),
+                          ("95.5", False)):
         table.write_text(f"T1 P1 Z{length}\n")
         code, text = run(*verify)
         assert code == (0 if right else 1), text

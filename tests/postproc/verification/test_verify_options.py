@@ -1,5 +1,5 @@
-"""Verifying with other options than the header of a program names: the cause is reported first, for people's programs
-too."""
+"""Verifying with other options than the header of a program names: the cause is reported first, for people's
+programs too."""
 
 from __future__ import annotations
 
@@ -62,7 +62,8 @@ def test_chosen_axes_of_the_header_are_asked_for_first(controller: str, tmp_path
 
 @pytest.mark.parametrize(("orient", "max_tilt"), [("whole-part", 50.0), ("per-pass", 40.0)])
 def test_another_plan_or_tilt_is_reported(orient: str, max_tilt: float, tmp_path: Path) -> None:
-    noted = verified(tmp_path, program(orient="per-pass", max_tilt=50.0).text, orient=orient, max_tilt=max_tilt)
+    noted = verified(tmp_path, program(orient="per-pass", max_tilt=50.0).text, orient=orient,
+                     max_tilt=max_tilt)
     assert errors(noted) == ["verify.orient"]
     assert f"--orient {orient} --max-tilt {max_tilt:g}" in noted.diagnostics[0].message
 

@@ -122,7 +122,7 @@ def test_planned_feeds_count_only_as_they_were_written() -> None:
     assert "verify.slow" in caught(result, re.sub(r"\(FINGERPRINT OF THE PLANNED.*\n", "", result.text))
 
 
-# ---- Klartext --------------------------------------------------------------------------------------------------------
+# ---- Klartext ----------------------------------------------------------------------------------------------
 
 
 def drilled() -> PostResult:

@@ -20,7 +20,8 @@ BARE = b"PARTNO bare\nFEDRAT/500\nGOTO/-10,5,30\nGOTO/-10,5,0\nGOTO/10,5,0\nGOTO
 LOADED = BARE.replace(b"FEDRAT", b"UNITS/MM\nLOADTL/1\nSPINDL/RPM,3000,CLW\nFEDRAT")
 
 
-def converted(text: bytes, setup: dict[str, object], control: str = "linuxcnc", **options: object) -> PostResult:
+def converted(text: bytes, setup: dict[str, object], control: str = "linuxcnc",
+              **options: object) -> PostResult:
     path, found = toolpaths.read_bytes(text, file="part.apt")
     return postproc.convert(path, "mill-3axis", control, SetupFile.model_validate(setup),
                             Options(**options), diagnostics=found)  # type: ignore[arg-type]
@@ -50,7 +51,8 @@ def test_systems_are_kept_once() -> None:
 
 
 @pytest.mark.parametrize(("numbers", "tools"), [({}, [3, 4]), ({"MILL": 7}, [7, 4]), ({"OTHER": 7}, [3, 4])])
-def test_tools_keep_their_number_where_the_setup_gives_none(numbers: dict[str, int], tools: list[int]) -> None:
+def test_tools_keep_their_number_where_the_setup_gives_none(numbers: dict[str, int],
+                                                            tools: list[int]) -> None:
     c = commanded(b"TOOL PATH/A,TOOL,MILL\nLOAD/TOOL,3\nGOTO/1,2,3\nEND-OF-PATH\nTOOL PATH/B,TOOL,DRILL\nLOAD/TOOL,4\n"
                   b"GOTO/1,2,3\nEND-OF-PATH\n")
     assert tools_of(c, {"tool_numbers": numbers}).tolist() == tools
@@ -58,7 +60,8 @@ def test_tools_keep_their_number_where_the_setup_gives_none(numbers: dict[str, i
 
 @pytest.mark.parametrize("setup", [
     {"output": {"spindle": {"rpm": 3000.0}}}, {"tools": {"1": {"spindle": {"rpm": 3000.0, "direction": "anti-clockwise"}}}}])
-def test_the_spindle_of_the_setup_is_expected(setup: dict[str, object], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_spindle_of_the_setup_is_expected(setup: dict[str, object],
+                                              monkeypatch: pytest.MonkeyPatch) -> None:
     text = LOADED.replace(b"SPINDL/RPM,3000,CLW\n", b"")
     result = converted(text, setup)
     assert result.ok and result.witness is not None, [str(d) for d in result.diagnostics]

@@ -19,7 +19,7 @@ HEAD = "N10 G17 G710 G90 G94 G40 G64\nN20 G54\n"
 ARC = "G18 G2 X2 Z0 I1 K0 F100\n"
 
 
-# ---- Siemens: the tool length follows the plane ---------------------------------------------------------------------
+# ---- Siemens: the tool length follows the plane ------------------------------------------------------------
 
 @pytest.mark.parametrize(("text", "bad"), [
     (HEAD + "T1\nM6\nG0 X0 Y0\nD1 Z0\n" + ARC + "M30\n", True),
@@ -52,7 +52,7 @@ def test_siemens_writes_no_arcs_in_other_planes_under_traori() -> None:
     assert "G18" not in tcp and KEPT not in tcp and (" G2 " in tcp or " G3 " in tcp)
 
 
-# ---- speeds as S can state them ---------------------------------------------------------------------------------------
+# ---- speeds as S can state them ----------------------------------------------------------------------------
 
 @pytest.mark.parametrize(("controller", "text"), [
     (FANUC, "S1273 M3"), (HAAS, "S1273 M3"), (SIEMENS, "S1273 M3"), ("linuxcnc", "S1273 M3")])
@@ -87,7 +87,7 @@ def test_a_point_in_a_speed_is_refused(word: str) -> None:
         assert not faults(controller, text.replace(word, "S800 M3"))
 
 
-# ---- texts ------------------------------------------------------------------------------------------------------------
+# ---- texts -------------------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize(("controller", "name"), [
     (FANUC, "(A  B C   D)"), (HAAS, "(A  B C   D)"), ("heidenhain-tnc640", "* - A %b C ; d"), (SIEMENS, "; A~%b C ; d")])
@@ -97,13 +97,14 @@ def test_names_of_operations_hold_nothing_that_ends_or_continues_a_block(control
     assert name in blocks(controller, made)
 
 
-@pytest.mark.parametrize(("seconds", "text"), [(0.00044, "DWELL 0.001"), (0.12345, "DWELL 0.123"), (2.0, "DWELL 2")])
+@pytest.mark.parametrize(("seconds", "text"),
+                         [(0.00044, "DWELL 0.001"), (0.12345, "DWELL 0.123"), (2.0, "DWELL 2")])
 def test_dwells_are_whole_milliseconds_and_none_is_lost(seconds: float, text: str) -> None:
     made = program([step("rapid", X=1.0)], {0: [command("DWELL", seconds)]})
     assert blocks("heidenhain-tnc640", made)[1] == f"CYCL DEF 9.1 {text}"
 
 
-# ---- what no position shows -------------------------------------------------------------------------------------------
+# ---- what no position shows --------------------------------------------------------------------------------
 
 def taps(between: str) -> str:
     head = "%\nO1\nG21 G17 G90 G94\nG54\nS500 M3\nG0 X0. Y0. Z9.\n"

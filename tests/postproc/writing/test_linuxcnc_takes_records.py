@@ -28,7 +28,8 @@ def read(result: PostResult, interpret, folder: Path) -> Canonical:
 @pytest.mark.parametrize("lines", [
     [], ["CUTCOM/OFF", "GOTO/60,-20,0"], ["GOHOME"], ["RAPID", "GOTO/60,0,50", "LOADTL/2", "SPINDL/RPM,600,CLW", *SQUARE],
     ["CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/30,30,0", "CYCLE/OFF", "RAPID", "GOTO/30,30,50"]])
-def test_compensation_left_on_is_ended_where_linuxcnc_needs_it(lines: list[str], interpret, tmp_path: Path) -> None:
+def test_compensation_left_on_is_ended_where_linuxcnc_needs_it(lines: list[str], interpret,
+                                                               tmp_path: Path) -> None:
     result = good(convert(toolpath(*SQUARE, *lines, head=HEAD), "mill-3axis"))
     text = result.text.splitlines()
     c = read(result, interpret, tmp_path)

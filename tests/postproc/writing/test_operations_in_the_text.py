@@ -44,7 +44,8 @@ def test_linuxcnc_is_written_as_if_there_were_no_operations() -> None:
     ("fanuc-30i", ["M98 P1001", "M98 P1002"], ["O1001", "M99", "O1002", "M99", "%"]),
     ("haas-ngc", ["M97 P1001", "M97 P1002"], ["N1001", "M99", "N1002", "M99", "%"]),
     ("heidenhain-tnc640", ["CALL LBL 1001", "CALL LBL 1002"], ["LBL 1001", "LBL 0", "LBL 1002", "LBL 0"])])
-def test_operations_become_subprograms_behind_the_end(controller: str, calls: list[str], subs: list[str]) -> None:
+def test_operations_become_subprograms_behind_the_end(controller: str, calls: list[str],
+                                                      subs: list[str]) -> None:
     text = [b.split(" ", 1)[1] if controller.startswith("h") and b[0].isdigit() else b
             for b in lines(controller, two_operations(), subprograms=True)]
     end = text.index("M30")

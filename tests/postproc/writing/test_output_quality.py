@@ -38,7 +38,8 @@ def verdict(result: PostResult, text: str, *severities: Severity) -> set[str]:
 
 
 @pytest.mark.parametrize("controller", CONTROLS)
-@pytest.mark.parametrize(("asked", "most"), [(15915.507752, 0), (795.774715, 1), (79.577472, 2), (7.957747, 3)])
+@pytest.mark.parametrize(("asked", "most"),
+                         [(15915.507752, 0), (795.774715, 1), (79.577472, 2), (7.957747, 3)])
 def test_speeds_have_no_decimals_that_no_spindle_keeps(controller: str, asked: float, most: int) -> None:
     result = flat(controller, asked)
     assert result.ok, [str(d) for d in result.diagnostics]
@@ -96,7 +97,7 @@ def test_a_pair_is_kept_where_the_state_before_it_is_not_known() -> None:
     assert needless_pairs({4: [on, Command("COMMENT", ("A",)), off, on]}, 9) == {4: [on, Command("COMMENT", ("A",))]}
 
 
-# ---- stock -----------------------------------------------------------------------------------------------------------
+# ---- stock -------------------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize("controller", CONTROLS)
 def test_the_stock_stands_in_the_work_offset(controller: str) -> None:
@@ -112,11 +113,12 @@ def test_the_stock_of_a_turned_part_is_turned_with_it() -> None:
     """x of the part along -Y of the table; the work offset is the part's zero."""
     setup = setup_of("[part]\norigin = [31, -12, 5]\nx_axis = [0, -1, 0]\ny_axis = [1, 0, 0]\n[tools.1]\ngauge_length = 90\n"
                      "[tools.2]\ngauge_length = 65\n[rewind.stock]\nlow = [-30, -20, -15]\nhigh = [35, 25, 30]\n")
-    result = postproc.convert(indexed(), machines.load("mikron-ucp710"), "heidenhain-tnc640", setup, Options())
+    result = postproc.convert(indexed(), machines.load("mikron-ucp710"), "heidenhain-tnc640",
+                              setup, Options())
     assert result.text.splitlines()[1:3] == ["1 BLK FORM 0.1 Z X-20 Y-35 Z-15", "2 BLK FORM 0.2 X+25 Y+30 Z+30"]
 
 
-# ---- indexing with the tool at home ------------------------------------------------------------------------------------
+# ---- indexing with the tool at home ------------------------------------------------------------------------
 
 def at_home(index: str) -> SetupFile:
     return SETUP.model_copy(update={"clearance": SETUP.clearance.model_copy(update={"index": index})})
@@ -139,7 +141,8 @@ def test_the_tool_is_home_while_rotary_axes_are_turned(controller: str, output: 
 
 
 @pytest.mark.parametrize(("controller", "output"), [("fanuc-30i", "axes"), ("heidenhain-tnc640", "auto")])
-def test_the_tool_is_home_there_in_corrected_programs_too(controller: str, output: str, tmp_path: Path) -> None:
+def test_the_tool_is_home_there_in_corrected_programs_too(controller: str, output: str,
+                                                          tmp_path: Path) -> None:
     """The head nods by 40 arcsec along Z and is 0.1 mm off at its end: a retract that is corrected is as high as home."""
     (tmp_path / "z.csv").write_text("Z [mm],EZZ [um],EAZ [arcsec],EBZ [arcsec]\n-250,0,0,0\n250,100,40,-40\n")
     (tmp_path / "errors.toml").write_text('machine = "mikron-ucp710"\n' + "".join(

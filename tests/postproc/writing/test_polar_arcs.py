@@ -131,7 +131,8 @@ def test_a_hole_between_helices_states_where_it_is() -> None:
                  step("feed", Z=-8.0, F=200.0), step("rapid", Z=5.0),
                  step("ccw", X=end[0], Y=end[1], Z=4.0, centre=(*away, 0.0), F=300.0)]
         hole = Hole(2, 4, 0, 5.0, -8.0, 5.0, 5.0, "DRILL", 3)
-        text = blocks("heidenhain-tnc640", program(steps, holes=(hole,)), (Cycle("DRILL", 11.0, 2.0, None, 200.0),))
+        text = blocks("heidenhain-tnc640", program(steps, holes=(hole,)),
+                      (Cycle("DRILL", 11.0, 2.0, None, 200.0),))
         assert any(line.endswith("M99") and f"X{at[0]:+.4f}".rstrip("0") in line for line in text)
         wanted, unlike = (polar_arc(begin, end, at + away, 111.0, GRAIN, GRAIN) for begin in (
             at, executed(text[:3], (20.0, 0.0))[2]))
@@ -154,7 +155,8 @@ def job_of(controller: str, model: str) -> Job:
     path, _ = toolpaths.read(SAMPLES / "pocket.cls")
     (spec, _), (setup, _) = load_controller(controller), load_setup(SAMPLES / "tools.setup.toml")
     assert spec is not None and setup is not None
-    job, found = prepare(path, machine("mikron-ucp710"), spec, setup, Options(error_model=model, output="tcp"))
+    job, found = prepare(path, machine("mikron-ucp710"), spec, setup,
+                         Options(error_model=model, output="tcp"))
     assert job is not None, found
     return job
 
@@ -191,8 +193,8 @@ def test_the_bound_counts_helices_where_there_are_some() -> None:
 @pytest.mark.parametrize("sense", [1, -1])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_whole_circle_behind_a_helix_begins_where_it_ends(tmp_path: Path, sense: int, seed: int) -> None:
-    """A helical bore cleaned at its bottom: CP ends where its angle lets it; C from there to the circle's own end would
-    be the small rest of a turn."""
+    """A helical bore cleaned at its bottom: CP ends where its angle lets it; C from there to the circle's own
+    end would be the small rest of a turn."""
     rng = np.random.default_rng(seed)
     centre = rng.uniform(-30.0, 30.0, 2)
     start = np.round(turned(centre + np.array([8.7, 0.0]), centre, float(rng.uniform(0.0, 360.0))), 4)

@@ -79,9 +79,11 @@ def test_files_of_another_program_are_not_replaced_in_silence(tmp_path: Path) ->
 
 
 @pytest.mark.covering
-@pytest.mark.parametrize(("keys", "step"), [({}, 10), ({"subprograms": True}, 10), ({"subprograms": True}, 1001)])
+@pytest.mark.parametrize(("keys", "step"),
+                         [({}, 10), ({"subprograms": True}, 10), ({"subprograms": True}, 1001)])
 @pytest.mark.parametrize("controller", CONTROLLERS)
-def test_no_block_number_stands_twice(controller: str, keys: dict[str, object], step: int, tmp_path: Path) -> None:
+def test_no_block_number_stands_twice(controller: str, keys: dict[str, object], step: int,
+                                      tmp_path: Path) -> None:
     shop = tmp_path / "shop.toml"
     shop.write_text(f'base = "{controller}"\n[format]\nsequence_step = {step}\n')
     path, _ = toolpaths.read(GOLDEN / "three_laws.cls")

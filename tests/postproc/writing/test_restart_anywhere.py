@@ -131,7 +131,8 @@ def test_a_machine_on_rods_goes_home_with_all_axes(controller: str) -> None:
     result = restartable(controller, "uranesx", "flat.cls")
     lines = result.text.split("\n")
     label = [k for k, n in enumerate(lines) if n.startswith(LABELS[controller])][-1]
-    motion = executed(result, "\n".join(["%", FOREIGN[controller], *lines[label:]]), result.machine.home - [9.0, 5.0, 2.0])
+    motion = executed(result, "\n".join(["%", FOREIGN[controller], *lines[label:]]),
+                      result.machine.home - [9.0, 5.0, 2.0])
     whole = executed(result, result.text, result.machine.home)
     first = int(np.searchsorted(motion.line, 3))
     assert motion.code[first] == 0 and motion.end[first].tolist() == result.machine.home.tolist()

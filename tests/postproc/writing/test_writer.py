@@ -26,7 +26,7 @@ from tests.postproc.kit import (
     words_of,
 )
 
-# ---- numbers and modality --------------------------------------------------------------------------------------------
+# ---- numbers and modality ----------------------------------------------------------------------------------
 
 
 def test_words_are_rounded_to_the_decimals_and_trimmed() -> None:
@@ -68,7 +68,7 @@ def test_too_few_decimals_for_the_tolerance_are_reported(tmp_path: Path) -> None
     assert "tolerance.rounding" in codes(result.diagnostics) and not result.ok
 
 
-# ---- rotary moves ----------------------------------------------------------------------------------------------------
+# ---- rotary moves ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table", "linuxcnc-xyzac-trt"])
@@ -100,7 +100,7 @@ def test_snapped_residues_stay_below_the_rounding() -> None:
     assert max(np.linalg.norm(tip, axis=1).max() for tip, _ in cut) < 0.01
 
 
-# ---- feeds -----------------------------------------------------------------------------------------------------------
+# ---- feeds -------------------------------------------------------------------------------------------------
 
 
 def test_inverse_time_states_f_in_every_block_and_per_minute_again_after_it() -> None:
@@ -166,12 +166,13 @@ def test_axis_limits_are_kept_by_every_sample() -> None:
             before = s.end
 
 
-# ---- comments and lengths --------------------------------------------------------------------------------------------
+# ---- comments and lengths ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "generic-iso"])
 def test_comments_cannot_break_out_or_overflow(controller: str) -> None:
-    path = toolpath("PPRINT/A (G0 Z-50) %;\tB" + "x" * 400, "PPRINT/äöü ()", "RAPID", "GOTO/0,0,5", "GOTO/9,0,5")
+    path = toolpath("PPRINT/A (G0 Z-50) %;\tB" + "x" * 400, "PPRINT/äöü ()", "RAPID", "GOTO/0,0,5",
+                    "GOTO/9,0,5")
     result = good(convert(path, "mill-3axis", controller))
     limit = result.controller.format.line_length
     for line in result.text.splitlines():

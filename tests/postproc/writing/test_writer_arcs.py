@@ -9,7 +9,8 @@ from postproc.setup.model import SetupFile
 from tests.postproc.kit import NX, angle, body, circle, convert, execute, good, goto, tilted, tool_poses, toolpath
 
 
-def nx(*lines: str, name: str = "mill-3axis", setup: SetupFile | None = None, controller: str = "linuxcnc") -> list[str]:
+def nx(*lines: str, name: str = "mill-3axis", setup: SetupFile | None = None,
+       controller: str = "linuxcnc") -> list[str]:
     path = toolpath(*lines, "END-OF-PATH", head=NX)
     return body(good(convert(path, name, controller, setup)).text)
 

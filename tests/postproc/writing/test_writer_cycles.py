@@ -83,7 +83,8 @@ def test_no_canned_cycle_under_inverse_time() -> None:
 def test_cycles_on_a_head_at_an_angle_are_single_moves() -> None:
     """A fork head leans: the hole does not run along the machine's Z, so there is no canned cycle."""
     axis = tilted(30, 0)
-    path = toolpath("RAPID", *goto([50 * axis], [axis]), "CYCLE/DRILL,DEPTH,12,MMPM,100,CLEAR,3", *goto([[10, 0, 0]]))
+    path = toolpath("RAPID", *goto([50 * axis], [axis]), "CYCLE/DRILL,DEPTH,12,MMPM,100,CLEAR,3",
+                    *goto([[10, 0, 0]]))
     result = good(convert(path, "fork-head-ab"))
     assert not re.search(r"G8[1-9]", "\n".join(body(result.text)).replace("G80", ""))
     steps = execute(result)
@@ -93,7 +94,8 @@ def test_cycles_on_a_head_at_an_angle_are_single_moves() -> None:
 
 @pytest.mark.parametrize("between", [[], ["COOLNT/FLOOD"], ["DELAY/1"]])
 @pytest.mark.parametrize("controller", ["linuxcnc", "generic-iso"])
-def test_no_cycle_goes_back_to_a_first_level_that_the_tool_has_left(between: list[str], controller: str) -> None:
+def test_no_cycle_goes_back_to_a_first_level_that_the_tool_has_left(between: list[str],
+                                                                    controller: str) -> None:
     """From the plane of the hole before, LinuxCNC would go aslant to that level, and after a G80 it is none any more."""
     got = cycle("CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/10,0,0", *between,
                 "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,50", "GOTO/20,0,0", "GOTO/30,0,0", controller=controller)
@@ -117,14 +119,15 @@ def test_a_command_between_holes_ends_the_first_level_too(controller: str) -> No
 @pytest.mark.parametrize("kind", ["DRILL", "TAP"])
 @pytest.mark.parametrize("seed", [1, 3])
 def test_holes_of_one_plane_may_differ_by_the_last_decimal(controller: str, kind: str, seed: int) -> None:
-    """Points of four decimals in a tilted plane: the levels of the holes differ by the last one here and there, and a rapid
-    of that length is no cut that was left out."""
+    """Points of four decimals in a tilted plane: the levels of the holes differ by the last one here and
+    there, and a rapid of that length is no cut that was left out."""
     turned = rotation(np.array([0.6, -0.8, 0.0]), np.array([0.5]))[0]
     places = np.random.default_rng(seed).uniform(-20, 20, (40, 3)) * [1, 1, 0]
     feed = "MMPR,1" if kind == "TAP" else "MMPM,100"
     holes = goto(np.round(places @ turned.T, 4), np.tile(np.round(turned[:, 2], 7), (40, 1)))
     above = goto((turned @ [0, 0, 40.0])[None], turned[:, 2][None])
-    path = toolpath("RAPID", *above, f"CYCLE/{kind},DEPTH,9,{feed},RAPTO,3,RTRCTO,3", *holes, "CYCLE/OFF", "RAPID", *above)
+    path = toolpath("RAPID", *above, f"CYCLE/{kind},DEPTH,9,{feed},RAPTO,3,RTRCTO,3", *holes, "CYCLE/OFF",
+                    "RAPID", *above)
     result = convert(path, "head-table", controller)
     assert result.ok, [str(d) for d in result.diagnostics]
 
@@ -141,5 +144,6 @@ def test_a_tool_in_a_tilted_plane_rises_before_it_goes_to_a_higher_hole(controll
     holes = goto(np.round(places @ turned.T, 4), np.tile(np.round(turned[:, 2], 7), (30, 1)))
     above = goto((turned @ [0, 0, 40.0])[None], turned[:, 2][None])
     record = "CYCLE/DEEP,DEPTH,9,MMPM,100,STEP,4,RAPTO,3,RTRCTO,3"
-    result = convert(toolpath("RAPID", *above, record, *holes, "CYCLE/OFF", "RAPID", *above), "head-table", controller)
+    result = convert(toolpath("RAPID", *above, record, *holes, "CYCLE/OFF", "RAPID", *above),
+                     "head-table", controller)
     assert result.ok, [str(d) for d in result.diagnostics]

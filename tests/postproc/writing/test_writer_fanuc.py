@@ -55,7 +55,8 @@ def test_tilted_plane_is_stated_without_a_length_and_the_length_inside() -> None
 
 def test_the_plane_of_zero_angles_is_stated_too() -> None:
     flat = Section(0, "tilted", Plane(np.eye(3), np.zeros(3)), (0.0, 0.0, 0.0), ())
-    made = program([step("rapid", X=1.0)], {0: [command("ENTER_SECTION", 1.0)]}, sections=(Section(0, "axes"), flat))
+    made = program([step("rapid", X=1.0)], {0: [command("ENTER_SECTION", 1.0)]},
+                   sections=(Section(0, "axes"), flat))
     assert blocks("fanuc-30i", made)[0] == "G68.2 X0. Y0. Z0. I0. J0. K0."
 
 
@@ -97,7 +98,8 @@ def test_smoothing_states_no_tolerance_and_is_taken_back() -> None:
 
 @pytest.mark.parametrize(("plane", "centre", "words"), [
     (17, (-5.0, 2.0, 0.0), "I-5. J2."), (18, (-5.0, 0.0, 2.0), "I-5. K2."), (19, (0.0, -5.0, 2.0), "J-5. K2.")])
-def test_arcs_state_the_centre_of_their_plane_alone(plane: int, centre: tuple[float, float, float], words: str) -> None:
+def test_arcs_state_the_centre_of_their_plane_alone(plane: int, centre: tuple[float, float, float],
+                                                    words: str) -> None:
     made = program([step("ccw", X=1.0, Y=2.0, Z=3.0, plane=plane, centre=centre, F=100.0)])
     head = "" if plane == 17 else f"G{plane} "
     assert blocks("fanuc-30i", made) == [f"{head}G3 X1. Y2. Z3. {words} F100."]
@@ -130,7 +132,8 @@ def test_cycles_dwell_in_milliseconds_and_peck_with_a_point() -> None:
         "G98 G83 X10. Y20. Z-8. R2. Q3. F200.", "G80"]
 
 
-@pytest.mark.parametrize(("turning", "key", "code"), [("CLOCKWISE", "TAP", "G84"), ("COUNTERCLOCKWISE", "TAP_LEFT", "G74")])
+@pytest.mark.parametrize(("turning", "key", "code"),
+                         [("CLOCKWISE", "TAP", "G84"), ("COUNTERCLOCKWISE", "TAP_LEFT", "G74")])
 def test_taps_are_rigid(turning: str, key: str, code: str) -> None:
     steps, hole = drilled(key, feed=750.0)
     made = program(steps, {0: [command(f"START_SPINDLE_{turning}", 500.0)]}, holes=(hole,))

@@ -159,6 +159,7 @@ def test_taps_state_the_pitch(turning: str, key: str, pitch: str) -> None:
 
 def test_no_word_of_another_dialect_is_left() -> None:
     steps, hole = drilled("DRILL")
-    made = program([*steps, step("feed", X=1.0, F=5.0), step("rapid", Z=600.0, home=True)], {0: LOAD}, holes=(hole,))
+    made = program([*steps, step("feed", X=1.0, F=5.0), step("rapid", Z=600.0, home=True)], {0: LOAD},
+                   holes=(hole,))
     text = "\n".join(lines("heidenhain-tnc640", made, cycles=(Cycle("DRILL", 8.0, 2.0, 2.0, 200.0),)))
     assert not re.search(r"\bG\d|\bH\d|%|\(", text)

@@ -58,7 +58,8 @@ def test_programmable_offsets_are_not_taken_for_settable_ones() -> None:
 
 def test_smoothing_states_both_tolerances_and_one_degree_without_rotary_axes() -> None:
     made = program([step("rapid", X=0.0)])
-    assert "N30 CYCLE832(0.003,_ORI_FINISH,0.015)" in lines("siemens-840d", made, smoothing=0.003, axis_smoothing=0.015)
+    assert "N30 CYCLE832(0.003,_ORI_FINISH,0.015)" in lines("siemens-840d", made, smoothing=0.003,
+                                                            axis_smoothing=0.015)
     text = lines("siemens-840d", made, smoothing=0.003)
     assert "N30 CYCLE832(0.003,_ORI_FINISH,1)" in text and "N50 CYCLE832(0,_OFF,1)" in text
 
@@ -75,7 +76,8 @@ CALLS = [("DRILL", {}, "MCALL CYCLE81(20,0,2,-8)"), ("DRILL", {"dwell": 0.5}, "M
 
 
 @pytest.mark.parametrize(("kind", "more", "call"), CALLS, ids=lambda v: v if isinstance(v, str) else "")
-def test_cycles_are_modal_calls_with_the_feed_before_them(kind: str, more: dict[str, float], call: str) -> None:
+def test_cycles_are_modal_calls_with_the_feed_before_them(kind: str, more: dict[str, float],
+                                                          call: str) -> None:
     steps, hole = drilled(kind, retract=20.0)
     made = program([*steps, step("feed", Z=30.0, F=200.0)], {0: LOAD}, holes=(hole,))
     text = blocks("siemens-840d", made, (Cycle(kind, 8.0, 2.0, None, 200.0, **more),))

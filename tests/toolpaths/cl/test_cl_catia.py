@@ -23,7 +23,8 @@ def read(text: str, *codes: str) -> ReadResult:
     return found
 
 
-@pytest.mark.parametrize(("axis", "away"), [("", "0,0,25"), (", 0.0, 0.0, 1.0", "0,0,25"), (", 0.0,-0.6, 0.8", "0,-3,24")])
+@pytest.mark.parametrize(("axis", "away"),
+                         [("", "0,0,25"), (", 0.0, 0.0, 1.0", "0,0,25"), (", 0.0,-0.6, 0.8", "0,-3,24")])
 def test_a_second_number_is_the_start_plane_where_the_tool_stands_there(axis: str, away: str) -> None:
     found = read(f"RAPID\nGOTO  /{away}{axis}\nCYCLE/DRILL,    3.000000,    5.000000\nGOTO  /0,0,20{axis}\nCYCLE/OFF\n",
                  "cl.cycle-place")
@@ -47,7 +48,8 @@ def test_a_cycle_with_a_unit_has_its_feed() -> None:
 @pytest.mark.parametrize(("toward", "end", "turns", "sense"), [
     ("0,1,0", "10,0,-6", 2.0, 1), ("0,-1,0", "10,0,-6", 2.0, -1), ("0,1,0", "0,10,-6.75", 2.25, 1)])
 @pytest.mark.parametrize("axis", ["0,0,1", "0,0,-1"])
-def test_a_helix_turns_by_its_height_over_its_pitch(toward: str, end: str, turns: float, sense: int, axis: str) -> None:
+def test_a_helix_turns_by_its_height_over_its_pitch(toward: str, end: str, turns: float, sense: int,
+                                                    axis: str) -> None:
     record = HELIX.format("0,0,0", toward, axis, 3, 10, 360 * turns, -3 * turns, int(turns), end)
     p = read(f"GOTO  /10,0,0\n{record}GOTO  /20,0,0\n").toolpath
     assert p.kind.tolist() == [Kind.FEED, Kind.ARC, Kind.FEED]
@@ -69,7 +71,8 @@ def test_what_is_no_helix_is_refused(record: str) -> None:
 
 
 def test_a_helix_whose_end_is_elsewhere_is_refused() -> None:
-    read("GOTO  /10,0,0\n" + HELIX.format("0,0,0", "0,1,0", "0,0,1", 3, 10, 720, 6, 2, "0,10,-6"), "cl.arc-sweep")
+    read("GOTO  /10,0,0\n" + HELIX.format("0,0,0", "0,1,0", "0,0,1", 3, 10, 720, 6, 2, "0,10,-6"),
+         "cl.arc-sweep")
 
 
 def test_tools_that_are_numbered_and_not_loaded_stay_so() -> None:

@@ -91,7 +91,8 @@ def test_remarks_are_refused_only_as_what_is_left_of_one_that_says_something(rem
     assert found == ([("cl.data-comment", (5,))] if refused else [])
 
 
-@pytest.mark.parametrize(("dialect", "refused"), [("ncl", False), ("generic", False), ("solidworks", True), ("creo", True)])
+@pytest.mark.parametrize(("dialect", "refused"),
+                         [("ncl", False), ("generic", False), ("solidworks", True), ("creo", True)])
 def test_six_numbers_of_cutter(dialect: str, refused: bool) -> None:
     text = HEAD + "LOADTL/1\nCUTTER/10.0,2.0,50.0,0.0,0.0,0.0\nGOTO/1,2,3\n"
     found = read_bytes(text, dialect=dialect).diagnostics

@@ -38,7 +38,8 @@ def read(text: str, fewest: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Toolp
 
 @pytest.mark.parametrize("together", [7, 50_000])
 @pytest.mark.parametrize("form", FORMS)
-def test_feeds_by_arrays_are_those_of_the_records(form: str, together: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_feeds_by_arrays_are_those_of_the_records(form: str, together: int,
+                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(feed_lines, "TOGETHER", together)
     used = 0
     for seed in range(25):

@@ -98,7 +98,8 @@ def errors(text: str) -> list[Diagnostic]:
     return [d for d in found if d.severity is Severity.ERROR]
 
 
-@pytest.mark.parametrize(("code", "wrong", "right", "word"), ROWS, ids=[f"{r[0]}-{k}" for k, r in enumerate(ROWS)])
+@pytest.mark.parametrize(("code", "wrong", "right", "word"), ROWS,
+                         ids=[f"{r[0]}-{k}" for k, r in enumerate(ROWS)])
 def test_a_hint_followed_is_the_end_of_the_error(code: str, wrong: str, right: str, word: str) -> None:
     found = [d for d in errors(wrong) if d.code == code]
     assert found and any(word in d.hint for d in found), [str(d) for d in errors(wrong)]

@@ -51,7 +51,8 @@ def test_no_line_that_names_a_motion_is_left_out(line: str, at: int, end: str) -
 def test_text_between_records_is_refused_unless_it_is_allowed() -> None:
     found = read_bytes(ISO + "GOTO/0,0,0\n* next: rapid to the clearance plane\nGOTO/1,0,0\n")
     assert [code for code, _ in errors(found)] == ["cl.text"]
-    allowed = read_bytes(ISO + "GOTO/0,0,0\n* next: rapid to the clearance plane\nGOTO/1,0,0\n", allow_unknown=["(TEXT)"])
+    allowed = read_bytes(ISO + "GOTO/0,0,0\n* next: rapid to the clearance plane\nGOTO/1,0,0\n",
+                         allow_unknown=["(TEXT)"])
     assert errors(allowed) == [] and allowed.toolpath.records.neutral == 1
 
 
@@ -132,7 +133,8 @@ def test_what_is_no_length_register_is_refused(record: str) -> None:
     ("END-OF-PATH\nTOOL PAT", ["cl.cut-off"]), ("GOTO/1,0,0\nGOTO/1 2 3.", ["cl.cut-off"]),
     ("FINI\nPart of GOTO/1,2,3 here", ["cl.cut-off"]),
 ])
-def test_the_text_of_a_listing_behind_its_end_needs_no_line_end(tail: str, noted: list[str], tmp_path: Path) -> None:
+def test_the_text_of_a_listing_behind_its_end_needs_no_line_end(tail: str, noted: list[str],
+                                                                tmp_path: Path) -> None:
     file = tmp_path / "part.cls"
     file.write_bytes(f"{NX}GOTO/0,0,0\n{tail}".encode())
     _, diagnostics = toolpaths.read(file)

@@ -78,7 +78,8 @@ def test_a_dollar_in_text_does_not_swallow_the_next_record() -> None:
 
 
 def test_words_that_begin_with_a_digit() -> None:
-    assert words_of("DEEP2, 1STPECK ,5.,3DCOMP,2 3,,x,,") == ("DEEP2", "1STPECK", 5.0, "3DCOMP", 2.0, 3.0, "", "X")
+    assert words_of("DEEP2, 1STPECK ,5.,3DCOMP,2 3,,x,,") == ("DEEP2", "1STPECK", 5.0, "3DCOMP", 2.0,
+                                                              3.0, "", "X")
 
 
 @pytest.mark.parametrize(("text", "major"), [
@@ -216,7 +217,8 @@ def test_joining_at_once_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
             fields = [rng.choice(numbers) + rng.choice(breaks) for _ in range(rng.randint(1, 7))]
             text += rng.choice(heads) + ",".join(fields) + rng.choice(["\n", ",\n", "$\n", "\n1,2,3\n", "\nRAPID\n"])
         results = []
-        for size, joined in ((1 << 22, scan._joined), (40, scan._joined), (60, lambda c: (c, np.zeros(0, np.int64)))):
+        for size, joined in ((1 << 22, scan._joined), (40, scan._joined),
+                             (60, lambda c: (c, np.zeros(0, np.int64)))):
             with monkeypatch.context() as patch:
                 patch.setattr(scan, "CHUNK", size)
                 patch.setattr(scan, "_joined", joined)

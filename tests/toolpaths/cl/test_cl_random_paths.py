@@ -90,6 +90,7 @@ def test_random_path(name: str, seed: int) -> None:
     result = read_bytes(walk.file.text(), units=units)
     assert not has_errors(result.diagnostics), [str(d) for d in result.diagnostics]
     found = inspect(result)
-    assert (found["points"], found["arcs"], found["cycles"]) == (len(walk.tips), len(walk.sweeps), walk.cycles)
+    assert (found["points"], found["arcs"], found["cycles"]) == (len(walk.tips), len(walk.sweeps),
+                                                                 walk.cycles)
     assert result.toolpath.tip == pytest.approx(np.array(walk.tips), abs=2e-3)
     assert result.toolpath.arcs.sweep == pytest.approx(np.array(walk.sweeps), abs=2e-2)

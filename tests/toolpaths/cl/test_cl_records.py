@@ -83,7 +83,8 @@ def test_taps_pecks_and_dwells() -> None:
     assert one("CYCLE/DEEP,DEPTH,10,MMPM,60,CLEAR,3,STEP,4,0,0,RETURN,5").steps == (4.0,)
     assert one("CYCLE/DRILL,DEPTH,10,MMPM,60,CLEAR,3,STEP,0,RETURN,5").steps == ()
     tap = one("CYCLE/TAP,DEPTH,10,TPI,20,CLEAR,3,RETURN,5")
-    assert (tap.pitch, tap.feed, tap.feed_mode) == (pytest.approx(1.27), pytest.approx(1.27), FeedMode.PER_REVOLUTION)
+    assert (tap.pitch, tap.feed, tap.feed_mode) == (pytest.approx(1.27), pytest.approx(1.27),
+                                                    FeedMode.PER_REVOLUTION)
     assert one("CYCLE/TAP,DEPTH,10,MMPR,1.5,CLEAR,3,RETURN,5").pitch == 1.5
     assert one("CYCLE/DEEP,DEPTH,10,MMPM,60,CLEAR,3,STEP,4,2,RETURN,5").steps == (4.0, 2.0)
     assert one("CYCLE/BRKCHP,DEPTH,10,MMPM,60,CLEAR,3,INCR,4,RETURN,5").kind == "BRKCHP"
@@ -104,7 +105,8 @@ def test_taps_pecks_and_dwells() -> None:
     ("CYCLE/DRILL,BRKCHP,RAPTO,3,FEDTO,-5,STEP,2,MMPM,60", None),
     ("CYCLE/FACE,RAPTO,3,FEDTO,-5,MMPM,60,DWELL,REV,4", None),
 ])
-def test_variants_of_cycles_are_carried_out_reported_or_refused(record: str, severity: Severity | None) -> None:
+def test_variants_of_cycles_are_carried_out_reported_or_refused(record: str,
+                                                                severity: Severity | None) -> None:
     found = read_bytes(NX + f"RAPID\nGOTO/0,0,9\n{record}\nGOTO/0,0,0\nCYCLE/OFF\nEND-OF-PATH\n")
     noted = [(d.severity, d.code) for d in found.diagnostics if d.severity is not Severity.INFO]
     code = "cl.cycle" if severity is Severity.ERROR else "cl.cycle-option"

@@ -163,7 +163,8 @@ def test_modifiers_of_fedrat_are_no_feed() -> None:
 @pytest.mark.parametrize(("record", "word", "feed"), [
     ("FEDRAT/MMPM,120,SCALE,0.5", "SCALE", 2), ("FEDRAT/SCALE,2", "SCALE", 10), ("FEDRAT/LENGTH,5,MMPM,60", "LENGTH", 1),
     ("FEDRAT/LOCK,ON", "LOCK", 10), ("FEDRAT/MMPM,120,MAXIPM,20", "MAXIPM", 2)])
-def test_what_changes_the_feed_is_refused_and_left_out_as_the_hint_says(record: str, word: str, feed: float) -> None:
+def test_what_changes_the_feed_is_refused_and_left_out_as_the_hint_says(record: str, word: str,
+                                                                        feed: float) -> None:
     text = f"{ISO}{record}\nGOTO/1,1,1\nFINI\n"
     found = [d for d in read_bytes(text).diagnostics if d.severity is Severity.ERROR]
     assert [(d.code, d.lines) for d in found] == [("cl.feed-option", (ISO.count("\n") + 1,))]
@@ -243,7 +244,8 @@ def test_rigid_tapping_by_pitch() -> None:
 
 
 def test_an_nx_arc_that_ends_a_hair_behind_its_start_goes_back_that_way() -> None:
-    p = read(NX + "GOTO/68.9,0,0,0,0,1\nCIRCLE/0,0,0,0,0,-1,68.9,.03,.5,10,0\nGOTO/68.9,-0.0001,0\n", "cl.arc-back")
+    p = read(NX + "GOTO/68.9,0,0,0,0,1\nCIRCLE/0,0,0,0,0,-1,68.9,.03,.5,10,0\nGOTO/68.9,-0.0001,0\n",
+             "cl.arc-back")
     assert p.arcs.sweep.tolist() == pytest.approx([0.0001 / 68.9], rel=1e-6)
     assert p.arcs.normal.tolist() == [[0, 0, -1]]
 

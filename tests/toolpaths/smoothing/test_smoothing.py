@@ -25,7 +25,8 @@ def chain(tip: Floats, axis: Floats | None = None) -> Curves:
     moves = len(tip) - 1
     axis = np.tile([0.0, 0.0, 1.0], (moves + 1, 1)) if axis is None else axis
     none = np.zeros((moves, 3))
-    return Curves(tip[:-1], tip[1:], axis[:-1], axis[1:], np.zeros(moves, dtype=bool), none, none, np.zeros(moves))
+    return Curves(tip[:-1], tip[1:], axis[:-1], axis[1:], np.zeros(moves, dtype=bool), none, none,
+                  np.zeros(moves))
 
 
 def wave(s: Floats) -> tuple[Floats, Floats]:

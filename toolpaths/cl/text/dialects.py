@@ -13,8 +13,9 @@ from toolpaths.units import MM_PER_INCH
 class Planes(Enum):
     """How a CYCLE states the planes above a hole: c by CLEAR or by place, r by RAPTO, d the depth.
 
-    Four are those of Autodesk's posts for APT (onCycle and onCyclePoint of "CAMplete APT" and "MANUSnc APT", "Common ISO
-    4343 APT", "MfgSuite APT", "Generative Machining APT"), which take c from the clearance height of the operation.
+    Four are those of Autodesk's posts for APT (onCycle and onCyclePoint of "CAMplete APT" and "MANUSnc APT",
+    "Common ISO 4343 APT", "MfgSuite APT", "Generative Machining APT"), which take c from the clearance height
+    of the operation.
     """
 
     RELATIVE = "the GOTO is the hole's top; the tool starts r above it, or c where r is not stated"

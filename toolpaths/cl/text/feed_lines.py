@@ -1,7 +1,7 @@
 """FEDRAT lines that differ in their number alone, read by arrays: where every point has a feed of its own there are as many.
 
-They are of one form, that of the first such line: what stands before and behind the number is the same to the byte. All
-others are left to the statements.
+They are of one form, that of the first such line: what stands before and behind the number is the same to the
+byte. All others are left to the statements.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _LONGEST = 32
 @dataclass(frozen=True)
 @arrays(value="S", stop="S")
 class FeedLines:
-    """Slow lines by their index in the scan: the first of the form, `value` (S,) of each, `stop` (S,) one past the last
-    of the unbroken run that it stands in; 0 for lines of other forms."""
+    """Slow lines by their index in the scan: the first of the form, `value` (S,) of each, `stop` (S,) one
+    past the last of the unbroken run that it stands in; 0 for lines of other forms."""
 
     first: int
     value: Floats
@@ -71,7 +71,8 @@ def _form(line: bytes) -> tuple[bytes, bytes] | None:
     return head.encode(), tail.encode()
 
 
-def _read(c: Bytes, starts: Ints, ends: Ints, head: bytes, tail: bytes, largest: float) -> tuple[Bools, Floats]:
+def _read(c: Bytes, starts: Ints, ends: Ints, head: bytes, tail: bytes,
+          largest: float) -> tuple[Bools, Floats]:
     """(lines (K,) of the form whose numbers are none beyond `largest`, their numbers)."""
     good = _begin_with(c, starts, ends, head) & _end_with(c, starts, ends, tail)
     good &= ends - starts - len(head) - len(tail) <= _LONGEST

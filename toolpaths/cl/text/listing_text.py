@@ -9,7 +9,8 @@ from toolpaths.cl.text.words import SILENT, TEXT_WORDS
 
 SINGLE = re.compile(r"[A-Z0-9_-]*[A-Z][A-Z0-9_-]*")
 _RULE = re.compile(r"([-=*_#~])\1{4,}")
-_LISTING = re.compile(r"\s*(?:Information listing created by\b|Tool Path Listing has \d+ lines?)", re.IGNORECASE)
+_LISTING = re.compile(r"\s*(?:Information listing created by\b|Tool Path Listing has \d+ lines?)",
+                      re.IGNORECASE)
 _LABELLED = re.compile(r"[^\W\d][\w .()-]* ?:(?:\s|$)|[^\W\d][\w .()-]*  +:")
 _NUMBERS = re.compile(r"[-+.,\s\deEdD$]*")
 _SENTENCE = re.compile(r"[A-Za-z]+(?: +[A-Za-z']+){2,}[.!]?")

@@ -26,7 +26,8 @@ class DiagnosticLog:
         self.file = file
         self._entries: dict[tuple[Severity, str, str], _Entry] = {}
 
-    def add(self, severity: Severity, code: str, message: str, line: int = 0, hint: str = "", key: str = "") -> None:
+    def add(self, severity: Severity, code: str, message: str, line: int = 0, hint: str = "",
+            key: str = "") -> None:
         """Note one problem; `key` distinguishes problems of one code that are to be listed apart."""
         entry = self._entries.get((severity, code, key))
         if entry is None:

@@ -1,8 +1,8 @@
 """Plain GOTO lines to arrays, all other lines to slices: the part of reading that must be fast.
 
-A line is plain where it is blanks, `GOTO`, blanks, `/` and 3, 6 or 9 numbers with commas between, nothing else. Its
-numbers go through numpy's text parser (correctly rounded); every other line is left to the statements, which say what is
-wrong.
+A line is plain where it is blanks, `GOTO`, blanks, `/` and 3, 6 or 9 numbers with commas between, nothing
+else. Its numbers go through numpy's text parser (correctly rounded); every other line is left to the
+statements, which say what is wrong.
 """
 
 from __future__ import annotations

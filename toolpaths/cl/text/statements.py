@@ -76,9 +76,9 @@ class Statement:
 class StatementList:
     """The slow part of a file in order: statement, its first line, and how many plain points stand before it.
 
-    `first` says for each different statement (points apart) the line where it stands first. `feeds` holds, by the index of
-    the first of them, the numbers of neighbouring FEDRAT statements that differ in nothing else: for all of them stands the
-    first of the file.
+    `first` says for each different statement (points apart) the line where it stands first. `feeds` holds, by
+    the index of the first of them, the numbers of neighbouring FEDRAT statements that differ in nothing else:
+    for all of them stands the first of the file.
     """
 
     statements: list[Statement] = field(default_factory=list)
@@ -155,7 +155,8 @@ def _comment(text: str) -> Statement:
 class Lexer:
     """Cuts the slow lines of a file into statements; equal lines are looked at once."""
 
-    def __init__(self, data: bytes, scan: Scan, log: DiagnosticLog, known: Callable[[str], bool], largest: float = LARGEST):
+    def __init__(self, data: bytes, scan: Scan, log: DiagnosticLog, known: Callable[[str], bool],
+                 largest: float = LARGEST):
         self.data, self.scan, self.log, self.known, self.largest = data, scan, log, known, largest
         self.memo: dict[bytes, Statement | None] = {}
         self.next = 0
@@ -226,8 +227,8 @@ class Lexer:
         return statement_of(joined) if joined else None
 
     def _unlabelled(self, text: str) -> str:
-        """`text` without the label of APT before a statement, as in `A10)GOTO/...`: not where a bracket stands in a word,
-        as in `O)STOP`."""
+        """`text` without the label of APT before a statement, as in `A10)GOTO/...`: not where a bracket
+        stands in a word, as in `O)STOP`."""
         label = _LABEL.match(text)
         rest = text[label.end():] if label else ""
         if label and label[0].rstrip(" )").isalpha() and not label[0].endswith(" "):

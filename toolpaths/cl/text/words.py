@@ -1,7 +1,7 @@
 """The vocabulary: which major words the reader knows, and what becomes of each.
 
-Words with a handler of their own are listed where they are handled (`HANDLERS` of motion, feeds, frames, tools,
-cycles and structure). Here stand the words that need none.
+Words with a handler of their own are listed where they are handled (`HANDLERS` of motion, feeds, frames,
+tools, cycles and structure). Here stand the words that need none.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ EVENTS: dict[str, str] = {
     "SLOWDN": "as in the file",
     "END": "none",
 }
-"""Records without motion that become an Event, and what its values hold. Also events, from their own handlers: LOADTL
-(tool number, then the length register where the file names one), ROTATE, ROTABL and ROTHED (as in the file),
+"""Records without motion that become an Event, and what its values hold. Also events, from their own
+handlers: LOADTL (tool number, then the length register where the file names one), ROTATE, ROTABL and ROTHED
+    (as in the file),
 PPRINT and INSERT (one text), GOHOME without a point (none), FEDRAT/INVERS,AUTO or OFF (the words)."""
 
 LENGTH_EVENTS = frozenset({"RETRCT", "CLEARP", "CLRSRF", "LEADER"})
