@@ -6,6 +6,9 @@ elsewhere, and between the two it moved in rapid.
 
 from __future__ import annotations
 
+from functools import cache
+from itertools import chain
+
 import numpy as np
 
 from postproc.path.links import SafeSpace
@@ -55,8 +58,8 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angl
 
     The tool comes back in one run of feed blocks: the next rapid behind them ends the search. On the path it
     stands in other poses twice too. The innermost that is a position of the CL file counts, for what lies
-    outside it is motion of the CL file; without any the outermost that leaves a cut: high above the part a
-    tool stands in one pose twice as well.
+    outside it is motion of the CL file; without any the outermost that leaves a cut, or meets no position
+    of the CL file on its way: high above the part a tool stands in one pose twice as well.
     """
     low, high = max(k - _REACH, 1), min(k + _REACH, len(tip))
     stop = np.flatnonzero(~rapid[low:k])
@@ -70,11 +73,19 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angl
     pairs = np.argwhere(same)
     if not len(pairs):
         return None
-    for first, last in pairs[np.lexsort((pairs[:, 1], -pairs[:, 0]))]:
-        if (np.linalg.norm(stops - tip[begin[first]], axis=1) <= grain[0]).any():
-            return int(begin[first]) + 1, int(end[last])
-    cuts = pairs[~rapid[begin[pairs[:, 0]]]]
-    return (int(begin[cuts[0, 0]]) + 1, int(end[cuts[0, 1]])) if len(cuts) else None
+
+    @cache
+    def meets(block: int) -> bool:
+        return bool((np.linalg.norm(stops - tip[block], axis=1) <= grain[0]).any())
+
+    blocks = np.stack([begin[pairs[:, 0]], end[pairs[:, 1]]], axis=1).tolist()
+    for first, last in sorted(blocks, key=lambda pair: (-pair[0], pair[1])):
+        if meets(first):
+            return first + 1, last
+    cuts = [(first, last) for first, last in blocks if not rapid[first]]
+    clear = ((first, last) for first, last in blocks if not any(map(meets, range(first + 1, last))))
+    found = next(chain(cuts, clear), None)
+    return None if found is None else (found[0] + 1, found[1])
 
 
 def check_rewinds(motion: Motion, executed: BlockPoses, number: Ints, tip: Floats, axis: Floats, space: SafeSpace,
