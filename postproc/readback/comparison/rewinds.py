@@ -59,7 +59,7 @@ def _around(k: int, rapid: Bools, tip: Floats, axis: Floats, stops: Floats, angl
     The tool comes back in one run of feed blocks: the next rapid behind them ends the search. On the path it
     stands in other poses twice too. The innermost that is a position of the CL file counts, for what lies
     outside it is motion of the CL file; without any the outermost that leaves a cut, or meets no position
-    of the CL file on its way: high above the part a tool stands in one pose twice as well.
+    of the CL file on its path: high above the part a tool stands in one pose twice as well.
     """
     low, high = max(k - _REACH, 1), min(k + _REACH, len(tip))
     stop = np.flatnonzero(~rapid[low:k])
