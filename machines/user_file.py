@@ -124,7 +124,7 @@ def schema(*models: type[BaseModel]) -> Values:
 
     It holds for a file with its base merged in: a file that names a base may leave out what that gives.
     """
-    any_of: Any = Union[models]  # noqa: UP007
+    any_of: Any = Union[models]  # noqa: UP007  # of as many as are given
     result: Values = TypeAdapter(any_of).json_schema()
     base = {"type": "string", "description": "built-in file (or .toml file next to this one) whose values hold where "
                                              "this file gives none"}

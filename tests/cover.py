@@ -51,6 +51,6 @@ def chosen(cases: Sequence[Case], together: int = 1, count: int = 0, of: Sequenc
 
 def _case(item: pytest.Item) -> Case:
     """Values of a case by parameter; where one cannot be compared, its number among the values of that parameter."""
-    spec = item.callspec  # type: ignore[attr-defined]
+    spec = item.callspec
     return {name: value if isinstance(value, Hashable) and not callable(value) else ("case", spec.indices[name])
             for name, value in spec.params.items()}

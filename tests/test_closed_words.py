@@ -137,5 +137,5 @@ def test_help_shows_the_words_that_an_option_takes(command: str, option: str, wo
     import typer
 
     root = typer.main.get_command(app)
-    taken = {name: p for p in root.commands[command].params for name in p.opts}  # type: ignore[attr-defined]
+    taken = {name: p for p in root.commands[command].params for name in p.opts}
     assert taken[option].metavar == f"{{{','.join(get_args(words))}}}"

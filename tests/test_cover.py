@@ -58,6 +58,6 @@ def test_the_marker_leaves_the_others_to_the_slow_tests() -> None:
     one = [Item(f"a.py::one[{a}-{b}]", pytest.mark.covering, letter=a, number=b) for a, b in rows]
     two = [Item(f"a.py::two[{a}-{b}]", pytest.mark.covering(together=2), letter=a, number=b) for a, b in rows]
     plain = [Item(f"a.py::three[{a}]", None, letter=a) for a in "abc"] + [Item("a.py::four", pytest.mark.covering)]
-    mark_slow([*one, *two, *plain])  # type: ignore[list-item]
+    mark_slow([*one, *two, *plain])
     assert [item.added for item in one] == [[], ["slow"], ["slow"], []]
     assert not any(item.added for item in (*two, *plain))

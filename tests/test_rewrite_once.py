@@ -20,7 +20,7 @@ def test_the_second_worker_finds_what_the_first_has_kept(tmp_path: Path, pytestc
 
     def prepare(source: Path, config: Any) -> Any:
         calls.append(source)
-        return rewrite._rewrite_test.__wrapped__(source, config)  # type: ignore[attr-defined]
+        return rewrite._rewrite_test.__wrapped__(source, config)
 
     first, second = (rewrite_once.one_at_a_time(prepare)(file, pytestconfig) for _ in range(2))
     assert calls == [file] and first == second

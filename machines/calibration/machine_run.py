@@ -157,7 +157,7 @@ def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, star
     if not result.converged:
         run.problem("calibrate.converged", "the fit does not come to an end",
                     "check units and signs of the table")
-    _untold(run, result.not_identifiable)
+    _undetermined(run, result.not_identifiable)
     if has_errors(run.found):
         return CalibrationOutcome(None, figures)
     _far(run, given, measured.kind, fitted.setup)
@@ -169,7 +169,7 @@ def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, star
                 wanted)
 
 
-def _untold(run: CalibrationRun, groups: Sequence[tuple[str, ...]]) -> None:
+def _undetermined(run: CalibrationRun, groups: Sequence[tuple[str, ...]]) -> None:
     """Parameters that the readings do not determine, alone or from each other."""
     alone, together = [g[0] for g in groups if len(g) == 1], [folded(g) for g in groups if len(g) > 1]
     approaches = any({name[-1] for name in g} == {"+", "-"} for g in groups)

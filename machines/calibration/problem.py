@@ -171,8 +171,8 @@ class _Decomposed:
     def groups(self) -> tuple[tuple[str, ...], ...]:
         """Parameters that share a direction which the data do not determine, each set once."""
         names = [name for name, free in zip(self.names, self.free, strict=True) if free]
-        untold = self.full[self.rank:].T
-        projector = np.abs(untold @ untold.T)
+        undetermined = self.full[self.rank:].T
+        projector = np.abs(undetermined @ undetermined.T)
         left, found = {k for k in range(len(names)) if projector[k, k] > PART}, []
         while left:
             group, front = set(), {min(left)}

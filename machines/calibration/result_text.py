@@ -61,11 +61,11 @@ def _ball(setup: dict[str, float]) -> tuple[float, ...]:
 def _errors(figures: CalibrationFigures) -> list[str]:
     """Each parameter that was found; how many others stay."""
     noted = [(name, p, sigma) for name, p in figures["parameters"].items() if (sigma := p["sigma"]) is not None]
-    untold, kept = [name for name, p in figures["parameters"].items() if p["sigma"] is None], figures["kept"]
+    unknown, kept = [name for name, p in figures["parameters"].items() if p["sigma"] is None], figures["kept"]
     lines = ["found, with one standard deviation:"] if noted else []
     lines += table_text([(name, f"{_value(p['value'], sigma)} {p['unit']}", f"{p['at'] and 'at '}{p['at']}")
                          for name, p, sigma in noted], indent=2) if noted else []
-    lines += [f"not known, 0 in the model: {', '.join(untold)}"] if untold else []
+    lines += [f"not known, 0 in the model: {', '.join(unknown)}"] if unknown else []
     return lines + ([f"other parameters, which stay as they were: {kept}"] if kept else [])
 
 

@@ -99,9 +99,9 @@ def rotary(run: CalibrationRun, given: RotaryMeasurementModel, table: CsvTable) 
     fitted = fit_rotary(bench, readings, sigma, given.harmonics, run.checked.robust)
     figures = _rotary_figures(given, bench, fitted, sigma)
     never = hidden(bench, sigma, given.harmonics) if fitted.lost else ()
-    untold = [name for name in fitted.lost if name not in never]
-    if untold:
-        run.problem("calibrate.rank", f"the readings do not determine {folded(untold)}",
+    undetermined = [name for name in fitted.lost if name not in never]
+    if undetermined:
+        run.problem("calibrate.rank", f"the readings do not determine {folded(undetermined)}",
                     "measure one more set-up, the indexer turned by one increment more")
         return CalibrationOutcome(None, figures)
     if fitted.lost:

@@ -11,7 +11,7 @@ from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.job.job import prepare, with_shop
-from postproc.pipeline.hooks import check_hooks
+from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
@@ -140,7 +140,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     if has_errors(found):
         return replace(begun, diagnostics=tuple(found))
     job, more = prepare(path, machine, spec, start.setup, options)
-    found += [*more, *(check_hooks(job) if job is not None else [])]
+    found += [*more, *(refused_hooks(job) if job is not None else [])]
     if job is None or has_errors(found):
         return replace(begun, diagnostics=tuple(found))
     asked = start.asked or start.setup

@@ -23,7 +23,7 @@ _HINT = ("blocks of the shop hold comments and codes that come back to where the
          "[hooks] passive; what switches the spindle or coolant, stops or moves is a record of the CL file")
 
 
-def check_hooks(job: Job) -> list[Diagnostic]:
+def refused_hooks(job: Job) -> list[Diagnostic]:
     """Errors of blocks that do more than pass, and of passive codes that the control carries out."""
     machine, hooks = job.machine, job.hooks
     reader = reader_for(job.controller, machine.axis_names, None, machine.stop, job.control.rolls,

@@ -22,7 +22,7 @@ from postproc.path.rewinds import drawing_of
 from postproc.path.singular import check_singular
 from postproc.path.travel import check_travel
 from postproc.path.turn_steps import with_short_turns
-from postproc.pipeline.hooks import check_hooks
+from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.program_header import header_lines
 from postproc.pipeline.program_lines import cl_lines
 from postproc.pipeline.result import PostResult, StageName, shared_fields
@@ -102,7 +102,7 @@ def prepared(begun: BegunStage, progress: Progress | None) -> tuple[BegunStage |
     found = [*found, *_bad_meshes(begun.setup, options.setup)]
     if job is None:
         return begun, found
-    found += check_hooks(job)
+    found += refused_hooks(job)
     return handed_on(PreparedStage, begun, job=job, toolpath=begun.toolpath if has_errors(found) else job.toolpath), found
 
 
@@ -145,7 +145,7 @@ def solved(made: PlacedStage, progress: Progress | None) -> tuple[PlacedStage | 
 def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage | CorrectedStage, DiagnosticList]:
     """The path on the machine with its geometric errors, where it is inside travel without."""
     job, path = made.job, made.path
-    if job.errors is None or job.errors.corrected_by != "post":
+    if job.errors is None or not job.corrects:
         return handed_on(CorrectedStage, made, nominal=None, compensation=None), []
     from postproc.correction.compensation import compensate
 

@@ -25,7 +25,7 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
               "rounding": bound.tip, "axis_rounding": bound.axis / DEG,
               "linearising": MARGIN * (tolerance - smoothing - bound.tip),
               "axis_linearising": MARGIN * (axis - axis_smoothing - bound.axis / DEG)}
-    if job.errors is not None and job.errors.corrected_by == "post":
+    if job.corrects:
         from postproc.correction.compensation import SHARE
 
         shares |= {"geometric_errors": SHARE * tolerance, "axis_geometric_errors": SHARE * axis}

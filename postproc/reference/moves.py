@@ -86,6 +86,11 @@ class Moves:
         columns: dict[str, Any] = {name: taken(getattr(self, name), keep) for name in names}
         return replace(self, **columns)
 
+    def run_by(self, owner: Ints) -> Bools:
+        """(E,) True for blocks that run a move of the CL file itself, by the move that each serves: not those of
+        links that lead to it, nor what stands behind the last one."""
+        return np.asarray((owner < len(self)) & ~self.link[np.minimum(owner, len(self) - 1)])
+
     def curves(self, rows: Ints | slice = slice(None)) -> Curves:
         """The reference motion of every row, or of some; linked rows stand still at their end."""
         ends = np.arange(len(self))[rows]

@@ -84,7 +84,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     code, diagnostics = reader.read(data, gcode, others)
     head = read_head(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]
-    if gcode and not _by_post(job) and head.corrected is not None:
+    if gcode and not job.corrects and head.corrected is not None:
         return None, [_twice(job, gcode), *diagnostics]
     if code is not None:
         diagnostics += placed([_located(d, job.toolpath.file, of_cl) for d in check_stated(code, reader, gcode)], code.files)
@@ -113,10 +113,10 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(code, motion, job, comparison.owner, faults),
                *check_index(motion, job, home, comparison.owner, faults),
-               *check_hooks(as_bytes(data), code, motion, job, comparison.owner, faults),
-              *_bodies(motion, executed, job, comparison, faults)]
+               *check_hooks(data, code, motion, job, comparison.owner, faults),
+               *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
-    if gcode and _by_post(job):
+    if gcode and job.corrects:
         noted = [*(_of_model(head, job, gcode, has_errors(noted)) if head.corrected is not None else
                    _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
@@ -139,11 +139,6 @@ def _unmeasured(motion: Motion, executed: BlockPoses, job: Job, faults: Faults) 
     from postproc.readback.execution.actual import ActualBlockPoses
 
     return check_measured(motion, executed, job, faults) if isinstance(executed, ActualBlockPoses) else []
-
-
-def _by_post(job: Job) -> bool:
-    """True where programs of the job are to correct the machine's geometric errors."""
-    return job.errors is not None and job.errors.corrected_by == "post"
 
 
 def _twice(job: Job, gcode: str) -> Diagnostic:
@@ -231,7 +226,7 @@ def _located(d: Diagnostic, file: str, of_cl: Callable[[int], tuple[int, ...]] |
 def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> BlockPoses:
     """Poses of the machine as it is: with its errors where the program corrects them."""
     before = poses_before(motion, job.control)
-    if job.errors is None or not _by_post(job):
+    if job.errors is None or not job.corrects:
         return BlockPoses(job.control, job.kinematics_of, lengths, before)
     from postproc.readback.execution.actual import ActualBlockPoses
 

@@ -48,11 +48,11 @@ def compared(name: str, module: ModuleType, plain: Callable[[], object], loop: C
     """A line: both times and their ratio; `loop` runs with the module's loops as they stand."""
     given: dict[str, Any] = {key: getattr(module, key) for key in ("compiled", "wanted") if hasattr(module, key)}
     if "wanted" in given:
-        module.wanted = lambda *_: False  # type: ignore[attr-defined]
+        module.wanted = lambda *_: False
     first = seconds(plain)
-    module.compiled = lambda function: function  # type: ignore[attr-defined]
+    module.compiled = lambda function: function
     if "wanted" in given:
-        module.wanted = lambda *_: True  # type: ignore[attr-defined]
+        module.wanted = lambda *_: True
     with np.errstate(all="ignore"):
         second = seconds(loop)
     for key, value in given.items():

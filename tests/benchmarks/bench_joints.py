@@ -93,8 +93,8 @@ def moves(name: str, rng: np.random.Generator, count: int) -> tuple[Curves, np.n
     start = rng.uniform(-60, 60, (count, 3))
     end = start + rng.normal(0, 15, (count, 3))
     if not kin.straight_slides:
-        start, _ = kin.workspace.random(rng, count)  # type: ignore[attr-defined]
-        space = kin.workspace  # type: ignore[attr-defined]
+        start, _ = kin.workspace.random(rng, count)
+        space = kin.workspace
         end = np.clip(start + rng.normal(0, 15, (count, 3)), space.lower, space.upper)
     tilt, heading = rng.uniform(5, 25, (2, count)), rng.uniform(0, 360, count)
     axes = [leaning(tilt[0], heading), leaning(tilt[1], heading + rng.uniform(-40, 40, count))]
@@ -134,7 +134,7 @@ def against_truth() -> None:
 
 def clocked(label: str, n: int, base: float, call: object) -> float:
     start = time.process_time()
-    call()  # type: ignore[operator]
+    call()
     used = time.process_time() - start
     adjacent = f"  {used / base:5.1f} x the inverse" if base else ""
     print(f"  {label:34} {used:6.2f} s  {n / used / 1e6:6.2f} M points/s{adjacent}")
@@ -150,17 +150,17 @@ def speed(n: int) -> None:
         tip = np.stack((30 * np.cos(t), 30 * np.sin(t), 10 * np.sin(t / 50)), axis=1)
         axis = leaning(20 + 8 * np.sin(0.7 * t), 170 * np.sin(t / 3) + (0 if limits_of is None else 3 * t))
         print(f"{n} points, {name}" + (", C within +-400 degrees" if limits_of else ""))
-        base = clocked("inverse kinematics, all branches", n, 0.0, lambda: m.kinematics.inverse(tip, axis))  # noqa: B023
+        base = clocked("inverse kinematics, all branches", n, 0.0, lambda: m.kinematics.inverse(tip, axis))  # noqa: B023  # called at once
         found: list[np.ndarray] = []
-        clocked("plan", n, base, lambda: found.append(plan_runs(  # noqa: B023
-            [PoseRun(m.kinematics, tip, axis)], limits, m.home)[0].q))  # noqa: B023
+        clocked("plan", n, base, lambda: found.append(plan_runs(  # noqa: B023  # called at once
+            [PoseRun(m.kinematics, tip, axis)], limits, m.home)[0].q))  # noqa: B023  # called at once
         zero = np.zeros((n - 1, 3))
         curves = Curves(tip[:-1], tip[1:], axis[:-1], axis[1:], np.zeros(n - 1, dtype=bool), zero, zero,
                         np.zeros(n - 1))
         clocked("leading past singular directions", n, base, lambda: lead_past(
-            m.kinematics, curves, curves.length() / 20.0, AXIS / 2, limits.velocity))  # noqa: B023
+            m.kinematics, curves, curves.length() / 20.0, AXIS / 2, limits.velocity))  # noqa: B023  # called at once
         clocked("linearising, proved", n, base, lambda: linearise(
-            Control(m, "axes", np.zeros(3)), m.kinematics, curves, found[0][:-1], found[0][1:],  # noqa: B023
+            Control(m, "axes", np.zeros(3)), m.kinematics, curves, found[0][:-1], found[0][1:],  # noqa: B023  # called at once
             np.zeros(n - 1, dtype=bool), TIP, AXIS))
 
 

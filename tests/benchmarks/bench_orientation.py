@@ -32,7 +32,7 @@ from toolpaths.units import DEG
 
 SAMPLES = Path(__file__).parents[2] / "samples"
 sys.path.insert(0, str(SAMPLES))
-import orientation as samples  # noqa: E402
+import orientation as samples  # noqa: E402  # found on the path set above
 
 GRID = 8.0
 """degrees, of the brute force; the neighbourhood of its best is searched again at a fifth and a twenty-fifth"""

@@ -61,7 +61,7 @@ def loaded(setup: str, limits: dict[str, object]) -> SetupFile:
 def placed(path: Toolpath, m: Machine, setup: SetupFile, **options: object) -> tuple[PlacementChoice, float]:
     """The choice, and the seconds that it took."""
     begin = time.perf_counter()
-    choice, found = place(path, m, setup, Options(**options))  # type: ignore[arg-type]
+    choice, found = place(path, m, setup, Options(**options))
     assert choice is not None, [str(d) for d in found]
     return choice, time.perf_counter() - begin
 

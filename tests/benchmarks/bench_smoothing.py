@@ -118,7 +118,7 @@ def planned() -> None:
 def sample(file: str, name: str, setup: str, **options: object) -> PostResult:
     path, _ = toolpaths.read(SAMPLES / file)
     return postproc.convert(path, machine(name), "linuxcnc", SAMPLES / f"{setup}.setup.toml",
-                            postproc.Options(**options))  # type: ignore[arg-type]
+                            postproc.Options(**options))
 
 
 def samples() -> None:
@@ -189,7 +189,7 @@ def with_c(bounds: JointLimits, made: Machine) -> JointLimits:
 
 def workspace(made: Machine, rng: np.random.Generator) -> Floats:
     """Random platform coordinates of the workspace, its corners included."""
-    space = made.kinematics.workspace  # type: ignore[attr-defined]
+    space = made.kinematics.workspace
     place, tilt = space.random(rng, 20_000)
     if not hasattr(made.kinematics, "solve_platform"):
         return np.asarray(place)

@@ -40,7 +40,7 @@ class Clocked:
 def main() -> None:
     """Print the table."""
     bound = Clocked(compare._bound)
-    compare._bound = bound  # type: ignore[assignment]
+    compare._bound = bound
     for points in sys.argv[1:] or ["1000", "100000"]:
         for kind in ([], ["--five-axis"]):
             with tempfile.TemporaryDirectory() as folder:

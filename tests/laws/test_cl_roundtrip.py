@@ -157,7 +157,7 @@ def test_chunks_do_not_matter(monkeypatch: object) -> None:
     text = "UNITS/MM\n" + "".join(f"GOTO/{k},{-k}.5,0{',0,0,1' if k % 3 else ''}\n{'RAPID' if k % 5 else ''}\n"
                                   for k in range(400))
     whole = read_bytes(text).toolpath
-    monkeypatch.setattr(module, "CHUNK", 50)  # type: ignore[attr-defined]
+    monkeypatch.setattr(module, "CHUNK", 50)
     parts = read_bytes(text).toolpath
     assert parts.equals(whole)
     assert np.array_equal(parts.line, whole.line)

@@ -86,7 +86,7 @@ def setup_file() -> SetupFile:
 def convert(path: Toolpath, found: list, machine: str, setup: SetupFile | None = None,
             feed_mode: str = "auto") -> PostResult:
     return postproc.convert(path, machines.load(machine), "linuxcnc", setup or setup_file(),
-                            postproc.Options(feed_mode=feed_mode), found)  # type: ignore[arg-type]
+                            postproc.Options(feed_mode=feed_mode), found)
 
 
 def all_outputs(interpret, sample: str, names: tuple[str, ...]) -> list[Output]:

@@ -36,7 +36,7 @@ def compensated(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[bo
 
     def choose(on: bool) -> None:
         def both(folder: Path, *arguments: object) -> None:
-            write(folder, *arguments)  # type: ignore[arg-type]
+            write(folder, *arguments)
             hal, ini = folder / "sim.hal", folder / "sim.ini"
             hal.write_text(hal.read_text().replace("net sample0 joint.0.pos-cmd =>", "net feedback0 =>"))
             if on:

@@ -75,7 +75,7 @@ def test_a_harmful_change_of_a_program_is_measured() -> None:
     for old, new, said in (("F600", "F605", "another time"), ("P0.5", "P0.9", "rest")):
         assert old in plain.text
         got = verified(asked, plain.text.replace(old, new), {})
-        assert not got.ok or said in change(plain.effect, got.effect)  # type: ignore[arg-type]
+        assert not got.ok or said in change(plain.effect, got.effect)
     assert change(plain.effect, plain.effect) == ""
 
 

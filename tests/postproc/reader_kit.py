@@ -53,7 +53,7 @@ def executed(dialect: str, text: str, on: str = "mill-3axis", others: Mapping[st
 
 def good(dialect: str, text: str, on: str = "mill-3axis", **more: object) -> Motion:
     """The motion of a program without faults."""
-    motion, found = executed(dialect, text, on, **more)  # type: ignore[arg-type]
+    motion, found = executed(dialect, text, on, **more)
     assert not has_errors(found), [str(d) for d in found]
     assert motion is not None
     return motion

@@ -55,7 +55,7 @@ def test_every_value_with_arrays_is_checked() -> None:
     with_arrays = {name for name, cls in every.items() if array_fields(cls)}
     assert len(with_arrays) > 170
     assert {name: unchecked(every[name]) for name in with_arrays - IN_WORK if unchecked(every[name])} == {}
-    frozen = {name for name in with_arrays if every[name].__dataclass_params__.frozen}  # type: ignore[attr-defined]
+    frozen = {name for name in with_arrays if every[name].__dataclass_params__.frozen}
     assert with_arrays - frozen == IN_WORK
     assert {name: set(getattr(cls, TABLE, ())) - {field.name for field in dataclasses.fields(cls)}
             for name, cls in every.items() if hasattr(cls, TABLE)} == {name: set() for name in every

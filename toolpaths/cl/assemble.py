@@ -173,9 +173,9 @@ def _normals(b: ToolpathBuilder, rows: PointRows) -> tuple[Floats | None, Floats
     normal = unit(np.where(is_normal[:, None], rows.third, np.nan)) if is_normal.any() else None
     if not is_contact.any():
         return normal, None
-    untold = np.setdiff1d(np.flatnonzero(is_contact), b.contacts)
+    unstated = np.setdiff1d(np.flatnonzero(is_contact), b.contacts)
     b.log.many(Severity.WARNING, "cl.contact", "numbers 7 to 9 of GOTO are not a unit vector; read as the contact point",
-               rows.line[untold])
+               rows.line[unstated])
     return normal, np.where(is_contact[:, None], rows.third * b.scale, np.nan)
 
 

@@ -241,7 +241,7 @@ def check_links(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints,
            faults: Faults) -> list[Diagnostic]:
     """Linking blocks, those after the last point too, stay on the line of retract, clear of the path, or on
     the line of approach; within what corrections of geometric errors change on the path, besides the tolerance."""
-    rows = np.flatnonzero((owner == len(moves)) | ((owner < len(moves)) & moves.link[np.minimum(owner, len(moves) - 1)]))
+    rows = np.flatnonzero(~moves.run_by(owner) & (owner <= len(moves)))
     rows = rows[rows > 0]
     bad = np.zeros(len(rows), dtype=bool)
     m = owner[rows]

@@ -31,11 +31,12 @@ def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults:
     if not machine.clamp_codes:
         return found
     moves, cut = job.moves.without_pecks(), cutting_rows(motion, job, owner)
-    turned = {letter: _turns(motion, machine.axis_names.index(letter)) for letter in machine.clamp_codes}
-    standing = {group: _standing(cut, np.any([turned[letter] for letter in group], axis=0))
+    columns = np.array([machine.axis_names.index(letter) for letter in machine.clamp_codes])
+    turning = dict(zip(machine.clamp_codes, (turned(motion, columns) > TURNS).T, strict=True))
+    standing = {group: _standing(cut, np.any([turning[letter] for letter in group], axis=0))
                 for group in machine.clamp_groups}
     for letter, one in machine.clamp_codes.items():
-        state, turns = _states(code, one), turned[letter]
+        state, turns = _states(code, one), turning[letter]
         before, line = state[motion.block - 1], motion.line
         bad = np.flatnonzero(turns & (before != 1.0))
         if len(bad):
@@ -54,15 +55,13 @@ def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults:
 
 def cutting_rows(motion: Motion, job: Job, owner: Ints) -> Bools:
     """(E,) rows that cut: at feed, and serving a move that no link leads to."""
-    moves = job.moves.without_pecks()
-    inside = (owner >= 0) & (owner < len(moves))
-    return np.asarray((motion.code > 0) & inside & ~moves.link[np.clip(owner, 0, len(moves) - 1)])
+    return np.asarray((motion.code > 0) & job.moves.without_pecks().run_by(owner))
 
 
-def _turns(motion: Motion, j: int) -> Bools:
-    """(E,) rows that turn joint j."""
-    degrees = np.concatenate([motion.start[j:j + 1], motion.end[:, j]])
-    return np.asarray(np.abs(np.diff(degrees)) > TURNS)
+def turned(motion: Motion, joints: Ints) -> Floats:
+    """(E, K) degrees by which rows turn joints (K,)."""
+    degrees = np.concatenate([motion.start[None], motion.end])[:, joints]
+    return np.asarray(np.abs(np.diff(degrees, axis=0)))
 
 
 def _states(code: Canonical, one: ClampCodes) -> Floats:
@@ -108,13 +107,13 @@ def check_index(motion: Motion, job: Job, home: Floats, owner: Ints, faults: Fau
     linking = first[np.clip(owner, 0, len(moves))] & ~cutting_rows(motion, job, owner)
     rotary = np.flatnonzero(np.array(job.machine.rotary))
     before = np.concatenate([motion.start[None], motion.end[:-1]])
-    turned, lift = np.abs(motion.end - before)[:, rotary], job.machine.retract_axis
+    turns, lift = turned(motion, rotary), job.machine.retract_axis
     away = np.abs(before[:, lift] - home[lift])
-    bad = np.flatnonzero(linking & (turned > TURNS).any(axis=1) & (away > AWAY))
+    bad = np.flatnonzero(linking & (turns > TURNS).any(axis=1) & (away > AWAY))
     if job.corrects and len(bad):
         near = [correction(job, place[bad], motion.tool[bad]) for place in (before, motion.end)]
         explained = (near[0] + near[1])[:, rotary]
-        bad = bad[(turned[bad] > TURNS + explained).any(axis=1) & (away[bad] > AWAY + near[0][:, lift])]
+        bad = bad[(turns[bad] > TURNS + explained).any(axis=1) & (away[bad] > AWAY + near[0][:, lift])]
     if not len(bad):
         return []
     name, k = job.machine.axis_names[lift], int(bad[0])

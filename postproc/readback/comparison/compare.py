@@ -195,7 +195,7 @@ WorstPlace = tuple[float, tuple[int, int]]
 def _farthest(motion: Motion, executed: BlockPoses, moves: Moves, tip: Floats, axis: Floats, match: Ints, owner: Ints,
               tolerance: float) -> tuple[WorstPlace, WorstPlace]:
     """The worst deviations of tip and axis, between the points and at them."""
-    rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
+    rows = np.flatnonzero(moves.run_by(owner))
     tip_off, axis_off = _deviations(motion, executed, moves, rows, owner, tolerance)
     done = as_slice(np.flatnonzero(match >= 0))
     there = as_slice(match[done])
@@ -218,7 +218,7 @@ def _bound(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allo
     """Bounds of every block of the moves that are no links. From hole to hole dog-legs are looked at in
     height alone; so are all paths where geometric errors are corrected: a control that drills the holes takes
     up lost motion on its path."""
-    rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
+    rows = np.flatnonzero(moves.run_by(owner))
     begin, share = _place(motion, executed, rows, owner, moves)
     free = executed.bent(motion, rows) | corrects
     level = (moves.phase[owner[rows]] == Phase.POSITION) & (motion.code[rows] == 0) & free

@@ -11,8 +11,9 @@ from string import Formatter
 import numpy as np
 
 from postproc.job.job import Job
-from postproc.readback.comparison.clamps import cutting_rows
+from postproc.readback.comparison.clamps import TURNS, cutting_rows, turned
 from postproc.readback.comparison.faults import Faults
+from postproc.readback.dialects.base import as_bytes
 from postproc.readback.execution.execute import Motion
 from postproc.readback.text.canonical import LOADED, Canonical
 from postproc.readback.text.modal import codes
@@ -24,7 +25,7 @@ Gap = tuple[int, int]
 """lines between which a block has to stand, neither counted"""
 
 
-def check_hooks(data: bytes, code: Canonical, motion: Motion, job: Job, owner: Ints,
+def check_hooks(data: bytes | str, code: Canonical, motion: Motion, job: Job, owner: Ints,
                 faults: Faults) -> list[Diagnostic]:
     """Every block of `[hooks]` at its places, by the lines of the program, each line for one place; in a
     program of several files, or whose lines come back, none is looked for. `owner` (E,): the move that each row serves."""
@@ -35,7 +36,7 @@ def check_hooks(data: bytes, code: Canonical, motion: Motion, job: Job, owner: I
         said = faults.warning("verify.hook", "the blocks of [hooks] are not looked for: the program has subprograms", 0, 1,
                               hint="write it without subprograms to have them looked for")
         return [replace(said, severity=Severity.INFO)]
-    text = lines_of(data).upper()
+    text = lines_of(as_bytes(data)).upper()
     gaps, found = _gaps(code, motion, job, owner, text.count(b"\n")), list[Diagnostic]()
     ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == 10)
     offset = job.controller.program.offset_name(job.setup.work_offset_code)
@@ -115,8 +116,7 @@ def _indexing(motion: Motion, job: Job, rows: Ints, cuts: list[int]) -> tuple[li
     """Before and behind the turns of rotary axes between two of the cuts `rows`, whose lines stand between
     both ends in `cuts`."""
     rotary = np.flatnonzero(np.array(job.machine.rotary))
-    degrees = np.concatenate([motion.start[None], motion.end])[:, rotary]
-    turns = np.setdiff1d(np.flatnonzero((np.abs(np.diff(degrees, axis=0)) > 1e-6).any(axis=1)), rows)
+    turns = np.setdiff1d(np.flatnonzero((turned(motion, rotary) > TURNS).any(axis=1)), rows)
     after, first = np.unique(np.searchsorted(rows, turns), return_index=True)
     last = np.append(first[1:], len(turns))[:len(first)] - 1
     begun, done = motion.line[turns[first]].tolist(), motion.line[turns[last]].tolist()

@@ -64,8 +64,7 @@ def length_matters(job: Job) -> bool:
     if not job.setup.output.tool_call:
         return False
     turning = len(job.control.rotary) > len(table_axes(job.control))
-    corrected = job.errors is not None and job.errors.corrected_by == "post"
-    return turning or corrected or not job.machine.kinematics.straight_slides
+    return turning or job.corrects or not job.machine.kinematics.straight_slides
 
 
 def with_longer_tools(job: Job) -> Job:
@@ -126,7 +125,7 @@ class _Rates:
            left: tuple[float, float]) -> _Rates:
         """The rates of all blocks."""
         rows, moves = np.arange(len(motion)), job.moves.without_pecks()
-        link = (owner >= len(moves)) | moves.link[np.minimum(owner, len(moves) - 1)]
+        link = ~moves.run_by(owner)
         tip, axis, clear = np.zeros(len(rows)), np.zeros(len(rows)), np.full(len(rows), np.inf)
         near = job.options.tolerance + executed.corrected_between(motion, np.flatnonzero(link))
         for t in _SHARES:

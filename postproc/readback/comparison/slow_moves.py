@@ -123,7 +123,7 @@ class _Slack:
     def of(cls, job: Job, inch: bool = False) -> _Slack:
         """Of a job; programs that correct geometric errors take up lost motion on the path."""
         unit = INCH if inch else 1.0
-        if job.errors is not None and job.errors.corrected_by == "post":
+        if job.corrects:
             return cls(0.25, 0.002, 10.0 * unit * 10.0**-job.controller.format.linear_decimals)
         return cls(0.003, 1e-5, 2.0 * unit * 10.0**-job.controller.format.linear_decimals)
 
@@ -211,7 +211,7 @@ def check_fed_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Move
                      down: Bools, faults: Faults) -> list[Diagnostic]:
     """Feed moves for rapids, or on the path between operations, that are faster than the axes, or slower than
     both they and, where they lead `down` (E,) to a cut, its feed."""
-    if job.errors is not None and job.errors.corrected_by == "post":
+    if job.corrects:
         return []
     m = np.minimum(owner, len(moves) - 1)
     ours = (motion.code > 0) & (owner <= len(moves)) & ~motion.hole

@@ -73,7 +73,7 @@ def check_end(motion: Motion, job: Job, home: Floats, faults: Faults) -> list[Di
     away = off_home(job.machine, job.control.rolls, motion.end[-1], home)
     axes, names = lifting(job), job.machine.axis_names
     bad = [int(j) for j in np.flatnonzero(~(away <= AWAY))]
-    if job.errors is not None and job.errors.corrected_by == "post":
+    if job.corrects:
         return []
     lifted = [names[j] for j in bad if j in axes]
     if lifted:

@@ -52,7 +52,7 @@ def correction(job: Job, place: Floats, tool: Ints) -> Floats:
     A retract as high as home is corrected, home itself is not. It is what the machine with errors needs at
     the places (N, J), its lost motion included.
     """
-    if job.errors is None or job.errors.corrected_by != "post":
+    if job.errors is None or not job.corrects:
         return np.zeros(place.shape)
     from machines.geometric_error.actual.correction import correct
 

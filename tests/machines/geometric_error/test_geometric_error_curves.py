@@ -38,7 +38,7 @@ def test_series_and_polynomial_are_what_they_say() -> None:
 
 @pytest.mark.parametrize("rule", ["linear", "spline"])
 def test_a_period_joins_the_ends(rule: str) -> None:
-    curve = TableCurve(X, V, rule, period=300.0)  # type: ignore[arg-type]
+    curve = TableCurve(X, V, rule, period=300.0)
     x = np.linspace(-100.0, 200.0, 31)
     assert curve.at(x + 900.0) == pytest.approx(curve.at(x), abs=1e-14)
     assert curve.at(np.array([200.0 - 1e-9]))[0] == pytest.approx(V[0], abs=1e-11)

@@ -233,7 +233,7 @@ def test_samples_are_realistic(path: Path) -> None:
 
 def test_the_schema_knows_the_tables() -> None:
     assert {"components", "location", "legs", "map",
-            "base"} <= set(error_model_schema()["properties"])  # type: ignore[call-overload]
+            "base"} <= set(error_model_schema()["properties"])
 
 
 # ---- LinuxCNC ----------------------------------------------------------------------------------------------
@@ -277,7 +277,7 @@ def test_linuxcnc_holds_positioning_errors_of_256_rows() -> None:
 
 
 def empty(letters: tuple[str, ...], nodes: tuple[Floats, ...], **how: object) -> ErrorMap:
-    return ErrorMap(letters, nodes, np.zeros((*map(len, nodes), 6)), **how)  # type: ignore[arg-type]
+    return ErrorMap(letters, nodes, np.zeros((*map(len, nodes), 6)), **how)
 
 
 # ---- maps --------------------------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ from toolpaths.units import DEG
 
 def random_map(letters: tuple[str, ...], nodes: tuple[Floats, ...], **how: object) -> ErrorMap:
     table = np.random.default_rng(1).normal(size=(*map(len, nodes), 6)) * [0.03, 0.03, 0.03, 3e-5, 3e-5, 3e-5]
-    return ErrorMap(letters, nodes, table, **how)  # type: ignore[arg-type]
+    return ErrorMap(letters, nodes, table, **how)
 
 
 def loaded(folder: Path, table: str, keys: str = "") -> tuple[ErrorModel | None, list[Diagnostic]]:
@@ -139,7 +139,7 @@ def test_directions_of_the_machine_turn_with_the_table(name: str) -> None:
     w = actual.coordinates(q)
     moved = actual.place(w)[0] - kin.forward(q)[0]
     if name == "h4a-c-table":
-        c = kin.sense * q[:, 4]  # type: ignore[attr-defined]
+        c = kin.sense * q[:, 4]
         x, y = 0.01 * np.cos(c) + 0.02 * np.sin(c), 0.01 * np.sin(c) - 0.02 * np.cos(c)
         wanted = np.stack([x, y, 0.03 + 0.0 * c], axis=1)
     else:  # the slides stand on the bed: moving them is a displacement along the machine's axes
@@ -187,7 +187,7 @@ def test_a_map_says_at_its_nodes_what_its_model_says(name: str, letters: str) ->
     made = map_of(actual, nominal, random_map(tuple(letters), nodes, bed=part_side(kin, machine.structure)), fixed)
     by_map = ErrorModel(map=made).on(kin)
     w = nodes_of(ActualByMap(nominal, made), made.places(), fixed)
-    assert by_map.lattice_places(w) == pytest.approx(made.places(), abs=1e-9)  # type: ignore[attr-defined]
+    assert by_map.lattice_places(w) == pytest.approx(made.places(), abs=1e-9)
     for one, two in zip(by_map.place(w), actual.place(w), strict=True):
         assert one == pytest.approx(two, abs=1e-11)
     assert np.abs(made.table[..., :3]).max() > 1e-3

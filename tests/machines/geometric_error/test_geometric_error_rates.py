@@ -37,8 +37,8 @@ CURVES: dict[str, Curve] = {
     "one row": TableCurve(np.array([1.0]), np.array([0.4])),
     "fourier": Fourier(RNG.normal(size=7), period=5.0, origin=1.0),
     "polynomial": Polynomial(RNG.normal(size=5), (-3.0, 4.0), origin=0.5, scale=2.0)}
-CURVES["turned"] = RotatedCurve((((0, 0), Component(parse("EXC"), CURVES["linear"])),  # type: ignore[arg-type]
-                                 ((0, 1), Component(parse("EYC"), CURVES["fourier"]))),  # type: ignore[arg-type]
+CURVES["turned"] = RotatedCurve((((0, 0), Component(parse("EXC"), CURVES["linear"])),
+                                 ((0, 1), Component(parse("EYC"), CURVES["fourier"]))),
                                 np.array([0.0, 0.6, 0.8]), back=True)
 
 
@@ -103,7 +103,7 @@ def test_no_error_of_a_serial_machine_changes_faster(name: str) -> None:
     assert worst_share(kin, ErrorModel(serial_errors(kin, 3))) <= BOUND
     assert worst_share(kin, ErrorModel(with_two_directions(kin))) <= BOUND
     moving = dict.fromkeys("ABC", "moving")
-    assert worst_share(kin, ErrorModel(replace(serial_errors(kin, 4), frame=moving))) <= BOUND  # type: ignore[arg-type]
+    assert worst_share(kin, ErrorModel(replace(serial_errors(kin, 4), frame=moving))) <= BOUND
 
 
 @pytest.mark.parametrize("name", ["uranesx", "h4a-c-table", "h4a-spindle-axis"])
@@ -115,7 +115,7 @@ def test_no_error_of_a_machine_on_rods_changes_faster(name: str) -> None:
     assert worst_share(kin, replace(both, axes=SerialErrors()), (1e-3, 0.7)) <= BOUND
     if any(kin.rotary):
         assert worst_share(kin, replace(both, axes=with_two_directions(kin, kin.axis_names[4:])), (1e-3, 0.3)) <= BOUND
-        moving = replace(both.axes, frame=dict.fromkeys("ABC", "moving"))  # type: ignore[arg-type]
+        moving = replace(both.axes, frame=dict.fromkeys("ABC", "moving"))
         assert worst_share(kin, replace(both, axes=moving), (0.3,)) <= BOUND
 
 
@@ -166,7 +166,7 @@ def test_no_error_of_a_map_changes_faster(name: str) -> None:
                                 (("X", *bed), (slide, np.linspace(0.0, 5.0, 6))[: 1 + len(bed)],
                                  {"periods": (0.0, 2.0 * np.pi)[: 1 + len(bed)]})):
         table = rng.normal(size=(*map(len, nodes), 6)) * [0.03, 0.03, 0.03, 3e-5, 3e-5, 3e-5]
-        assert worst_share(kin, ErrorModel(map=ErrorMap(letters, nodes, table, **how))) <= BOUND  # type: ignore[arg-type]
+        assert worst_share(kin, ErrorModel(map=ErrorMap(letters, nodes, table, **how))) <= BOUND
 
 
 @pytest.mark.parametrize(("text", "letter", "turning"),

@@ -236,7 +236,7 @@ def test_deltas_without_rods_take_the_distance_of_their_pairs(name: str, tmp_pat
     assert turned.min() > 0.9 * 0.01 / 40.0
     assert correct(actual, q, tip, axis).tip_after.max() < 1e-6
     text = save(replace(found, name="again"), tmp_path)[0]
-    assert load(text, machine).rods.pairs == found.rods.pairs  # type: ignore[union-attr]
+    assert load(text, machine).rods.pairs == found.rods.pairs
 
 
 def test_pairs_are_asked_for_where_they_are_missing_and_nowhere_else(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ NAMES = (TABLE, SPINDLE)
 def h4(name: str, **changes: object) -> H4Linear:
     kinematics = machines.load(name).kinematics
     assert isinstance(kinematics, H4Linear)
-    return replace(kinematics, **changes)  # type: ignore[arg-type]
+    return replace(kinematics, **changes)
 
 
 def poses(kinematics: H4Linear, n: int, seed: int = 0) -> tuple[Floats, Floats, Floats]:

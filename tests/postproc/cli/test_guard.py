@@ -54,7 +54,7 @@ def test_a_fault_of_our_own(broken: Path, capsys: pytest.CaptureFixture[str]) ->
 def test_the_code_is_that_of_kind_and_place() -> None:
     def fault(kind: type[Exception], data: object) -> Exception:
         with pytest.raises(kind) as raised:
-            reader.read_bytes(data)  # type: ignore[arg-type]
+            reader.read_bytes(data)
         return raised.value
 
     first, again, other = fault(TypeError, None), fault(TypeError, 1.5), fault(ValueError, [999])

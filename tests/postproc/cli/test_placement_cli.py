@@ -239,7 +239,7 @@ def test_a_place_that_cannot_be_converted_is_passed_over(monkeypatch: pytest.Mon
     real, asked = pipeline.convert, []
 
     def convert_but_first(*args: object, **kwargs: object) -> object:
-        result = real(*args, **kwargs)  # type: ignore[arg-type]
+        result = real(*args, **kwargs)
         asked.append(args[3])
         return result.with_found([error("test.no", "not there")]) if len(asked) == 1 else result
 
@@ -248,7 +248,7 @@ def test_a_place_that_cannot_be_converted_is_passed_over(monkeypatch: pytest.Mon
                           setup_of(x=(-50.0, 50.0), turns=[0.0, 30.0]))
     assert choice is not None and len(asked) == 2
     assert any(d.code == "place.passed_over" and "not there" in d.message for d in found)
-    assert choice.part == asked[1].part  # type: ignore[attr-defined]
+    assert choice.part == asked[1].part
     assert choice.best.place[ANGLES] in (0.0, 30.0 * np.pi / 180.0)
 
 

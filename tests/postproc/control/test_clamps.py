@@ -69,7 +69,7 @@ def indexed() -> Toolpath:
 
 @cache
 def converted(controller: str, output: str) -> PostResult:
-    return postproc.convert(indexed(), clamping(), controller, SETUP, Options(output=output))  # type: ignore[arg-type]
+    return postproc.convert(indexed(), clamping(), controller, SETUP, Options(output=output))
 
 
 def switches(text: str) -> list[int]:
@@ -169,7 +169,7 @@ def test_an_axis_is_clamped_before_the_first_block_of_a_cut_and_up_to_the_last(c
     axis, along = tilted(40.0, 77.0), np.cross(tilted(40.0, 77.0), [0.0, 0.0, 1.0])
     path = toolpath("RAPID", point(45 * axis, axis), "FEDRAT/MMPM,500",
                     *(point(30 * axis + k * along, axis) for k in (0, 8, 4, 6, 1)), "RAPID", point(45 * axis + along, axis))
-    result = postproc.convert(path, clamping(), controller, SETUP, Options(output=output))  # type: ignore[arg-type]
+    result = postproc.convert(path, clamping(), controller, SETUP, Options(output=output))
     assert result.ok, [str(d) for d in result.diagnostics]
     lines = result.text.splitlines()
     codes_at = {n: lines[n].split()[-1] for n in switches(result.text)}
@@ -213,7 +213,7 @@ def along_a_cone() -> Toolpath:
 def test_axes_that_share_a_code_are_freed_and_clamped_together(name: str, controller: str,
                                                                output: str) -> None:
     result = postproc.convert(along_a_cone(), sharing(SHARED[name]), controller, SETUP,
-                              Options(output=output))  # type: ignore[arg-type]
+                              Options(output=output))
     assert result.ok, [str(d) for d in result.diagnostics]
     assert result.witness is not None and any(what.endswith("clamps") for what in result.witness.compared)
     lines = result.text.splitlines()

@@ -37,7 +37,7 @@ def hooks_of(controller: str) -> HooksModel:
     blocks = {f"{when}_{place}": (text.format(101 + 10 * k + j),)
               for k, place in enumerate(PLACES) for j, when in enumerate(("before", "after"))}
     passive = (word,) if word else tuple(dict.fromkeys(re.split(r"[ (]", b)[0] for (b,) in blocks.values()))
-    return HooksModel(**blocks, passive=passive)  # type: ignore[arg-type]
+    return HooksModel(**blocks, passive=passive)
 
 
 @cache
@@ -60,7 +60,7 @@ def machine_of(controller: str) -> Machine:
 
 @cache
 def converted(controller: str, output: str = "auto") -> PostResult:
-    options = Options(output=output)  # type: ignore[arg-type]
+    options = Options(output=output)
     return postproc.convert(work(), machine_of(controller), controller, SETUP, options)
 
 

@@ -28,7 +28,7 @@ from toolpaths.diagnostics import Severity
 def same() -> PostResult:
     """The same block at all places, Fanuc, with T in three digits, and a name that is too long for its line."""
     places = [f"{a}_{b}" for a, b in product(("before", "after"), ("tool", "operation", "stop", "index"))]
-    hooks = HooksModel(**dict.fromkeys(places, ("(T{tool_number:03d} {operation})",)))  # type: ignore[arg-type]
+    hooks = HooksModel(**dict.fromkeys(places, ("(T{tool_number:03d} {operation})",)))
     return postproc.convert(work(), replace(clamping(), hooks=hooks), "fanuc-30i", SETUP,
                             Options(output="axes"))
 

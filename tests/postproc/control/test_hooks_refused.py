@@ -17,7 +17,7 @@ import machines
 from machines.hooks import PASSIVE, HooksModel, filled
 from postproc.controllers.model import builtin_files
 from postproc.job.job import Job, with_shop
-from postproc.pipeline.hooks import check_hooks
+from postproc.pipeline.hooks import refused_hooks
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.text.modal import drop_passive
 from postproc.readback.text.words import tokenise
@@ -39,7 +39,7 @@ def with_blocks(controller: str, *blocks: str, passive: tuple[str, ...] = ()) ->
     job = job_of(controller)
     machine = replace(job.machine, hooks=HooksModel(before_operation=blocks, passive=passive))
     spec = job.controller.model_copy(update={"program": job.controller.program.model_copy(update={"passive": ()})})
-    return check_hooks(replace(job, machine=machine, controller=with_shop(spec, machine, job.setup)))
+    return refused_hooks(replace(job, machine=machine, controller=with_shop(spec, machine, job.setup)))
 
 
 # ---- passive codes -----------------------------------------------------------------------------------------
@@ -175,5 +175,5 @@ def test_numbers_with_zeros_and_names_that_are_cut() -> None:
                            "({operation} " + "A" * 90 + ")")
     job = job_of("linuxcnc")
     hooks = HooksModel(before_stop=("({work_offset:02d})",))
-    found = check_hooks(replace(job, setup=job.setup.model_copy(update={"work_offset_code": "G59.1", "hooks": hooks})))
+    found = refused_hooks(replace(job, setup=job.setup.model_copy(update={"work_offset_code": "G59.1", "hooks": hooks})))
     assert [d.code for d in found] == ["hooks.code"] and "{work_offset}" in found[0].hint

@@ -96,7 +96,9 @@ def test_every_convention_of_angles_gives_the_same_part(name: str, convention: s
     mode = TILTED.replace("ZXZ", convention)
     if convention == "rotary":
         mode = '[modes.tilted]\nenter = ["G254"]\nleave = ["G255"]\nangles = "rotary"\n'
-    follows(made(tmp_path, indexed(), name, "tilted", mode))
+    result = made(tmp_path, indexed(), name, "tilted", mode)
+    follows(result)
+    assert {b.law for b in run(result) if b.code > 0} == {"tilted"}
 
 
 def test_coarse_angles_move_the_axis_and_not_the_tip(tmp_path: Path) -> None:
@@ -119,7 +121,9 @@ def test_samples_by_the_rule(file: str, name: str, laws: set[str], tmp_path: Pat
 
 def test_the_golden_five_axis_piece_by_tip(tmp_path: Path) -> None:
     path, _ = toolpaths.read(GOLDEN / "short_five_axis.apt")
-    follows(convert(path, "head-table", shop(tmp_path)), axis_within=9e-4)
+    result = convert(path, "head-table", shop(tmp_path))
+    follows(result, axis_within=9e-4)
+    assert {b.law for b in run(result) if b.code > 0} == {"tcp"}
 
 
 # ---- sections ----------------------------------------------------------------------------------------------

@@ -62,7 +62,7 @@ def winding(sense: float = 1.0) -> Toolpath:
 def converted(controller: str, rule: str, sense: float = 1.0, output: str = "axes",
               low: float = 0.0) -> PostResult:
     return postproc.convert(winding(sense), rolling(rule, low), controller, TOOLS,
-                            Options(output=output))  # type: ignore[arg-type]
+                            Options(output=output))
 
 
 @cache
@@ -150,12 +150,12 @@ def test_axes_that_count_park_at_whole_turns_and_unwind_only_where_asked(control
     assert abs(figures["turns_left"]) * 360.0 == abs(c_of(left)[-1]) and none["turns_left"] == 0
     assert figures["next_start_s"] == pytest.approx(abs(c_of(left)[-1]) / 120.0)
     assert none["in_program_s"] == pytest.approx(figures["next_start_s"], abs=0.01) and figures["in_program_s"] < 0.01
-    longer = estimate_of(home).seconds - estimate_of(left).seconds  # type: ignore[union-attr]
+    longer = estimate_of(home).seconds - estimate_of(left).seconds
     assert longer == pytest.approx(none["in_program_s"], abs=1.5)
     assert "turns from home" in as_text(left, "x.nc") and "unwinds whole turns" in as_text(home, "x.nc")
     rolled = converted(controller, "")
     assert as_dict(rolled, "x.nc")["unwinding"] == {} and "turns from home" not in as_text(rolled, "x.nc")
-    assert estimate_of(rolled).seconds < estimate_of(home).seconds - 6.0  # type: ignore[union-attr]
+    assert estimate_of(rolled).seconds < estimate_of(home).seconds - 6.0
 
 
 def test_the_time_is_that_of_the_way_that_the_control_takes() -> None:
@@ -201,7 +201,7 @@ def test_a_reader_of_the_other_rule_is_caught_by_the_second_witness(controller: 
                                                                      monkeypatch: pytest.MonkeyPatch) -> None:
     real = reader_for
 
-    def other(spec, letters, home=None, stop="", rolls=None, clamps=None):  # type: ignore[no-untyped-def]
+    def other(spec, letters, home=None, stop="", rolls=None, clamps=None):
         return real(spec, letters, home, stop, {j: replace(r, rule=as_if) for j, r in (rolls or {}).items()}, clamps)
     monkeypatch.setattr("postproc.verification.read_back.reader_for", other)
     result = postproc.convert(winding(-1.0), rolling(rule), controller, TOOLS, Options(output="axes"))
@@ -215,7 +215,7 @@ def test_tip_modes_enter_at_the_nearest_whole_turn() -> None:
     path = winding()
     seconds = {m: estimate_of(postproc.convert(path, rolling(modulo=m), "fanuc-30i", TOOLS,
                                                Options(output="tcp"))).seconds
-               for m in (True, False)}  # type: ignore[union-attr]
+               for m in (True, False)}
     assert seconds[True] <= seconds[False] + 0.01
 
 

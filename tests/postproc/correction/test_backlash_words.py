@@ -134,7 +134,7 @@ def converted(sample: str | Path, machine: str, controller: str, model: str | Pa
               setup: SetupFile | None = None) -> PostResult:
     path, found = toolpaths.read(SAMPLES / sample)
     options = Options(setup="" if setup else str(SAMPLES / "tools.setup.toml"), error_model=str(model),
-                      output=output)  # type: ignore[arg-type]
+                      output=output)
     return postproc.convert(path, machine, controller, setup, options, found)
 
 

@@ -147,7 +147,7 @@ def test_a_short_rapid_before_a_rapid_takes_up_lost_motion() -> None:
     motion = SimpleNamespace(code=np.array([0, 1, 0, 0, 0, 0, 0, 1, 1, 0, 1]))
     job = SimpleNamespace(errors=True, options=Options(), rounding=SimpleNamespace(tip=1e-4))
     assert np.flatnonzero(_taken_up(job, motion, tip * np.ones(3) / np.sqrt(3.0))).tolist() == [2,
-                                                                                                10]  # type: ignore[arg-type]
+                                                                                                10]
 
 
 @pytest.mark.parametrize(("feed_adjacent", "noted"), [(0.008, False), (0.001, True)])
@@ -158,6 +158,6 @@ def test_the_end_of_a_cut_may_pass_for_the_beginning_of_a_rapid(feed_adjacent: f
     moves = type("Moves", (SimpleNamespace,), {"__len__": lambda self: 2})(
         kind=np.array([1, 0]), link=np.zeros(2, dtype=bool), seconds=np.full(2, np.nan), line=np.array([7, 8]),
         feed=np.array([feed, np.nan]), lengths=lambda: np.array([0.176, 25.0]), sweeps=lambda: np.zeros(2))
-    found = check_speeds(motion, moves, np.array([0, 1, 1]), np.array([0, 2]),  # type: ignore[arg-type]
+    found = check_speeds(motion, moves, np.array([0, 1, 1]), np.array([0, 2]),
                          np.array([0.168 / feed, feed_adjacent / feed, 0.1]), 0.01, Faults("a.apt"))
     assert [d.code for d in found] == (["verify.feed"] if noted else [])

@@ -141,7 +141,7 @@ def test_what_a_level_is_off_by_is_taken_up_before_a_feed_and_at_its_beginning()
     motion = SimpleNamespace(code=np.array([0, 0, 0, 1, 1, 1, 1, 0, 1, 1, 1, 1]))
     job = SimpleNamespace(errors=True, options=Options(), rounding=SimpleNamespace(tip=1e-4))
     tip = np.cumsum(approach)[:, None] * np.eye(3)[:1]
-    assert np.flatnonzero(_taken_up(job, motion, tip)).tolist() == [2, 4]  # type: ignore[arg-type]
+    assert np.flatnonzero(_taken_up(job, motion, tip)).tolist() == [2, 4]
 
 
 @pytest.mark.covering

@@ -47,6 +47,6 @@ def test_small_tilts_on_a_turned_table_are_exact(machine: str, controller: str, 
     result = postproc.convert(path, machine, controller, diagnostics=found, options=Options(
         error_model=str(tmp_path / "m.toml"), setup=str(tmp_path / "s.toml")))
     assert result.ok, [str(d) for d in result.diagnostics]
-    assert {s.law for s in result.program.sections} >= {"tilted"}  # type: ignore[union-attr]
+    assert {s.law for s in result.program.sections} >= {"tilted"}
     left = after_formatting(result)
     assert left is not None and left.tip.max() < 1e-4

@@ -57,7 +57,7 @@ def test_mesh_follows_the_limits_gently() -> None:
 def test_mesh_narrows_for_a_slow_feed() -> None:
     eased = Eased.between(random_path(2), 0.0, 100.0, 25.0)
 
-    def feed(sigma: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    def feed(sigma: np.ndarray) -> np.ndarray:
         return np.where(np.abs(sigma - 60.0) < 5.0, 4.0, np.inf)
 
     knots = mesh(eased, MIKRON, feed, Spacing(dt=3e-3))

@@ -112,7 +112,7 @@ def test_corner_at_a_stop_uses_its_own_side() -> None:
     times = [plan(PolynomialPath(line, 20.0), limits).seconds for line in ([[0.0, 1.0], [0.0]], [[0.0], [0.0, 1.0]])]
 
     class Corner(PolynomialPath):
-        def derivatives(self, s):  # type: ignore[no-untyped-def]
+        def derivatives(self, s):
             at = super().derivatives(s)
             second = s >= 20.0
             return type(at)(*(np.where(second[:, None], other, one) for one, other in zip(

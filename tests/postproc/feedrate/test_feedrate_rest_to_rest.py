@@ -18,7 +18,7 @@ LIMITS = JointLimits(np.array([100.0, 50.0, 3.0]), np.array([1000.0, 800.0, 20.0
                      np.array([5000.0, 60000.0, 300.0]))
 
 
-def moves(count: int, seed: int = 5) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def moves(count: int, seed: int = 5) -> tuple[np.ndarray, np.ndarray]:
     """From micrometres to metres; some joints stand still."""
     rng = np.random.default_rng(seed)
     travel = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-4.0, 3.0, (count, 1)) * [1.0, 1.0, 0.05]

@@ -38,7 +38,7 @@ def toppra_time(path: SplinePath, sigma: Floats, unit: float = 10.0) -> float:
         import toppra.algorithm
         from toppra import constraint
 
-    class Evaluated(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc]
+    class Evaluated(toppra.interpolator.AbstractGeometricPath):
         dof, path_interval, waypoints = 5, np.array([path.start, path.end]) / unit, None
 
         def __call__(self, s: Any, order: int = 0) -> Any:

@@ -43,7 +43,7 @@ def seconds(limits: Limits, a: np.ndarray, b: np.ndarray) -> float:
 
 
 def plus(a: Cost, *b: float) -> Cost:
-    return tuple(x + y for x, y in zip(a, b, strict=True))  # type: ignore[return-value]
+    return tuple(x + y for x, y in zip(a, b, strict=True))
 
 
 UNITS = np.array([1 << 57, 1 << 51, 1 << 45, 1 << 39, 1], dtype=np.int64)
@@ -62,7 +62,7 @@ def unpacked(value: int) -> Cost:
     for u in UNITS.tolist()[:4]:
         counts.append(value // u)
         value %= u
-    return (*counts, value * 1e-9)  # type: ignore[return-value]
+    return (*counts, value * 1e-9)
 
 
 def apart(limits: Limits, a: np.ndarray, b: np.ndarray) -> np.ndarray:

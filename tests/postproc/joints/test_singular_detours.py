@@ -45,7 +45,7 @@ def test_poles_are_where_the_inverse_is_a_family(name: str) -> None:
     poles = poles_of(m.kinematics)
     assert poles
     for pole in poles:
-        tip = np.zeros((1, 3)) if m.kinematics.straight_slides else m.kinematics.workspace.middle[None]  # type: ignore[attr-defined]
+        tip = np.zeros((1, 3)) if m.kinematics.straight_slides else m.kinematics.workspace.middle[None]
         q = [m.kinematics.inverse(tip, pole.frame[2:], near=np.eye(5)[pole.joint] * v)[0] for v in (0.3, 1.1)]
         assert q[0][0, pole.joint] == pytest.approx(0.3) and q[1][0, pole.joint] == pytest.approx(1.1)
 

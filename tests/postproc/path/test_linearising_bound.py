@@ -27,7 +27,7 @@ def moves(name: str, count: int, seed: int, size: float = 1.0) -> tuple[np.ndarr
     if isinstance(kin, Serial):
         q0 = rng.uniform(-1, 1, (count, kin.joints)) * np.where(kin.rotary, 1.5, 100.0)
         return q0, q0 + step
-    slides = random_slides(kin, rng, count)  # type: ignore[attr-defined]
+    slides = random_slides(kin, rng, count)
     q0 = np.column_stack([slides, rng.uniform(-1, 1, (count, kin.joints - slides.shape[1]))])
     return q0, q0 + 0.3 * step
 
@@ -103,7 +103,7 @@ LAWS = [(name, law) for name in NAMES for law in ("axes", "tcp") if law == "axes
 def test_bound_is_never_below_dense_truth(name: str, law: str) -> None:
     """Whole moves, far too long to pass, and the pieces that linearising makes of them."""
     kin = machine(name).kinematics.with_tool(80.0)
-    control = Control(machine(name), law, np.zeros(3))  # type: ignore[arg-type]
+    control = Control(machine(name), law, np.zeros(3))
     curves, q0, q1 = curves_for(name, 40, 9)
     assert len(curves) >= 15
     n = len(curves)

@@ -267,7 +267,7 @@ def test_ends_follow_the_blocks_and_not_the_home_mode() -> None:
     assert isinstance(m.kinematics, LinearDelta)
     q = m.home + np.linspace(0.0, 50.0, 20)[1:, None] * np.array([1.0, -0.5, 0.2])
     right = np.hstack(m.kinematics.forward(q))
-    found = assembly.ends(Forgetful(m.kinematics, 5), q, m.home)  # type: ignore[arg-type]
+    found = assembly.ends(Forgetful(m.kinematics, 5), q, m.home)
     np.testing.assert_allclose(found, right, atol=1e-9)
 
 

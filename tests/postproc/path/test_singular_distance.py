@@ -20,7 +20,7 @@ PARALLEL = [name for name in machines.names() if machine(name).kinematics.singul
 
 def places(name: str, count: int) -> np.ndarray:
     kin = machine(name).kinematics
-    slides = random_slides(kin, np.random.default_rng(3), count)  # type: ignore[attr-defined]
+    slides = random_slides(kin, np.random.default_rng(3), count)
     return np.column_stack([slides, np.zeros((count, kin.joints - slides.shape[1]))])
 
 
@@ -30,7 +30,7 @@ def test_distances_against_the_rates_of_the_machine(name: str) -> None:
     kin, q = machine(name).kinematics, places(name, 200)
     found = kin.singular_distance(q)
     assert (found > 0.05).all() and (found <= 2.0).all()
-    rates = kin.jacobian(q)[:, :3, :kin.legs.lengths.size]  # type: ignore[attr-defined]
+    rates = kin.jacobian(q)[:, :3, :kin.legs.lengths.size]
     fastest = np.linalg.svd(rates, compute_uv=False)[:, 0]
     arm = 1.0 if not any(kin.rotary) else 6.0
     assert (fastest <= arm / found[:, 1]).all()

@@ -59,7 +59,7 @@ def part_for(machine: str) -> tuple[toolpaths.Toolpath, object]:
 def test_a_small_part_is_written_and_proved(machine: str, control: str) -> None:
     path, setup = part_for(machine)
     tolerance = 0.02 if (machine, control) == ("h4a-spindle-axis", "haas-ngc") else 0.01  # three decimals of a degree
-    result = postproc.convert(path, machine, control, setup, Options(tolerance=tolerance))  # type: ignore[arg-type]
+    result = postproc.convert(path, machine, control, setup, Options(tolerance=tolerance))
     assert result.ok, [str(d) for d in result.diagnostics if d.severity is Severity.ERROR]
     assert result.comparison is not None and result.comparison.unbounded == 0 and result.witness is not None
     assert not [d for d in result.diagnostics if d.code.startswith("witness")]

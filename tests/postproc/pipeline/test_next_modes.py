@@ -39,7 +39,7 @@ def read(name: str) -> toolpaths.Toolpath:
 
 def casting(controller: str, output: str = "auto", setup: str = "casting.setup.toml") -> PostResult:
     return postproc.convert(read("casting/casting.ncl"), machines.load(CASTING / "trunnion_over.toml"), controller,
-                            CASTING / setup, Options(output=output))  # type: ignore[arg-type]
+                            CASTING / setup, Options(output=output))
 
 
 def errors_of(result: PostResult) -> set[str]:
@@ -50,7 +50,7 @@ def refusing(monkeypatch: pytest.MonkeyPatch, bad: Callable[[frames.Law, np.ndar
     """The read-back refuses the tilted planes that `bad` names by their law and the joints that they are entered at."""
     whole = frames._wrong_pose
 
-    def wrong(law, control, kin, q, file, line):  # type: ignore[no-untyped-def]
+    def wrong(law, control, kin, q, file, line):
         if bad(law, q):
             return [error("gcode.plane_pose", "planted", file=file, lines=[line])]
         return whole(law, control, kin, q, file, line)
@@ -137,7 +137,7 @@ def test_what_no_mode_converts_fails_once_with_what_to_do(monkeypatch: pytest.Mo
 @pytest.mark.parametrize("sample", ["five_faces.cls", "joints/singular_pass.cls"])
 def test_auto_converts_what_another_mode_converts(sample: str, controller: str) -> None:
     path, setup = read(sample), SAMPLES / "tools.setup.toml"
-    done = {mode: postproc.convert(path, "trunnion-bc", controller, setup, Options(output=mode)).ok  # type: ignore[arg-type]
+    done = {mode: postproc.convert(path, "trunnion-bc", controller, setup, Options(output=mode)).ok
             for mode in ("auto", *MODES)}
     assert done["auto"] or not any(done.values())
 
@@ -157,5 +157,5 @@ def test_auto_converts_all_samples_that_another_mode_converts(machine: str, cont
             continue
         assert all(d.hint for d in auto.diagnostics if d.severity is Severity.ERROR and auto.reached == "verify"), file
         for mode in MODES:
-            asked = postproc.convert(path, loaded, controller, setup, Options(output=mode), found)  # type: ignore[arg-type]
+            asked = postproc.convert(path, loaded, controller, setup, Options(output=mode), found)
             assert not asked.ok, (file, mode, errors_of(auto))

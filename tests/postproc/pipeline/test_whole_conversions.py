@@ -86,7 +86,8 @@ def test_turns_on_the_spot(name: str, a: tuple[float, float], b: tuple[float, fl
     ["RAPID", *goto([[3, 1, 0]], UP), *goto([[5, 1, 0]], UP), "RAPID", *goto([[5, 1, 0]], UP), *goto([[5, 1, 5]], UP)],
 ], ids=["rapid twice", "feed twice before a turn", "rapid on the spot between cuts"])
 def test_a_point_twice_is_one_point(lines: list[str]) -> None:
-    good(convert(toolpath(*lines), "mikron-ucp710"))
+    result = good(convert(toolpath(*lines), "mikron-ucp710"))
+    assert result.comparison.unbounded == 0 and result.comparison.tip_bound <= result.options.tolerance
 
 
 @pytest.mark.parametrize("scale", [0.0, 0.01, 0.2, 1.0, 10.0])
@@ -96,9 +97,11 @@ def test_trembling_paths(scale: float) -> None:
     tips = scale * np.cumsum(rng.normal(0, 0.004, (200, 3)), axis=0)
     axes = np.array([0.3, 0.1, 1]) + np.cumsum(rng.normal(0, 0.002, (200, 3)), axis=0)
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    good(convert(toolpath("RAPID", "GOTO/0,0,5", *goto(tips)), "mill-3axis"))
+    flat = good(convert(toolpath("RAPID", "GOTO/0,0,5", *goto(tips)), "mill-3axis"))
+    assert flat.comparison.tip_bound <= flat.options.tolerance
     for name in ["mikron-ucp710"] if scale < 0.1 or scale > 1.0 else ["linuxcnc-xyzac-trt"]:
-        good(convert(toolpath("RAPID", *goto([[0, 0, 5]], axes[:1]), *goto(tips, axes)), name))
+        turned = good(convert(toolpath("RAPID", *goto([[0, 0, 5]], axes[:1]), *goto(tips, axes)), name))
+        assert turned.comparison.tip_bound <= turned.options.tolerance
 
 
 def test_back_and_forth_on_one_line() -> None:

@@ -249,6 +249,6 @@ def test_places_that_cannot_be_converted_are_left(good_from: float, taken: float
     proof = SimpleNamespace(options=Options(), of=lambda one: (
         (1.0, None) if one is now or one.place[0] > good_from else (np.nan, wrong)))
     timer = SimpleNamespace(known=lambda: known, space=SimpleNamespace(holds=lambda place: True))
-    best, found = _proved(proof, timer, known[0], now)  # type: ignore[arg-type]
+    best, found = _proved(proof, timer, known[0], now)
     assert best is not None and best.place[0] == taken
     assert [d.code for d in found] == ["place.passed_over"] * failures

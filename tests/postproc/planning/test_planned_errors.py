@@ -35,7 +35,7 @@ def screw(folder: Path) -> str:
 def planned(cl: str, machine: str, controller: str, **options: str) -> PostResult:
     path, found = toolpaths.read_bytes(cl)
     result = postproc.convert(path, machine, controller, diagnostics=found,
-                              options=Options(feed="planned", **options))  # type: ignore[arg-type]
+                              options=Options(feed="planned", **options))
     assert result.ok, [str(d) for d in result.diagnostics]
     return result
 

@@ -25,7 +25,7 @@ WORK = {XYZ: np.array([10.0, 20, 30]), XYZAC: np.array([10.0, 20, 30, 0, 90])}
 def read(text: str, letters: tuple[str, ...] = XYZ) -> tuple[Motion, list[Diagnostic]]:
     words, found = tokenise(text.encode(), "t.ngc")
     if found:
-        return None, found  # type: ignore[return-value]
+        return None, found
     offsets = Offsets(WORK[letters], np.array([0, 1, 2]), LENGTHS, HOME[letters], True, 0.254)
     return execute(words, letters, offsets, "t.ngc")
 

@@ -289,7 +289,7 @@ def test_pivots_of_the_control_that_are_not_the_machines_show() -> None:
     ends = good(FANUC, by_tip(FANUC, TIPS, [rotary] * 4), name).end.copy()
     axes = by_axes(FANUC, name, ends, control(name).work_offset)
     same = [executed(FANUC, axes, name, of=control(name, own=k))[0] for k in (None, own)]
-    assert np.array_equal(same[0].end, same[1].end)  # type: ignore[union-attr]
+    assert np.array_equal(same[0].end, same[1].end)
 
 
 def shifted(kin: Kinematics) -> Kinematics:

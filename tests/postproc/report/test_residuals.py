@@ -37,7 +37,7 @@ def field(sample: str, machine: str, setup: SetupFile, **options: object) -> tup
     path, found = toolpaths.read(f"samples/{sample}")
     result = postproc.convert(path, machine, "linuxcnc", setup=setup, diagnostics=found,
                               options=Options(error_model=f"samples/errors/{machine}.toml",
-                                              **options))  # type: ignore[arg-type]
+                                              **options))
     noted = residuals(result)
     assert result.ok and noted is not None, [str(d) for d in result.diagnostics]
     return result, noted

@@ -23,7 +23,7 @@ SAID = ("FEED PLANNED BY JOE", "GEOMETRIC ERRORS OF M1: CORRECTED IN THIS PROGRA
 def written(more: str, controller: str, part: str = "T", **options: object) -> tuple[Toolpath, PostResult]:
     path, found = toolpaths.read_bytes(f"PARTNO/{part}\nUNITS/MM\n{more}LOADTL/1\nSPINDL/RPM,3000,CLW\n{CUT}")
     result = postproc.convert(path, "mill-3axis", controller, diagnostics=found,
-                              options=Options(**options))  # type: ignore[arg-type]
+                              options=Options(**options))
     assert result.ok, [str(d) for d in result.diagnostics]
     return path, result
 

@@ -30,7 +30,7 @@ def faces() -> Toolpath:
 @cache
 def program(controller: str = "linuxcnc", **options: object) -> PostResult:
     result = postproc.convert(faces(), "mikron-ucp710", controller,
-                              options=Options(setup=str(TOOLS), **options))  # type: ignore[arg-type]
+                              options=Options(setup=str(TOOLS), **options))
     assert result.ok, [str(d) for d in result.diagnostics]
     return result
 
@@ -38,7 +38,7 @@ def program(controller: str = "linuxcnc", **options: object) -> PostResult:
 def verified(folder: Path, text: str, controller: str = "linuxcnc", **options: object) -> VerifyResult:
     (folder / "a.ngc").write_text(text)
     return verify(folder / "a.ngc", faces(), "mikron-ucp710", controller,
-                  options=Options(setup=str(TOOLS), **options))  # type: ignore[arg-type]
+                  options=Options(setup=str(TOOLS), **options))
 
 
 def errors(result: VerifyResult) -> list[str]:

@@ -24,7 +24,7 @@ def converted(text: bytes, setup: dict[str, object], control: str = "linuxcnc",
               **options: object) -> PostResult:
     path, found = toolpaths.read_bytes(text, file="part.apt")
     return postproc.convert(path, "mill-3axis", control, SetupFile.model_validate(setup),
-                            Options(**options), diagnostics=found)  # type: ignore[arg-type]
+                            Options(**options), diagnostics=found)
 
 
 @pytest.mark.covering
@@ -69,7 +69,7 @@ def test_the_spindle_of_the_setup_is_expected(setup: dict[str, object],
     old = ToolpathBuilder.event
 
     def hidden(self: ToolpathBuilder, word: str, values: tuple[object, ...]) -> None:
-        old(self, word, values)  # type: ignore[arg-type]
+        old(self, word, values)
         if word == "LOADTL":
             old(self, "SPINDL", ("RPM", 2000.0, "CLW"))
     monkeypatch.setattr(ToolpathBuilder, "event", hidden)
@@ -97,7 +97,7 @@ def test_a_finding_is_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
     old = ToolpathBuilder.event
 
     def flooded(self: ToolpathBuilder, word: str, values: tuple[object, ...]) -> None:
-        old(self, word, values)  # type: ignore[arg-type]
+        old(self, word, values)
         if word == "SPINDL":
             old(self, "COOLNT", ("FLOOD",))
     monkeypatch.setattr(ToolpathBuilder, "event", flooded)
@@ -114,4 +114,4 @@ def test_a_witness_that_fails_proves_nothing(proof: bool, monkeypatch: pytest.Mo
     assert result.witness is not None and "failed: IndexError: planted" in result.witness.not_compared[0]
     assert [d.code for d in result.diagnostics if d.code.startswith("witness")] == ["witness.failed"] * proof
     assert result.ok is not proof
-    assert second_witness(None, SetupFile(), Options(), result.job, result.comparison)[1] == []  # type: ignore[arg-type]
+    assert second_witness(None, SetupFile(), Options(), result.job, result.comparison)[1] == []

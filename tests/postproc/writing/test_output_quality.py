@@ -127,7 +127,7 @@ def at_home(index: str) -> SetupFile:
 @cache
 def indexing(controller: str, index: str, output: str) -> PostResult:
     return postproc.convert(indexed(), machines.load("mikron-ucp710"), controller, at_home(index),
-                            Options(output=output))  # type: ignore[arg-type]
+                            Options(output=output))
 
 
 @pytest.mark.parametrize("output", ["auto", "axes"])
@@ -147,7 +147,7 @@ def test_the_tool_is_home_there_in_corrected_programs_too(controller: str, outpu
     (tmp_path / "z.csv").write_text("Z [mm],EZZ [um],EAZ [arcsec],EBZ [arcsec]\n-250,0,0,0\n250,100,40,-40\n")
     (tmp_path / "errors.toml").write_text('machine = "mikron-ucp710"\n' + "".join(
         f'[components.{name}]\ntable = "z.csv"\ninterpolation = "linear"\n' for name in ("EZZ", "EAZ", "EBZ")))
-    options = Options(output=output, error_model=str(tmp_path / "errors.toml"))  # type: ignore[arg-type]
+    options = Options(output=output, error_model=str(tmp_path / "errors.toml"))
     result, low = (postproc.convert(indexed(), machines.load("mikron-ucp710"), controller, at_home(index), options)
                    for index in ("home", "plane"))
     assert result.ok and low.ok, [str(d) for d in result.diagnostics]

@@ -9,7 +9,7 @@ import pytest
 
 import toolpaths
 from toolpaths.cl.read import ReadResult, read_bytes
-from toolpaths.diagnostics import Severity
+from toolpaths.diagnostics import Severity, has_errors
 from toolpaths.toolpath import Kind
 
 HEAD = "$$     CATIA APT VERSION 1.0\nPARTNO X\nFEDRAT/  300.0000,MMPM\n"
@@ -67,12 +67,13 @@ def test_a_helix_that_does_not_rise_turns_by_its_angle() -> None:
 @pytest.mark.parametrize("record", ["HELICAL/CENTER,0,0,0,AXIS,0,0,1\n",
                                     HELIX.format("0,0", "0,1,0", "0,0,1", 3, 10, 720, 6, 2, "10,0,-6")])
 def test_what_is_no_helix_is_refused(record: str) -> None:
-    read(f"GOTO  /10,0,0\n{record}", "cl.circle")
+    assert has_errors(read(f"GOTO  /10,0,0\n{record}", "cl.circle").diagnostics)
 
 
 def test_a_helix_whose_end_is_elsewhere_is_refused() -> None:
-    read("GOTO  /10,0,0\n" + HELIX.format("0,0,0", "0,1,0", "0,0,1", 3, 10, 720, 6, 2, "0,10,-6"),
-         "cl.arc-sweep")
+    found = read("GOTO  /10,0,0\n" + HELIX.format("0,0,0", "0,1,0", "0,0,1", 3, 10, 720, 6, 2, "0,10,-6"),
+                 "cl.arc-sweep")
+    assert has_errors(found.diagnostics)
 
 
 def test_tools_that_are_numbered_and_not_loaded_stay_so() -> None:

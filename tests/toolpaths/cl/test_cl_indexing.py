@@ -15,7 +15,7 @@ from toolpaths.toolpath import Kind, Toolpath
 SAMPLES = Path(__file__).parents[3] / "samples"
 sys.path.insert(0, str(SAMPLES))
 
-import make_indexing as m  # noqa: E402
+import make_indexing as m  # noqa: E402  # found on the path set above
 
 FILES = sorted(p for p in SAMPLES.rglob("*") if p.suffix in (".cls", ".apt", ".ncl", ".clt", ".as", ".aptsource"))
 

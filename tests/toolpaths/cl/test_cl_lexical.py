@@ -17,7 +17,7 @@ from toolpaths.diagnostics import Severity, has_errors
 
 
 def read(text: str | bytes, **options: str) -> ReadResult:
-    return read_bytes(text, **options)  # type: ignore[arg-type]
+    return read_bytes(text, **options)
 
 
 def clean(text: str | bytes) -> ReadResult:

@@ -301,7 +301,7 @@ def test_the_dialect_can_be_given() -> None:
 
 
 def units(text: str, **options: str) -> tuple[str, list[tuple[str, str]]]:
-    result: ReadResult = read_bytes(text, **options)  # type: ignore[arg-type]
+    result: ReadResult = read_bytes(text, **options)
     return result.toolpath.units, [(d.code, d.severity.name) for d in result.diagnostics if "unit" in d.code]
 
 

@@ -219,10 +219,10 @@ def test_samples(name: str) -> None:
     found = inspect(result)
     for key in ("points", "rapids", "arcs", "cycles", "holes", "units"):
         assert found[key] == want[key], key
-    assert len(found["operations"]) == want["operations"]  # type: ignore[arg-type]
+    assert len(found["operations"]) == want["operations"]
     assert found["length_mm"] == pytest.approx(want["feed_length_mm"], abs=2e-3)
     for letter, limits in want["extents_mm"].items():
-        assert found["extents"][letter] == pytest.approx(limits, abs=1e-4)  # type: ignore[index]
+        assert found["extents"][letter] == pytest.approx(limits, abs=1e-4)
     json.dumps(found)
     assert toolpaths.read_bytes(toolpaths.write(result.toolpath))[0].equals(result.toolpath)
 
