@@ -49,6 +49,7 @@ from postproc.readback.comparison.slow_moves import with_fingerprint
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
 from postproc.setup.system import with_system
+from postproc.verification.planned_words import check_planned
 from postproc.verification.proof_text import with_statement
 from postproc.verification.read_back import read_back
 from postproc.verification.second_witness import second_witness
@@ -235,6 +236,9 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
                                   others={name: text.encode() for name, text in made.files.items()},
                                   of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.program,
                                                                                       made.controller))
+    if comparison is not None and made.motion is not None and not has_errors(found):
+        found = [*found, *check_planned(made.path, made.moves, on_written(made.compensation, made.motion.needed),
+                                        made.options.merge_feeds, comparison, job)]
     if comparison is not None and not has_errors(found):
         witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison,
                                        b"" if made.files else made.text)
