@@ -5,8 +5,11 @@ from __future__ import annotations
 import sys
 from functools import cache
 
+BUILDS = "_get_command"
+"""the function of typer's runner that builds them"""
+
 
 def install() -> None:
     """For all tests of this process, where one of them calls commands."""
     if runner := sys.modules.get("typer.testing"):
-        runner._get_command = cache(runner._get_command)  # type: ignore[attr-defined]
+        setattr(runner, BUILDS, cache(getattr(runner, BUILDS)))

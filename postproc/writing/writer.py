@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
-from functools import cached_property
 from itertools import chain
 
 import numpy as np
@@ -17,7 +16,7 @@ from postproc.compile.program import PER_MINUTE, Command, Hole
 from postproc.control.rollover import HALF
 from postproc.controllers.model import Mode
 from postproc.controllers.texts import blocks_of
-from postproc.reference.coolant import COMMANDS, CoolantCommand, switching
+from postproc.reference.coolant import COMMANDS
 from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name
 from toolpaths.arrays import Ints
 
@@ -290,14 +289,6 @@ class Writer(WriterState, ABC):
         else:
             yield from self.numbered_command(command)
 
-    @cached_property
-    def fixed(self) -> dict[str, str]:
-        """The commands that are one code whatever they carry."""
-        codes = self.controller.codes
-        return {"STOP_SPINDLE_TURNING": codes.spindle_stop, "PROGRAM_STOP": codes.stop,
-                "OPTIONAL_PROGRAM_STOP": codes.optional_stop,
-                "CANCEL_TOOL_LENGTH_OFFSET": codes.length_cancel, "CUTTER_COMPENSATION_OFF": codes.compensation_off}
-
     def hooked(self, command: Command) -> str:
         """A block of the shop; modal codes are stated again behind it, since a macro may leave others."""
         text, number, name, operation = (str(arg) for arg in command.args)
@@ -338,11 +329,6 @@ class Writer(WriterState, ABC):
             yield self.switching[asked][0]
         self.flowing |= wanted
         self.cooling = None if command.skip else bool(wanted)
-
-    @cached_property
-    def switching(self) -> dict[CoolantCommand, tuple[str, str]]:
-        """The controller's codes for each kind of coolant (`postproc.reference.coolant`)."""
-        return switching(self.controller.codes)
 
     def coolant_off(self) -> list[str]:
         """The codes that end what may flow: those of kinds that have one of their own, and the one for all others."""
