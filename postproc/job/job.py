@@ -29,7 +29,7 @@ from postproc.reference.split_operations import cut_operations
 from postproc.reference.stated_feeds import without_feed
 from postproc.reference.tool_numbers import numbered
 from postproc.reference.unnumbered_tools import measured_length
-from postproc.setup.model import Placement, SetupFile, part_placement, work_frame
+from postproc.setup.model import Placement, SetupFile, part_placement, stated_value, work_frame
 from postproc.setup.system import standing
 from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, warning
@@ -193,6 +193,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`:
     output modes that "auto" passes over."""
     toolpath, diagnostics = numbered(toolpath, setup, options.setup)
+    diagnostics += _assumed(setup, options)
     toolpath, found = plain_records(toolpath, controller)
     diagnostics += found
     toolpath, stated = with_defaults(toolpath, setup)
@@ -214,7 +215,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     frame, found = work_frame(setup, toolpath, options.setup)
     diagnostics += found
-    if placement is None or frame is None or has_errors(diagnostics):
+    refused = [d for d in diagnostics if d.severity is Severity.ERROR]
+    if placement is None or frame is None or any(d.code not in OF_SETUP for d in refused):
         return None, diagnostics
     axis_tolerance = options.axis_tolerance * DEG
     moves, found = build_moves(toolpath, setup, axis_tolerance)
@@ -243,6 +245,12 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
               modes, errors, tuple(stated))
     return job, diagnostics + _tool_lengths(job) + _unused_tools(job)
+
+
+def _assumed(setup: SetupFile, options: Options) -> list[Diagnostic]:
+    """Values of the set-up that nobody has stated."""
+    return [warning("setup.assumed", f"{key} = {stated_value(setup, key)} is assumed: nobody has stated it", file=options.setup,
+                    hint="state yours, and take its name out of `assumed`") for key in setup.assumed]
 
 
 def _work_offset(controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:
