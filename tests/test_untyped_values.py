@@ -27,7 +27,7 @@ BORDERS = {
     "postproc/proof/file.py": "the proof file, JSON", "postproc/proof/changes.py": FIGURES,
     "postproc/cli/time.py": FIGURES, "postproc/cli/place.py": FIGURES, "postproc/cli/orient.py": FIGURES,
     "postproc/cli/console.py": FIGURES, "postproc/cli/error_text.py": FIGURES, "postproc/cli/error_files.py": FIGURES,
-    "postproc/cli/catalogue.py": FIGURES,
+    "postproc/cli/catalogue.py": FIGURES, "postproc/cli/setup_new.py": FIGURES, "postproc/setup_sheet/text.py": TABLES,
     "postproc/verification/second_witness.py": TABLES, "postproc/witness/states.py": TABLES,
     "postproc/witness/place.py": TABLES, "postproc/witness/machine.py": TABLES, "postproc/witness/evidence.py": TABLES,
     "toolpaths/interrupted_runs.py": "the journal, JSON",

@@ -131,6 +131,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     from postproc.pipeline.convert import convert as run
     from postproc.proof import command
     from postproc.report import summary
+    from postproc.setup_sheet.offers import offers
     from postproc.writing.program_files import program_files
 
     outputs: dict[Path, str | bytes] = {}
@@ -143,7 +144,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         result = replace(result, diagnostics=(*result.diagnostics, *why))
         time = estimate_of(result)  # all before a file is written
         values, text = summary.as_dict(result, str(output), time), summary.as_text(result, str(output), time)
-        more: list[Diagnostic] = []
+        more = offers(result, path, machine, controller)
         if result.ok:
             texts, more = program_files(output, result.text, result.files or {})
             refuse_inputs(list(texts)[:-1], inputs)

@@ -21,7 +21,7 @@ from postproc.cli.options import (
 if TYPE_CHECKING:
     from postproc.base.options import Options
     from postproc.setup_sheet.make import SetupSheet
-    from postproc.setup_sheet.questions import Given, Question
+    from postproc.setup_sheet.questions import GivenAnswers, Question
 
 EXAMPLES = """Example: postproc setup new part.cls -m mikron-ucp710 -c fanuc-30i -o part.setup.toml
 
@@ -39,14 +39,14 @@ def setup_new(file: ClFile, machine: MachineName,
               force: Annotated[bool, typer.Option("--force", help="replace a file that there is already")] = False,
               gauge_length: Annotated[list[str] | None, typer.Option("--gauge-length", metavar="[N=]MM",
                                                                      help=f"gauge length {_ALL_TOOLS}")] = None,
-              spindle: Annotated[list[str] | None, typer.Option("--spindle", metavar="[N=]RPM", help="spindle speed where the "
-                                                                f"CL file states none, {_ALL_TOOLS}")] = None,
+              spindle: Annotated[list[str] | None, typer.Option("--spindle", metavar="[N=]RPM", help="spindle speed where "
+                                                                f"the CL file states none, {_ALL_TOOLS}")] = None,
               feed: Annotated[float | None, typer.Option("--feed", metavar="MM/MIN", min=0.001, max=2e5,
                                                          help="feed of cuts for which the CL file states none")] = None,
               coolant: Annotated[str, typer.Option("--coolant", metavar="KIND", help="where the CL file states none: off, "
                                                    "flood, mist, through, air")] = "",
-              work_offset_code: Annotated[str, typer.Option("--work-offset-code", metavar="CODE",
-                                                            help="register of the work offset, as the control names it")] = "G54",
+              work_offset_code: Annotated[str, typer.Option("--work-offset-code", metavar="CODE", help="register of the "
+                                                            "work offset, as the control names it")] = "G54",
               tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
               units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None, json: Json = "") -> None:
     """Write the set-up of a CL file: what the files state, what is asked for, a place that fits; proved."""
@@ -70,18 +70,18 @@ def setup_new(file: ClFile, machine: MachineName,
     report(sheet.diagnostics, json, values, text, outputs)
 
 
-def _made(file: Path, machine: str, controller: str, options: Options, given: Given, yes: bool, code: str,
+def _made(file: Path, machine: str, controller: str, options: Options, given: GivenAnswers, yes: bool, code: str,
           progress: Any) -> SetupSheet:
     import toolpaths
     from postproc.setup_sheet.make import new_setup
 
-    asked = _Asking()
+    asked, m = _Asking(), machine_of(machine)
     path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
                                  allow_unknown=options.allow_unknown)
     try:
-        return new_setup(path, machine_of(machine), controller, options, given, None if yes else asked, yes, found, code, progress)
+        return new_setup(path, m, controller, options, given, None if yes else asked, yes, found, code, progress)
     except EOFError:
-        return new_setup(path, machine_of(machine), controller, options, asked.added(given), None, False, found, code, progress)
+        return new_setup(path, m, controller, options, asked.added(given), None, False, found, code, progress)
 
 
 class _Asking:
@@ -106,7 +106,7 @@ class _Asking:
                 return value
             typer.echo(wrong, err=True)
 
-    def added(self, given: Given) -> Given:
+    def added(self, given: GivenAnswers) -> GivenAnswers:
         """The options of the command line with what was answered before standard input ended."""
         from dataclasses import replace
 
@@ -116,8 +116,10 @@ class _Asking:
                 result = replace(result, coolant=str(value))
             elif question.kind == "feed":
                 result = replace(result, feed=float(value))
+            elif question.kind == "spindle":
+                result = replace(result, spindle={**result.spindle, question.number: float(value)})
             else:
-                result = replace(result, **{question.kind: {**getattr(result, question.kind), question.number: float(value)}})
+                result = replace(result, gauge_length={**result.gauge_length, question.number: float(value)})
         return result
 
 
@@ -135,16 +137,16 @@ def _line() -> str:
     return line
 
 
-def _given(lengths: list[str], speeds: list[str], feed: float | None, coolant: str) -> Given:
+def _given(lengths: list[str], speeds: list[str], feed: float | None, coolant: str) -> GivenAnswers:
     from typing import get_args
 
     from postproc.setup.spindle import CoolantKind
-    from postproc.setup_sheet.questions import Given
+    from postproc.setup_sheet.questions import GivenAnswers
 
     if coolant and coolant not in get_args(CoolantKind):
         raise typer.BadParameter(f"{coolant!r} is not available; choose from {', '.join(get_args(CoolantKind))}",
                                  param_hint="--coolant")
-    return Given(_numbers(lengths, "--gauge-length", 2000.0), _numbers(speeds, "--spindle", 200000.0), feed, coolant)
+    return GivenAnswers(_numbers(lengths, "--gauge-length", 2000.0), _numbers(speeds, "--spindle", 200000.0), feed, coolant)
 
 
 def _numbers(values: list[str], option: str, most: float) -> dict[int, float]:

@@ -12,8 +12,8 @@ from postproc.compile.program import Program
 from postproc.control.modes import table_axes
 from postproc.job.job import Job
 from postproc.pipeline.stage_values import CompiledStage
-from postproc.setup.model import stated_value
 from postproc.readback.comparison.length_margins import length_matters
+from postproc.setup.model import stated_value
 
 
 def header_lines(made: CompiledStage) -> list[str]:

@@ -55,8 +55,8 @@ def attitudes_of(toolpath: Toolpath, machine: Machine, axis_tolerance: float) ->
 def _quarters(candidates: list[tuple[Floats, str]], up: Floats) -> list[tuple[Floats, str]]:
     """Each with its quarter turns about the direction `up` (3,) of the table."""
     turns = [(np.round(rotation(up, np.array([n * _QUARTER]))[0], 15), n) for n in (0, 1, 3, 2)]
-    return [(turn @ by, f"{why}, turned by {90 * n} degrees on the table" if n else why) for by, why in candidates
-            for turn, n in turns]
+    return [(np.asarray(turn @ by), f"{why}, turned by {90 * n} degrees on the table" if n else why)
+            for by, why in candidates for turn, n in turns]
 
 
 def _axes(toolpath: Toolpath) -> Floats:
@@ -65,7 +65,8 @@ def _axes(toolpath: Toolpath) -> Floats:
     axes = toolpath.axis[cuts] if cuts.any() else toolpath.axis
     _, first = np.unique(np.round(axes, 6), axis=0, return_index=True)
     first = np.sort(first)
-    return axes[first[np.unique(np.linspace(0, len(first) - 1, min(len(first), _MANY)).astype(int))]]
+    picked = np.unique(np.linspace(0, len(first) - 1, min(len(first), _MANY)).astype(int))
+    return np.asarray(axes[first[picked]])
 
 
 def _candidates(toolpath: Toolpath, axes: Floats, home: Floats) -> list[tuple[Floats, str]]:
@@ -91,8 +92,8 @@ def _least(a: Floats, b: Floats) -> Floats:
         if cosine > 0.0:
             return np.eye(3)
         across = np.cross(a, np.eye(3)[int(np.abs(a).argmin())])
-        return rotation(across / np.linalg.norm(across), np.array([np.pi]))[0]
-    return rotation(across / size, np.array([np.arctan2(size, cosine)]))[0]
+        return np.asarray(rotation(across / np.linalg.norm(across), np.array([np.pi]))[0])
+    return np.asarray(rotation(across / size, np.array([np.arctan2(size, cosine)]))[0])
 
 
 def _judged(turn: Floats, why: str, axes: Floats, home: Floats, machine: Machine, tolerance: float) -> Attitude:

@@ -12,7 +12,7 @@ import numpy as np
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile
-from postproc.job.job import prepare
+from postproc.job.job import OF_SETUP, prepare
 from postproc.reference.events import cutting, spindle_states
 from postproc.reference.records import plain_records
 from postproc.reference.same_tool import differ
@@ -26,9 +26,6 @@ from toolpaths.toolpath import Event, Kind, Role, Tool, Toolpath
 
 TRIAL = {"output": {"feed": 100.0, "spindle": {"rpm": 1000.0}}}
 """what stands in for open values while the rest is looked at; never written"""
-OPEN = frozenset({"tool.length", "tool.number", "tool.same_number", "feed.missing", "spindle.not_started",
-                  "spindle.no_speed"})
-"""codes of what a set-up file answers"""
 
 
 @dataclass(frozen=True)
@@ -96,7 +93,7 @@ def facts_of(toolpath: Toolpath, machine: Machine, controller: ControllerFile, o
     rows = np.flatnonzero(without_feed(path))
     return SheetFacts(named, tuple(_tools(path)), any(d.code == "tool.length" for d in errors), len(rows),
                       tuple(np.unique(path.line[rows])[:3].tolist()),
-                      tuple(d for d in errors if d.code not in OPEN))
+                      tuple(d for d in errors if d.code not in OF_SETUP))
 
 
 def _taken(toolpath: Toolpath) -> set[int]:

@@ -12,7 +12,7 @@ from postproc.controllers.model import load_controller
 from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import SheetFacts, facts_of
 from postproc.setup_sheet.place import Fit, Progress, fitted
-from postproc.setup_sheet.questions import Answer, Given, Question, answered, questions_of
+from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, questions_of
 from postproc.setup_sheet.text import SheetHead, sheet_text, sheet_values
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, require, warning
 from toolpaths.toolpath import Toolpath
@@ -40,7 +40,7 @@ class SetupSheet:
         return list(self.fit.setup.assumed) if self.fit is not None else []
 
 
-def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, options: Options, given: Given,
+def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, options: Options, given: GivenAnswers,
               ask: Callable[[Question], float | str] | None, assume: bool, found: list[Diagnostic],
               code: str = "G54", progress: Progress | None = None) -> SetupSheet:
     """The set-up of a file on a machine and a control, proved by a conversion.
@@ -96,11 +96,12 @@ def _with(made: SetupSheet, more: list[Diagnostic], text: str) -> SetupSheet:
 def _open(left: list[Question], file: str) -> Diagnostic:
     """All that still has to be given, in one list."""
     lines = [f"  {one.text}{f', {one.unit}' if one.unit else ''}: {one.option}" for one in left]
-    return error("setup.unanswered", f"{len(left)} value{'s' * (len(left) > 1)} nobody has stated:\n" + "\n".join(lines), file=file,
-                 hint="run it on a terminal, give the options, or --yes to write assumed values that are marked so")
+    said = f"{len(left)} value{'s' * (len(left) > 1)} nobody has stated:\n" + "\n".join(lines)
+    return error("setup.unanswered", said, file=file, hint="run it on a terminal, give the options, or --yes to write assumed "
+                 "values that are marked so")
 
 
-def _unused(given: Given, facts: SheetFacts, toolpath: Toolpath) -> list[Diagnostic]:
+def _unused(given: GivenAnswers, facts: SheetFacts, toolpath: Toolpath) -> list[Diagnostic]:
     """Answers for tools that the file does not cut with."""
     used = {tool.number for tool in facts.tools}
     wrong = sorted({n for n in (*given.gauge_length, *given.spindle) if n and n not in used})
@@ -114,9 +115,9 @@ def _assumed(made: SetupSheet, fit: Fit) -> list[Diagnostic]:
     """What was assumed, as a warning each."""
     keys = {one.key: one for one in made.questions}
     values = dict(made.answers)
-    return [warning("setup.assumed", f"{key} = {values[key].value}{f' {keys[key].unit}' if keys[key].unit else ''} is assumed: "
-                    "nobody has stated it", hint=f"state it by {keys[key].option}, or in the file, and take its name out of "
-                    "`assumed`") for key in fit.setup.assumed]
+    return [warning("setup.assumed", f"{key} = {values[key].value} {keys[key].unit} is assumed: nobody has stated it",
+                    hint=f"state it by {keys[key].option}, or in the file, and take its name out of `assumed`")
+            for key in fit.setup.assumed]
 
 
 def _not_fitted(fit: Fit) -> list[Diagnostic]:
@@ -124,6 +125,6 @@ def _not_fitted(fit: Fit) -> list[Diagnostic]:
     errors = [d for d in fit.result.diagnostics if d.severity is Severity.ERROR]
     said = [info("place.found", f"{fit.tried} place{'s' * (fit.tried > 1)} tried, none is possible"
                  + "".join(f"; {why}" for why in fit.lacks[:3]),
-                 hint="a machine with more travel, shorter tools, or a file for each side of the part")] if fit.tried > 1 or (
-        fit.lacks) else []
+                 hint="a machine with more travel, shorter tools, or a file for each side of the part")]
+    said = said if fit.tried > 1 or fit.lacks else []
     return [*errors, *said]

@@ -102,18 +102,18 @@ def _beyond(result: PostResult) -> bool:
     return all(d.code in PLACES for d in result.diagnostics if d.severity is Severity.ERROR)
 
 
-def found_place(result: PostResult) -> list[Diagnostic]:
+def found_place(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
     """What `place` would find for a conversion that is refused by travel or reach: a note with [part], or why
-    no place fits; nothing for other refusals."""
+    no place fits; nothing for other refusals. `toolpath` is as it was read."""
     if result.ok or not _beyond(result):
         return []
-    if len(result.toolpath) > _MOST:
+    if len(toolpath) > _MOST:
         return [_note("postproc setup new looks for a place that fits", "")]
     setup = result.setup
     lacks = list[str]()
-    attitudes = attitudes_of(result.toolpath, result.machine, result.options.axis_tolerance * DEG)
+    attitudes = attitudes_of(toolpath, result.machine, result.options.axis_tolerance * DEG)
     options = replace(result.options, error_model="", orient="keep")
-    place = next(_places(result.toolpath, result.machine, setup, options, attitudes, lacks), None)
+    place = next(_places(toolpath, result.machine, setup, options, attitudes, lacks), None)
     if place is None:
         return [_note("no place of the part was found that travel allows" + "".join(f"; {why}" for why in lacks[:3]),
                       "a machine with more travel, or a file for each side of the part")]
@@ -134,8 +134,8 @@ def _places(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
     reached = [one for one in attitudes if one.unreachable == 0.0]
     if not reached:
         best = attitudes[0]
-        lacks.append(f"however the part is turned, {machine.name} cannot take every tool axis of the cuts: at best (the part "
-                     f"{best.why}) {100.0 * best.unreachable:.0f} % of them are beyond its rotary axes")
+        lacks.append(f"however the part is turned, {machine.name} cannot take every tool axis of the cuts: at best (the "
+                     f"part {best.why}) {100.0 * best.unreachable:.0f} % of them are beyond its rotary axes")
         return
     work, _ = work_of(toolpath, machine, setup.model_copy(update={"part": PartPlacement()}), options, turning=False)
     if work is None:

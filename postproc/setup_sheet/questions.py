@@ -10,8 +10,8 @@ from typing import Literal, get_args
 from postproc.setup.spindle import CoolantKind
 from postproc.setup_sheet.facts import SheetFacts, ToolFacts
 
-Kind = Literal["gauge_length", "spindle", "feed", "coolant"]
-Source = Literal["answered", "assumed"]
+QuestionKind = Literal["gauge_length", "spindle", "feed", "coolant"]
+AnswerSource = Literal["answered", "assumed"]
 ASSUMED_SPEED = 1000.0
 """rev/min, for a first run in the air: no cutting speed"""
 ASSUMED_FEED = 100.0
@@ -20,9 +20,9 @@ ASSUMED_LENGTH = 150.0
 """mm, longer where CAM draws a longer cutter"""
 _ABOVE_CUTTER = 50.0
 """mm from the end of a cutter, as CAM draws it, to the gauge point, where that is assumed"""
-_LARGEST: dict[Kind, float] = {"gauge_length": 2000.0, "spindle": 200000.0, "feed": 200000.0}
-_UNITS: dict[Kind, str] = {"gauge_length": "mm", "spindle": "rev/min", "feed": "mm/min", "coolant": ""}
-_OPTIONS: dict[Kind, str] = {"gauge_length": "--gauge-length", "spindle": "--spindle", "feed": "--feed",
+_LARGEST: dict[QuestionKind, float] = {"gauge_length": 2000.0, "spindle": 200000.0, "feed": 200000.0}
+_UNITS: dict[QuestionKind, str] = {"gauge_length": "mm", "spindle": "rev/min", "feed": "mm/min", "coolant": ""}
+_OPTIONS: dict[QuestionKind, str] = {"gauge_length": "--gauge-length", "spindle": "--spindle", "feed": "--feed",
                              "coolant": "--coolant"}
 
 
@@ -36,7 +36,7 @@ class Question:
         assumed: what --yes takes, None: nothing, the key is left out
     """
 
-    kind: Kind
+    kind: QuestionKind
     number: int
     text: str
     default: float | str | None
@@ -70,11 +70,11 @@ class Answer:
     """A value with where it comes from."""
 
     value: float | str
-    source: Source
+    source: AnswerSource
 
 
 @dataclass(frozen=True)
-class Given:
+class GivenAnswers:
     """Answers on the command line: by tool number, 0 for all tools."""
 
     gauge_length: Mapping[int, float] = field(default_factory=dict)
@@ -132,7 +132,7 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
     return value, ""
 
 
-def answered(questions: list[Question], given: Given, ask: Callable[[Question], float | str] | None,
+def answered(questions: list[Question], given: GivenAnswers, ask: Callable[[Question], float | str] | None,
              assume: bool) -> tuple[dict[str, Answer], list[Question]]:
     """The answers by key, and the questions that have none: from the command line, by asking, else assumed."""
     result, left = dict[str, Answer](), list[Question]()

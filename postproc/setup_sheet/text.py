@@ -58,14 +58,14 @@ def sheet_text(head: SheetHead, facts: SheetFacts, answers: Mapping[str, Answer]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _line(key: str, value: str, why: str) -> str:
+def _line(key: str, value: str, remark: str) -> str:
     """`key = value`, with the reason in a column of its own."""
-    return f"{f'{key} = {value}':<{_COLUMN}}  # {' '.join(why.split())}"
+    return f"{f'{key} = {value}':<{_COLUMN}}  # {' '.join(remark.split())}"
 
 
 def _top(head: SheetHead, setup: SetupFile, toolpath: Toolpath) -> Iterator[str]:
     yield f"# Set-up of {head.file} on {head.machine}, {head.controller}: written by postproc setup new."
-    yield f"# Proved with a tolerance of {head.tolerance:g} mm and {head.axis_tolerance:g} degrees (--tolerance, --axis-tolerance)."
+    yield f"# Proved with --tolerance {head.tolerance:g} (mm) and --axis-tolerance {head.axis_tolerance:g} (degrees)."
     yield f"# Units of the CL file: {head.units}, {head.units_from}"
     yield _line("description", json.dumps(setup.description, ensure_ascii=False), "name of the part, or of the CL file")
     yield _line("work_offset_code", json.dumps(setup.work_offset_code), "register of the control: the first; or as the shop "
@@ -81,7 +81,7 @@ def _top(head: SheetHead, setup: SetupFile, toolpath: Toolpath) -> Iterator[str]
 
 def _part(fit: Fit) -> Iterator[str]:
     part, place = fit.setup.part, fit.place
-    yield "[part]    # where the CL file's absolute frame stands on the table: set the part up so, or move it with postproc place"
+    yield "[part]    # where the CL file's absolute frame stands on the table: set the part up so, or see postproc place"
     why = place.why if place is not None else "as stated"
     yield _line("origin", _vector(part.origin), f"mm; {why}")
     turned = part.x_axis != (1.0, 0.0, 0.0) or part.y_axis != (0.0, 1.0, 0.0)
@@ -92,8 +92,8 @@ def _part(fit: Fit) -> Iterator[str]:
 
 def _clearance(setup: SetupFile) -> Iterator[str]:
     yield "[clearance]"
-    yield _line("margin", f"{setup.clearance.margin:g}", "mm that linking moves keep from what is cut: the default; they take "
-                "less where travel ends")
+    yield _line("margin", f"{setup.clearance.margin:g}", "mm that linking moves keep from what is cut: the default; less "
+                "where travel ends")
 
 
 def _tool(tool: ToolFacts, facts: SheetFacts, answers: Mapping[str, Answer]) -> Iterator[str]:
@@ -110,7 +110,7 @@ def _tool(tool: ToolFacts, facts: SheetFacts, answers: Mapping[str, Answer]) -> 
                     f"rev/min; {_from(speed)}; the CL file states none for some cut")
     else:
         yield f"# spindle: {tool.speed}, of the CL file"
-    yield f"# coolant: {tool.coolant}, of the CL file" if tool.coolant else "# coolant: the CL file states none: [output] coolant"
+    yield f"# coolant: {tool.coolant or 'none stated, see [output]'}{', of the CL file' * bool(tool.coolant)}"
 
 
 def _output(head: SheetHead, setup: SetupFile, facts: SheetFacts, answers: Mapping[str, Answer]) -> Iterator[str]:
@@ -119,8 +119,8 @@ def _output(head: SheetHead, setup: SetupFile, facts: SheetFacts, answers: Mappi
     feed, coolant = answers.get("output.feed"), answers.get("output.coolant")
     if feed is not None:
         lines = ", ".join(map(str, facts.feed_lines))
-        yield _line("feed", f"{feed.value:g}", f"mm/min; {_from(feed)}; {facts.without_feed} moves cut before any FEDRAT (lines "
-                    f"{lines})")
+        yield _line("feed", f"{feed.value:g}", f"mm/min; {_from(feed)}; {facts.without_feed} moves cut before any FEDRAT "
+                    f"(lines {lines})")
     else:
         yield "# feed: every cut has one in the CL file"
     if coolant is not None:
