@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from postproc.cli.says import SAYS
+
 if TYPE_CHECKING:
     from machines.machine import Machine
     from toolpaths.diagnostics import Diagnostic
@@ -65,7 +67,11 @@ def progress_bar() -> Iterator[Any]:
     """A bar on standard error for long work; silent where that is no terminal."""
     import sys
 
-    if not sys.stderr.isatty():
+    if SAYS.verbose:
+        said: list[str] = []
+        yield lambda stage, at, total: _say(stage, said)
+        return
+    if SAYS.quiet or not sys.stderr.isatty():
         yield lambda stage, at, total: None
         return
     from rich.console import Console
@@ -74,6 +80,13 @@ def progress_bar() -> Iterator[Any]:
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("")
         yield lambda stage, at, total: bar.update(task, description=stage, completed=at, total=total)
+
+
+def _say(stage: str, said: list[str]) -> None:
+    """Each stage once, as it begins."""
+    if said[-1:] != [stage]:
+        said.append(stage)
+        typer.echo(stage, err=True)
 
 
 def _plain(value: object) -> object:
@@ -96,20 +109,37 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
     `outputs` (path -> content, the one that needs the others last) and the file of the figures are written
     together: all, or where one fails none.
     """
-    from toolpaths.diagnostics import has_errors
+    from toolpaths.diagnostics import Severity, has_errors
 
+    passed = not has_errors(diagnostics)
+    if SAYS.strict:
+        diagnostics = as_errors(diagnostics)
     ok = not has_errors(diagnostics)
+    if passed and not ok:  # by --strict alone
+        unwritten = {"output": None} if "output" in values else {}
+        values = values | unwritten | {"diagnostics": [d.as_dict() for d in diagnostics]}
+        text, outputs = "", {}
     more, failed = _written(target, _headed(values, ok), dict(outputs or {}))
     for d in (*diagnostics, *more):
-        typer.echo(str(d), err=True)
+        if not SAYS.quiet or d.severity is not Severity.INFO:
+            typer.echo(str(d), err=True)
     if failed and outputs:
         values, text = {"diagnostics": [d.as_dict() for d in (*diagnostics, *more)]}, ""
     if target == "-":
         print_json(rounded(_headed(values, ok and not failed)))
-    elif text:
+    elif text and not SAYS.quiet:
         typer.echo(text)
     if failed or not ok:
         raise typer.Exit(1)
+
+
+def as_errors(diagnostics: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
+    """The diagnostics with warnings as errors."""
+    from dataclasses import replace
+
+    from toolpaths.diagnostics import Severity
+
+    return tuple(replace(d, severity=Severity.ERROR) if d.severity is Severity.WARNING else d for d in diagnostics)
 
 
 def _headed(values: dict[str, Any], ok: bool) -> dict[str, Any]:

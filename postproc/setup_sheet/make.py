@@ -64,6 +64,10 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     questions = questions_of(facts)
     answers, left = answered(questions, given, ask, assume)
     known += _unused(given, facts, toolpath)
+    for tool in () if facts.lengths else facts.tools:  # not needed, but given: travel is checked with it
+        length = given.gauge_length.get(tool.number, given.gauge_length.get(0))
+        if length is not None:
+            answers[f"tools.{tool.number}.gauge_length"] = Answer(length, "answered")
     if left:
         return SetupSheet("", (*known, _open(left, toolpath.file)), facts, tuple(questions), tuple(answers.items()))
     values = sheet_values(facts, answers, toolpath.name or Path(toolpath.file).name, code)
@@ -97,8 +101,8 @@ def _open(left: list[Question], file: str) -> Diagnostic:
     """All that still has to be given, in one list."""
     lines = [f"  {one.text}{f', {one.unit}' if one.unit else ''}: {one.option}" for one in left]
     said = f"{len(left)} value{'s' * (len(left) > 1)} nobody has stated:\n" + "\n".join(lines)
-    return error("setup.unanswered", said, file=file, hint="run it on a terminal, give the options, or --yes to write assumed "
-                 "values that are marked so")
+    return error("setup.unanswered", said, file=file, hint="run it on a terminal, give the options, or --yes to write "
+                 "assumed values that are marked so")
 
 
 def _unused(given: GivenAnswers, facts: SheetFacts, toolpath: Toolpath) -> list[Diagnostic]:

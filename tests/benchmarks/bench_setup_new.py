@@ -32,9 +32,10 @@ def main() -> None:
             after[case] += bool(sheet.text)
             questions[case] += len(sheet.questions)
             places[case] += sheet.fit.tried if sheet.fit else 0
-    print(f"{len(SHAPES)} shapes on {name}, {controller}: first-try conversions before, after; questions; places converted")
+    print(f"{len(SHAPES)} shapes on {name}, {controller}: first-try conversions before, after; questions; places tried")
     for case in CASES:
-        print(f"{case:26} {before[case]:3} {after[case]:3} {questions[case] / len(SHAPES):5.1f} {places[case] / len(SHAPES):5.1f}")
+        mean = questions[case] / len(SHAPES), places[case] / len(SHAPES)
+        print(f"{case:26} {before[case]:3} {after[case]:3} {mean[0]:5.1f} {mean[1]:5.1f}")
     count = len(SHAPES) * len(CASES)
     print(f"{'all':26} {before.total()} of {count}, {after.total()} of {count}; {questions.total()} questions")
 
