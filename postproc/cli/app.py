@@ -14,6 +14,7 @@ from postproc.cli.console import (
     Json,
     controller_of,
     machine_of,
+    no_program,
     own_files,
     progress_bar,
     refuse_inputs,
@@ -222,7 +223,8 @@ def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", 
     from toolpaths.cl.inspect import summary as text_of
     from toolpaths.cl.read import read_file
 
-    with progress_bar() as progress:
+    with shown_errors(json), progress_bar() as progress:
+        no_program(file)
         result = read_file(file, units=options.units or None, dialect=options.dialect or None,
                            allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
     found = figures(result)
@@ -271,6 +273,7 @@ def _options(tolerance: float, axis_tolerance: float, feed_mode: FeedModeChoice,
 def _read(file: Path, options: Options, progress: Any) -> tuple[Toolpath, list[Diagnostic]]:
     import toolpaths
 
+    no_program(file)
     return toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
                           allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
 

@@ -13,12 +13,14 @@ from postproc.cli.says import SAYS
 
 if TYPE_CHECKING:
     from machines.machine import Machine
-    from toolpaths.diagnostics import Diagnostic
+    from toolpaths.diagnostics import Diagnostic, Severity
 
 Json = Annotated[str, typer.Option("--json", metavar="FILE", help="write the figures as JSON; - for standard output")]
 
 SCHEMA_VERSION = 1
 """of the JSON objects of all commands; it rises where a key changes its meaning or goes"""
+ALIKE = 4
+"""diagnostics of one code and one remedy up to which each is shown"""
 LONGEST_NAME = 255
 """characters that the name of a file may have"""
 
@@ -49,6 +51,28 @@ def controller_file(name: str) -> Any:
     if spec is None:
         raise DiagnosticError(found)
     return spec
+
+
+def no_program(file: Path) -> None:
+    """An error where a program of a control stands in the place of a CL file; standard input is not looked at.
+
+    Raises:
+        DiagnosticError: says what it is.
+    """
+    from postproc.cycle_time.source import looks_like_gcode
+    from toolpaths.diagnostics import DiagnosticError, error
+    from toolpaths.input_files import is_regular, read_input
+
+    if str(file) == "-" or not is_regular(file):
+        return
+    try:
+        data = read_input(file)
+    except OSError:  # reading the CL file says why
+        return
+    if looks_like_gcode(data):
+        raise DiagnosticError([error("file.program", "this is G-code, a program of a control, not a CL file", file=str(file),
+                                     hint="name the CL file that it was made from; postproc verify GCODE FILE compares the "
+                                     "two, postproc time GCODE estimates its time")])
 
 
 @contextmanager
@@ -120,9 +144,8 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
         values = values | unwritten | {"diagnostics": [d.as_dict() for d in diagnostics]}
         text, outputs = "", {}
     more, failed = _written(target, _headed(values, ok), dict(outputs or {}))
-    for d in (*diagnostics, *more):
-        if not SAYS.quiet or d.severity is not Severity.INFO:
-            typer.echo(str(d), err=True)
+    for line in lines_of((*diagnostics, *more), Severity.WARNING if SAYS.quiet else Severity.INFO):
+        typer.echo(line, err=True)
     if failed and outputs:
         values, text = {"diagnostics": [d.as_dict() for d in (*diagnostics, *more)]}, ""
     if target == "-":
@@ -131,6 +154,28 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
         typer.echo(text)
     if failed or not ok:
         raise typer.Exit(1)
+
+
+def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
+    """Diagnostics for people: of many with one code and one remedy the first, and where the others are; of one
+    wrong number one line. JSON has them all."""
+    groups: dict[tuple[Severity, str, str], list[Diagnostic]] = {}
+    for d in diagnostics:
+        if d.severity >= least:
+            groups.setdefault((d.severity, d.code, d.hint), []).append(d)
+    shown: list[str] = []
+    said: set[tuple[Severity, str, str]] = set()
+    for d in diagnostics:
+        key = d.severity, d.code, d.hint
+        group = groups.get(key, [])
+        if len(group) <= ALIKE:
+            shown += [str(d)] if d.severity >= least else []
+        elif key not in said:
+            said.add(key)
+            lines = sorted({line for one in group[1:] for line in one.lines})
+            where = f", lines {', '.join(map(str, lines[:6]))}{', ...' if len(lines) > 6 else ''}" if lines else ""
+            shown += [str(d), f"  and {len(group) - 1} more [{d.code}]{where}: --json names them all"]
+    return shown
 
 
 def as_errors(diagnostics: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
