@@ -213,6 +213,26 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
     report((*result.diagnostics, *more), json, stages, as_text(stages))
 
 
+@app.command(epilog="Example: postproc explain travel.exceeded")
+def explain(code: Annotated[str, typer.Argument(metavar="CODE", help="as in the brackets of a message")] = "",
+            json: Json = "") -> None:
+    """Explain a code of a message: what it is about, what to do, an example; without one list all codes."""
+    from dataclasses import asdict
+
+    from postproc.explain.pages import pages, unknown
+    from toolpaths.diagnostics import DiagnosticError, error
+
+    known = pages()
+    with shown_errors(json):
+        if code and code.strip("[]") not in known:
+            raise DiagnosticError([error("file.no-code", f"there is no code {code!r}", hint=unknown(code.strip("[]")))])
+    if not code:
+        report((), json, {"codes": list(known)}, "\n".join(known))
+        return
+    page = known[code.strip("[]")]
+    report((), json, asdict(page), page.text())
+
+
 @app.command(epilog="Example: postproc inspect part.cls --json -")
 def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
             json: Json = "") -> None:
