@@ -61,15 +61,9 @@ def no_program(file: Path) -> None:
     """
     from postproc.cycle_time.source import looks_like_gcode
     from toolpaths.diagnostics import DiagnosticError, error
-    from toolpaths.input_files import is_regular, read_input
+    from toolpaths.input_files import first_bytes
 
-    if str(file) == "-" or not is_regular(file):
-        return
-    try:
-        data = read_input(file)
-    except OSError:  # reading the CL file says why
-        return
-    if looks_like_gcode(data):
+    if looks_like_gcode(first_bytes(file, 20_000)):
         raise DiagnosticError([error("file.program", "this is G-code, a program of a control, not a CL file", file=str(file),
                                      hint="name the CL file that it was made from; postproc verify GCODE FILE compares the "
                                      "two, postproc time GCODE estimates its time")])

@@ -75,7 +75,7 @@ def commands(command: object, names: tuple[str, ...] = ()) -> dict[str, set[str]
     """Parameters by command."""
     inner = getattr(command, "commands", None)
     if inner is None:
-        return {" ".join(names): {p.name for p in command.params}}  # type: ignore[attr-defined]  # a command of typer
+        return {" ".join(names): {p.name for p in command.params}}
     return {name: found for key, one in inner.items() for name, found in commands(one, (*names, key)).items()}
 
 
