@@ -137,7 +137,7 @@ def solved(made: PlacedStage, progress: Progress | None) -> tuple[PlacedStage | 
     path, found = build_path(job.modes, job.kinematics, made.moves, job.space, job.home_rows(), job.operation,
                              shares["linearising"], shares["axis_linearising"] * DEG, made.toolpath.file, progress,
                              made.drawing)
-    found = with_system(found, job.work_system, job.placement)
+    found = with_system(found, job.work_system, job.placement, job.moves.axis)
     if path is None:
         return made, found
     return handed_on(SolvedStage, made, path=with_short_turns(path, made.moves, job.control, job.kinematics)), found
@@ -154,7 +154,7 @@ def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage
     far = check_travel(path, job.moves, job.control, job.kinematics, file)[0]
     far += check_reach(path, job.moves, job.control, file)
     if has_errors(far):
-        return made, with_system(far, job.work_system, job.placement)
+        return made, with_system(far, job.work_system, job.placement, job.moves.axis)
     better, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
                                        options.tolerance, job.axis_tolerance, writing_of(job, moves),
                                        only_canned(job.toolpath, job.controller), options.error_beyond, file)
@@ -169,7 +169,7 @@ def checked(made: CorrectedStage, progress: Progress | None) -> tuple[CheckedSta
     found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
     found += check_reach(path, job.moves, job.control, file)
     found += check_singular(path, job.moves, job.control, job.setup.joints.singular_distance, file)
-    return handed_on(CheckedStage, made, extents=extents), with_system(found, job.work_system, job.placement)
+    return handed_on(CheckedStage, made, extents=extents), with_system(found, job.work_system, job.placement, job.moves.axis)
 
 
 def planned(made: CheckedStage, progress: Progress | None) -> tuple[PlannedStage, DiagnosticList]:
