@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -54,6 +54,7 @@ from toolpaths.choices import FieldEnding, GivenDialect, GivenUnit
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
+    from postproc.base.progress import Progress
     from postproc.pipeline.result import PostResult
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
@@ -267,7 +268,7 @@ def _options(tolerance: float, axis_tolerance: float, feed_mode: FeedModeChoice,
                    tuple(w.upper() for w in allow_unknown or ()))
 
 
-def _read(file: Path, options: Options, progress: Any) -> tuple[Toolpath, list[Diagnostic]]:
+def _read(file: Path, options: Options, progress: Progress) -> tuple[Toolpath, list[Diagnostic]]:
     import toolpaths
 
     return toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
