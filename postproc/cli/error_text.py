@@ -8,8 +8,12 @@ from toolpaths.table_text import table_text
 
 if TYPE_CHECKING:
     from machines.geometric_error.actual.model import ErrorModel
-    from machines.geometric_error.exchange.exports import MadeMap, Screws
+    from machines.geometric_error.exchange.exports import MadeMap, NotOfJoint, Screws
     from toolpaths.diagnostics import Diagnostic
+
+_NOT_OF_JOINT: dict[NotOfJoint, str] = {
+    "leans": "its axis leans, and the error is not about the axis",
+    "reference off the axis": "the reference point of its axis lies next to the axis: the error moves the tool sideways too"}
 
 
 def check_text(file: str, found: dict[str, Any]) -> str:
@@ -113,7 +117,7 @@ def screw_figures(model: ErrorModel, screws: Screws, names: dict[str, str], lost
               f"{before[0]:.2f} um, {left[0]:.2f} um after; axis {before[1]:.2f} arcsec, {left[1]:.2f} arcsec after"]
     if model.covariance is not None:
         noted.append("lost: the covariance of what these files hold, as they have no place for it; a --rest keeps its own")
-    noted += [f"{name} is left: {why}" for name, why in screws.left.items()]
+    noted += [f"{name} is left: {_NOT_OF_JOINT[why]}" for name, why in screws.left.items()]
     return {"losses": lost, "worst_tip_um": [before[0], left[0]], "worst_axis_arcsec": [before[1], left[1]]}, noted
 
 

@@ -1,4 +1,4 @@
-"""What every command has: the option that raises the size of the files it reads."""
+"""What every command has: help as usage lines are written, and the option that raises the size of the files it reads."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from shutil import get_terminal_size
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperArgument, TyperGroup, TyperOption
 
 MaxFileSize = Annotated[float | None, typer.Option("--max-file-size", metavar="MB", min=0.001, max=1e9, is_eager=True,
                                                    callback=lambda context, value: _hold(context, value),
@@ -24,6 +24,31 @@ def width() -> int:
     return get_terminal_size((PIPE, 24)).columns if sys.stdout.isatty() else PIPE
 
 
+ORDER = ("convert", "verify", "inspect", "trace", "time", "orient", "place", "calibrate", "errors", "machine", "controller",
+         "setup")
+"""commands as the help lists them, the first ones first; others follow"""
+
+
+class Argument(TyperArgument):
+    """A file or name as usage lines have it, FILE, without typer's braces and names of types."""
+
+    def get_usage_pieces(self, ctx: object) -> list[str]:
+        """The name; in brackets where it may be left out."""
+        return [self.display_name_raw if self.required else f"[{self.display_name_raw}]"]
+
+    def display_type_rich(self, ctx: object) -> None:
+        """Nothing: the text says what it is."""
+
+
+class Option(TyperOption):
+    """An option whose range is written as `1 to 300`."""
+
+    def _get_number_range_help_str(self) -> str | None:
+        if self.min is None or self.max is None:
+            return None if self.min is None else f"at least {self.min:g}"
+        return f"{self.min:g} to {self.max:g}"
+
+
 class Group(TyperGroup):
     """Commands with the option, each of them; help in the width of the terminal."""
 
@@ -33,6 +58,21 @@ class Group(TyperGroup):
         for command in self.commands.values():
             if not isinstance(command, TyperGroup):
                 command.params.append(_option())
+                for param in command.params:
+                    _plainly(param)
+
+    def list_commands(self, ctx: object) -> list[str]:
+        """Names in the order of the journey."""
+        return sorted(self.commands, key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER))
+
+
+def _plainly(param: object) -> None:
+    """Let typer write it as above."""
+    if isinstance(param, TyperArgument):
+        param.metavar = param.metavar or param.name.upper()
+        param.__class__ = Argument
+    elif isinstance(param, TyperOption):
+        param.__class__ = Option
 
 
 def _hold(context: typer.Context, value: float | None) -> None:

@@ -86,7 +86,7 @@ class FeedRules(UserModel):
     least_inverse_rate: float = Field(default=0.0, ge=0.0)
     """mm/min below which inverse time runs X, Y, Z faster than asked (LinuxCNC 0.1)"""
     length: Literal["xyz-first", "all", "geometry"] = "xyz-first"
-    """what a feed per minute refers to where X, Y, Z are axis positions: X, Y, Z before rotary axes, all axes
+    """what a feed per minute refers to where X, Y, Z are machine coordinates: X, Y, Z before rotary axes, all axes
     alike, or the geometry axes before all others"""
     arc_inverse: Literal["length", "radius", "refuse"] = "length"
     """inverse time in arcs: speed by length, speed by radius, or not allowed"""
@@ -108,7 +108,7 @@ class InterpolationRules(UserModel):
     """Which motion lies between two blocks."""
 
     linear: Literal["joints"] = "joints"
-    """straight in the joints, where words are axis positions"""
+    """straight in the joints, where words are machine coordinates"""
     rapids: Literal["straight", "dog-leg"] = "straight"
     """dog-leg: every axis at its own rapid speed, so that the tool leaves the straight line"""
     modules: bool = False
@@ -213,7 +213,7 @@ class TiltedMode(Mode):
 
 
 class Modes(UserModel):
-    """Output modes next to axis positions."""
+    """Output modes next to machine coordinates."""
 
     tcp: TcpMode | None = None
     """tool-centre-point mode"""

@@ -15,7 +15,7 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
     """The writer that the controller file names.
 
     Args:
-        length_offsets: axis positions of Z are less the tool's length, which a register of the control adds
+        length_offsets: machine coordinates of Z are less the tool's length, which a register of the control adds
         smoothing, axis_smoothing: mm and degrees left to the controller's own smoothing
         work_offset: the set-up's code, G54 to G59.3
         name: of the program, where the controller's programs hold one
