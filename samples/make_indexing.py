@@ -107,7 +107,8 @@ def text_of(run_options: SpellingOptions) -> str:
     return "\n".join([*lines, f"ROTATE / AAXIS, INCR, {last:.3f}, CCLW", "FINI"]) + "\n"
 
 
-FILES = {"creo_rotate.ncl": lambda: text_of(SpellingOptions()), "creo_rotate_multax.ncl": lambda: text_of(SpellingOptions(multax=True)),
+FILES = {"creo_rotate.ncl": lambda: text_of(SpellingOptions()),
+         "creo_rotate_multax.ncl": lambda: text_of(SpellingOptions(multax=True)),
          "indexing.setup.toml": lambda: SETUP}
 
 

@@ -30,6 +30,8 @@ class ArcRules(UserModel):
     """mm; larger arcs are written as lines"""
     helix_planes: tuple[Literal[17, 18, 19], ...] = (17, 18, 19)
     """planes in which an arc may move along the third axis too"""
+    helix_by_angle: bool = False
+    """helices state the angle that they sweep, not their end (Klartext CP IPA): its last decimal moves the end"""
     start: tuple[str, ...] = ()
     """blocks of the safe start in programs that hold arcs in G18 or G19"""
 
@@ -70,6 +72,11 @@ class Cycles(UserModel):
     """kinds that must not become single moves, next to those that never do"""
     dwell_milliseconds: bool = False
     """the dwell of a cycle is a whole number of ms, else s"""
+    rises_first: bool = False
+    """before a hole that ends at the first level of its sequence, a tool that stands at the plane of the hole is brought to
+    that level on the path there (RS274/NGC)"""
+    plane_at_start: bool = False
+    """cycles return to the R plane until the program states the level (LinuxCNC when it is switched on)"""
     peck_relief: float = Field(default=0.254, ge=0.0)
     """mm before the last depth to which the tool returns rapidly"""
 

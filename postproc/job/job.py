@@ -151,10 +151,10 @@ class Job:
 
     @cached_property
     def rounding(self) -> Rounding:
-        """What the rounding of the words may cost, helices by angle (Klartext) counted besides."""
+        """What the rounding of the words may cost, with that of the angles of helices."""
         found = rounding_bound(self.control, self.kinematics(int(self.moves.tool[0])), self.moves,
                                decimals(self.control, self.controller), self.modes.cutting_laws(), self.options.tolerance)
-        if self.controller.writer != "heidenhain" or not self.controller.arcs.enabled:
+        if not (self.controller.arcs.enabled and self.controller.arcs.helix_by_angle):
             return found
         places = self.controller.format
         return replace(found, tip=found.tip + helix_bound(self.moves, 10.0 ** -places.linear_decimals,
