@@ -17,6 +17,8 @@ from toolpaths.diagnostics import Diagnostic
 Worded = Annotated[str, placeholders("letter", "value")]
 
 
+WriterName = Literal["iso", "linuxcnc", "fanuc", "haas", "siemens", "heidenhain"]
+"""dialects: each has a writer, a reader and a form of tool tables"""
 LengthState = Literal["any", "off", "on"]
 """whether the length register is in force where a mode begins"""
 
@@ -251,7 +253,7 @@ class ControllerFile(UserModel):
 
     description: str
     """one line for people"""
-    writer: Literal["iso", "linuxcnc", "fanuc", "haas", "siemens", "heidenhain"] = "iso"
+    writer: WriterName = "iso"
     """class that adds what data cannot say"""
     sources: tuple[str, ...] = ()
     """documents that the rules come from"""

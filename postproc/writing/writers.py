@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from postproc.compile.program import Program
-from postproc.controllers.model import ControllerFile
+from postproc.controllers.model import ControllerFile, WriterName
 from postproc.writing.writer import Writer
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
@@ -29,7 +29,8 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
     from postproc.writing.linuxcnc import LinuxcncWriter
     from postproc.writing.siemens import SiemensWriter
 
-    writers: dict[str, type[Writer]] = {"iso": IsoWriter, "linuxcnc": LinuxcncWriter, "fanuc": FanucWriter,
-                                        "haas": HaasWriter, "siemens": SiemensWriter, "heidenhain": KlartextWriter}
+    writers: dict[WriterName, type[Writer]] = {
+        "iso": IsoWriter, "linuxcnc": LinuxcncWriter, "fanuc": FanucWriter, "haas": HaasWriter, "siemens": SiemensWriter,
+        "heidenhain": KlartextWriter}
     return writers[controller.writer](controller, program, cycles, length_offsets, smoothing, work_offset, axis_smoothing,
                                       name, subprograms, stock)
