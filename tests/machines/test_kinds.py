@@ -32,7 +32,7 @@ def only(tmp_path: Path, text: str = GOOD) -> object:
 def test_an_unknown_kind_lists_what_is_registered(tmp_path, monkeypatch) -> None:
     monkeypatch.delenv(kinds.FILES, raising=False)
     fault = only(tmp_path)
-    assert fault.code == "machine.kind" and "registered are serial, linear-delta, h4-linear" in fault.message
+    assert fault.code == "machine.kind" and f"registered are {', '.join(kinds.BUILT_IN)}" in fault.message
     assert kinds.GROUP in fault.hint and kinds.FILES in fault.hint
     monkeypatch.setenv(kinds.FILES, str(SAMPLE))  # what the hint says
     assert machines.load(tmp_path / "m.toml").structure == "scissors"
