@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -55,6 +55,7 @@ from toolpaths.choices import FieldEnding, GivenDialect, GivenUnit
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
+    from postproc.base.progress import Progress
     from postproc.pipeline.result import PostResult
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
@@ -66,7 +67,8 @@ app.add_typer(machine_app, name="machine")
 app.add_typer(setup_app, name="setup")
 app.add_typer(controller_app, name="controller")
 app.add_typer(errors_app, name="errors")
-app.command(epilog="Example: postproc calibrate reversal.toml -o errors.toml")(calibrate)
+app.command(short_help="Identify a machine's errors from measurements, each with its uncertainty.",
+            epilog="Example: postproc calibrate reversal.toml -o errors.toml")(calibrate)
 app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc")(time)
 app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog=PLACES)(place)
@@ -290,7 +292,7 @@ def _options(tolerance: float, axis_tolerance: float, feed_mode: FeedModeChoice,
                    tuple(w.upper() for w in allow_unknown or ()))
 
 
-def _read(file: Path, options: Options, progress: Any) -> tuple[Toolpath, list[Diagnostic]]:
+def _read(file: Path, options: Options, progress: Progress) -> tuple[Toolpath, list[Diagnostic]]:
     import toolpaths
 
     no_program(file)

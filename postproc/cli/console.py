@@ -13,6 +13,8 @@ from postproc.cli.says import SAYS
 
 if TYPE_CHECKING:
     from machines.machine import Machine
+    from postproc.base.progress import Progress
+    from postproc.controllers.model import ControllerFile
     from toolpaths.diagnostics import Diagnostic, Severity
 
 Json = Annotated[str, typer.Option("--json", metavar="FILE", help="write the figures as JSON; - for standard output")]
@@ -38,7 +40,7 @@ def controller_of(name: str) -> str:
     return name
 
 
-def controller_file(name: str) -> Any:
+def controller_file(name: str) -> ControllerFile:
     """The controller of a name or a file.
 
     Raises:
@@ -81,7 +83,7 @@ def shown_errors(json: str) -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar() -> Iterator[Any]:
+def progress_bar() -> Iterator[Progress]:
     """A bar on standard error for long work; silent where that is no terminal."""
     import sys
 
@@ -93,9 +95,9 @@ def progress_bar() -> Iterator[Any]:
         yield lambda stage, at, total: None
         return
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import Progress as Bar
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    with Bar(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("")
         yield lambda stage, at, total: bar.update(task, description=stage, completed=at, total=total)
 

@@ -1,4 +1,5 @@
-"""What every command has: options on the size of input files, on how much is said, on warnings; defaults of the job file."""
+"""What every command has: help as usage lines are written, options on the size of input files, on how much is said, on
+warnings; defaults of the job file."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from shutil import get_terminal_size
 from typing import Annotated, Any, Literal
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperArgument, TyperGroup, TyperOption
 
 from postproc.cli.job_defaults import given_defaults
 from postproc.cli.says import SAYS
@@ -34,6 +35,31 @@ def width() -> int:
     return get_terminal_size((PIPE, 24)).columns if sys.stdout.isatty() else PIPE
 
 
+ORDER = ("convert", "verify", "inspect", "trace", "time", "orient", "place", "calibrate", "errors", "machine", "controller",
+         "setup")
+"""commands as the help lists them, the first ones first; others follow"""
+
+
+class Argument(TyperArgument):
+    """A file or name as usage lines have it, FILE, without typer's braces and names of types."""
+
+    def get_usage_pieces(self, ctx: object) -> list[str]:
+        """The name; in brackets where it may be left out."""
+        return [self.display_name_raw if self.required else f"[{self.display_name_raw}]"]
+
+    def display_type_rich(self, ctx: object) -> None:
+        """Nothing: the text says what it is."""
+
+
+class Option(TyperOption):
+    """An option whose range is written as `1 to 300`."""
+
+    def _get_number_range_help_str(self) -> str | None:
+        if self.min is None or self.max is None:
+            return None if self.min is None else f"at least {self.min:g}"
+        return f"{self.min:g} to {self.max:g}"
+
+
 class Group(TyperGroup):
     """Commands with the option, each of them; help in the width of the terminal."""
 
@@ -43,6 +69,8 @@ class Group(TyperGroup):
         for command in self.commands.values():
             if not isinstance(command, TyperGroup):
                 command.params += _options()
+                for param in command.params:
+                    _plainly(param)
 
     def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]  # of click's own
         """The command, with the defaults of the job file."""
@@ -50,6 +78,19 @@ class Group(TyperGroup):
         if command is not None and not isinstance(command, TyperGroup):
             given_defaults(command, rest, ctx)
         return name, command, rest
+
+    def list_commands(self, ctx: object) -> list[str]:
+        """Names in the order of the journey."""
+        return sorted(self.commands, key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER))
+
+
+def _plainly(param: object) -> None:
+    """Let typer write it as above."""
+    if isinstance(param, TyperArgument):
+        param.metavar = param.metavar or param.name.upper()
+        param.__class__ = Argument
+    elif isinstance(param, TyperOption):
+        param.__class__ = Option
 
 
 def _hold(context: typer.Context, value: float | None) -> None:

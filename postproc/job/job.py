@@ -156,10 +156,10 @@ class Job:
 
     @cached_property
     def rounding(self) -> Rounding:
-        """What the rounding of the words may cost, helices by angle (Klartext) counted besides."""
+        """What the rounding of the words may cost, with that of the angles of helices."""
         found = rounding_bound(self.control, self.kinematics(int(self.moves.tool[0])), self.moves,
                                decimals(self.control, self.controller), self.modes.cutting_laws(), self.options.tolerance)
-        if self.controller.writer != "heidenhain" or not self.controller.arcs.enabled:
+        if not (self.controller.arcs.enabled and self.controller.arcs.helix_by_angle):
             return found
         places = self.controller.format
         return replace(found, tip=found.tip + helix_bound(self.moves, 10.0 ** -places.linear_decimals,
@@ -282,14 +282,14 @@ def _program_number(toolpath: Toolpath, controller: ControllerFile, setup: Setup
 def _measured(control: Control, controller: ControllerFile, axis: Floats, setup: SetupFile,
               options: Options) -> list[Diagnostic]:
     """Where a tool cannot be measured into the work offset: its length stands along Z of the words only where
-    every rotary axis carries the part and the words are axis positions, and where the control adds none of its own."""
+    every rotary axis carries the part and the words are machine coordinates, and where the control adds none of its own."""
     if setup.output.tool_call:
         return []
     name = control.machine.name
     if control.base == "tcp":
         why = f"the control runs the kinematics of {name} and needs the length of the tool"
     elif words_depend_on_length(control, control.machine.kinematics, axis) or not control.length_on_z:
-        why = f"on {name} the axis positions depend on the tool's length in other directions than Z"
+        why = f"on {name} the machine coordinates depend on the tool's length in other directions than Z"
     elif controller.keeps_length:
         why = "this control adds the length of the tool in the spindle by itself"
     else:
@@ -355,8 +355,8 @@ def _tool_lengths(job: Job) -> list[Diagnostic]:
     names = ", ".join(f"T{n}" for n in missing)
     hint = "add to the set-up: " + ", ".join(f"[tools.{n}] gauge_length = ..." for n in missing[:6])
     if words_depend_on_length(job.control, job.machine.kinematics, job.moves.axis):
-        return [error("tool.length", f"no gauge length for {names}: on {job.machine.name} the axis positions depend on it",
-                      file=job.toolpath.file, hint=hint)]
+        return [error("tool.length", f"no gauge length for {names}: on {job.machine.name} the machine coordinates depend on "
+                      "it", file=job.toolpath.file, hint=hint)]
     return [warning("tool.length", f"no gauge length for {names}: travel is checked as if it were 0", hint=hint,
                     file=job.toolpath.file)]
 

@@ -9,6 +9,7 @@ import numpy as np
 from postproc.base.header_words import LENGTHS_PENDING, PENDING, corrected_by_control, corrected_here, feeds_line, model_mark
 from postproc.base.version import VERSION
 from postproc.compile.program import Program
+from postproc.control.control import MODE_NAMES
 from postproc.control.modes import table_axes
 from postproc.job.job import Job
 from postproc.pipeline.stage_values import CompiledStage
@@ -107,6 +108,4 @@ def _corrections(made: CompiledStage) -> list[str]:
 
 def _meanings(program: Program) -> str:
     """What the words of a program mean, in order of first use."""
-    names = {"axes": "machine coordinates without RTCP", "tcp": "tool-centre-point control",
-             "tilted": "tilted work planes"}
-    return ", ".join(dict.fromkeys(names[section.law] for section in program.sections))
+    return ", ".join(dict.fromkeys(MODE_NAMES[section.law] for section in program.sections))

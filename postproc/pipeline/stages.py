@@ -6,10 +6,11 @@ Each stage is a pure function: what the one before has handed on, and progress, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path as FilePath
 from typing import Any
 
+from postproc.base.progress import Progress
 from postproc.compile.compile import compile_program, writing_of
 from postproc.compile.cycle_refusals import only_canned
 from postproc.compile.feed import PlannedTimes as PlannedFeeds
@@ -25,7 +26,7 @@ from postproc.path.turn_steps import with_short_turns
 from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.program_header import header_lines
 from postproc.pipeline.program_lines import cl_lines
-from postproc.pipeline.result import PostResult, StageName, shared_fields
+from postproc.pipeline.result import PostResult, StageName
 from postproc.pipeline.smoothed_stages import ExcludedPasses, written_moves
 from postproc.pipeline.stage_values import (
     BegunStage,
@@ -58,7 +59,6 @@ from postproc.writing.writers import writer_for
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.units import DEG
 
-Progress = Callable[[str, int, int], None]
 DiagnosticList = list[Diagnostic]
 _STRETCH = 1_000_000
 """characters of a program that are looked at together"""
@@ -80,7 +80,9 @@ class Stage:
 def staged(result: PostResult, progress: Progress | None = None,
            left: ExcludedPasses = frozenset()) -> PostResult:
     """A conversion through all stages, up to the first that finds an error; `left`: passes that --smooth leaves."""
-    made: Any = BegunStage(**shared_fields(BegunStage, result), left=left)
+    made: Any = BegunStage(result.options, result.machine, result.controller, result.controller_name, result.setup,
+                           result.diagnostics, result.toolpath, result.choice, result.source, result.asked, left,
+                           result.refused)
     for stage in STAGES:
         made, found = stage.run(made, progress)
         result = replace(_recorded(result, made, found), reached=stage.name)
@@ -92,8 +94,8 @@ def staged(result: PostResult, progress: Progress | None = None,
 
 def _recorded(result: PostResult, made: BegunStage, found: DiagnosticList) -> PostResult:
     """With what a stage has handed on; the text only stands in it at the end."""
-    known = shared_fields(PostResult, made)
-    return result.with_found(found, **{name: known[name] for name in known.keys() - {"text", "files", "diagnostics"}})
+    known = {one.name for one in fields(result)} - {"text", "files", "diagnostics"}
+    return replace(result.with_found(found), **{name: value for name, value in vars(made).items() if name in known})
 
 
 def prepared(begun: BegunStage, progress: Progress | None) -> tuple[BegunStage | PreparedStage, DiagnosticList]:

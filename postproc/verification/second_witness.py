@@ -105,7 +105,7 @@ def error_tables(file: str | Path) -> tuple[dict[str, Any], dict[str, bytes]]:
 
 
 def offset_joints(control: Control) -> Floats | None:
-    """(J,) joints of the program's zero; None where words are no axis positions by it, or it holds a tool's length."""
+    """(J,) joints of the program's zero; None where words are no machine coordinates by it, or it holds a tool's length."""
     if control.base == "tcp" or control.measured or not control.machine.kinematics.straight_slides:
         return None
     return np.asarray(control.work_offset / _units(control.machine.axis_names))

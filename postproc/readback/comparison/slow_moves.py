@@ -156,7 +156,7 @@ def feed_rounding(motion: Motion, job: Job, owner: Ints, cutting: Bools, moves: 
     least = np.full(moves + 1, np.inf)
     rows = np.flatnonzero(cutting & (motion.feed > 0.0))
     np.minimum.at(least, owner[rows], motion.feed[rows])
-    places = job.controller.format.feed_decimals + 2 * (least < 1.0) * (job.controller.writer != "heidenhain")
+    places = job.controller.format.feed_decimals + job.controller.format.small_feed_decimals * (least < 1.0)
     return np.asarray(10.0**-places.astype(np.float64) / least)[:-1]
 
 
