@@ -98,11 +98,12 @@ class Program:
 
     Attributes:
         letters: the axis words, the order of the columns of `words`
-        words (K, J): end positions, mm and degrees, already rounded to the controller's decimals; positions
-            of `home` (K,) blocks are machine coordinates
+        words (K, J): end positions, mm and degrees, already rounded to the controller's decimals, those of
+            inches in a program in inches; positions of `home` (K,) blocks are machine coordinates
         write (K, J): words that the block states
         code (K,): 0 STRAIGHT_TRAVERSE, 1 STRAIGHT_FEED, 2 ARC_FEED
-        feed (K,): mm/min or deg/min, or 1/min where mode is INVERSE; NaN for traverses
+        feed (K,): F as it is written: mm, inches (or parts of them) or degrees per minute, or 1/min where mode
+            is INVERSE; NaN for traverses
         mode (K,): PER_MINUTE or INVERSE
         plane, ccw, center: of the arcs; center (K, 3) is relative to the block's start, mm
         row (K,): row of the Toolpath; line (K,): CL line; link (K,): True for linking blocks

@@ -10,9 +10,20 @@ from pydantic import Field
 
 from machines.choices import RolloverRule, Stop
 from machines.user_file import UserModel, load_toml
-from postproc.controllers.spelling import Codes, Comment, Format, ProgramBlocks, SubprogramFormat, Tools
+from postproc.base.length_text import INCH, MM, LengthText
+from postproc.controllers.spelling import (
+    Codes,
+    Comment,
+    Format,
+    InchFormat,
+    ProgramBlocks,
+    SubprogramFormat,
+    Tools,
+    Units,
+)
 from postproc.controllers.texts import CYCLE_VALUES, placeholders
 from toolpaths.diagnostics import Diagnostic
+from toolpaths.units import MM_PER_INCH
 
 Worded = Annotated[str, placeholders("letter", "value")]
 
@@ -249,6 +260,10 @@ class ControllerFile(UserModel):
     sources: tuple[str, ...] = ()
     """documents that the rules come from"""
     format: Format = Format()
+    units: Units = Units()
+    """the words that state mm or inches"""
+    inch: InchFormat = InchFormat()
+    """what is different in a program in inches"""
     comment: Comment = Comment()
     program: ProgramBlocks = ProgramBlocks()
     start: Start = Start()
@@ -283,6 +298,44 @@ class ControllerFile(UserModel):
             return self
         more = {"passive": tuple(dict.fromkeys((*self.program.passive, *passive))), "number": number or self.program.number}
         return self.model_copy(update={"program": self.program.model_copy(update=more)})
+
+    def in_units(self, units: Literal["mm", "inch"] | None) -> ControllerFile:
+        """The controller that writes lengths and feeds in the units asked for, else in its own."""
+        units = units or self.format.units
+        style: dict[str, object] = {"units": units}
+        if units == "inch":
+            style |= {"linear_decimals": self.inch.linear_decimals, "feed_decimals": self.inch.feed_decimals}
+        return self.model_copy(update={"format": self.format.model_copy(update=style)})
+
+    @property
+    def unit(self) -> float:
+        """mm of a unit of length in programs: 25.4 in inches."""
+        return MM_PER_INCH if self.format.units == "inch" else 1.0
+
+    @property
+    def lengths(self) -> LengthText:
+        """How the head of a program says lengths."""
+        return INCH if self.format.units == "inch" else MM
+
+    @property
+    def grain(self) -> float:
+        """mm of the last decimal of a length."""
+        return self.unit * 10.0 ** -self.format.linear_decimals
+
+    @property
+    def feed_unit(self) -> float:
+        """mm/min of F1."""
+        return MM_PER_INCH / self.inch.feed_parts if self.format.units == "inch" else 1.0
+
+    @property
+    def degree_is_inch(self) -> bool:
+        """True where degrees count as inches in a feed that refers to all axes."""
+        return self.format.units == "inch" and self.inch.degree == "inch"
+
+    @property
+    def units_word(self) -> str:
+        """The word that states the units of the program."""
+        return self.units.inch if self.format.units == "inch" else self.units.mm
 
     def divided(self, files: bool) -> ControllerFile:
         """The controller that writes operations into files of their own, where that is asked for."""

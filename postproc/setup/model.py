@@ -86,6 +86,9 @@ class ToolSetup(ToolBody):
 class OutputSettings(UserModel):
     """What the words of the program mean, and how it is divided."""
 
+    units: Literal["mm", "inch"] | None = None
+    """of lengths and feeds in the program: coordinates, arcs, cycles, pitches, planes, header and proof; default: as the
+    controller file has them ([format] units), mm. Angles, and feeds of rotary axes alone, stay degrees"""
     default: OutputMode = "auto"
     """axes: machine coordinates; tcp: tool-centre-point control; tilted: the tip in a tilted work plane,
     rotary axes standing still; auto: the best that controller and machine can. --output-mode goes before it"""

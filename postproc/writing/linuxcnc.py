@@ -22,5 +22,5 @@ class LinuxcncWriter(IsoWriter):
         """G64 P (blending) and Q (merging of short lines); both add up to the share (measured: Q adds to P)."""
         if self.smoothing <= 0.0:
             return []
-        blend, chain = self.plain(self.smoothing * 2.0 / 3.0), self.plain(self.smoothing / 3.0)
+        blend, chain = self.share(self.smoothing * 2.0 / 3.0), self.share(self.smoothing / 3.0)
         return [block.format(tolerance=blend, chain=chain, axis="0") for block in self.controller.program.path_tolerance]

@@ -11,7 +11,8 @@ import numpy as np
 
 from postproc.compile.program import PER_MINUTE, Hole, Program, Section
 from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
-from toolpaths.arrays import Floats
+from postproc.controllers.texts import CYCLE_LENGTHS
+from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Cycle
 
 
@@ -38,6 +39,7 @@ class WriterState:
         self.offset_needs = controller.program.offset_needs(work_offset)
         self.offset_name = controller.program.offset_name(work_offset)
         self.name = "".join(c if c.isascii() and c.isalnum() else "_" for c in name).upper()[:24] or "PROGRAM"
+        self.units = controller.units_word
         self.subprograms = subprograms and bool(controller.subprograms.call)
         self.files: dict[str, list[str]] = {}
         self.space = " " if controller.format.space else ""
@@ -52,6 +54,10 @@ class WriterState:
         self.taken: set[int] = set()
         self.ahead: tuple[int, list[str]] = (0, [])
         self.restate()
+
+    def named(self, number: int | str) -> dict[str, int | str]:
+        """What the text of a frame or a subprogram may name."""
+        return {"name": self.name, "number": number, "units": self.units}
 
     def restate(self) -> None:
         """State motion code and feed with the next block."""
@@ -77,6 +83,21 @@ class WriterState:
 
     # ---- numbers -------------------------------------------------------------------------------------------
 
+    def lengths(self, values: Floats) -> list[str]:
+        """Lengths, mm, as text in the units of the program."""
+        return self.number_text(values / self.controller.unit, self.controller.format.linear_decimals)
+
+    def stated(self, axis: int, rows: Ints | int) -> Floats:
+        """Words of an axis in blocks, in the units of the program."""
+        values = self.program.words[np.atleast_1d(rows), axis]
+        return values if self.program.letters[axis] in "ABC" else np.asarray(values / self.controller.unit)
+
+    def share(self, length: float) -> str:
+        """A length that the control's smoothing may take, mm, in the units of the program, rounded down in inches."""
+        if self.controller.unit == 1.0:
+            return self.plain(length)
+        return self.plain(math.floor(length / self.controller.unit * SHARE + 1e-6) / SHARE)
+
     def number_text(self, values: Floats, places: int) -> list[str]:
         """Numbers as text, rounded to `places`, -0 as 0; all at once, which is much faster than one by one."""
         style = self.controller.format
@@ -90,7 +111,7 @@ class WriterState:
         return _MINUS_ZERO.sub(f"{sign}0", text).split()
 
     def hole_feed(self, hole: Hole) -> float:
-        """Feed of drilling down in a hole, mm/min; that of a tap keeps the pitch at the speed that is written."""
+        """Feed of drilling down in a hole, as F states it; that of a tap keeps the pitch at the speed that is written."""
         return float(self.program.feed[hole.drill]) * (self.rounded if hole.key.startswith("TAP") else 1.0)
 
     def spindle_speed(self, asked: float) -> float:
@@ -106,15 +127,21 @@ class WriterState:
         return (cycles.with_dwell if self.cycles[hole.cycle].dwell > 0.0 else cycles.table)[hole.key]
 
     def cycle_values(self, hole: Hole) -> dict[str, float]:
-        """The values that the text of a cycle may name (`CYCLE_VALUES`)."""
+        """The values that the text of a cycle may name (`CYCLE_VALUES`), lengths in the units of the program."""
+        values = self._cycle_values(hole)
+        return {name: value / self.controller.unit if name in CYCLE_LENGTHS else value for name, value in values.items()}
+
+    def _cycle_values(self, hole: Hole) -> dict[str, float]:
+        """The same in mm; the feed as F states it."""
         cycle, feed = self.cycles[hole.cycle], self.hole_feed(hole)
         surface = hole.plane_level - cycle.clearance
         depth, step = surface - hole.bottom, min(peck_of(cycle), surface - hole.bottom)
-        pitch = cycle.pitch or (feed / abs(self.speed) if self.speed else 0.0)
+        pitch = cycle.pitch or (feed * self.controller.feed_unit / abs(self.speed) if self.speed else 0.0)
         return {"retract": hole.retract, "surface": surface, "clearance": cycle.clearance, "bottom": hole.bottom,
                 "depth": depth, "level": -depth, "step": step, "breaks": float(math.ceil(depth / step)),
-                "dwell": cycle.dwell, "feed": feed, "pitch": -pitch if hole.key == "TAP_LEFT" else pitch,
-                "speed": abs(self.speed), "second": hole.retract - surface}
+                "relief": self.controller.cycles.peck_relief, "dwell": cycle.dwell, "feed": feed,
+                "pitch": -pitch if hole.key == "TAP_LEFT" else pitch, "speed": abs(self.speed),
+                "second": hole.retract - surface}
 
     @staticmethod
     def plain(value: float | str) -> str:
@@ -179,6 +206,8 @@ class WriterState:
         return {"register": self.register, "work_offset": self.work_offset, "direction": direction, **angles}
 
 
+SHARE = 1e6
+"""steps in an inch that a share of the tolerance is rounded down to"""
 SPEED_DIGITS = 3
 """decimals of a speed from 1 to 10; one less each time that it is ten times as great"""
 _ZEROS = re.compile(r"0+ ")

@@ -57,7 +57,7 @@ class Writer(WriterState, ABC):
     def lines(self, header: list[str]) -> Iterator[str]:
         """The blocks of the whole program, without line ends; subprograms of files of their own go into `files`."""
         frame, place = self.controller.program, self.controller.subprograms.place
-        named = {"name": self.name, "number": f"{frame.number:04d}"}
+        named = self.named(f"{frame.number:04d}")
         main, subs = self.sorted_blocks()
         inside = [block for blocks in subs.values() for block in blocks] if place != "files" else []
         yield from (self.framed(block.format(**named)) for block in frame.begin)
@@ -78,8 +78,7 @@ class Writer(WriterState, ABC):
         """The stock for the graphics of the control, where it is known and the control has blocks for it."""
         if self.stock is None or not self.controller.program.stock:
             return []
-        texts = self.number_text(self.stock.ravel(), self.controller.format.linear_decimals)
-        values = dict(zip(("x0", "y0", "z0", "x1", "y1", "z1"), texts, strict=True))
+        values = dict(zip(("x0", "y0", "z0", "x1", "y1", "z1"), self.lengths(self.stock.ravel()), strict=True))
         return [block.format(**values) for block in self.controller.program.stock]
 
     def sorted_blocks(self) -> tuple[Iterable[str], dict[int, list[str]]]:
@@ -93,12 +92,12 @@ class Writer(WriterState, ABC):
             if block != MARK:
                 into.append(block)
                 continue
-            named = {"name": self.name, "number": 1001 + len(subs)}
-            self.taken.add(1001 + len(subs))
+            named = self.named(number := 1001 + len(subs))
+            self.taken.add(number)
             main.append(spec.call.format(**named))
-            into = subs[1001 + len(subs)] = [text.format(**named) for text in spec.begin]
+            into = subs[number] = [text.format(**named) for text in spec.begin]
         for number, blocks in subs.items():
-            blocks += [text.format(name=self.name, number=number) for text in spec.end]
+            blocks += [text.format(**self.named(number)) for text in spec.end]
         return main, subs
 
     @property
@@ -130,7 +129,7 @@ class Writer(WriterState, ABC):
         if (self.program.plane[self.program.code == 2] > 17).any():
             yield from self.controller.arcs.start
         for block in self.controller.program.preamble:
-            yield from blocks_of(block.replace("{work_offset}", self.work_offset))
+            yield from blocks_of(block.replace("{work_offset}", self.work_offset).replace("{units}", self.units))
 
     def used_modes(self) -> list[Mode]:
         """The modes of the program's sections."""
@@ -141,6 +140,7 @@ class Writer(WriterState, ABC):
     def relies_on(self) -> list[str]:
         """Settings of the control that the program needs, each once."""
         needed = [self.offset_needs] if self.offset_needs else []
+        needed += self.controller.inch.relies_on if self.controller.format.units == "inch" else ()
         needed += [text for mode in self.used_modes() for text in mode.relies_on]
         letters, text = self.beyond_a_turn(), self.controller.program.relies_on_turns
         needed += [text.format(axes=" ".join(letters))] if letters and text else []
@@ -161,7 +161,7 @@ class Writer(WriterState, ABC):
         blocks = self.controller.program.path_tolerance
         if self.smoothing <= 0.0 and any("{" in block for block in blocks):
             return []
-        values = {"tolerance": self.plain(self.smoothing), "chain": "", "axis": self.plain(self.axis_smoothing)}
+        values = {"tolerance": self.share(self.smoothing), "chain": "", "axis": self.plain(self.axis_smoothing)}
         return [block.format(**values) for block in blocks]
 
     def numbered(self, block: str) -> str:
@@ -227,7 +227,7 @@ class Writer(WriterState, ABC):
             rows = np.flatnonzero(p.write[at:stop, j])
             column = [""] * (stop - at)
             texts = self.rolled(j, at + rows) if j in p.rolls else [
-                letter + text for text in self.number_text(p.words[at + rows, j], int(p.decimals[j]))]
+                letter + text for text in self.number_text(self.stated(j, at + rows), int(p.decimals[j]))]
             for row, text in zip(rows.tolist(), texts, strict=True):
                 column[row] = self.space + text
             columns.append(column)

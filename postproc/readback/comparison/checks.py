@@ -12,7 +12,6 @@ from postproc.readback.comparison.faults import Faults
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinates
-from postproc.readback.execution.rows import INCH
 from postproc.reference.holes import PECKING, Phase
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
@@ -218,19 +217,18 @@ def _seconds(motion: Motion, control: Control, by_radius: bool, rows: Ints, swee
     """Those of the blocks `rows` (K,), whose sweeps are `sweep` (K,)."""
     before, end = coordinates(motion, rows)
     step = end - before
-    length = control.feed_length(step)
+    unit = motion.unit[rows]
+    length = control.feed_units(step, unit)
     tips = np.flatnonzero(motion.frame[rows] > 0)
     if len(tips):
-        length[tips] = control.under("tcp").feed_length(np.where(np.abs(step[tips]) > STILL, step[tips], 0.0))
+        length[tips] = control.under("tcp").feed_units(np.where(np.abs(step[tips]) > STILL, step[tips], 0.0), unit[tips])
     for plane, (i, j) in PLANE_COLUMNS.items():
         k = np.flatnonzero(np.isfinite(sweep) & (motion.plane[rows] == plane))
         if len(k):
             columns = [int(control.xyz[i]), int(control.xyz[j])]
             radius = np.linalg.norm(before[k][:, columns] - motion.center[rows[k]][:, (i, j)], axis=1)
             rise = step[k, int(control.xyz[3 - i - j])]
-            length[k] = np.hypot(radius * sweep[k], rise)
-    linear = np.isfinite(sweep) | (step[:, control.slides] != 0.0).any(axis=1)
-    length = np.where(motion.inch[rows] & linear, length / INCH, length)
+            length[k] = np.hypot(radius * sweep[k], rise) / unit[k]
     share = np.where(np.isfinite(sweep), sweep, 1.0) if by_radius else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
         feed = motion.feed[rows]
