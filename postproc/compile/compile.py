@@ -16,6 +16,7 @@ from postproc.compile.hooks import with_hooks
 from postproc.compile.long_turns import long_turns, standing_unsaid, without_standing
 from postproc.compile.program import Command, Commands, Hole, Program
 from postproc.compile.sections import sections_of, with_sections
+from postproc.compile.smoothing import with_smoothing
 from postproc.compile.word_rows import WordRows, block_tools, joints_of, with_turns, word_rows
 from postproc.job.job import Job
 from postproc.path.model import ARC, JointPath
@@ -58,6 +59,7 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                       placed, kept_holes, job.grid.places, sections, skip[keep], control.rolls,
                       control.machine.home * control.unit)
     found += long_turns(program, toolpath.file)
+    program = with_smoothing(program, job.smoothing, toolpath)
     program = with_clamps(program, control.machine, controller.plane_turns)
     program = with_hooks(program, job.hooks, {tool.number: tool.name for tool in reversed(toolpath.tools)})
     found += standing_unsaid(control.rolls, control.machine.axis_names, job.setup.output.apart, bool(skip.any()),

@@ -27,7 +27,7 @@ CommandName = Literal[
     "CUTTER_COMPENSATION_LEFT", "CUTTER_COMPENSATION_RIGHT", "CUTTER_COMPENSATION_OFF",
     "START_SPINDLE_CLOCKWISE", "START_SPINDLE_COUNTERCLOCKWISE", "STOP_SPINDLE_TURNING", CoolantCommand,
     "PROGRAM_STOP", "OPTIONAL_PROGRAM_STOP", "DWELL", "COMMENT", "INSERT",
-    "ENTER_SECTION", "LEAVE_SECTION", "OPERATION_START", "RESTATE", "CLAMP", "UNCLAMP", "HOOK"]
+    "ENTER_SECTION", "LEAVE_SECTION", "OPERATION_START", "RESTATE", "CLAMP", "UNCLAMP", "HOOK", "SMOOTHING"]
 """canonical functions without motion, named as in NIST RS274/NGC where that has them"""
 
 
@@ -37,7 +37,7 @@ class Command:
 
     ("ENTER_SECTION", (i,)) and ("LEAVE_SECTION", (i,)) stand where a section that needs codes begins and
     ends, ("OPERATION_START", (name,)) or (name, 1.0) where the program can be taken up, with 1.0 from home,
-    ("RESTATE",) behind
+    ("SMOOTHING", (name,)) where the control's own smoothing becomes that of an operation, ("RESTATE",) behind
     blocks that a switch may leave out: modal codes are stated again. `skip`: the block switch leaves it out.
     """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
@@ -17,6 +18,7 @@ from postproc.controllers.spelling import (
     Format,
     InchFormat,
     ProgramBlocks,
+    SmoothingLevel,
     SubprogramFormat,
     Tools,
     Units,
@@ -25,6 +27,9 @@ from postproc.controllers.texts import CYCLE_VALUES, placeholders
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.units import MM_PER_INCH
 
+SMOOTHING = r"^G[0-9]+(\.[0-9]+)?( [A-Z][0-9]+(\.[0-9]*)?)*$"
+"""words that a reader knows the control's smoothing by"""
+SmoothingText = Annotated[str, Field(pattern=SMOOTHING)]
 Worded = Annotated[str, placeholders("letter", "value")]
 
 
@@ -128,6 +133,8 @@ class InterpolationRules(UserModel):
     """share of the tolerance left to the controller's own smoothing"""
     smoothing_fixed: float | None = Field(default=None, ge=0.0)
     """mm that it takes instead of a share, where its tolerance is a parameter of the control"""
+    smoothing_in_modes: bool = True
+    """it may be changed while the tip's or a plane's mode is on"""
     axis_smoothing_share: float = Field(default=0.0, ge=0.0, le=0.8)
     """share of the axis tolerance left to it"""
 
@@ -280,6 +287,11 @@ class ControllerFile(UserModel):
     kinematics: InterpolationRules = InterpolationRules()
     modes: Modes = Modes()
     rollover: RolloverRules = RolloverRules()
+    levels: dict[str, SmoothingLevel] = Field(default_factory=dict)
+    """the control's own smoothing by kind of operation, for [output.smoothing] of the set-up"""
+    smoothing_words: dict[SmoothingText, Annotated[float, Field(ge=0.0)]] = Field(default_factory=dict)
+    """further words that set the control's smoothing, and the mm that each may take: "G61.1" = 0.005, or
+    "G05 P10000" = 0.005"""
     links: LinkRules = LinkRules()
 
     @property
@@ -311,6 +323,13 @@ class ControllerFile(UserModel):
     def unit(self) -> float:
         """mm of a unit of length in programs: 25.4 in inches."""
         return MM_PER_INCH if self.format.units == "inch" else 1.0
+
+    @property
+    def known_smoothing(self) -> dict[str, float]:
+        """mm that words without a tolerance of their own may take: those of levels, and the further ones."""
+        fixed = {level.blocks[-1]: level.tolerance for level in self.levels.values()
+                 if level.tolerance is not None and level.blocks and re.fullmatch(SMOOTHING, level.blocks[-1])}
+        return {**fixed, **self.smoothing_words}
 
     @property
     def lengths(self) -> LengthText:

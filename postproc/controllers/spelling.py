@@ -170,6 +170,17 @@ class ProgramBlocks(UserModel):
         return f"{named[2].strip().lower()} {named[1]}" if named else text
 
 
+class SmoothingLevel(UserModel):
+    """The control's own smoothing of one kind of operation, as roughing or finishing."""
+
+    blocks: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...]
+    """blocks that set it; as `program.path_tolerance`"""
+    tolerance: float | None = Field(default=None, ge=0.0)
+    """mm that it may take, where parameters of the control say so: the last of `blocks` stands for that when it is read"""
+    share: float | None = Field(default=None, ge=0.0, le=0.8)
+    """share of the tolerance that it may take, where its blocks state it; default: as `kinematics.smoothing_share`"""
+
+
 Switch = Annotated[str, Field(pattern=r"^(M[0-9]+)?$")]
 """an M code, which is read back too, or none"""
 

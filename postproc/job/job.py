@@ -19,6 +19,7 @@ from postproc.control.word_grid import WordGrid, word_grid
 from postproc.controllers.model import ControllerFile
 from postproc.job.pivots import control_kinematics
 from postproc.job.rounding import Rounding, helix_bound, rounding_bound
+from postproc.job.smoothing import SmoothingPlan, smoothing_plan
 from postproc.job.units import other_units
 from postproc.path.links import SafeSpace, safe_space
 from postproc.reference.events import register_changes, tool_changes
@@ -162,6 +163,11 @@ class Job:
         return replace(found, tip=found.tip + helix_bound(self.moves, self.controller.grain, angle, self.corrects))
 
     @cached_property
+    def smoothing(self) -> SmoothingPlan:
+        """The control's own smoothing by operation."""
+        return smoothing_plan(self.controller, self.setup, self.options, self.toolpath)[0]
+
+    @cached_property
     def grid(self) -> WordGrid:
         """Decimals of the axis words, and the units of lengths."""
         return word_grid(self.control, self.controller)
@@ -211,7 +217,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     toolpath = by_rule(toolpath, controller, machine.length_register, machine.radius_register)
     toolpath, found = own_registers(toolpath, controller)
     diagnostics += found
-    diagnostics += [*_work_offset(controller, setup, options), *other_units(controller, options.setup)]
+    diagnostics += [*_work_offset(controller, setup, options), *other_units(controller, options.setup),
+                    *smoothing_plan(controller, setup, options, toolpath)[1]]
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += [*found, *_program_number(toolpath, controller, setup, options)]
     diagnostics += [*unfit_holes(toolpath, controller), *_refused(toolpath), *_no_inverse_time(controller, options)]

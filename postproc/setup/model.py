@@ -94,6 +94,9 @@ class OutputSettings(UserModel):
     rotary axes standing still; auto: the best that controller and machine can. --output-mode goes before it"""
     operations: dict[str, OutputMode] = Field(default_factory=dict)
     """by name of the operation"""
+    smoothing: dict[str, str | Annotated[float, Field(gt=0.0)]] = Field(default_factory=dict)
+    """of the control itself, by name of the operation: a level of the controller file ("roughing", "finishing"), or the
+    mm that it may take, which the bound counts; others have that of the controller file"""
     restart: bool = False
     """every operation begins at home with everything restated, so that the program can be taken up there"""
     subprograms: bool = False

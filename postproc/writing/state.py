@@ -12,6 +12,7 @@ import numpy as np
 from postproc.compile.program import PER_MINUTE, Hole, Program, Section
 from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
 from postproc.controllers.texts import CYCLE_LENGTHS
+from postproc.job.smoothing import Smoothing
 from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Cycle
 
@@ -26,13 +27,15 @@ class WriterState:
     their own, by name, once the program is written. `turning` and `cooling` say whether spindle and coolant
     run, None where nobody knows, `flowing` the kinds of coolant that may run (`postproc.reference.coolant`);
     `taken` are block numbers that subprograms bear; `stock` (2, 3) least and greatest X, Y, Z of the stock;
-    `ahead` the axis words of a stretch of blocks, and the first of them.
+    `levels`
+    smoothing of operations by name, `level` the blocks of the one in force; `ahead` the axis words of a stretch of
+    blocks, and the first of them.
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
                  smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "",
-                 subprograms: bool = False, stock: Floats | None = None) -> None:
-        self.stock = stock
+                 subprograms: bool = False, stock: Floats | None = None, levels: dict[str, Smoothing] | None = None) -> None:
+        self.stock, self.levels, self.level = stock, levels or {}, list[str]()
         self.controller, self.program, self.cycles = controller, program, cycles
         self.length_offsets, self.smoothing, self.axis_smoothing = length_offsets, smoothing, axis_smoothing
         self.work_offset = controller.program.offset_block(work_offset) or work_offset
@@ -80,6 +83,28 @@ class WriterState:
     def clean(self, text: str) -> str:
         """The text without characters that a comment must not hold, cut to the line length."""
         return clean(self.controller, text)
+
+    # ---- smoothing -----------------------------------------------------------------------------------------
+
+    def smoothing_blocks(self, operation: str = "") -> list[str]:
+        """Blocks that set the control's own smoothing, of an operation by its name, where something is left to it."""
+        usual = Smoothing(self.smoothing, self.controller.program.path_tolerance)
+        wanted = self.levels.get(operation, usual)
+        self.level = self.smoothed(wanted.mm, wanted.blocks)
+        return self.level
+
+    def other_smoothing(self, operation: str) -> list[str]:
+        """The same where an operation has another than is in force."""
+        before = self.level
+        after = self.smoothing_blocks(operation)
+        return after if after != before else []
+
+    def smoothed(self, mm: float, blocks: tuple[str, ...]) -> list[str]:
+        """Blocks of a smoothing that may take so many mm."""
+        if mm <= 0.0 and any("{" in block for block in blocks):
+            return []
+        values = {"tolerance": self.share(mm), "chain": "", "axis": self.plain(self.axis_smoothing)}
+        return [block.format(**values) for block in blocks]
 
     # ---- numbers -------------------------------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ from machines.hooks import filled
 from postproc.compile.clamps import CLAMP, UNCLAMP
 from postproc.compile.hooks import HOOK
 from postproc.compile.program import PER_MINUTE, Command, Hole
+from postproc.compile.smoothing import SMOOTHING
 from postproc.control.rollover import HALF
 from postproc.controllers.model import Mode
 from postproc.controllers.texts import blocks_of
@@ -83,7 +84,8 @@ class Writer(WriterState, ABC):
 
     def sorted_blocks(self) -> tuple[Iterable[str], dict[int, list[str]]]:
         """Blocks of the main program up to its ending, and those of the subprograms by number, one for each operation."""
-        start = chain(self.start(), self.smoothing_blocks())
+        first = next((str(c.args[0]) for c in self.program.commands.get(0, ()) if c.name == SMOOTHING), "")
+        start = chain(self.start(), self.smoothing_blocks(first))
         if not self.subprograms:
             return chain(start, (block for block in self.body() if block != MARK)), {}
         spec, main, subs = self.controller.subprograms, list(start), dict[int, list[str]]()
@@ -155,14 +157,6 @@ class Writer(WriterState, ABC):
         p = self.program
         far = np.flatnonzero(((np.abs(p.words) >= FULL_TURN) & p.write & ~p.home[:, None]).any(axis=0)).tolist()
         return [p.letters[j] for j in far if p.letters[j] in "ABC" and j not in p.rolls]
-
-    def smoothing_blocks(self) -> list[str]:
-        """Blocks that set the control's own smoothing, where something is left to it."""
-        blocks = self.controller.program.path_tolerance
-        if self.smoothing <= 0.0 and any("{" in block for block in blocks):
-            return []
-        values = {"tolerance": self.share(self.smoothing), "chain": "", "axis": self.plain(self.axis_smoothing)}
-        return [block.format(**values) for block in blocks]
 
     def numbered(self, block: str) -> str:
         """The block with its number where the controller numbers blocks; the sign of the block switch stays in front."""
@@ -283,6 +277,8 @@ class Writer(WriterState, ABC):
             yield self.hooked(command)
         elif command.name == "RESTATE":
             self.forget()
+        elif command.name == SMOOTHING:
+            yield from self.other_smoothing(str(command.args[0]))
         elif command.name == "OPERATION_START":
             yield from self.operation(str(command.args[0]), len(command.args) > 1)
         elif command.name == "COMMENT":
@@ -311,7 +307,7 @@ class Writer(WriterState, ABC):
         yield MARK
         values = {"name": self.clean(name), "comment": self.comment(name), "number": 100 * self.operations}
         blocks = [block.format(**values) for block in self.controller.program.operation]
-        blocks += [*self.start(), *self.smoothing_blocks()] if restart and self.operations > 1 else []
+        blocks += [*self.start(), *self.smoothing_blocks(name)] if restart and self.operations > 1 else []
         if not blocks:
             return
         self.forget()

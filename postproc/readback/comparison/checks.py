@@ -158,15 +158,15 @@ def _beyond_travel(motion: Motion, executed: BlockPoses, slack: Floats) -> tuple
 
 def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """The control's own smoothing while cutting: stated where the controller has it, and inside its share."""
-    if not job.controller.program.path_tolerance:
+    if not job.controller.program.path_tolerance and not job.smoothing.named:
         return []
-    rules = job.controller.kinematics
-    share = rules.smoothing_share * job.options.tolerance if rules.smoothing_fixed is None else rules.smoothing_fixed
     rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
-    bad = rows[~(motion.blend[rows] <= share * (1.0 + 1e-6))]
+    shares = job.smoothing.by_operation[np.minimum(job.toolpath.operation[moves.row[owner[rows]]],
+                                                   len(job.smoothing.by_operation) - 1)]
+    bad = rows[~(motion.blend[rows] <= shares * (1.0 + 1e-6))]
     if not len(bad):
         return []
-    k = int(bad[0])
+    k, share = int(bad[0]), float(shares[np.searchsorted(rows, bad[0])])
     found = "is not stated" if np.isnan(motion.blend[k]) else "has no limit" if np.isinf(motion.blend[k]) \
         else f"may take {motion.blend[k]:g} mm"
     return [faults.error("verify.smoothing", f"the control's smoothing {found}, its share of the tolerance is {share:g} mm",

@@ -50,7 +50,7 @@ class IsoReader(Reader):
     def canonical(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words."""
         words, found = text.words, list[Diagnostic]()
-        new: New = []
+        words, new = self.own_smoothing(words)
         drop = np.zeros(len(words.letter), dtype=bool)
         self.tools(words, new, line, file, found)
         self.rests(words, new, drop, line, file, found)
@@ -63,6 +63,24 @@ class IsoReader(Reader):
         words = self.arcs(relative_words(words, self.axes), new, drop)
         found += self.numbers(words.take(~drop), line, file)
         return Canonical(added(words, new, drop), line), found
+
+    def own_smoothing(self, words: Words) -> tuple[Words, New]:
+        """Words without those of the control's smoothing that the controller file knows by what they may take, and that."""
+        known = self.controller.known_smoothing if self.controller is not None else {}
+        new, drop = list[tuple[int, str, float]](), np.zeros(len(words.letter), dtype=bool)
+        for text, mm in known.items():
+            stated = [(ord(part[0]), float(part[1:])) for part in text.split(" ")]
+            for k in np.flatnonzero((words.letter == stated[0][0]) & (words.value == stated[0][1])).tolist():
+                rows = slice(k, k + len(stated))
+                here = list(zip(words.letter[rows].tolist(), words.value[rows].tolist(), strict=True))
+                if here == stated and words.line[k] == words.line[k + len(stated) - 1]:
+                    drop[rows] = True
+                    new.append((int(words.line[k]), SMOOTH, mm))
+        return words.take(~drop) if new else words, new
+
+    def check(self, words: Words, file: str) -> list[Diagnostic]:
+        """Codes and words but for those that set the control's smoothing."""
+        return super().check(self.own_smoothing(words)[0], file)
 
     def tools(self, words: Words, new: New, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """Tools that M6 loads, and length registers by G43 H and G49."""

@@ -21,7 +21,7 @@ TEXTS = {"description", "sources"}
 ONE_VALUE = {"kinematics.linear"}
 """statements of the file that have one allowed value so far"""
 OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "units.others",
-          "inch.degree", "modes.tcp", "modes.tilted", "arcs.helix_planes",
+          "inch.degree", "levels", "smoothing_words", "kinematics.smoothing_in_modes", "modes.tcp", "modes.tilted", "arcs.helix_planes",
           "cutter_compensation.begins_on_arc", "cutter_compensation.ends_on_arc", "cutter_compensation.modal_register",
           "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload",
           "tools.length_automatic", "program.operation", "program.carried_out", "program.relies_on_turns", "program.stock",
@@ -31,8 +31,8 @@ OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "units.others"
           *(f"rollover.{key}" for key in ("default", "rules", "shortest", "positive", "negative", "zero_negative", "on",
                                           "needs"))}
 """keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py,
-test_compensated_arcs.py, test_parts.py, test_rollover.py, test_inch_output.py, test_hooks_refused.py, test_output_quality.py
-and test_output_modes*.py show what they do"""
+test_compensated_arcs.py, test_parts.py, test_rollover.py, test_inch_output.py, test_smoothing_levels.py,
+test_hooks_refused.py, test_output_quality.py and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states"""
 OTHER: dict[str, Any] = {

@@ -69,6 +69,7 @@ def test_each_mode_is_written_as_reviewed(controller: str, machine: str, mode: s
 def test_no_file_is_left_over() -> None:
     known = {name_of(*piece) for piece in PIECES}
     known |= {name_of(GOLDEN / "three_laws.cls", m, c, mode) for c, m in LAWS for mode in ("auto", "axes", "tcp")}
+    known |= {name_of(GOLDEN / "every_cycle.cls", m, c, "inch") for c, m in LAWS}
     assert {p.name for p in GOLDEN.iterdir() if p.suffix not in (".apt", ".cls")} == known
 
 
