@@ -21,7 +21,8 @@ TEXTS = {"description", "sources"}
 ONE_VALUE = {"kinematics.linear"}
 """statements of the file that have one allowed value so far"""
 OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "units.others",
-          "inch.degree", "levels", "smoothing_words", "kinematics.smoothing_in_modes", "modes.tcp", "modes.tilted", "arcs.helix_planes",
+          "inch.degree", "levels", "smoothing_words", "kinematics.smoothing_in_modes",
+          "modes.tcp", "modes.tilted", "arcs.helix_planes",
           "cutter_compensation.begins_on_arc", "cutter_compensation.ends_on_arc", "cutter_compensation.modal_register",
           "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload",
           "tools.length_automatic", "program.operation", "program.carried_out", "program.relies_on_turns", "program.stock",
