@@ -177,6 +177,6 @@ FAULTS = (
           "np.fmax(needed, np.roll(planned.needed, 1))", ("fast planned", "planned"),
           why="a plan that is slower than needed: the proof holds planned feeds from above only, by "
           "the feed of the CL file"),
-    Fault("rounding of words to one place less", "planning", "decimals", "f.linear_decimals).astype",
-          "f.linear_decimals - 2).astype"),
+    Fault("rounding of words to one place less", "planning", "word_grid", "style.linear_decimals).astype",
+          "style.linear_decimals - 2).astype"),
 )
