@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from functools import cached_property
 from textwrap import wrap
 
 import numpy as np
@@ -13,6 +14,7 @@ from postproc.compile.program import PER_MINUTE, Hole, Program, Section
 from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
 from postproc.controllers.texts import CYCLE_LENGTHS
 from postproc.job.smoothing import Smoothing
+from postproc.reference.coolant import CoolantCommand, switching
 from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Cycle
 
@@ -105,6 +107,21 @@ class WriterState:
             return []
         values = {"tolerance": self.share(mm), "chain": "", "axis": self.plain(self.axis_smoothing)}
         return [block.format(**values) for block in blocks]
+
+    # ---- codes ------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def fixed(self) -> dict[str, str]:
+        """The commands that are one code whatever they carry."""
+        codes = self.controller.codes
+        return {"STOP_SPINDLE_TURNING": codes.spindle_stop, "PROGRAM_STOP": codes.stop,
+                "OPTIONAL_PROGRAM_STOP": codes.optional_stop,
+                "CANCEL_TOOL_LENGTH_OFFSET": codes.length_cancel, "CUTTER_COMPENSATION_OFF": codes.compensation_off}
+
+    @cached_property
+    def switching(self) -> dict[CoolantCommand, tuple[str, str]]:
+        """The controller's codes for each kind of coolant (`postproc.reference.coolant`)."""
+        return switching(self.controller.codes)
 
     # ---- numbers -------------------------------------------------------------------------------------------
 

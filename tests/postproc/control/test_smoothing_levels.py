@@ -121,4 +121,4 @@ def test_it_is_not_changed_while_a_mode_is_on_where_the_control_cannot() -> None
     if made.ok:  # the mode was left between the operations
         assert made.text.index("G49", made.text.index("G43.4")) < made.text.index("G05.1 Q1 R10")
     else:
-        assert "smoothing.mode" in codes(made.diagnostics)
+        assert "output.smoothing_mode" in codes(made.diagnostics)
