@@ -136,7 +136,7 @@ def _states_retract(controller: ControllerFile, key: CycleKey) -> bool:
 def _slack(path: JointPath, controller: ControllerFile, block: int) -> float:
     """mm by which words of one level may differ."""
     tilted = path.frames[int(path.frame[block])].control.law == "tilted"
-    return ROUNDED * 10.0 ** -controller.format.linear_decimals if tilted else 1e-9
+    return ROUNDED * controller.grain if tilted else 1e-9
 
 
 def _without_feeding_rapids(moves: Moves, path: JointPath, first: int, last: int) -> tuple[int, int]:

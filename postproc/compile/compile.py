@@ -16,9 +16,9 @@ from postproc.compile.hooks import with_hooks
 from postproc.compile.long_turns import long_turns, standing_unsaid, without_standing
 from postproc.compile.program import Command, Commands, Hole, Program
 from postproc.compile.sections import sections_of, with_sections
+from postproc.compile.smoothing import with_smoothing
 from postproc.compile.word_rows import WordRows, block_tools, joints_of, with_turns, word_rows
 from postproc.job.job import Job
-from postproc.job.rounding import decimals
 from postproc.path.model import ARC, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
@@ -34,17 +34,16 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
     """The canonical program of a path along `moves`; `planned` are the feeds that the plan allows, blocks
     that are `apart` (K,) no part of canned cycles."""
     toolpath, control, controller = job.toolpath, job.control, job.controller
-    places = decimals(control, controller)
     skip = skipped(toolpath, moves, path)
     words = words_of(job, moves, path, after(skip))
     native, holes = holes_of(toolpath, moves, path, words, control, controller,
                              skip if apart is None else skip | apart)
     feeds = plan_feeds(path, control, words.end - words.start, moves.feed[path.move],
                        toolpath.pass_[moves.row[path.move]], native, job.options.feed_mode, controller.feed,
-                       planned)
+                       planned, controller.feed_unit)
     commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.apart,
                                         job.setup.output.tool_call, job.setup.output.stop_between_tools)
-    end = np.where(path.home[:, None], np.round(path.q * control.unit, int(places.max())), words.end)
+    end = np.where(path.home[:, None], job.grid.trimmed(path.q * control.unit), words.end)
     write = without_standing(words.write, end, control.rolls)
     keep = write.any(axis=1) | (path.code == ARC)
     new = np.concatenate([[0], np.cumsum(keep)])
@@ -57,9 +56,10 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
     program = Program(control.machine.axis_names, end[keep], write[keep], path.code[keep], feeds.feed[keep],
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], path.center[keep], path.home[keep],
                       np.isnan(path.u[keep]), moves.row[path.move[keep]], line,
-                      placed, kept_holes, places, sections, skip[keep], control.rolls,
+                      placed, kept_holes, job.grid.places, sections, skip[keep], control.rolls,
                       control.machine.home * control.unit)
     found += long_turns(program, toolpath.file)
+    program = with_smoothing(program, job.smoothing, toolpath)
     program = with_clamps(program, control.machine, controller.plane_turns)
     program = with_hooks(program, job.hooks, {tool.number: tool.name for tool in reversed(toolpath.tools)})
     found += standing_unsaid(control.rolls, control.machine.axis_names, job.setup.output.apart, bool(skip.any()),
@@ -71,7 +71,7 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
 
 def words_of(job: Job, moves: Moves, path: JointPath, again: Ints | None = None) -> WordRows:
     """The words of a path's blocks; the blocks `again` state every axis."""
-    return word_rows(path, moves, job.control, job.kinematics, job.offset_length, decimals(job.control, job.controller),
+    return word_rows(path, moves, job.control, job.kinematics, job.offset_length, job.grid,
                      np.zeros(0, dtype=np.int64) if again is None else again, job.rounding.made_up, job.bidirectional,
                      job.corrects)
 
@@ -87,8 +87,7 @@ def writing_of(job: Job, moves: Moves) -> Writing:
         return with_turns(q, path.q[rows], path, rows, block_tools(path, moves), job.kinematics,
                           job.rounding.made_up)
 
-    grain = np.asarray(10.0 ** -decimals(job.control, job.controller).astype(np.float64))
-    return Writing(lambda path: words_of(job, moves, path).end, joints, turned, grain)
+    return Writing(lambda path: words_of(job, moves, path).end, joints, turned, job.grid.grain)
 
 
 def _moved(commands: Commands, new: Ints) -> Commands:

@@ -38,7 +38,8 @@ class PlannedTimes:
 
 
 def plan_feeds(path: JointPath, control: Control, step: Floats, asked: Floats, passes: Ints, native: Bools,
-               feed_mode: FeedModeChoice, rules: FeedRules, planned: PlannedTimes | None = None) -> Feeds:
+               feed_mode: FeedModeChoice, rules: FeedRules, planned: PlannedTimes | None = None,
+               unit: float = 1.0) -> Feeds:
     """Feed words for the blocks of a path.
 
     Args:
@@ -48,12 +49,13 @@ def plan_feeds(path: JointPath, control: Control, step: Floats, asked: Floats, p
         feed_mode: "auto", "per-minute" or "inverse-time"
         rules: of the controller
         planned: feeds that keep acceleration and jerk, too; velocities only without it
+        unit: mm/min of F1 where it counts lengths
     """
     mode = _modes(path, control, step, passes, native, feed_mode, rules)
     needed = least_seconds(path, control, asked, step)
     if planned is None:
-        return feed_words(path, control, step, asked, needed, mode, rules)
-    feeds = feed_words(path, control, step, asked, np.fmax(needed, planned.needed), mode, rules)
+        return feed_words(path, control, step, asked, needed, mode, rules, unit)
+    feeds = feed_words(path, control, step, asked, np.fmax(needed, planned.needed), mode, rules, unit)
     open_to_it = (feeds.mode == PER_MINUTE) & (path.code != 0) & ~native & (feeds.seconds > 0.0) & (feeds.feed > 0.0)
     feed = merged(feeds.feed, open_to_it, passes, planned.merge)
     factor = np.where(open_to_it, feeds.feed / np.where(open_to_it, feed, 1.0), 1.0)
@@ -82,7 +84,7 @@ def _control_bends(path: JointPath) -> Bools:
 
 
 def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, needed: Floats, mode: Array,
-               rules: FeedRules) -> Feeds:
+               rules: FeedRules, unit: float = 1.0) -> Feeds:
     """The words of blocks that take the time asked for, or the time (K,) s needed where that is longer, in
     the feed mode (K,) and under the law of each. Blocks without a time of their own, retracts in feed motion,
     have no feed asked for."""
@@ -93,13 +95,14 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
     turned = np.abs(step)[:, control.rotary].sum(axis=1)
     length = np.zeros(len(path))
     for law, k in path.by_control():
-        length[k] = law.feed_length(step[k])
+        length[k] = law.feed_units(step[k], unit)
+    asked = asked / unit
     length = np.where(arc & np.isfinite(asked), wanted * asked, length)
     with np.errstate(divide="ignore", invalid="ignore"):
         per_minute = 60.0 * length / seconds
         inverse = 60.0 / seconds
         rate = np.nan_to_num(inverse * length)
-        by_radius = inverse * length / _radius(path) if arc.any() and rules.arc_inverse == "radius" else inverse
+        by_radius = inverse * length * unit / _radius(path) if arc.any() and rules.arc_inverse == "radius" else inverse
     own = (wanted > 0.0) | (needed <= 0.0)
     same = cutting & ~slowed & np.isfinite(asked) & (turned == 0.0) & own
     for law, k in path.by_control():

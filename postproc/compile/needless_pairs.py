@@ -9,7 +9,7 @@ from postproc.reference.coolant import COMMANDS
 
 _SPINDLE = ("START_SPINDLE_CLOCKWISE", "START_SPINDLE_COUNTERCLOCKWISE")
 _OFF = {"STOP_SPINDLE_TURNING": "spindle", "COOLANT_OFF": "coolant"}
-_PASSES = frozenset({"COMMENT", "SELECT_TOOL", "OPERATION_START", "USE_TOOL_LENGTH_OFFSET"})
+_PASSES = frozenset({"COMMENT", "SELECT_TOOL", "OPERATION_START", "SMOOTHING", "USE_TOOL_LENGTH_OFFSET"})
 """commands between that are no reason: the spindle need not stand, nothing must be dry"""
 
 

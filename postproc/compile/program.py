@@ -27,7 +27,7 @@ CommandName = Literal[
     "CUTTER_COMPENSATION_LEFT", "CUTTER_COMPENSATION_RIGHT", "CUTTER_COMPENSATION_OFF",
     "START_SPINDLE_CLOCKWISE", "START_SPINDLE_COUNTERCLOCKWISE", "STOP_SPINDLE_TURNING", CoolantCommand,
     "PROGRAM_STOP", "OPTIONAL_PROGRAM_STOP", "DWELL", "COMMENT", "INSERT",
-    "ENTER_SECTION", "LEAVE_SECTION", "OPERATION_START", "RESTATE", "CLAMP", "UNCLAMP", "HOOK"]
+    "ENTER_SECTION", "LEAVE_SECTION", "OPERATION_START", "RESTATE", "CLAMP", "UNCLAMP", "HOOK", "SMOOTHING"]
 """canonical functions without motion, named as in NIST RS274/NGC where that has them"""
 
 
@@ -37,7 +37,7 @@ class Command:
 
     ("ENTER_SECTION", (i,)) and ("LEAVE_SECTION", (i,)) stand where a section that needs codes begins and
     ends, ("OPERATION_START", (name,)) or (name, 1.0) where the program can be taken up, with 1.0 from home,
-    ("RESTATE",) behind
+    ("SMOOTHING", (name,)) where the control's own smoothing becomes that of an operation, ("RESTATE",) behind
     blocks that a switch may leave out: modal codes are stated again. `skip`: the block switch leaves it out.
     """
 
@@ -98,11 +98,12 @@ class Program:
 
     Attributes:
         letters: the axis words, the order of the columns of `words`
-        words (K, J): end positions, mm and degrees, already rounded to the controller's decimals; positions
-            of `home` (K,) blocks are machine coordinates
+        words (K, J): end positions, mm and degrees, already rounded to the controller's decimals, those of
+            inches in a program in inches; positions of `home` (K,) blocks are machine coordinates
         write (K, J): words that the block states
         code (K,): 0 STRAIGHT_TRAVERSE, 1 STRAIGHT_FEED, 2 ARC_FEED
-        feed (K,): mm/min or deg/min, or 1/min where mode is INVERSE; NaN for traverses
+        feed (K,): F as it is written: mm, inches (or parts of them) or degrees per minute, or 1/min where mode
+            is INVERSE; NaN for traverses
         mode (K,): PER_MINUTE or INVERSE
         plane, ccw, center: of the arcs; center (K, 3) is relative to the block's start, mm
         row (K,): row of the Toolpath; line (K,): CL line; link (K,): True for linking blocks

@@ -11,6 +11,7 @@ from machines.kinematics.base import Kinematics
 from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_AXIS
+from postproc.control.word_grid import WordGrid
 from postproc.path.model import ARC, FEED, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
@@ -31,25 +32,20 @@ class WordRows:
 
 
 def word_rows(path: JointPath, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
-              lengths: Callable[[int], float], places: Ints, again: Ints, made_up: bool = False,
+              lengths: Callable[[int], float], grid: WordGrid, again: Ints, made_up: bool = False,
               bidirectional: Sequence[int] = (), exact: bool = False) -> WordRows:
-    """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `places` (J,) the
+    """The words of all blocks; `lengths` gives the gauge length of the tool of an index, `grid` says their
     decimals, `again` the blocks that state every axis, `made_up` as in `Rounding`; `bidirectional` joints
     lose motion, see `_held`; `exact` ends of CL moves keep the last decimals of their words."""
     begins = np.flatnonzero(np.diff(path.frame)) + 1
     tool = block_tools(path, moves)
-    rounds = places if made_up else None
+    rounds = grid if made_up else None
     unrounded = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
-    end = _rounded(_snapped(_rounded(unrounded, places), path, control, places, exact), places)
-    end = _flat(_rounded(_held(end, path, control, tool, places, bidirectional), places), path, control)
+    end = grid.rounded(_snapped(grid.rounded(unrounded), path, control, grid.grain, exact))
+    end = _flat(grid.rounded(_held(end, path, control, tool, grid.places, bidirectional)), path, control)
     start = np.concatenate([end[:1], end[:-1]])
-    start[begins] = _rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds), places)
+    start[begins] = grid.rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds))
     return WordRows(end, start, _written(end, start, np.union1d(begins, again), path, control))
-
-
-def _rounded(words: Floats, places: Ints) -> Floats:
-    grain = 10.0 ** -places
-    return np.asarray(np.round(np.round(words / grain) * grain, int(places.max())))
 
 
 def block_tools(path: JointPath, moves: Moves) -> Ints:
@@ -60,10 +56,10 @@ def block_tools(path: JointPath, moves: Moves) -> Ints:
 
 
 def _words(path: JointPath, q: Floats, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
-           lengths: Callable[[int], float], rounds: Ints | None) -> Floats:
+           lengths: Callable[[int], float], rounds: WordGrid | None) -> Floats:
     """Unrounded words of joints q (K, J) under the law and with the tool of the blocks `rows` (K,).
 
-    With `rounds` (decimals) rotary words are rounded first where words are machine coordinates, and the slides are
+    With `rounds` rotary words are rounded first where words are machine coordinates, and the slides are
     those that then bring the tip to its place.
     """
     words = np.empty_like(q)
@@ -97,16 +93,16 @@ def with_turns(q: Floats, turns: Floats, path: JointPath, rows: Ints, tool: Ints
     return result
 
 
-def _made_up(q: Floats, law: Control, kin: Kinematics, places: Ints) -> Floats:
+def _made_up(q: Floats, law: Control, kin: Kinematics, grid: WordGrid) -> Floats:
     """Joints with rounded rotary words and the tip of q (K, J)."""
     turned, rotary = q.copy(), law.rotary
-    turned[:, rotary] = _rounded(q * law.unit, places)[:, rotary] / law.unit[rotary]
+    turned[:, rotary] = grid.rounded(q * law.unit)[:, rotary] / law.unit[rotary]
     moved = np.flatnonzero((turned != q).any(axis=1))
     turned[moved] = kin.at_tip(kin.forward(q[moved])[0], turned[moved], law.slides)
     return turned
 
 
-def _snapped(words: Floats, path: JointPath, control: Control, places: Ints, exact: bool) -> Floats:
+def _snapped(words: Floats, path: JointPath, control: Control, grain: Floats, exact: bool) -> Floats:
     """Words (rounded) without tiny X, Y, Z residues next to a rotary move.
 
     Under inverse time LinuxCNC takes the length of X, Y, Z alone where any of them moves, so that a residue
@@ -116,7 +112,7 @@ def _snapped(words: Floats, path: JointPath, control: Control, places: Ints, exa
     slides, rotary = control.slides, control.rotary
     if not len(rotary) or len(words) < 2:
         return words
-    snap = SNAP * 10.0 ** -places[slides]
+    snap = SNAP * grain[slides]
     turning = (words[1:, rotary] != words[:-1, rotary]).any(axis=1) & (path.code[1:] == FEED)
     turning &= (path.frame[1:] == path.frame[:-1]) & ~(exact & (path.u[1:] == 1.0))
     step = np.abs(words[1:, slides] - words[:-1, slides])

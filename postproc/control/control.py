@@ -54,6 +54,7 @@ class Control:
         entry_frame: what the frame of the tip is where its mode is entered with turned tables, see `TcpMode.frame`
         own_kinematics: at the gauge point, as the control holds it; None: the machine's
         rolls: modulo axes by joint
+        degree_is_inch: where a feed in inches refers to all axes, degrees count as inches, else as mm
         measured: mm of tool length that the work offset holds, where the program calls none
     """
 
@@ -69,6 +70,7 @@ class Control:
     helix_planes: tuple[int, ...] = (17, 18, 19)
     arc_planes: tuple[int, ...] = (17, 18, 19)
     entry_frame: Literal["table", "entry", "either"] = "table"
+    degree_is_inch: bool = False
     measured: float = 0.0
     rolls: dict[int, Rollover] = field(default_factory=dict)
 
@@ -168,6 +170,21 @@ class Control:
             length = np.linalg.norm(step[:, [j for j, name in enumerate(names) if name in letters]], axis=1)
             result = np.where(length > 0.0, length, result)
         return result
+
+    def feed_units(self, step: Floats, unit: float | Floats) -> Floats:
+        """(K,) the same length in what F counts: degrees where no slide moves, else `unit` mm, (K,) or for all."""
+        unit = np.broadcast_to(np.asarray(unit, dtype=np.float64), len(step))
+        inches = (step[:, self.slides] != 0.0).any(axis=1) & (unit != 1.0)
+        if not inches.any():
+            return self.feed_length(step)
+        if self.degree_is_inch:
+            step = np.where(inches[:, None] & self.is_rotary, step * unit[:, None], step)
+        return np.asarray(self.feed_length(step) / np.where(inches, unit, 1.0))
+
+    @cached_property
+    def is_rotary(self) -> Bools:
+        """(J,) the rotary axes."""
+        return np.array(self.machine.rotary)
 
     @cached_property
     def unit(self) -> Floats:

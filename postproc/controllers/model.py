@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,10 +11,25 @@ from pydantic import Field
 
 from machines.choices import RolloverRule, Stop
 from machines.user_file import UserModel, load_toml
-from postproc.controllers.spelling import Codes, Comment, Format, ProgramBlocks, SubprogramFormat, Tools
+from postproc.base.length_text import INCH, MM, LengthText
+from postproc.controllers.spelling import (
+    Codes,
+    Comment,
+    Format,
+    InchFormat,
+    ProgramBlocks,
+    SmoothingLevel,
+    SubprogramFormat,
+    Tools,
+    Units,
+)
 from postproc.controllers.texts import CYCLE_VALUES, placeholders
 from toolpaths.diagnostics import Diagnostic
+from toolpaths.units import MM_PER_INCH
 
+SMOOTHING = r"^G[0-9]+(\.[0-9]+)?( [A-Z][0-9]+(\.[0-9]*)?)*$"
+"""words that a reader knows the control's smoothing by"""
+SmoothingText = Annotated[str, Field(pattern=SMOOTHING)]
 Worded = Annotated[str, placeholders("letter", "value")]
 
 
@@ -126,6 +142,8 @@ class InterpolationRules(UserModel):
     """share of the tolerance left to the controller's own smoothing"""
     smoothing_fixed: float | None = Field(default=None, ge=0.0)
     """mm that it takes instead of a share, where its tolerance is a parameter of the control"""
+    smoothing_in_modes: bool = True
+    """it may be changed while the tip's or a plane's mode is on"""
     axis_smoothing_share: float = Field(default=0.0, ge=0.0, le=0.8)
     """share of the axis tolerance left to it"""
 
@@ -258,6 +276,10 @@ class ControllerFile(UserModel):
     sources: tuple[str, ...] = ()
     """documents that the rules come from"""
     format: Format = Format()
+    units: Units = Units()
+    """the words that state mm or inches"""
+    inch: InchFormat = InchFormat()
+    """what is different in a program in inches"""
     comment: Comment = Comment()
     program: ProgramBlocks = ProgramBlocks()
     start: Start = Start()
@@ -274,6 +296,11 @@ class ControllerFile(UserModel):
     kinematics: InterpolationRules = InterpolationRules()
     modes: Modes = Modes()
     rollover: RolloverRules = RolloverRules()
+    levels: dict[str, SmoothingLevel] = Field(default_factory=dict)
+    """the control's own smoothing by kind of operation, for [output.smoothing] of the set-up"""
+    smoothing_words: dict[SmoothingText, Annotated[float, Field(ge=0.0)]] = Field(default_factory=dict)
+    """further words that set the control's smoothing, and the mm that each may take: "G61.1" = 0.005, or
+    "G05 P10000" = 0.005"""
     links: LinkRules = LinkRules()
 
     @property
@@ -292,6 +319,51 @@ class ControllerFile(UserModel):
             return self
         more = {"passive": tuple(dict.fromkeys((*self.program.passive, *passive))), "number": number or self.program.number}
         return self.model_copy(update={"program": self.program.model_copy(update=more)})
+
+    def in_units(self, units: Literal["mm", "inch"] | None) -> ControllerFile:
+        """The controller that writes lengths and feeds in the units asked for, else in its own."""
+        units = units or self.format.units
+        style: dict[str, object] = {"units": units}
+        if units == "inch":
+            style |= {"linear_decimals": self.inch.linear_decimals, "feed_decimals": self.inch.feed_decimals}
+        return self.model_copy(update={"format": self.format.model_copy(update=style)})
+
+    @property
+    def unit(self) -> float:
+        """mm of a unit of length in programs: 25.4 in inches."""
+        return MM_PER_INCH if self.format.units == "inch" else 1.0
+
+    @property
+    def known_smoothing(self) -> dict[str, float]:
+        """mm that words without a tolerance of their own may take: those of levels, and the further ones."""
+        fixed = {level.blocks[-1]: level.tolerance for level in self.levels.values()
+                 if level.tolerance is not None and level.blocks and re.fullmatch(SMOOTHING, level.blocks[-1])}
+        return {**fixed, **self.smoothing_words}
+
+    @property
+    def lengths(self) -> LengthText:
+        """How the head of a program says lengths."""
+        return INCH if self.format.units == "inch" else MM
+
+    @property
+    def grain(self) -> float:
+        """mm of the last decimal of a length."""
+        return self.unit * 10.0 ** -self.format.linear_decimals
+
+    @property
+    def feed_unit(self) -> float:
+        """mm/min of F1."""
+        return MM_PER_INCH / self.inch.feed_parts if self.format.units == "inch" else 1.0
+
+    @property
+    def degree_is_inch(self) -> bool:
+        """True where degrees count as inches in a feed that refers to all axes."""
+        return self.format.units == "inch" and self.inch.degree == "inch"
+
+    @property
+    def units_word(self) -> str:
+        """The word that states the units of the program."""
+        return self.units.inch if self.format.units == "inch" else self.units.mm
 
     def divided(self, files: bool) -> ControllerFile:
         """The controller that writes operations into files of their own, where that is asked for."""

@@ -23,12 +23,14 @@ from postproc.controllers.texts import (
 class Format(UserModel):
     """How numbers and blocks are spelt."""
 
+    units: Literal["mm", "inch"] = "mm"
+    """of lengths and feeds where the set-up states none ([output] units)"""
     linear_decimals: int = Field(default=4, ge=0, le=9)
-    """of X, Y, Z and other lengths"""
+    """of X, Y, Z and other lengths, mm"""
     rotary_decimals: int = Field(default=4, ge=0, le=9)
     """of A, B, C, degrees"""
     feed_decimals: int = Field(default=4, ge=0, le=9)
-    """of F"""
+    """of F in mm/min"""
     small_feed_decimals: int = Field(default=2, ge=0, le=6)
     """how many more where F is below 1"""
     speed_decimals: int = Field(default=6, ge=0, le=6)
@@ -47,6 +49,32 @@ class Format(UserModel):
     """letter before a block number"""
     plus_sign: bool = False
     """a sign before positive numbers too"""
+
+
+class Units(UserModel):
+    """The words that say whether lengths are mm or inches; {units} in `program.begin` and `preamble` is the one in force."""
+
+    mm: str = Field(default="G21", min_length=1)
+    """lengths and feeds in mm"""
+    inch: str = Field(default="G20", min_length=1)
+    """lengths and feeds in inches"""
+    others: dict[str, Literal["mm", "inch"]] = Field(default_factory=dict)
+    """further words of the control that state units"""
+
+
+class InchFormat(UserModel):
+    """What is different in a program in inches."""
+
+    linear_decimals: int = Field(default=5, ge=0, le=9)
+    """of X, Y, Z and other lengths, inches"""
+    feed_decimals: int = Field(default=4, ge=0, le=9)
+    """of F; two more below 1"""
+    feed_parts: float = Field(default=1.0, gt=0.0)
+    """what an inch per minute is in units of F: 10 where F counts tenths of it. Never of degrees per minute"""
+    degree: Literal["mm", "inch"] = "inch"
+    """what a degree counts as where a feed per minute refers to all axes"""
+    relies_on: tuple[str, ...] = ()
+    """settings of the control that a program in inches needs: comments at its head"""
 
 
 class Comment(UserModel):
@@ -80,14 +108,15 @@ class ProgramBlocks(UserModel):
     """Blocks that stand around every program."""
 
     begin: tuple[Named, ...] = ("%",)
-    """{name} is the program's name, {number} its number in four digits"""
+    """{name} is the program's name, {number} its number in four digits, {units} the word of its units"""
     number: int = Field(default=1, ge=1, le=9999)
     """of the program, where the controller has numbers"""
     stock: tuple[Annotated[str, placeholders("x0", "y0", "z0", "x1", "y1", "z1")], ...] = ()
     """blocks behind `begin` that state the stock for the control's graphics, where the set-up has one
     ([rewind.stock]): its least and greatest X, Y, Z, mm in the work offset with all rotary axes at 0"""
-    preamble: tuple[Annotated[str, placeholders("work_offset")], ...] = ()
-    """safe start: units, modes and planes that the program relies on; {work_offset} is the set-up's code"""
+    preamble: tuple[Annotated[str, placeholders("work_offset", "units")], ...] = ()
+    """safe start: units, modes and planes that the program relies on; {work_offset} is the
+    set-up's code, {units} states mm or inches"""
     work_offsets: WorkOffsets = Field(default_factory=dict)
     """what the controller writes for G54 to G59 and G59.1 to G59.3; empty: those codes themselves"""
     more_offsets: dict[Numbered, FurtherOffsets] = Field(default_factory=dict)
@@ -141,6 +170,17 @@ class ProgramBlocks(UserModel):
         text = self.offset_block(code) or code
         named = re.search(r"=\+?(\d+) *;(.+)$", text)
         return f"{named[2].strip().lower()} {named[1]}" if named else text
+
+
+class SmoothingLevel(UserModel):
+    """The control's own smoothing of one kind of operation, as roughing or finishing."""
+
+    blocks: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...]
+    """blocks that set it; as `program.path_tolerance`"""
+    tolerance: float | None = Field(default=None, ge=0.0)
+    """mm that it may take, where parameters of the control say so: the last of `blocks` stands for that when it is read"""
+    share: float | None = Field(default=None, ge=0.0, le=0.8)
+    """share of the tolerance that it may take, where its blocks state it; default: as `kinematics.smoothing_share`"""
 
 
 Switch = Annotated[str, Field(pattern=r"^(M[0-9]+)?$")]

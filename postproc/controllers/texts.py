@@ -10,12 +10,13 @@ from pydantic import AfterValidator
 
 WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 """the codes that a set-up may name"""
-CYCLE_VALUES = ("retract", "surface", "clearance", "bottom", "depth", "level", "step", "breaks", "dwell", "feed", "pitch",
-                "speed", "second")
-"""what a cycle's text may name: retract level, surface and bottom (mm on the tool's axis), clearance above
-the surface, depth below it, level of the bottom seen from it (negative), peck, number of pecks, dwell in s,
-feed in mm/min, pitch in mm
-(negative: left-hand), speed in 1/min, second: the retract level above the surface"""
+CYCLE_LENGTHS = ("retract", "surface", "clearance", "bottom", "depth", "level", "step", "relief", "pitch", "second")
+"""those of `CYCLE_VALUES` that are lengths, in the units of the program"""
+CYCLE_VALUES = (*CYCLE_LENGTHS, "breaks", "dwell", "feed", "speed")
+"""what a cycle's text may name: retract level, surface and bottom (on the tool's axis), clearance above
+the surface, depth below it, level of the bottom seen from it (negative), peck, relief (`cycles.peck_relief`), number
+of pecks, dwell in s, feed as F states it, pitch (negative: left-hand), speed in 1/min, second: the retract level
+above the surface"""
 
 
 def placeholders(*allowed: str) -> AfterValidator:
@@ -39,7 +40,7 @@ def _all_offsets(offsets: dict[str, str]) -> dict[str, str]:
 
 
 WorkOffsets = Annotated[dict[str, str], AfterValidator(_all_offsets)]
-Named = Annotated[str, placeholders("name", "number")]
+Named = Annotated[str, placeholders("name", "number", "units")]
 Numbered = Annotated[str, placeholders("number")]
 Registered = Annotated[str, placeholders("register")]
 DwellText = Annotated[str, placeholders("seconds", "milliseconds")]

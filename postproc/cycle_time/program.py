@@ -76,9 +76,9 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
                           np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names,
                           pauses,
                           origin.cl_line, origin.move, _tip_lengths(motion, control))
-    inch = _feed_inch(words, block, own_path)
+    per = np.where(_feed_inch(words, block, own_path), INCH / code.feed_parts, 1.0)
     turned = np.where(np.isnan(motion.pitch), override, 1.0)
-    blocks = replace(blocks, speed=_speeds(inch, motion, blocks, by_radius) * turned)
+    blocks = replace(blocks, speed=_speeds(per, motion, blocks, by_radius) * turned)
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
     blocks = _unrolled(blocks, motion, control, unit) if (motion.frame > 0).any() else blocks.take(moving)
     return replace(blocks, pauses=_with_indexing(blocks, machine))
@@ -195,12 +195,12 @@ def _feed_inch(words: Words, block: Ints, kept: bool) -> Bools:
     return np.asarray(fill_values(at, inch[at - 1].astype(np.float64), words.lines)[block] == 1.0)
 
 
-def _speeds(inch: Bools, motion: Motion, blocks: MotionBlocks, by_radius: bool) -> Floats:
-    """(E,) mm/s or rad/s that the feed word asks for; `inch` (E,): it counts inches."""
+def _speeds(unit: Floats, motion: Motion, blocks: MotionBlocks, by_radius: bool) -> Floats:
+    """(E,) mm/s or rad/s that the feed word asks for; `unit` (E,): mm that 1 of it stands for."""
     form = shape(blocks)
     linear = (form.first != 0.0).any(axis=1) | blocks.arc
-    per_minute = motion.feed * np.where(linear, np.where(inch, INCH, 1.0), DEG)
-    least = LEAST_RATE * np.where(linear, 1.0, DEG)
+    per_minute = motion.feed * np.where(linear, unit, DEG)
+    least = LEAST_RATE * np.where(linear, unit, DEG)
     around = np.where(blocks.arc & by_radius, blocks.sweep, 1.0)
     rate = motion.feed * form.length / np.where(around > 0.0, around, 1.0)
     asked = np.where(motion.inverse, np.maximum(rate, least), per_minute) / 60.0

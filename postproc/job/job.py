@@ -15,9 +15,12 @@ from postproc.base.options import Options
 from postproc.control.control import Control, InterpolationMode
 from postproc.control.modes import OutputModes, Refused, output_modes
 from postproc.control.rollover import rollovers
+from postproc.control.word_grid import WordGrid, word_grid
 from postproc.controllers.model import ControllerFile
 from postproc.job.pivots import control_kinematics
-from postproc.job.rounding import Rounding, decimals, helix_bound, rounding_bound
+from postproc.job.rounding import Rounding, helix_bound, rounding_bound
+from postproc.job.smoothing import SmoothingPlan, smoothing_plan
+from postproc.job.units import other_units
 from postproc.path.links import SafeSpace, safe_space
 from postproc.reference.events import register_changes, tool_changes
 from postproc.reference.hole_depths import unfit_holes
@@ -158,12 +161,21 @@ class Job:
     def rounding(self) -> Rounding:
         """What the rounding of the words may cost, with that of the angles of helices."""
         found = rounding_bound(self.control, self.kinematics(int(self.moves.tool[0])), self.moves,
-                               decimals(self.control, self.controller), self.modes.cutting_laws(), self.options.tolerance)
+                               self.grid.grain, self.modes.cutting_laws(), self.options.tolerance)
         if not (self.controller.arcs.enabled and self.controller.arcs.helix_by_angle):
             return found
-        places = self.controller.format
-        return replace(found, tip=found.tip + helix_bound(self.moves, 10.0 ** -places.linear_decimals,
-                                                          10.0 ** -places.rotary_decimals, self.corrects))
+        angle = 10.0 ** -self.controller.format.rotary_decimals
+        return replace(found, tip=found.tip + helix_bound(self.moves, self.controller.grain, angle, self.corrects))
+
+    @cached_property
+    def smoothing(self) -> SmoothingPlan:
+        """The control's own smoothing by operation."""
+        return smoothing_plan(self.controller, self.setup, self.options, self.toolpath)[0]
+
+    @cached_property
+    def grid(self) -> WordGrid:
+        """Decimals of the axis words, and the units of lengths."""
+        return word_grid(self.control, self.controller)
 
     @property
     def corrects(self) -> bool:
@@ -189,8 +201,9 @@ class Job:
 
 
 def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) -> ControllerFile:
-    """The controller that knows the codes of the shop's own blocks, and the number of the program."""
-    return controller.with_shop(machine.hooks.under(setup.hooks).passive, setup.output.program_number)
+    """The controller that knows the codes of the shop's own blocks, the number of the program and its units."""
+    shop = controller.with_shop(machine.hooks.under(setup.hooks).passive, setup.output.program_number)
+    return shop.in_units(setup.output.units)
 
 
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,
@@ -210,7 +223,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     toolpath = by_rule(toolpath, controller, machine.length_register, machine.radius_register)
     toolpath, found = own_registers(toolpath, controller)
     diagnostics += found
-    diagnostics += _work_offset(controller, setup, options)
+    diagnostics += [*_work_offset(controller, setup, options), *other_units(controller, options.setup),
+                    *smoothing_plan(controller, setup, options, toolpath)[1]]
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += [*found, *_program_number(toolpath, controller, setup, options)]
     diagnostics += [*unfit_holes(toolpath, controller), *_refused(toolpath), *_no_inverse_time(controller, options)]
@@ -241,12 +255,12 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     corrects = geometric is not None and geometric.corrected_by == "post"  # tables that are corrected do not stand at zero
     entry = "table" if corrects or controller.modes.tcp is None else controller.modes.tcp.frame
     control = Control(machine, law, origin, largest, law, rapids=controller.kinematics.rapids, entry_frame=entry,
-                      feed_rule=controller.feed.length, own_kinematics=own,
+                      feed_rule=controller.feed.length, degree_is_inch=controller.degree_is_inch, own_kinematics=own,
                       helix_planes=controller.arcs.helix_planes,
                       rolls=rolls, measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
     diagnostics += _measured(control, controller, moves.axis, setup, options)
     modes, found = output_modes(control, controller, setup, options, toolpath,
-                                decimals(control, controller), refused)
+                                word_grid(control, controller).places, refused)
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
               modes, geometric, tuple(stated))

@@ -10,9 +10,8 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.control.control import Control, InterpolationMode
-from postproc.controllers.model import ControllerFile
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
@@ -33,24 +32,19 @@ class Rounding:
     made_up: bool = False
 
 
-def decimals(control: Control, controller: ControllerFile) -> Ints:
-    """(J,) decimals of the axis words."""
-    f = controller.format
-    return np.where(control.machine.rotary, f.rotary_decimals, f.linear_decimals).astype(np.int64)
-
-
-def rounding_bound(control: Control, kin: Kinematics, moves: Moves, places: Ints,
+def rounding_bound(control: Control, kin: Kinematics, moves: Moves, grain: Floats,
                    laws: Collection[InterpolationMode], tolerance: float) -> Rounding:
     """Worst case of half a last decimal in every word, to first order (Jacobian), at up to 500 of the poses.
 
-    `laws` are those that the words may have. Where X, Y, Z are the tip, rotary words turn the tool about it.
+    `grain` (J,) is the last decimal of each word, mm or degrees; `laws` are those that the words may have. Where
+    X, Y, Z are the tip, rotary words turn the tool about it.
     """
     rows = np.unique(np.linspace(0, len(moves) - 1, min(len(moves), 500)).astype(int))
     some = kin.inverse(moves.tip[rows], kin.nearest_axis(moves.axis[rows]))[0]
     some = some[np.isfinite(some).all(axis=1)]
     if not len(some):
         return Rounding(0.0, 0.0)
-    step = 0.5 * 10.0 ** -places / control.unit
+    step = 0.5 * grain / control.unit
     jacobian = kin.jacobian(some)
     axis = np.linalg.norm(jacobian[:, 3:], axis=1) @ step
     if "axes" not in laws:

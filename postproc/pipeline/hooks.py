@@ -95,7 +95,8 @@ def carried_out(reader: Reader, controller: ControllerFile, clamps: set[float], 
 def written(controller: ControllerFile) -> Iterator[str]:
     """Blocks that programs of the controller hold, with placeholders."""
     program = controller.program.model_dump(exclude={"passive", "carried_out", "relies_on_turns"})
-    rest = controller.model_dump(include={"codes", "subprograms", "subprogram_files", "arcs", "cycles", "rollover"},
+    rest = controller.model_dump(include={"codes", "subprograms", "subprogram_files", "arcs", "cycles", "rollover", "units",
+                                          "levels"},
                                  exclude={"rollover": {"needs", "default", "rules"}, "subprograms": {"place", "file"},
                                           "subprogram_files": {"place", "file"}, "cycles": {"rigid_only"}})
     modes = [mode for mode in (controller.modes.tcp, controller.modes.tilted) if mode is not None]

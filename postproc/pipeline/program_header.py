@@ -20,8 +20,8 @@ from postproc.setup.model import stated_value
 def header_lines(made: CompiledStage) -> list[str]:
     """The head of the program of a conversion that is compiled."""
     job, machine = made.job, made.machine
-    letters = zip(machine.axis_names, job.control.work_offset, strict=True)
-    offset = " ".join(f"{k}{v:.4f}" for k, v in letters)
+    letters, said = zip(machine.axis_names, job.control.work_offset, machine.rotary, strict=True), made.controller.lengths
+    offset = " ".join(f"{k}{v:.4f}" if turns else f"{k}{said.plain(v)}" for k, v, turns in letters)
     header = [f"postproc {VERSION}", f"source {FilePath(made.toolpath.file).name}", f"machine {machine.name}",
               f"controller {made.controller_name}", PENDING, *made.options.header(),
               f"words: {_meanings(made.program)}",
@@ -32,7 +32,8 @@ def header_lines(made: CompiledStage) -> list[str]:
         numbers = dict.fromkeys(f"{t.name} = T{t.number}" for t in made.toolpath.tools if t.name)
         header.append("tool numbers of the set-up: " + ", ".join(numbers))
     if any(d.code == "feed.of_setup" for d in made.diagnostics):
-        header.append(f"feed {made.setup.output.feed:g} mm/min of the set-up where the CL file states none")
+        feed = (made.setup.output.feed or 0.0) / said.unit
+        header.append(f"feed {feed:.6g} {said.name}/min of the set-up where the CL file states none")
     header += [f"ASSUMED, state it before cutting: {key} = {stated_value(made.setup, key)}" for key in made.setup.assumed]
     if made.motion is not None:
         header.append(feeds_line())
@@ -60,7 +61,7 @@ def _measured(job: Job) -> list[str]:
     if job.setup.output.tool_call:
         return []
     axis, length = "Z", job.control.measured
-    held = f"{axis} of the work offset holds its gauge length {length:.4f} mm" if length else \
+    held = f"{axis} of the work offset holds its gauge length {job.controller.lengths.text(length)}" if length else \
         f"its length must be added to {axis} of the work offset"
     return ["no tool call, no length register: for the tool in the spindle, measured into the work offset", held]
 
@@ -68,6 +69,7 @@ def _measured(job: Job) -> list[str]:
 def _tools(job: Job) -> list[str]:
     """A line for each tool that moves, in order of use: what must be in the magazine, and how long the set-up has it."""
     index, first = np.unique(job.moves.tool, return_index=True)
+    said = job.controller.lengths
     found: dict[int, str] = {}
     for k in index[np.argsort(first, kind="stable")].tolist():
         number, length = job.number_of(k), job.gauge_length(k)
@@ -76,8 +78,8 @@ def _tools(job: Job) -> list[str]:
             continue
         called = f"T{number}" if number or job.setup.output.tool_call else "without a number"
         parts = [f"tool {called}{f' {tool.name}' if tool and tool.name else ''}",
-                 *([f"diameter {tool.diameter:.4g} mm"] if tool and tool.diameter else []),
-                 f"gauge length {length:.4f} mm" if length else "gauge length not stated"]
+                 *([f"diameter {tool.diameter / said.unit:.4g} {said.name}"] if tool and tool.diameter else []),
+                 f"gauge length {said.text(length)}" if length else "gauge length not stated"]
         found[number] = ", ".join(parts)
     margins = [f"T{number}: {LENGTHS_PENDING}" for number in sorted(found)] if length_matters(job) else []
     return [*found.values(), *margins]

@@ -18,8 +18,7 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
     tolerance, axis = job.options.tolerance, job.options.axis_tolerance
     bound = job.rounding
     kinematics = job.controller.kinematics
-    fixed = kinematics.smoothing_fixed
-    smoothing = kinematics.smoothing_share * tolerance if fixed is None else fixed
+    smoothing = job.smoothing.most
     axis_smoothing = kinematics.axis_smoothing_share * axis
     shares = {"smoothing": smoothing, "axis_smoothing": axis_smoothing,
               "rounding": bound.tip, "axis_rounding": bound.axis / DEG,
@@ -38,5 +37,5 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
     if smoothing >= tolerance:
         return shares, [error("tolerance.smoothing", f"the control's own smoothing takes {smoothing:g} mm, the tolerance is "
                               f"{tolerance:g} mm", hint="a wider --tolerance, or a smaller kinematics.smoothing_fixed in "
-                              "the controller file")]
+                              "the controller file, or [output.smoothing] of the set-up")]
     return shares, rounding_problem(bound, tolerance - smoothing, job.axis_tolerance - axis_smoothing * DEG)

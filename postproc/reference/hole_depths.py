@@ -19,7 +19,7 @@ def unfit_holes(toolpath: Toolpath, controller: ControllerFile) -> list[Diagnost
     used = [toolpath.cycles[int(k)] for k in np.unique(toolpath.cycle[toolpath.cycle >= 0])]
     if not used:
         return []
-    least = 10.0**-controller.format.linear_decimals
+    least = controller.grain
     depth, clearance, retract, peck = np.array([_numbers(c) for c in used]).T
     shallow = ~(depth >= least)
     under = ~shallow & ~(clearance + depth >= least)

@@ -86,11 +86,17 @@ class ToolSetup(ToolBody):
 class OutputSettings(UserModel):
     """What the words of the program mean, and how it is divided."""
 
+    units: Literal["mm", "inch"] | None = None
+    """of lengths and feeds in the program: coordinates, arcs, cycles, pitches, planes, header and proof; default: as the
+    controller file has them ([format] units), mm. Angles, and feeds of rotary axes alone, stay degrees"""
     default: OutputMode = "auto"
     """axes: machine coordinates; tcp: tool-centre-point control; tilted: the tip in a tilted work plane,
     rotary axes standing still; auto: the best that controller and machine can. --output-mode goes before it"""
     operations: dict[str, OutputMode] = Field(default_factory=dict)
     """by name of the operation"""
+    smoothing: dict[str, str | Annotated[float, Field(gt=0.0)]] = Field(default_factory=dict)
+    """of the control itself, by name of the operation: a level of the controller file ("roughing", "finishing"), or the
+    mm that it may take, which the bound counts; others have that of the controller file"""
     restart: bool = False
     """every operation begins at home with everything restated, so that the program can be taken up there"""
     subprograms: bool = False

@@ -101,7 +101,7 @@ def _tool(tool: ToolFacts, facts: SheetFacts, answers: Mapping[str, Answer]) -> 
     length = answers.get(f"tools.{tool.number}.gauge_length")
     if length is not None:
         yield _line("gauge_length", f"{length.value:g}", f"mm; {_from(length)}; "
-                    + ("the axis positions depend on it" if facts.lengths else "travel is checked with it"))
+                    + ("the machine coordinates depend on it" if facts.lengths else "travel is checked with it"))
     else:
         yield ("# gauge_length: none needed, the length register takes it up; travel is checked as if it were 0: state it "
                "to check travel with the tool")

@@ -65,7 +65,7 @@ def check_planned(path: JointPath, moves: Moves, needed: Floats, merge: float, c
     first = np.full(size, len(motion) - 1)
     np.minimum.at(first, group, rows)
     owner = np.minimum(comparison.owner[first], count - 1)
-    rules, feed = Slack.of(job, bool(motion.inch.any())), reference.feed[owner]
+    rules, feed = Slack.of(job, bool((motion.unit != 1.0).any())), reference.feed[owner]
     share = rules.share + feed_rounding(motion, job, comparison.owner, cutting, count)[owner]
     slack = rules.seconds + rules.length / np.where(feed > 0.0, feed, np.inf)
     present = (here > 0) & (there > 0)

@@ -6,9 +6,8 @@ and that line is replaced when the proof is complete; the control sees a comment
 
 from __future__ import annotations
 
-import math
-
 from postproc.base.header_words import HEADER, LENGTHS_PENDING, PENDING
+from postproc.base.length_text import MM, LengthText
 from postproc.controllers.model import ControllerFile
 from postproc.readback.comparison.compare import Comparison
 from postproc.readback.text.words import plain
@@ -21,8 +20,6 @@ PLACES = 4
 """decimals of mm and degrees in the head"""
 ELSEWHERE = "proof: not said here"
 """in the head of a program whose blocks are too short for it; the summary and the file of the proof say it"""
-_MARGIN = 1e-6
-"""of the last decimal: a bound that stands on it goes to the next, on every processor"""
 _KINEMATICS = "kinematics "
 """begins what the second reading says of a machine file that it has not used"""
 
@@ -47,32 +44,32 @@ def _means(said: Testimony | None) -> str:
     return f"read-back and second reading of {'CL file and machine file' if machine else 'the CL file'}"
 
 
-def head_line(c: Comparison, said: Testimony | None, room: int) -> str:
+def head_line(c: Comparison, said: Testimony | None, room: int, lengths: LengthText = MM) -> str:
     """The same for the head of the program, in at most `room` characters, never cut short; bounds are rounded up.
 
     Without room for the names of what was not compared it says how many that are; without room for that, how
-    near alone; and where not even that has room, that it is not said here.
+    near alone; and where not even that has room, that it is not said here. `lengths`: in units of the program.
     """
     second = said is not None and bool(said.compared)
     by = "read-back, second reading" if second else "read-back"
     if c.unbounded:
-        near = f"{_up(c.worst_tip)}, {_up(c.worst_axis / DEG)}"
+        near = f"{lengths.up(c.worst_tip)}, {_up(c.worst_axis / DEG)}"
         text = (f"checked, not proved: {c.cuts - c.bounded_cuts} of {c.cuts} cuts unbounded; "
-                f"{_up(c.worst_tip)} mm, {_up(c.worst_axis / DEG)} degrees at places")
+                f"{lengths.up(c.worst_tip)} {lengths.name}, {_up(c.worst_axis / DEG)} degrees at places")
     else:
         cuts = f"all {c.cuts} cuts" if c.cuts == c.bounded_cuts else f"{c.bounded_cuts} of {c.cuts} cuts"
-        near = f"{_up(c.tip_bound)}, {_up(c.axis_bound / DEG)}"
-        text = f"proved by {by}: {cuts} within {_up(c.tip_bound)} mm, {_up(c.axis_bound / DEG)} degrees"
+        near = f"{lengths.up(c.tip_bound)}, {_up(c.axis_bound / DEG)}"
+        text = f"proved by {by}: {cuts} within {lengths.up(c.tip_bound)} {lengths.name}, {_up(c.axis_bound / DEG)} degrees"
     left = [] if said is None else list(said.not_compared)
     named = "; not in the second reading: " + "; ".join(left).replace("(", "- ").replace(")", "")
     count = f"; {len(left)} not read twice" if left else ""
-    tight = f"{'not proved' if c.unbounded else 'proved'}: {near} mm, degrees{count}"
+    tight = f"{'not proved' if c.unbounded else 'proved'}: {near} {lengths.name}, degrees{count}"
     return next(line for line in ((text + named) if left else text, text + count, tight, ELSEWHERE, "")
                 if len(line) <= room)
 
 
-def _up(value: float) -> str:
-    return f"{math.ceil(value * 10.0**PLACES + _MARGIN) / 10.0**PLACES:.{PLACES}f}" if math.isfinite(value) else "unknown"
+def _up(degrees: float) -> str:
+    return MM.up(degrees, PLACES)
 
 
 def with_statement(text: str, controller: ControllerFile, comparison: Comparison, witness: Testimony | None,
@@ -82,8 +79,8 @@ def with_statement(text: str, controller: ControllerFile, comparison: Comparison
     Args:
         file: the CL file, for messages
     """
-    lines = {PENDING: head_line(comparison, witness, comment_room(controller))}
-    lines |= {f"T{one.number}: {LENGTHS_PENDING}": one.line() for one in comparison.lengths}
+    lines = {PENDING: head_line(comparison, witness, comment_room(controller), controller.lengths)}
+    lines |= {f"T{one.number}: {LENGTHS_PENDING}": one.line(controller.lengths) for one in comparison.lengths}
     found: list[Diagnostic] = []
     for pending, line in lines.items():
         text, faults = _in_place_of(text, controller, pending, line, file)

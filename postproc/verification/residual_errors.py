@@ -12,7 +12,6 @@ from postproc.correction.compensation import ErrorCorrection
 from postproc.correction.runs import RowRuns
 from postproc.correction.written_deviation import AfterFormatting
 from postproc.job.job import Job
-from postproc.job.rounding import decimals
 from postproc.path.model import JointPath
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.holes import Phase
@@ -126,7 +125,7 @@ def _play(result: CorrectedConversion) -> tuple[float, float]:
     if not joints or not len(rows):
         return 0.0, 0.0
     q = path.q[rows[np.unique(np.linspace(0, len(rows) - 1, LOOKS).astype(np.int64))]]
-    step = (10.0 ** -decimals(job.control, job.controller) / job.control.unit)[joints]
+    step = (job.grid.grain / job.control.unit)[joints]
     worst = [0.0, 0.0]
     for number in {tool.number for tool in job.toolpath.tools}:
         rates = job.kinematics_of(number).jacobian(q)[:, :, joints]

@@ -83,7 +83,8 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
     lengthless = lengthless & (not control.length_on_z) & (not job.controller.keeps_length)
     start = motion.start / degrees if control.base != "tcp" else job.machine.home
     return ExecutedBlocks(job.machine.axis_names, joints, start, motion.line, motion.code, np.asarray(straight),
-                          arc_sweeps(motion, control), motion.feed, motion.inverse, motion.inch, by_tip, control.feed_rule,
+                          arc_sweeps(motion, control), motion.feed, motion.inverse, motion.unit, by_tip, control.feed_rule,
+                          control.degree_is_inch,
                           job.controller.feed.arc_inverse == "radius", motion.tool, motion.spindle, motion.rpm,
                           motion.coolant,
                           motion.dwell, motion.pitch, motion.hole, motion.register, lengthless, steps, joints_at, poses_at,

@@ -9,7 +9,6 @@ import numpy as np
 from postproc.witness.evidence import ExecutedBlocks
 from postproc.witness.text import Array
 
-_INCH = 25.4
 _STILL = 1e-7
 """mm or degrees by which a word that stands still may differ"""
 _SHORT = 0.2
@@ -30,12 +29,14 @@ def seconds_of(e: ExecutedBlocks) -> Array:
         rows = np.arange(first, min(first + _CHUNK, len(e)))
         step = e.steps(rows)
         linear = (np.abs(step[:, [name not in "ABC" for name in e.letters]]) > 0.0).any(axis=1)
+        unit = np.where(linear, e.unit[rows], 1.0)
+        if e.degree_is_inch:
+            step = step * np.where([name in "ABC" for name in e.letters], unit[:, None], 1.0)
         length[rows] = np.where(e.by_tip[rows], _first_of(np.where(np.abs(step) > _STILL, step, 0.0), e.letters, _KINDS),
-                                _by_rule(step, e.letters, e.rule))
-        length[rows] = np.where(e.inch[rows] & linear, length[rows] / _INCH, length[rows])
+                                _by_rule(step, e.letters, e.rule)) / unit
     arcs = np.flatnonzero((e.code == 2) & np.isfinite(e.sweep))
     if len(arcs):
-        length[arcs] = _arc_lengths(e, arcs) / np.where(e.inch[arcs], _INCH, 1.0)
+        length[arcs] = _arc_lengths(e, arcs) / e.unit[arcs]
     share = np.where(np.isfinite(e.sweep), np.abs(e.sweep), 1.0) if e.by_angle else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(60.0 * np.where(e.inverse, share, length) / e.feed)

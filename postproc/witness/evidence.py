@@ -57,10 +57,11 @@ class ExecutedBlocks:
     Attributes:
         letters: of the joints; joints (E, J) at the end of every block, mm and rad; start (J,)
         line, code (E,): line of the program; 0 rapid, 1 feed, 2 arc; straight (E,): True where joints go straight
-        sweep (E,): rad of arcs, NaN; feed (E,): F word in force, mm or degrees, or inch where `inch` (E,),
+        sweep (E,): rad of arcs, NaN; feed (E,): F word in force, degrees, or lengths of which each is `unit` (E,) mm,
             per minute, or 1/min where `inverse` (E,)
         steps: words (K, J) of blocks less those where they begin, mm and degrees; by_tip (E,): X, Y, Z are the tip
-        rule: what a feed per minute refers to ("xyz-first", "geometry", "all"); by_angle: inverse time of arcs counts rad
+        rule: what a feed per minute refers to ("xyz-first", "geometry", "all"); degree_is_inch: with all axes in
+            inches, degrees count as such, else as mm; by_angle: inverse time of arcs counts rad
         tool, spindle, rpm, coolant, dwell, pitch, hole (E,): as in force; pitch NaN outside taps, hole True in cycles
         register (E,): length register in force, -1 for none; lengthless (E,): True where none may be, since
             the joints hold the tool's length already
@@ -79,9 +80,10 @@ class ExecutedBlocks:
     sweep: Array
     feed: Array
     inverse: Array
-    inch: Array
+    unit: Array
     by_tip: Array
     rule: Literal["xyz-first", "geometry", "all"]
+    degree_is_inch: bool
     by_angle: bool
     tool: Array
     spindle: Array

@@ -96,10 +96,10 @@ class KlartextWriter(Writer):
             yield from self.climbing(k, start, end, f"{sense}{feed}")
             return
         if (start == end).all() and (self.begins(k, start[:2]) != start[:2]).any():
-            x, y = self.number_text(start[:2], self.controller.format.linear_decimals)
+            x, y = self.lengths(start[:2])
             yield f"L X{x} Y{y}"
             self.helix = None
-        centre = self.number_text(start + p.center[k], self.controller.format.linear_decimals)
+        centre = self.lengths(start + p.center[k])
         yield "CC" + "".join(f" {'XYZ'[i]}{centre[i]}" for i in range(3) if i != third)
         yield f"C{text} {sense}{feed}"
 
@@ -108,12 +108,12 @@ class KlartextWriter(Writer):
         p, f = self.program, self.controller.format
         centre = (start + p.center[k])[:2]
         turn = sweep(start[:2] - centre, end[:2] - centre, bool(p.ccw[k])) * (1.0 if p.ccw[k] else -1.0)
-        arc = polar_arc(self.begins(k, start[:2]), end[:2], centre, turn, 10.0 ** -f.linear_decimals,
+        arc = polar_arc(self.begins(k, start[:2]), end[:2], centre, turn, self.controller.grain,
                         10.0 ** -f.rotary_decimals)
         self.helix = k, arc.end
-        pole = self.number_text(arc.pole, f.linear_decimals)
+        pole = self.lengths(arc.pole)
         turned, = self.number_text(np.array([arc.angle]), f.rotary_decimals)
-        climbed, = self.number_text(np.array([end[2] - start[2]]), f.linear_decimals)
+        climbed, = self.lengths(np.array([end[2] - start[2]]))
         yield f"CC X{pole[0]} Y{pole[1]}"
         yield f"CP IPA{turned} IZ{climbed} {rest}"
 
@@ -134,7 +134,7 @@ class KlartextWriter(Writer):
             yield text
         self.cycle_text, self.side, self.asked, self.helix = text, "R0", "R0", None
         p = self.program
-        place = "".join(f" {letter}{self.number_text(p.words[hole.last, j:j + 1], int(p.decimals[j]))[0]}"
+        place = "".join(f" {letter}{self.number_text(self.stated(j, hole.last), int(p.decimals[j]))[0]}"
                         for j, letter in enumerate(p.letters) if letter in "XY")
         yield f"L{place} R0 FMAX M99"
 

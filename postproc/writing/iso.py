@@ -170,12 +170,11 @@ class IsoWriter(Writer):
         """I, J, K of arc blocks, relative to the start: the two of the plane."""
         p = self.program
         result = [""] * (last - first)
-        places = self.controller.format.linear_decimals
         if not self.has_arcs:
             return result
         for k in np.flatnonzero(p.code[first:last] == 2).tolist():
             third = PLANE_AXIS[int(p.plane[first + k])]
-            texts = self.number_text(p.center[first + k], places)
+            texts = self.lengths(p.center[first + k])
             result[k] = "".join(f"{self.space}{'IJK'[i]}{texts[i]}" for i in range(3) if i != third)
         return result
 
@@ -216,16 +215,16 @@ class IsoWriter(Writer):
         result = ""
         for j, letter in enumerate(p.letters):
             if letter in ("X", "Y"):
-                result += f"{self.space}{letter}{self.number_text(p.words[hole.last, j:j + 1], int(p.decimals[j]))[0]}"
+                result += f"{self.space}{letter}{self.number_text(self.stated(j, hole.last), int(p.decimals[j]))[0]}"
         return result
 
     def _cycle_text(self, hole: Hole, cycle: Cycle, spec: CannedCycle, feed: float) -> str:
-        cycles, places = self.controller.cycles, self.controller.format.linear_decimals
-        z, r = self.number_text(np.array([hole.bottom, hole.plane_level]), places)
+        cycles = self.controller.cycles
+        z, r = self.lengths(np.array([hole.bottom, hole.plane_level]))
         out = cycles.to_plane if abs(hole.retract - hole.plane_level) < 1e-9 else cycles.to_initial
         extra = ""
         if spec.peck:
-            extra += f"{self.space}{spec.peck}{self.number_text(np.array([peck_of(cycle)]), places)[0]}"
+            extra += f"{self.space}{spec.peck}{self.lengths(np.array([peck_of(cycle)]))[0]}"
         if spec.dwell:
             dwell = str(round(cycle.dwell * 1000.0)) if cycles.dwell_milliseconds else self.plain(cycle.dwell)
             extra += f"{self.space}{spec.dwell}{dwell}"

@@ -18,9 +18,9 @@ class LinuxcncWriter(IsoWriter):
         """A comment; one that LinuxCNC would carry out becomes plain text."""
         return super().comment(f"text: {text}" if ACTIVE.match(text) else text)
 
-    def smoothing_blocks(self) -> list[str]:
+    def smoothed(self, mm: float, blocks: tuple[str, ...]) -> list[str]:
         """G64 P (blending) and Q (merging of short lines); both add up to the share (measured: Q adds to P)."""
-        if self.smoothing <= 0.0:
+        if mm <= 0.0:
             return []
-        blend, chain = self.plain(self.smoothing * 2.0 / 3.0), self.plain(self.smoothing / 3.0)
-        return [block.format(tolerance=blend, chain=chain, axis="0") for block in self.controller.program.path_tolerance]
+        blend, chain = self.share(mm * 2.0 / 3.0), self.share(mm / 3.0)
+        return [block.format(tolerance=blend, chain=chain, axis="0") for block in blocks]

@@ -19,10 +19,10 @@ class SiemensWriter(IsoWriter):
             self.name = f"NC{self.name}"
         return super().sorted_blocks()
 
-    def smoothing_blocks(self) -> list[str]:
+    def smoothed(self, mm: float, blocks: tuple[str, ...]) -> list[str]:
         """CYCLE832: its third parameter must be given, and is 1 on machines without rotary axes."""
         self.axis_smoothing = self.axis_smoothing or 1.0
-        return super().smoothing_blocks()
+        return super().smoothed(mm, blocks)
 
     def hole(self, hole: Hole) -> Iterator[str]:
         """MCALL where anything but the place of the hole changes, then the place at rapid."""

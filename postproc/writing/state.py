@@ -12,8 +12,10 @@ import numpy as np
 
 from postproc.compile.program import PER_MINUTE, Hole, Program, Section
 from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
+from postproc.controllers.texts import CYCLE_LENGTHS
+from postproc.job.smoothing import Smoothing
 from postproc.reference.coolant import CoolantCommand, switching
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Cycle
 
 
@@ -27,19 +29,22 @@ class WriterState:
     their own, by name, once the program is written. `turning` and `cooling` say whether spindle and coolant
     run, None where nobody knows, `flowing` the kinds of coolant that may run (`postproc.reference.coolant`);
     `taken` are block numbers that subprograms bear; `stock` (2, 3) least and greatest X, Y, Z of the stock;
-    `ahead` the axis words of a stretch of blocks, and the first of them.
+    `levels`
+    smoothing of operations by name, `level` the blocks of the one in force; `ahead` the axis words of a stretch of
+    blocks, and the first of them.
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
                  smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "",
-                 subprograms: bool = False, stock: Floats | None = None) -> None:
-        self.stock = stock
+                 subprograms: bool = False, stock: Floats | None = None, levels: dict[str, Smoothing] | None = None) -> None:
+        self.stock, self.levels, self.level = stock, levels or {}, list[str]()
         self.controller, self.program, self.cycles = controller, program, cycles
         self.length_offsets, self.smoothing, self.axis_smoothing = length_offsets, smoothing, axis_smoothing
         self.work_offset = controller.program.offset_block(work_offset) or work_offset
         self.offset_needs = controller.program.offset_needs(work_offset)
         self.offset_name = controller.program.offset_name(work_offset)
         self.name = "".join(c if c.isascii() and c.isalnum() else "_" for c in name).upper()[:24] or "PROGRAM"
+        self.units = controller.units_word
         self.subprograms = subprograms and bool(controller.subprograms.call)
         self.files: dict[str, list[str]] = {}
         self.space = " " if controller.format.space else ""
@@ -54,6 +59,10 @@ class WriterState:
         self.taken: set[int] = set()
         self.ahead: tuple[int, list[str]] = (0, [])
         self.restate()
+
+    def named(self, number: int | str) -> dict[str, int | str]:
+        """What the text of a frame or a subprogram may name."""
+        return {"name": self.name, "number": number, "units": self.units}
 
     def restate(self) -> None:
         """State motion code and feed with the next block."""
@@ -77,6 +86,28 @@ class WriterState:
         """The text without characters that a comment must not hold, cut to the line length."""
         return clean(self.controller, text)
 
+    # ---- smoothing -----------------------------------------------------------------------------------------
+
+    def smoothing_blocks(self, operation: str = "") -> list[str]:
+        """Blocks that set the control's own smoothing, of an operation by its name, where something is left to it."""
+        usual = Smoothing(self.smoothing, self.controller.program.path_tolerance)
+        wanted = self.levels.get(operation, usual)
+        self.level = self.smoothed(wanted.mm, wanted.blocks)
+        return self.level
+
+    def other_smoothing(self, operation: str) -> list[str]:
+        """The same where an operation has another than is in force."""
+        before = self.level
+        after = self.smoothing_blocks(operation)
+        return after if after != before else []
+
+    def smoothed(self, mm: float, blocks: tuple[str, ...]) -> list[str]:
+        """Blocks of a smoothing that may take so many mm."""
+        if mm <= 0.0 and any("{" in block for block in blocks):
+            return []
+        values = {"tolerance": self.share(mm), "chain": "", "axis": self.plain(self.axis_smoothing)}
+        return [block.format(**values) for block in blocks]
+
     # ---- codes ------------------------------------------------------------------------------------------------
 
     @cached_property
@@ -94,6 +125,21 @@ class WriterState:
 
     # ---- numbers -------------------------------------------------------------------------------------------
 
+    def lengths(self, values: Floats) -> list[str]:
+        """Lengths, mm, as text in the units of the program."""
+        return self.number_text(values / self.controller.unit, self.controller.format.linear_decimals)
+
+    def stated(self, axis: int, rows: Ints | int) -> Floats:
+        """Words of an axis in blocks, in the units of the program."""
+        values = self.program.words[np.atleast_1d(rows), axis]
+        return values if self.program.letters[axis] in "ABC" else np.asarray(values / self.controller.unit)
+
+    def share(self, length: float) -> str:
+        """A length that the control's smoothing may take, mm, in the units of the program, rounded down in inches."""
+        if self.controller.unit == 1.0:
+            return self.plain(length)
+        return self.plain(math.floor(length / self.controller.unit * SHARE + 1e-6) / SHARE)
+
     def number_text(self, values: Floats, places: int) -> list[str]:
         """Numbers as text, rounded to `places`, -0 as 0; all at once, which is much faster than one by one."""
         style = self.controller.format
@@ -107,7 +153,7 @@ class WriterState:
         return _MINUS_ZERO.sub(f"{sign}0", text).split()
 
     def hole_feed(self, hole: Hole) -> float:
-        """Feed of drilling down in a hole, mm/min; that of a tap keeps the pitch at the speed that is written."""
+        """Feed of drilling down in a hole, as F states it; that of a tap keeps the pitch at the speed that is written."""
         return float(self.program.feed[hole.drill]) * (self.rounded if hole.key.startswith("TAP") else 1.0)
 
     def spindle_speed(self, asked: float) -> float:
@@ -123,15 +169,21 @@ class WriterState:
         return (cycles.with_dwell if self.cycles[hole.cycle].dwell > 0.0 else cycles.table)[hole.key]
 
     def cycle_values(self, hole: Hole) -> dict[str, float]:
-        """The values that the text of a cycle may name (`CYCLE_VALUES`)."""
+        """The values that the text of a cycle may name (`CYCLE_VALUES`), lengths in the units of the program."""
+        values = self._cycle_values(hole)
+        return {name: value / self.controller.unit if name in CYCLE_LENGTHS else value for name, value in values.items()}
+
+    def _cycle_values(self, hole: Hole) -> dict[str, float]:
+        """The same in mm; the feed as F states it."""
         cycle, feed = self.cycles[hole.cycle], self.hole_feed(hole)
         surface = hole.plane_level - cycle.clearance
         depth, step = surface - hole.bottom, min(peck_of(cycle), surface - hole.bottom)
-        pitch = cycle.pitch or (feed / abs(self.speed) if self.speed else 0.0)
+        pitch = cycle.pitch or (feed * self.controller.feed_unit / abs(self.speed) if self.speed else 0.0)
         return {"retract": hole.retract, "surface": surface, "clearance": cycle.clearance, "bottom": hole.bottom,
                 "depth": depth, "level": -depth, "step": step, "breaks": float(math.ceil(depth / step)),
-                "dwell": cycle.dwell, "feed": feed, "pitch": -pitch if hole.key == "TAP_LEFT" else pitch,
-                "speed": abs(self.speed), "second": hole.retract - surface}
+                "relief": self.controller.cycles.peck_relief, "dwell": cycle.dwell, "feed": feed,
+                "pitch": -pitch if hole.key == "TAP_LEFT" else pitch, "speed": abs(self.speed),
+                "second": hole.retract - surface}
 
     @staticmethod
     def plain(value: float | str) -> str:
@@ -196,6 +248,8 @@ class WriterState:
         return {"register": self.register, "work_offset": self.work_offset, "direction": direction, **angles}
 
 
+SHARE = 1e6
+"""steps in an inch that a share of the tolerance is rounded down to"""
 SPEED_DIGITS = 3
 """decimals of a speed from 1 to 10; one less each time that it is ten times as great"""
 _ZEROS = re.compile(r"0+ ")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from postproc.compile.program import Program
+from postproc.compile.smoothing import SMOOTHING
 from postproc.controllers.model import ControllerFile
 from postproc.writing.compensated import compensated_arcs
 from toolpaths.diagnostics import Diagnostic, error, warning
@@ -17,7 +18,28 @@ def unwritable(controller: ControllerFile, program: Program, cycles: tuple[Cycle
     """
     return [*_own_length(controller, program, file, length_offsets), *_radius_registers(controller, program, file),
             *compensated_arcs(controller, program, file), *_no_tool(controller, program, file),
-            *_pitches(controller, program, cycles, file)]
+            *_pitches(controller, program, cycles, file),
+            *_smoothed_in_modes(controller, program, file)]
+
+
+def _smoothed_in_modes(controller: ControllerFile, program: Program, file: str) -> list[Diagnostic]:
+    """Operations that begin with another smoothing while a mode is on, in which the control cannot change it."""
+    if controller.kinematics.smoothing_in_modes:
+        return []
+    law, lines, names = "axes", list[int](), list[str]()
+    for block, command in program.ordered():
+        if command.name == "ENTER_SECTION":
+            law = program.sections[int(command.args[0])].law
+        elif command.name == "LEAVE_SECTION":
+            law = "axes"
+        elif command.name == SMOOTHING and law != "axes":
+            lines.append(command.line or int(program.line[min(block, len(program) - 1)]))
+            names.append(str(command.args[0]))
+    if not lines:
+        return []
+    return [error("output.smoothing_mode", f"the smoothing of {', '.join(names[:6])} would change in a mode of the tip or "
+                  "of a plane is on", file=file, lines=lines[:6], count=len(lines),
+                  hint="[output] restart = true of the set-up: every operation begins at home, outside of modes")]
 
 
 def _own_length(controller: ControllerFile, program: Program, file: str,

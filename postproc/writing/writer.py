@@ -13,6 +13,7 @@ from machines.hooks import filled
 from postproc.compile.clamps import CLAMP, UNCLAMP
 from postproc.compile.hooks import HOOK
 from postproc.compile.program import PER_MINUTE, Command, Hole
+from postproc.compile.smoothing import SMOOTHING
 from postproc.control.rollover import HALF
 from postproc.controllers.model import Mode
 from postproc.controllers.texts import blocks_of
@@ -57,7 +58,7 @@ class Writer(WriterState, ABC):
     def lines(self, header: list[str]) -> Iterator[str]:
         """The blocks of the whole program, without line ends; subprograms of files of their own go into `files`."""
         frame, place = self.controller.program, self.controller.subprograms.place
-        named = {"name": self.name, "number": f"{frame.number:04d}"}
+        named = self.named(f"{frame.number:04d}")
         main, subs = self.sorted_blocks()
         inside = [block for blocks in subs.values() for block in blocks] if place != "files" else []
         yield from (self.framed(block.format(**named)) for block in frame.begin)
@@ -78,13 +79,13 @@ class Writer(WriterState, ABC):
         """The stock for the graphics of the control, where it is known and the control has blocks for it."""
         if self.stock is None or not self.controller.program.stock:
             return []
-        texts = self.number_text(self.stock.ravel(), self.controller.format.linear_decimals)
-        values = dict(zip(("x0", "y0", "z0", "x1", "y1", "z1"), texts, strict=True))
+        values = dict(zip(("x0", "y0", "z0", "x1", "y1", "z1"), self.lengths(self.stock.ravel()), strict=True))
         return [block.format(**values) for block in self.controller.program.stock]
 
     def sorted_blocks(self) -> tuple[Iterable[str], dict[int, list[str]]]:
         """Blocks of the main program up to its ending, and those of the subprograms by number, one for each operation."""
-        start = chain(self.start(), self.smoothing_blocks())
+        first = next((str(c.args[0]) for c in self.program.commands.get(0, ()) if c.name == SMOOTHING), "")
+        start = chain(self.start(), self.smoothing_blocks(first))
         if not self.subprograms:
             return chain(start, (block for block in self.body() if block != MARK)), {}
         spec, main, subs = self.controller.subprograms, list(start), dict[int, list[str]]()
@@ -93,12 +94,12 @@ class Writer(WriterState, ABC):
             if block != MARK:
                 into.append(block)
                 continue
-            named = {"name": self.name, "number": 1001 + len(subs)}
-            self.taken.add(1001 + len(subs))
+            named = self.named(number := 1001 + len(subs))
+            self.taken.add(number)
             main.append(spec.call.format(**named))
-            into = subs[1001 + len(subs)] = [text.format(**named) for text in spec.begin]
+            into = subs[number] = [text.format(**named) for text in spec.begin]
         for number, blocks in subs.items():
-            blocks += [text.format(name=self.name, number=number) for text in spec.end]
+            blocks += [text.format(**self.named(number)) for text in spec.end]
         return main, subs
 
     @property
@@ -130,7 +131,7 @@ class Writer(WriterState, ABC):
         if (self.program.plane[self.program.code == 2] > 17).any():
             yield from self.controller.arcs.start
         for block in self.controller.program.preamble:
-            yield from blocks_of(block.replace("{work_offset}", self.work_offset))
+            yield from blocks_of(block.replace("{work_offset}", self.work_offset).replace("{units}", self.units))
 
     def used_modes(self) -> list[Mode]:
         """The modes of the program's sections."""
@@ -141,6 +142,7 @@ class Writer(WriterState, ABC):
     def relies_on(self) -> list[str]:
         """Settings of the control that the program needs, each once."""
         needed = [self.offset_needs] if self.offset_needs else []
+        needed += self.controller.inch.relies_on if self.controller.format.units == "inch" else ()
         needed += [text for mode in self.used_modes() for text in mode.relies_on]
         letters, text = self.beyond_a_turn(), self.controller.program.relies_on_turns
         needed += [text.format(axes=" ".join(letters))] if letters and text else []
@@ -155,14 +157,6 @@ class Writer(WriterState, ABC):
         p = self.program
         far = np.flatnonzero(((np.abs(p.words) >= FULL_TURN) & p.write & ~p.home[:, None]).any(axis=0)).tolist()
         return [p.letters[j] for j in far if p.letters[j] in "ABC" and j not in p.rolls]
-
-    def smoothing_blocks(self) -> list[str]:
-        """Blocks that set the control's own smoothing, where something is left to it."""
-        blocks = self.controller.program.path_tolerance
-        if self.smoothing <= 0.0 and any("{" in block for block in blocks):
-            return []
-        values = {"tolerance": self.plain(self.smoothing), "chain": "", "axis": self.plain(self.axis_smoothing)}
-        return [block.format(**values) for block in blocks]
 
     def numbered(self, block: str) -> str:
         """The block with its number where the controller numbers blocks; the sign of the block switch stays in front."""
@@ -227,7 +221,7 @@ class Writer(WriterState, ABC):
             rows = np.flatnonzero(p.write[at:stop, j])
             column = [""] * (stop - at)
             texts = self.rolled(j, at + rows) if j in p.rolls else [
-                letter + text for text in self.number_text(p.words[at + rows, j], int(p.decimals[j]))]
+                letter + text for text in self.number_text(self.stated(j, at + rows), int(p.decimals[j]))]
             for row, text in zip(rows.tolist(), texts, strict=True):
                 column[row] = self.space + text
             columns.append(column)
@@ -279,6 +273,8 @@ class Writer(WriterState, ABC):
             yield self.hooked(command)
         elif command.name == "RESTATE":
             self.forget()
+        elif command.name == SMOOTHING:
+            yield from self.other_smoothing(str(command.args[0]))
         elif command.name == "OPERATION_START":
             yield from self.operation(str(command.args[0]), len(command.args) > 1)
         elif command.name == "COMMENT":
@@ -307,7 +303,7 @@ class Writer(WriterState, ABC):
         yield MARK
         values = {"name": self.clean(name), "comment": self.comment(name), "number": 100 * self.operations}
         blocks = [block.format(**values) for block in self.controller.program.operation]
-        blocks += [*self.start(), *self.smoothing_blocks()] if restart and self.operations > 1 else []
+        blocks += [*self.start(), *self.smoothing_blocks(name)] if restart and self.operations > 1 else []
         if not blocks:
             return
         self.forget()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from postproc.compile.program import Program
 from postproc.controllers.model import ControllerFile, WriterName
+from postproc.job.smoothing import Smoothing
 from postproc.writing.writer import Writer
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
@@ -11,7 +12,8 @@ from toolpaths.toolpath import Cycle
 
 def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
                smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "",
-               subprograms: bool = False, stock: Floats | None = None) -> Writer:
+               subprograms: bool = False, stock: Floats | None = None,
+               levels: dict[str, Smoothing] | None = None) -> Writer:
     """The writer that the controller file names.
 
     Args:
@@ -20,6 +22,7 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
         work_offset: the set-up's code, G54 to G59.3
         name: of the program, where the controller's programs hold one
         stock: (2, 3), least and greatest X, Y, Z of the stock in the work offset, mm
+        levels: the control's own smoothing of operations by name, where it is another
         subprograms: each operation becomes a subprogram of the file, where the controller has such
     """
     from postproc.writing.fanuc import FanucWriter
@@ -33,4 +36,4 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
         "iso": IsoWriter, "linuxcnc": LinuxcncWriter, "fanuc": FanucWriter, "haas": HaasWriter, "siemens": SiemensWriter,
         "heidenhain": KlartextWriter}
     return writers[controller.writer](controller, program, cycles, length_offsets, smoothing, work_offset, axis_smoothing,
-                                      name, subprograms, stock)
+                                      name, subprograms, stock, levels)

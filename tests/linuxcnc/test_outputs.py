@@ -306,3 +306,26 @@ def test_offset_in_the_header_is_the_one_used() -> None:
     stated = [float(word[1:]) for word in line.strip("()").split()[-5:]]
     assert result.job is not None
     np.testing.assert_allclose(stated, result.job.control.work_offset, atol=5e-5)
+
+
+@pytest.mark.parametrize("machine", ["mill-3axis", "mikron-ucp710"])
+def test_a_program_in_inches_is_the_motion_that_we_meant(interpret, tmp_path: Path, machine: str) -> None:
+    """Every cycle, and a blade by inverse time: the interpreter goes where our reader does, at the feeds that we meant."""
+    (tmp_path / "cycles.apt").write_text(CYCLES)
+    setup = setup_file()
+    setup = setup.model_copy(update={"output": setup.output.model_copy(update={"units": "inch"})})
+    for file in (tmp_path / "cycles.apt", SAMPLES / ("pocket.cls" if machine == "mill-3axis" else "blade.cls")):
+        path, found = toolpaths.read(file)
+        result = postproc.convert(path, machines.load(machine), "linuxcnc", setup, diagnostics=found)
+        assert result.ok and "G20 " in result.text, result.diagnostics
+        o = outputs.output(result, interpret)
+        c, m = o.canonical, o.motion
+        theirs = c.machine[o.moves][:, o.columns]
+        assert len(theirs) == len(m.end) and np.abs(theirs - m.end)[outputs.known(o)].max() < ROUNDED
+        cut = m.code > 0
+        assert o.result.job is not None
+        ours = block_seconds(m, o.result.job.control)[cut]
+        seconds = c.seconds[o.moves[cut]]
+        timed = np.isfinite(seconds) & (ours > 0.0)
+        np.testing.assert_allclose(seconds[timed], ours[timed], rtol=1e-5, atol=1e-7)
+        assert timed.sum() > 10

@@ -177,6 +177,6 @@ FAULTS = (
           "1.1 * limits.acceleration,", ("fast planned",)),
     Fault("planned without the jerk of a block", "planning", "span_speed", "orders, strict=True), 1)",
           "orders[:2], strict=False), 1)", ("fast planned",)),
-    Fault("rounding of words to one place less", "planning", "decimals", "f.linear_decimals).astype",
-          "f.linear_decimals - 2).astype"),
+    Fault("rounding of words to one place less", "planning", "word_grid", "style.linear_decimals).astype",
+          "style.linear_decimals - 2).astype"),
 )

@@ -12,7 +12,6 @@ from postproc.readback.comparison.faults import Faults
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinates
-from postproc.readback.execution.rows import INCH
 from postproc.reference.holes import PECKING, Phase
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
@@ -159,15 +158,15 @@ def _beyond_travel(motion: Motion, executed: BlockPoses, slack: Floats) -> tuple
 
 def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """The control's own smoothing while cutting: stated where the controller has it, and inside its share."""
-    if not job.controller.program.path_tolerance:
+    if not job.controller.program.path_tolerance and not job.smoothing.named:
         return []
-    rules = job.controller.kinematics
-    share = rules.smoothing_share * job.options.tolerance if rules.smoothing_fixed is None else rules.smoothing_fixed
     rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
-    bad = rows[~(motion.blend[rows] <= share * (1.0 + 1e-6))]
+    shares = job.smoothing.by_operation[np.minimum(job.toolpath.operation[moves.row[owner[rows]]],
+                                                   len(job.smoothing.by_operation) - 1)]
+    bad = rows[~(motion.blend[rows] <= shares * (1.0 + 1e-6))]
     if not len(bad):
         return []
-    k = int(bad[0])
+    k, share = int(bad[0]), float(shares[np.searchsorted(rows, bad[0])])
     found = "is not stated" if np.isnan(motion.blend[k]) else "has no limit" if np.isinf(motion.blend[k]) \
         else f"may take {motion.blend[k]:g} mm"
     return [faults.error("verify.smoothing", f"the control's smoothing {found}, its share of the tolerance is {share:g} mm",
@@ -218,19 +217,18 @@ def _seconds(motion: Motion, control: Control, by_radius: bool, rows: Ints, swee
     """Those of the blocks `rows` (K,), whose sweeps are `sweep` (K,)."""
     before, end = coordinates(motion, rows)
     step = end - before
-    length = control.feed_length(step)
+    unit = motion.unit[rows]
+    length = control.feed_units(step, unit)
     tips = np.flatnonzero(motion.frame[rows] > 0)
     if len(tips):
-        length[tips] = control.under("tcp").feed_length(np.where(np.abs(step[tips]) > STILL, step[tips], 0.0))
+        length[tips] = control.under("tcp").feed_units(np.where(np.abs(step[tips]) > STILL, step[tips], 0.0), unit[tips])
     for plane, (i, j) in PLANE_COLUMNS.items():
         k = np.flatnonzero(np.isfinite(sweep) & (motion.plane[rows] == plane))
         if len(k):
             columns = [int(control.xyz[i]), int(control.xyz[j])]
             radius = np.linalg.norm(before[k][:, columns] - motion.center[rows[k]][:, (i, j)], axis=1)
             rise = step[k, int(control.xyz[3 - i - j])]
-            length[k] = np.hypot(radius * sweep[k], rise)
-    linear = np.isfinite(sweep) | (step[:, control.slides] != 0.0).any(axis=1)
-    length = np.where(motion.inch[rows] & linear, length / INCH, length)
+            length[k] = np.hypot(radius * sweep[k], rise) / unit[k]
     share = np.where(np.isfinite(sweep), sweep, 1.0) if by_radius else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
         feed = motion.feed[rows]

@@ -90,7 +90,7 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
     moves, faults = job.moves.without_pecks(), Faults(job.toolpath.file, gcode)
     tip, axis = _ends(motion, executed)
     words = job.controller.format
-    grain = max(1e-3, 1.5 * 10.0**-words.linear_decimals), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
+    grain = max(1e-3, 1.5 * job.controller.grain), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
     number = rewinds(motion, tip, axis, moves.tip, executed.control.rotary,
                      (2.0 * tolerance, 2.0 * axis_tolerance))
     match, owner = _aligned(as_slice(np.flatnonzero(number < 0)), tip, axis, arc_sweeps(motion, executed.control), moves,

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from postproc.base.length_text import MM, LengthText
 from postproc.control.modes import table_axes
 from postproc.job.job import Job
 from postproc.joints.tracks import TRAVEL_SLACK
@@ -47,16 +48,12 @@ class LengthMargin:
     bodies: bool = False
     """bodies of the set-up are not looked at"""
 
-    def line(self) -> str:
-        """For the head of the program and the summary; margins are rounded down."""
-        ends = (f"by {sign}{_down(mm)} mm, then {what}" if mm < MUCH else f"by {sign}{MUCH:g} mm and more"
+    def line(self, said: LengthText = MM) -> str:
+        """For the head of the program, in its units, and the summary; margins are rounded down."""
+        ends = (f"by {sign}{said.down(mm, 3)} {said.name}, then {what}" if mm < MUCH
+                else f"by {sign}{MUCH / said.unit:.3g} {said.name} and more"
                 for sign, mm, what in (("-", self.shorter, self.ends_shorter), ("+", self.longer, self.ends_longer)))
         return f"T{self.number}: length may differ {'; '.join(ends)}{'; bodies apart' if self.bodies else ''}"
-
-
-def _down(mm: float) -> str:
-    """Three decimals, rounded down; one that stands on the last decimal goes to the one before, on every processor."""
-    return f"{max(np.floor(mm * 1000.0 - 1e-6), 0.0) / 1000.0:.3f}"
 
 
 def length_matters(job: Job) -> bool:

@@ -77,7 +77,7 @@ def check_slow(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, own
     asked = _asked(moves, owner, cutting, tip, length)
     total, again = _by_move(owner, cutting, seconds, len(moves)), _pecked(moves, owner, cutting, tip, length)
     total = total / again
-    rules = Slack.of(job, bool(motion.inch.any()))
+    rules = Slack.of(job, bool((motion.unit != 1.0).any()))
     slack = rules.seconds + rules.length / np.where(moves.feed > 0.0, moves.feed, np.inf)
     check = (moves.kind != Kind.RAPID) & ~moves.link & (match >= 0) & np.isfinite(asked) & np.isfinite(total) & (total > 0.0)
     check &= ~_taps(job, moves)
@@ -221,7 +221,7 @@ def check_fed_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Move
     needs = _least(motion, executed, rows)
     travel = np.concatenate([[np.inf], lengths(np.diff(tip, axis=0))])
     feed = np.where(down & (moves.feed[m] > 0.0), moves.feed[m], np.inf)
-    grain = Slack.of(job, bool(motion.inch.any())).length
+    grain = Slack.of(job, bool((motion.unit != 1.0).any())).length
     spot = np.where(down & (moves.seconds[m] > 0.0), moves.seconds[m], 0.0)
     allowed = np.fmax(np.fmax(needs, spot), travel / feed)
     least = executed.control.machine.limits.velocity[executed.control.slides].min(initial=np.inf)

@@ -266,7 +266,7 @@ class FanucReader(IsoReader):
         if set(stated) & set("PQR"):
             found.append(error("gcode.mode", "G68.2 by other than Euler angles is not executed by this reader", file=file,
                                lines=[int(line[b])], hint="write G68.2 X Y Z I J K"))
-        shift = np.array([stated.get(a, 0.0) for a in "XYZ"])
+        shift = np.array([stated.get(a, 0.0) for a in "XYZ"]) * self.units_at(words, b)
         return WordMeaning("tilted", "G68.2", turned("ZXZ", [stated.get(a, 0.0) for a in "IJK"]), shift)
 
     def unmoved(self, words: Words, first: int, last: int, line: Ints, file: str,
@@ -292,7 +292,8 @@ class FanucReader(IsoReader):
                                    hint="write G91 G28 Z0."))
                 continue
             new += [(b, "G", 53.0), (b, "G", 0.0)]
-            new += [(b, a, float(self.home[self.axes.index(a)])) for a in stated]
+            unit = self.units_at(words, b)
+            new += [(b, a, float(self.home[self.axes.index(a)]) / (1.0 if a in "ABC" else unit)) for a in stated]
             k = int(np.searchsorted(motions, b, side="right")) - 1
             if b + 1 not in motions and k >= 0 and b < words.lines:
                 new.append((b + 1, "G", float(motion[k])))

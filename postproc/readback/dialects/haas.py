@@ -3,7 +3,7 @@
 P of a dwell is ms, or s with a point; L repeats a cycle; I, J, K of G73 and G83 are the first peck, what each
 next one is less by, and the least; G154 P work offsets; M97 P runs a subprogram of the same program from its
 N; G234 tool centre point control, left by G49; G254 dynamic work offset, left by G255: X, Y, Z stay along the
-machine's axes while the offset follows the rotary tables; G187 P E, rounding of corners in mm. Inch
+machine's axes while the offset follows the rotary tables; G187 P E, rounding of corners. Inch
 and metric: setting 9; G20 and G21 only ask for it.
 """
 
@@ -81,7 +81,7 @@ class HaasReader(FanucReader):
         """G187 P E: corners rounded by E mm; without words, or without E, as a setting of the control has it."""
         for b in codes(words, "G", (187,))[0].tolist():
             stated = block(words, b)
-            new.append((b, SMOOTH, stated.get("E", 0.0) or float("inf")))
+            new.append((b, SMOOTH, stated.get("E", 0.0) * self.units_at(words, b) or float("inf")))
         for b in codes(words, "G", (61,))[0].tolist():
             new.append((b, SMOOTH, 0.0))
 

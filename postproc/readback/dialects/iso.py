@@ -22,6 +22,7 @@ from postproc.readback.text.modal import CYCLES, GROUPS, codes, columns, fill, n
 from postproc.readback.text.words import Words, tokenise
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.units import MM_PER_INCH
 
 New = list[tuple[int, str, float]]
 """words to add: block, letter, value"""
@@ -33,8 +34,9 @@ class IsoReader(Reader):
     rises_first = True
     stating = Reader.stating | {"arc_distance": "G91.1 or G90.1"}
     units_from = "the program before left them, or as its start-up code and the INI file have them"
-    millimetres = 25.4
-    """mm of smoothing per unit under G20"""
+
+    _stated: tuple[Words, Ints, Floats] | None = None
+    """words, and their blocks and codes of units"""
 
     def tokens(self, data: bytes, file: str) -> tuple[ProgramText, list[Diagnostic]]:
         """The words of one file; O numbers name it and do nothing."""
@@ -48,7 +50,7 @@ class IsoReader(Reader):
     def canonical(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words."""
         words, found = text.words, list[Diagnostic]()
-        new: New = []
+        words, new = self.own_smoothing(words)
         drop = np.zeros(len(words.letter), dtype=bool)
         self.tools(words, new, line, file, found)
         self.rests(words, new, drop, line, file, found)
@@ -61,6 +63,24 @@ class IsoReader(Reader):
         words = self.arcs(relative_words(words, self.axes), new, drop)
         found += self.numbers(words.take(~drop), line, file)
         return Canonical(added(words, new, drop), line), found
+
+    def own_smoothing(self, words: Words) -> tuple[Words, New]:
+        """Words without those of the control's smoothing that the controller file knows by what they may take, and that."""
+        known = self.controller.known_smoothing if self.controller is not None else {}
+        new, drop = list[tuple[int, str, float]](), np.zeros(len(words.letter), dtype=bool)
+        for text, mm in known.items():
+            stated = [(ord(part[0]), float(part[1:])) for part in text.split(" ")]
+            for k in np.flatnonzero((words.letter == stated[0][0]) & (words.value == stated[0][1])).tolist():
+                rows = slice(k, k + len(stated))
+                here = list(zip(words.letter[rows].tolist(), words.value[rows].tolist(), strict=True))
+                if here == stated and words.line[k] == words.line[k + len(stated) - 1]:
+                    drop[rows] = True
+                    new.append((int(words.line[k]), SMOOTH, mm))
+        return words.take(~drop) if new else words, new
+
+    def check(self, words: Words, file: str) -> list[Diagnostic]:
+        """Codes and words but for those that set the control's smoothing."""
+        return super().check(self.own_smoothing(words)[0], file)
 
     def tools(self, words: Words, new: New, line: Ints, file: str, found: list[Diagnostic]) -> None:
         """Tools that M6 loads, and length registers by G43 H and G49."""
@@ -99,14 +119,21 @@ class IsoReader(Reader):
     def paths(self, words: Words, new: New) -> None:
         """G61 none; G64 P blends within P and merges short lines within Q (P where it is not stated); P0 is no limit."""
         blocks, code = codes(words, "G", (61, 61.1, 64))
-        units = fill(*codes(words, "G", (20, 21)), words.lines, 21.0)
         for b, c in zip(blocks.tolist(), code.tolist(), strict=True):
             low, high = np.searchsorted(words.line, [b, b + 1])
             stated = {chr(a): float(v) for a, v in zip(words.letter[low:high], words.value[low:high], strict=True)}
             value = 0.0 if c != 64 else float("inf")
             if c == 64 and stated.get("P", 0.0) > 0.0 and stated.get("Q", 0.0) >= 0.0:
                 value = stated["P"] + stated.get("Q", stated["P"])
-            new.append((b, SMOOTH, value * (self.millimetres if units[b] == 20 else 1.0)))
+            new.append((b, SMOOTH, value * self.units_at(words, b)))
+
+    def units_at(self, words: Words, b: int) -> float:
+        """mm of a unit of length at a block: 25.4 behind G20."""
+        if self._stated is None or self._stated[0] is not words:
+            self._stated = words, *codes(words, "G", (20, 21))
+        _, blocks, code = self._stated
+        at = int(np.searchsorted(blocks, b, side="right")) - 1
+        return MM_PER_INCH if at >= 0 and code[at] == 20 else 1.0
 
     def levels(self, words: Words, new: New) -> None:
         """A fresh LinuxCNC's cycles return to R until G98 is stated (measured on 2.9; later it keeps the mode

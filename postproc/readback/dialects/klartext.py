@@ -144,9 +144,6 @@ class KlartextReader(Reader):
                 calls[b] = Call(b, f"REP {name} {b}", int(s.keys["REP"]))
             elif s.name in ("CALL LBL", "CALL PGM"):
                 calls[b] = Call(b, f"{s.name[5:]} {name}")
-            elif s.name == "BEGIN PGM" and s.args[1] == "INCH":
-                found.append(error("gcode.units", "a program in inches", file=file, lines=[b],
-                                   hint="write the program in mm: BEGIN PGM ... MM"))
         if not any(s.name == "BEGIN PGM" and s.args[1] for _, s in here):
             found.append(self.unstated(file, 1))
         names = {str(s.args[0]) for _, s in here if s.name == "BEGIN PGM"} | {PurePath(file).stem.upper()}
@@ -178,7 +175,16 @@ class KlartextReader(Reader):
     def canonical(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words."""
         run = KlartextRun(text, line, file, self.axes)
-        return run.canonical(), run.found
+        return run.canonical(), [*run.found, *_two_units(text, file)]
+
+
+def _two_units(text: ProgramText, file: str) -> list[Diagnostic]:
+    """A program that calls another in other units."""
+    units = {str(s.args[1]) for s in text.statements if s.name == "BEGIN PGM" and s.args[1]}
+    if len(units) < 2:
+        return []
+    return [error("gcode.units", "programs in mm and in inches that call one another", file=file,
+                  hint="write all of them in mm, or all in inches")]
 
 
 def _frame(here: list[tuple[int, DialectStatement]], file: str, lines: int) -> list[Diagnostic]:

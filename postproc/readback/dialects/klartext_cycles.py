@@ -8,12 +8,16 @@ Q202 count from the surface.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from postproc.readback.text.canonical import Drill, DrillStyle
 from postproc.readback.text.cycles import pecks
+from toolpaths.units import MM_PER_INCH
 
 RAPID = 99999.0
-"""mm/min and more: FMAX"""
+"""F and more: FMAX"""
+FEED_PARTS = 10.0
+"""in programs in inches F counts tenths of an inch per minute (34059x, Entering tool-related data, feed rate F)"""
 APPROACH = 0.2
 """mm before the last depth to which cycles 200 and 203 come back rapidly"""
 NEEDED = {number: tuple(f"Q{n}" for n in names) for number, names in {
@@ -28,8 +32,23 @@ Q = dict[str, float]
 Made = tuple[Drill | None, str]
 
 
-def drill_of(number: int, q: Q, speed: float) -> Made:
-    """(cycle, "") or (None, what is missing or not modelled); `speed` of the spindle, 1/min."""
+_LENGTHS = tuple(f"Q{n}" for n in (200, 201, 202, 203, 204, 205, 212, 239, 256, 257, 258, 259, 343, 379))
+"""those that are lengths; feeds are in units of F"""
+
+
+def drill_of(number: int, q: Q, speed: float, inch: bool = False) -> Made:
+    """(cycle, "") or (None, what is missing or not modelled); `speed` of the spindle, 1/min; `inch`: lengths are inches."""
+    if not inch:
+        return _drill_of(number, q, speed)
+    drill, why = _drill_of(number, {k: v * MM_PER_INCH if k in _LENGTHS else v for k, v in q.items()}, speed)
+    if drill is None or drill.tap != "rigid":
+        return drill, why
+    parts = MM_PER_INCH / FEED_PARTS
+    return replace(drill, feed=drill.feed / parts, feed_out=drill.feed_out / parts), why
+
+
+def _drill_of(number: int, q: Q, speed: float) -> Made:
+    """The same with lengths in mm."""
     kinds = {200: _drill, 201: _ream, 203: _universal, 205: _deep, 240: _centre}
     if number not in (*kinds, 206, 207):
         return None, "is not executed by this reader"

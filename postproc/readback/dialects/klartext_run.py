@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.iso import New
-from postproc.readback.dialects.klartext_cycles import drill_of
+from postproc.readback.dialects.klartext_cycles import FEED_PARTS, drill_of
 from postproc.readback.dialects.track import AxisPositions
 from postproc.readback.text.canonical import (
     CALL,
@@ -33,6 +33,7 @@ from postproc.readback.text.euler_angles import turned
 from postproc.readback.text.modal import GROUPS, codes, fill, number_of
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.units import MM_PER_INCH
 
 PLANES = {frozenset("XY"): 17.0, frozenset("XZ"): 18.0, frozenset("YZ"): 19.0}
 """codes of the planes of circles by their axes; DR+ turns as G3 does there"""
@@ -60,6 +61,7 @@ class KlartextRun:
         self.side = fill(*codes(text.words, "G", GROUPS["compensation"]), text.words.lines, 40.0)
         self.part = math.nan, math.nan
         self.waiting: tuple[int, float] | None = None
+        self.inch = any(s.name == "BEGIN PGM" and s.args[1] == "INCH" for s in text.statements[:1])
 
     def fault(self, code: str, b: int, message: str, hint: str) -> None:
         """An ERROR at a block."""
@@ -81,7 +83,9 @@ class KlartextRun:
             self.new += [(int(b), "M", v) for v in both[float(m)]]
         drop = (words.letter == ord(STATEMENT)) | ((words.letter == ord("M")) & np.isin(words.value, (13, 14, 91, 99, 128,
                                                                                                 129)))
-        return Canonical(added(words, self.new, drop), self.line, tuple(self.laws), tuple(self.drills))
+        self.new += [(1, "G", 20.0)] if self.inch else []
+        return Canonical(added(words, self.new, drop), self.line, tuple(self.laws), tuple(self.drills),
+                         feed_parts=FEED_PARTS if self.inch else 1.0)
 
     def one(self, b: int, s: DialectStatement) -> None:
         """One statement of block b."""
@@ -261,9 +265,10 @@ class KlartextRun:
                 self.fault("gcode.dwell", b, "CYCL DEF 9.1 lacks its time",
                            "CYCL DEF 9.1 DWELL 0.5 (seconds)")
         elif number == 32.0:
-            self.new += [(b, SMOOTH, s.keys.get("T", 0.0) or math.inf)] if part == 1.0 else []
+            unit = MM_PER_INCH if self.inch else 1.0
+            self.new += [(b, SMOOTH, s.keys.get("T", 0.0) * unit or math.inf)] if part == 1.0 else []
         else:
-            drill, why = drill_of(int(number), s.keys, float(self.speed[b]))
+            drill, why = drill_of(int(number), s.keys, float(self.speed[b]), self.inch)
             if drill is None:
                 self.fault("gcode.cycle", b, f"CYCL DEF {number:g} {why}",
                            "200, 201, 203, 205, 206, 207, 240, 247, 9 and 32 are executed")

@@ -35,7 +35,7 @@ from postproc.readback.text.canonical import (
     added,
 )
 from postproc.readback.text.flow import Call, Structure
-from postproc.readback.text.modal import GROUPS, Groups, codes, number_of
+from postproc.readback.text.modal import GROUPS, Groups, codes, fill, number_of
 from postproc.readback.text.rollover import DIRECTION, NEGATIVE, POSITIVE, SHORTEST
 from postproc.readback.text.words import Words, block_delete, lines_of, read_words
 from toolpaths.arrays import Bools, Ints
@@ -153,9 +153,19 @@ class SiemensReader(Reader):
         letter[letter >= FORCED] -= FORCED
         value = words.value.copy()
         units = (letter == ord("G")) & np.isin(value, (70, 71, 700, 710))
+        found += self._feeds_apart(words, line, file)
         value[units] = np.where(np.isin(value[units], (70, 700)), 20.0, 21.0)
         drop |= (letter == ord(STATEMENT)) | np.isin(letter, [ord(a) for a in "LP"])
         return Canonical(added(Words(letter, value, words.line, words.lines), new, drop), line, laws, drills), found
+
+    def _feeds_apart(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
+        """F while G70 holds: it leaves feeds in the basic system, mm or inches as MD10240 has it (S1, 3.1.6)."""
+        state = fill(*codes(words, "G", (70, 71, 700, 710)), words.lines, 0.0) == 70.0
+        blocks = np.unique(words.line[(words.letter == ord("F")) & state[words.line]])
+        if not len(blocks):
+            return []
+        return [error("gcode.units", "F while G70 holds, which leaves feeds in the basic system of the control (MD10240)",
+                      file=file, lines=line[blocks][:6].tolist(), count=len(blocks), hint="write G700 in the place of G70")]
 
     def _plain(self, words: Words, new: New, drop: Bools, run: SiemensRun) -> None:
         """What codes without names set: tools, length, offsets, rests, exact stop."""

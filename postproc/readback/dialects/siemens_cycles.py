@@ -10,6 +10,7 @@ to 30 mm depth, a fiftieth of the depth, 7 mm at the most, beyond).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from postproc.readback.text.canonical import DialectStatement, Drill
 from postproc.readback.text.cycles import pecks
@@ -18,8 +19,24 @@ CYCLES = ("CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84", "CYCLE840", "CYCLE85", "CY
 _SHALLOW, _LEAD, _MOST = 30.0, 0.6, 7.0
 
 
-def drill_of(s: DialectStatement, speed: float) -> tuple[Drill | None, str]:
-    """(cycle, "") or (None, what is missing or not modelled); `speed` of the spindle, 1/min."""
+_LENGTHS = {"CYCLE83": (5, 6, 7, 14, 16), "CYCLE84": (8,), "CYCLE840": (10,)}
+"""places of further lengths, next to the first five"""
+
+
+def drill_of(s: DialectStatement, speed: float, unit: float = 1.0) -> tuple[Drill | None, str]:
+    """(cycle, "") or (None, what is missing or not modelled); `speed` of the spindle, 1/min; `unit`: mm that lengths
+    of the cycle and of F count in."""
+    if unit != 1.0:
+        places = (*range(5), *_LENGTHS.get(s.name, ()))
+        s = replace(s, args=tuple(a * unit if k in places and isinstance(a, float) else a for k, a in enumerate(s.args)))
+    drill, why = _drill_of(s, speed)
+    if drill is None or not drill.tap:
+        return drill, why
+    return replace(drill, feed=drill.feed / unit, feed_out=drill.feed_out / unit), why
+
+
+def _drill_of(s: DialectStatement, speed: float) -> tuple[Drill | None, str]:
+    """The same with lengths in mm."""
     out, surface, safety, depth = (s.number(k) for k in range(4))
     if math.isnan(depth):
         depth = surface - s.number(4)

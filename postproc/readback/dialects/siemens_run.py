@@ -23,6 +23,7 @@ from postproc.readback.text.modal import codes, fill, number_of
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.units import MM_PER_INCH
 
 LENGTH_AXIS = "$SC_TOOL_LENGTH_CONST"
 """SD42940: 17 keeps the tool length along Z in every plane, from the next D on (NC programming, tool length
@@ -36,7 +37,7 @@ class SiemensRun:
     def __init__(self, words: Words, text: ProgramText, line: Ints, file: str, found: list[Diagnostic], new: New,
                  axes: tuple[str, ...]) -> None:
         self.words, self.text, self.line, self.file, self.found, self.new = words, text, line, file, found, new
-        self.axes = axes
+        self.axes, self.units = axes, codes(words, "G", (70, 71, 700, 710))
         self.length: list[tuple[int, float]] = []
         self.kept: list[tuple[int, float]] = []
         self.states: list[tuple[int, float]] = []
@@ -48,6 +49,11 @@ class SiemensRun:
     def fault(self, code: str, b: int, message: str, hint: str) -> None:
         """An ERROR at a block."""
         self.found.append(error(code, message, file=self.file, lines=[int(self.line[b])], hint=hint))
+
+    def unit(self, b: int) -> float:
+        """mm of a unit of length at a block: 25.4 behind G70 and G700."""
+        at = int(np.searchsorted(self.units[0], b, side="right")) - 1
+        return MM_PER_INCH if at >= 0 and self.units[1][at] in (70, 700) else 1.0
 
     def statements(self) -> tuple[tuple[WordMeaning, ...], tuple[Drill, ...]]:
         """Laws and cycles, with the words that put them in force."""
@@ -82,9 +88,9 @@ class SiemensRun:
             self.oriented = True
         elif s.name == "CYCLE832":
             off = "_OFF" in s.args or s.number(0, 0.0) <= 0.0
-            self.new.append((b, SMOOTH, float("inf") if off else s.number(0)))
+            self.new.append((b, SMOOTH, float("inf") if off else s.number(0) * self.unit(b)))
         elif s.name in CYCLES:
-            drill, why = drill_of(s, float(number_of(self.words, "S")[b]))
+            drill, why = drill_of(s, float(number_of(self.words, "S")[b]), self.unit(b))
             if drill is None:
                 self.fault("gcode.cycle", b, f"{s.name} {why}", "as the post writes it")
                 return
@@ -161,6 +167,7 @@ class SiemensRun:
         rotation = turned("".join(axes), [s.number(k, 0.0) for k in (7, 8, 9)])
         shift = np.array([s.number(k, 0.0) for k in (4, 5, 6)])
         shift = shift + rotation @ np.array([s.number(k, 0.0) for k in (10, 11, 12)])
+        shift = shift * self.unit(b)
         direction = s.number(13, 0.0)
         choice: RotaryDirection = "+" if direction > 0.0 else "-" if direction < 0.0 else "nearest"
         self.enter(b, "tilted", WordMeaning("tilted", s.name, rotation, shift, choice))

@@ -26,7 +26,7 @@ from toolpaths.shapes import arrays
 @arrays(line="E", code="int8: E", end="E J", start="J", plane="int8: E", ccw="E", center="E 3", feed="E", inverse="E",
         tool="E", register="E", spindle="int8: E", rpm="E", coolant="E", hole="E", missing_feed="E", dwell="E",
         compensation="int8: E", offset="E", blend="E", frame="E", block="E", radius="E", pitch="E", floating="E",
-        inch="E")
+        unit="E")
 class Motion:
     """E executed blocks.
 
@@ -44,7 +44,7 @@ class Motion:
         frame (E,): index into frames: the law that the block runs under
         block (E,): running number of the block; radius (E,): register of the radius in force (D), NaN for none
         pitch (E,): mm per turn of a tapping cycle, negative for left-hand ones, NaN outside; floating (E,): not coupled
-        inch (E,): `feed` counts inches where it counts a length
+        unit (E,): mm that 1 of `feed` stands for where it counts a length: 25.4 for inches
     """
 
     line: Ints
@@ -72,7 +72,7 @@ class Motion:
     radius: Floats
     pitch: Floats
     floating: Bools
-    inch: Bools
+    unit: Floats
     frames: tuple[ExecutionFrame, ...] = (AXES,)
 
     def __len__(self) -> int:
@@ -165,12 +165,17 @@ def _motion(words: Words, modal: Modal, rows: MotionRows, code: Canonical, used:
     dwell = _dwell(block, rows.code, rows.hole, rows.dwell, rests)
     pitch, floating = _threads(modal, rows, feed, call, code)
     state = {k: taken(getattr(modal, k), block) for k in (
-        "plane", "inverse", "tool", "spindle", "rpm", "coolant", "compensation", "offset", "blend", "inch")}
+        "plane", "inverse", "tool", "spindle", "rpm", "coolant", "compensation", "offset", "blend")}
     return Motion(in_files(code.line[block], code.files), rows.code, rows.end, offsets.home,
                   ccw=shared(taken(modal.motion, block) == 3), center=rows.center, feed=shared(feed),
                   register=taken(modal.length_register, block), hole=rows.hole, missing_feed=shared(missing),
                   dwell=shared(dwell), frame=rows.frame, block=block, radius=taken(number_of(words, "D"), block),
-                  pitch=pitch, floating=floating, frames=used, **state)
+                  pitch=pitch, floating=floating, unit=shared(feed_units(modal, code)[block]), frames=used, **state)
+
+
+def feed_units(modal: Modal, code: Canonical) -> Floats:
+    """(B + 1,) mm that 1 of F stands for at each block where it counts a length."""
+    return np.where(modal.inch, INCH / code.feed_parts, 1.0) if modal.inch.any() else repeated(1.0, len(modal.inch))
 
 
 def _threads(modal: Modal, rows: MotionRows, feed: Floats, call: Floats,
@@ -182,7 +187,7 @@ def _threads(modal: Modal, rows: MotionRows, feed: Floats, call: Floats,
     hand = np.where(motion == 84, 1.0, np.where(motion == 74, -1.0, np.nan))
     called = np.where(rows.hole, call[rows.block], np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
-        by_feed = feed * np.where(modal.inch[rows.block], INCH, 1.0) / rpm
+        by_feed = feed * feed_units(modal, code)[rows.block] / rpm
     own = np.array([d.pitch for d in code.drills] + [np.nan])
     kinds = np.array([("", "rigid", "floating").index(d.tap) for d in code.drills] + [0])
     drill = np.where(np.isfinite(called), called, -1.0).astype(np.int64)

@@ -128,7 +128,8 @@ class Canonical:
     """B blocks in the order in which the control runs them; words count blocks from 1.
 
     `line` (B + 1,) is the line that a block stands in; lines of further files count on from those before.
-    `files`: their names, and the lines that stand before each; empty for one file.
+    `files`: their names, and the lines that stand before each; empty for one file. `feed_parts`: what an inch
+    per minute is in units of F.
     """
 
     words: Words
@@ -136,6 +137,7 @@ class Canonical:
     laws: tuple[WordMeaning, ...] = ()
     drills: tuple[Drill, ...] = ()
     files: Files = ()
+    feed_parts: float = 1.0
 
     def without(self, letters: tuple[str, ...]) -> Canonical:
         """The same without the words of some letters."""

@@ -20,7 +20,9 @@ TEXTS = {"description", "sources"}
 """for people"""
 ONE_VALUE = {"kinematics.linear"}
 """statements of the file that have one allowed value so far"""
-OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "modes.tilted", "arcs.helix_planes",
+OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "units.others",
+          "inch.degree", "levels", "smoothing_words", "kinematics.smoothing_in_modes",
+          "modes.tcp", "modes.tilted", "arcs.helix_planes",
           "cutter_compensation.begins_on_arc", "cutter_compensation.ends_on_arc", "cutter_compensation.modal_register",
           "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload",
           "tools.length_automatic", "program.operation", "program.carried_out", "program.relies_on_turns", "program.stock",
@@ -30,13 +32,13 @@ OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "
           *(f"rollover.{key}" for key in ("default", "rules", "shortest", "positive", "negative", "zero_negative", "on",
                                           "needs"))}
 """keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py,
-test_compensated_arcs.py, test_parts.py, test_rollover.py, test_hooks_refused.py, test_output_quality.py and
-test_output_modes*.py show what they do"""
+test_compensated_arcs.py, test_parts.py, test_rollover.py, test_inch_output.py, test_smoothing_levels.py,
+test_hooks_refused.py, test_output_quality.py and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief", "cycles.plane_at_start", "arcs.helix_by_angle"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states, and what rounding moves"""
 OTHER: dict[str, Any] = {
     "writer": "iso", "format.line_length": 40, "program.passive": ["M19"], "program.path_tolerance": [],
-    "format.speed_decimals": 0,
+    "format.speed_decimals": 0, "format.units": "inch", "inch.feed_parts": 10.0,
     "codes.planes": {"17": "G17", "18": "G18.0", "19": "G19"}, "codes.through": "M88", "codes.through_off": "M89",
     "codes.air": "M83", "codes.air_off": "M84", "codes.tool_select": "T0{number}",
     "codes.tool_change": "M6 T{number}", "codes.length_offset": "G43.0 H{register}", "codes.dwell": "G04 P{seconds}",
@@ -50,7 +52,8 @@ OTHER: dict[str, Any] = {
 WITH: dict[str, list[str]] = {
     "format.sequence_prefix": ["format.sequence_step = 5"], "program.number": ['program.begin = ["%", "O{number}"]'],
     "codes.rigid_tap": ['program.passive = ["M19"]'], "codes.through_off": ['codes.through = "M88"'],
-    "codes.air_off": ['codes.air = "M83"']}
+    "codes.air_off": ['codes.air = "M83"'], "units.inch": ['format.units = "inch"'],
+    **{f"inch.{key}": ['format.units = "inch"'] for key in ("linear_decimals", "feed_decimals", "feed_parts", "relies_on")}}
 """values of other keys besides which a key counts"""
 HEAD = ["UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600"]
 FLAT = ["PPRINT/NOTE A LONG TEXT FOR PEOPLE", "COOLNT/FLOOD", "RAPID", "GOTO/0,0,50", "GOTO/10,0,5", "CUTCOM/LEFT,1",

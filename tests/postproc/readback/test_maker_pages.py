@@ -112,6 +112,29 @@ def test_the_head_is_no_code(name: str) -> None:
     assert not any(word in left for word in ("postproc", "fingerprint", "proved", "machine", "tolerance"))
 
 
+@pytest.mark.parametrize(("dialect", "cut", "feed"), [
+    (FANUC, "G1 X2. Y-1. F10.", 254.0), (HAAS, "G1 X2. Y-1. F10.", 254.0), (NGC, "G1 X2 Y-1 F10", 254.0),
+    (ISO, "G1 X2. Y-1. F10.", 254.0), (SIEMENS, "G1 X2 Y-1 F10", 254.0), (TNC, "L X+2 Y-1 R0 F100", 254.0)])
+def test_inches_of_every_control(dialect: str, cut: str, feed: float) -> None:
+    """F1 8.2, H1, N 3.5.6: G20; S1: G700 for lengths and feeds; T1: F in tenths of an inch per minute. 1 inch is 25.4 mm."""
+    up = "L X+0 Y+0 Z+1 R0 FMAX" if dialect == TNC else "G0 X0. Y0. Z1."
+    text = program(dialect, f"{up}\n{cut}\n")
+    for mm, inch in ((" MM", " INCH"), ("G710", "G700"), ("G21", "G20")):
+        text = text.replace(mm, inch)
+    motion = good(dialect, text)
+    assert (motion.end[-1] - motion.end[-2])[:2].tolist() == pytest.approx([2.0 * 25.4, -25.4])
+    assert motion.feed[-1] * motion.unit[-1] == pytest.approx(feed)
+
+
+@pytest.mark.parametrize(("dialect", "on", "mm"), [
+    (HAAS, "G187 P3 E0.001\n", 0.0254), (NGC, "G64 P0.001 Q0.001\n", 0.0508),
+    (SIEMENS, "CYCLE832(0.001,_ORI_FINISH,0.05)\n", 0.0254)])
+def test_smoothing_in_inches(dialect: str, on: str, mm: float) -> None:
+    """Lengths of the control's smoothing are in the units of the program."""
+    text = program(dialect, f"{on}G0 X1. Y0. Z1.\n").replace("G710", "G700").replace("G21", "G20")
+    assert good(dialect, text).blend[-1] == pytest.approx(mm)
+
+
 def test_units() -> None:
     assert abs(DEG * 180.0 - np.pi) < 1e-15 and abs(PER_MINUTE * 60.0 - 1.0) < 1e-15
 

@@ -209,8 +209,18 @@ def test_a_position_of_another_mode_is_not_known() -> None:
     assert faults(TNC, program(body), "mikron-ucp710") == {"gcode.pole": [5]}
 
 
-def test_inches_are_refused() -> None:
-    assert faults(TNC, program("L X+1 FMAX\n").replace(" MM", " INCH")) == {"gcode.units": [1]}
+def test_inches_hold_for_poles_polar_words_and_cycles() -> None:
+    """The whole program in inches: X, Y, CC, PR, and levels of a cycle; angles stay."""
+    body = START + "L F100\nL X+3 Y+1\nCC X+1 Y+1\nCP IPA+30 DR+\n"
+    mm, inch = (good(TNC, program(body).replace(" MM", units)) for units in (" MM", " INCH"))
+    steps = [np.diff(motion.end[-3:, :3], axis=0) for motion in (mm, inch)]
+    assert np.allclose(steps[1], 25.4 * steps[0], atol=1e-4)
+
+
+def test_programs_of_two_units_are_refused() -> None:
+    called = {"SUB.H": b"0 BEGIN PGM SUB MM\n1 L X+1 R0 FMAX\n2 END PGM SUB MM\n"}
+    found = executed(TNC, program(START + "CALL PGM SUB.H\n").replace(" MM", " INCH"), others=called)[1]
+    assert "gcode.units" in {d.code for d in found}
 
 
 def test_polar_end_is_turned_about_the_pole() -> None:

@@ -23,7 +23,8 @@ PROJECT = ("postproc", "machines", "toolpaths")
 BOTH = re.compile(r"[A-Z][A-Z0-9_]*")
 KEYS = re.compile(r"(?:controller|codes_of|spec)\.([a-z_]+)(?:\.([a-z_]+))?")
 TABLES = {"codes", "program", "start", "stops", "cutter_compensation", "cycles", "feed", "format", "kinematics", "modes",
-          "tools", "arcs", "comment", "subprograms", "writer"}
+          "tools", "arcs", "comment", "subprograms", "writer", "grain",
+          "known_smoothing"}
 
 
 def imported(files: list[Path]) -> set[tuple[str, str]]:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
 import toolpaths
 from postproc.pipeline.result import PostResult
-from tests.postproc.kit import SAMPLES, convert, good
+from tests.postproc.kit import SAMPLES, convert, good, tool_setup
 from toolpaths.diagnostics import has_errors
 
 GOLDEN = Path(__file__).parents[2] / "golden"
@@ -33,10 +34,13 @@ PIECES = [
 ]
 
 
-def made(source: Path, machine: str, controller: str, mode: str = "auto") -> PostResult:
+def made(source: Path, machine: str, controller: str, mode: str = "auto", units: Literal["mm", "inch"] = "mm") -> PostResult:
     path, found = toolpaths.read(source)
     assert not has_errors(found)
-    return good(convert(path, machine, controller, output=mode))
+    setup = tool_setup()
+    if units == "inch":
+        setup = setup.model_copy(update={"output": setup.output.model_copy(update={"units": units})})
+    return good(convert(path, machine, controller, setup, output=mode))
 
 
 def name_of(source: Path, machine: str, controller: str, mode: str = "") -> str:
@@ -65,4 +69,12 @@ def test_each_mode_is_written_as_reviewed(controller: str, machine: str, mode: s
 def test_no_file_is_left_over() -> None:
     known = {name_of(*piece) for piece in PIECES}
     known |= {name_of(GOLDEN / "three_laws.cls", m, c, mode) for c, m in LAWS for mode in ("auto", "axes", "tcp")}
+    known |= {name_of(GOLDEN / "every_cycle.cls", m, c, "inch") for c, m in LAWS}
     assert {p.name for p in GOLDEN.iterdir() if p.suffix not in (".apt", ".cls")} == known
+
+
+@pytest.mark.parametrize(("controller", "machine"), LAWS)
+def test_written_in_inches_as_reviewed(controller: str, machine: str) -> None:
+    """Every cycle, taps, arcs and a helix in inches."""
+    name = name_of(GOLDEN / "every_cycle.cls", machine, controller, "inch")
+    reviewed(GOLDEN / name, made(GOLDEN / "every_cycle.cls", machine, controller, units="inch").text)

@@ -71,7 +71,7 @@ def executed(result: PostResult, text: str, start: np.ndarray) -> Motion:
 def cuts(motion: Motion, first: int) -> list[tuple[object, ...]]:
     """Each block from the first cut behind row `first` on: where it ends, and the state that it is run in."""
     begin = first + int(np.flatnonzero(motion.code[first:] > 0)[0])
-    state = (motion.code, motion.feed, motion.inverse, motion.inch, motion.plane, motion.ccw, motion.tool, motion.register,
+    state = (motion.code, motion.feed, motion.inverse, motion.unit, motion.plane, motion.ccw, motion.tool, motion.register,
              motion.spindle, motion.rpm, motion.flood, motion.compensation, motion.offset, motion.blend, motion.dwell)
     return [(*motion.end[k].round(9), *(str(a[k]) for a in state), motion.frames[motion.frame[k]].law)
             for k in range(begin, len(motion))]

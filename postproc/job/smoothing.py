@@ -1,0 +1,93 @@
+"""The control's own smoothing by operation: by which blocks it is set, and the mm that it may take of the tolerance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from postproc.base.options import Options
+from postproc.controllers.model import ControllerFile
+from postproc.controllers.spelling import SmoothingLevel
+from postproc.setup.model import SetupFile
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.toolpath import Toolpath
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """mm that the control may take, and the blocks that say so, with placeholders."""
+
+    mm: float
+    blocks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SmoothingPlan:
+    """The smoothing of operations that state none (`default`), and of others by name; `used` by the path's operations."""
+
+    default: Smoothing
+    named: dict[str, Smoothing]
+    used: tuple[Smoothing, ...]
+
+    @cached_property
+    def most(self) -> float:
+        """mm that the control may take at the most: what the bound counts."""
+        return max((one.mm for one in self.used), default=self.default.mm)
+
+    @cached_property
+    def by_operation(self) -> Floats:
+        """(O,) mm of each operation of the path."""
+        return np.array([one.mm for one in self.used] or [self.default.mm])
+
+
+def smoothing_plan(controller: ControllerFile, setup: SetupFile, options: Options,
+                   toolpath: Toolpath) -> tuple[SmoothingPlan, list[Diagnostic]]:
+    """The smoothing that the set-up asks for ([output.smoothing]), and what the control or the file has not."""
+    default = Smoothing(_usual(controller, options), controller.program.path_tolerance)
+    named, found, names = dict[str, Smoothing](), list[Diagnostic](), {op.name for op in toolpath.operations}
+    for name, asked in setup.output.smoothing.items():
+        one, why = _asked(controller, asked, options, default)
+        if name not in names:
+            has = ", ".join(sorted(n for n in names if n)) or "none"
+            why = "which is not an operation of the CL file", f"it has: {has}"
+        if why is not None:
+            found.append(error("setup.smoothing", f"[output.smoothing] {name!r} = {asked!r}: {why[0]}", file=options.setup,
+                               hint=why[1]))
+        named[name] = one
+    used = tuple(named.get(op.name, default) for op in toolpath.operations)
+    return SmoothingPlan(default, named, used), found
+
+
+def _usual(controller: ControllerFile, options: Options) -> float:
+    fixed = controller.kinematics.smoothing_fixed
+    return controller.kinematics.smoothing_share * options.tolerance if fixed is None else fixed
+
+
+def _asked(controller: ControllerFile, asked: str | float, options: Options,
+           default: Smoothing) -> tuple[Smoothing, tuple[str, str] | None]:
+    """(the smoothing of a level or of so many mm, what is wrong with it and what to do)."""
+    levels = controller.levels
+    if isinstance(asked, str):
+        if asked in levels:
+            return Smoothing(_taken(levels[asked], options, default), levels[asked].blocks), None
+        known = ", ".join(levels) or "none: the controller file has no [levels]"
+        return default, ("the controller has no such level", f"it has: {known}")
+    if controller.kinematics.smoothing_fixed is None:
+        if any("{tolerance}" in block for block in default.blocks):
+            return Smoothing(asked, default.blocks), None
+        return default, ("the control's smoothing takes no tolerance", "name a level of the controller file")
+    within = [one for one in levels.values() if one.tolerance is not None and one.tolerance <= asked]
+    if not within:
+        least = min((one.tolerance for one in levels.values() if one.tolerance is not None), default=default.mm)
+        return default, ("no level of the controller keeps that", f"{least:g} mm, or a level by its name")
+    best = max(within, key=lambda one: one.tolerance or 0.0)
+    return Smoothing(_taken(best, options, default), best.blocks), None
+
+
+def _taken(level: SmoothingLevel, options: Options, default: Smoothing) -> float:
+    if level.tolerance is not None:
+        return level.tolerance
+    return default.mm if level.share is None else level.share * options.tolerance

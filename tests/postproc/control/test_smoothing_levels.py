@@ -1,0 +1,124 @@
+"""The control's own smoothing by operation: levels and tolerances of the set-up, switched where each operation begins."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from postproc.pipeline.convert import verify
+from postproc.setup.model import SetupFile
+from tests.postproc.kit import codes, convert, good, machine, shop_file, toolpath
+from toolpaths.toolpath import Toolpath
+
+MACHINE = "mill-3axis"
+CUTS = ["RAPID", "GOTO/0,0,50", "RAPID", "GOTO/0,0,2", "GOTO/0,0,-1", "GOTO/20,0,-1", "GOTO/20,20,-1", "RAPID",
+        "GOTO/20,20,50"]
+LEVELS = {
+    "fanuc-30i": ("G05.1 Q1 R1", "G05.1 Q1 R10", "G05.1 Q0"),
+    "haas-ngc": ("G187 P1 E0.005", "G187 P3 E0.003", "G187"),
+    "siemens-840d": ("CYCLE832(0.005,_ORI_ROUGH,0.015)", "CYCLE832(0.003,_ORI_FINISH,0.015)", "CYCLE832(0,_OFF,1)"),
+    "heidenhain-tnc640": ("CYCL DEF 32.2 HSC-MODE:1 TA0.015", "CYCL DEF 32.2 HSC-MODE:0 TA0.015", ""),
+    "linuxcnc": ("G64 P0.003333 Q0.001667", "G64 P0.002 Q0.001", "")}
+"""roughing, finishing, off at the end"""
+
+
+def part() -> Toolpath:
+    """ROUGH, FINE and REST, which states nothing, with one tool."""
+    head = ["UNITS/MM"]
+    body = [line for name in ("ROUGH", "FINE", "REST") for line in (
+        f"TOOL PATH/{name},TOOL,T1", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600",
+        *CUTS, "END-OF-PATH")]
+    return toolpath(*body, head=head)
+
+
+def setup(**asked: str | float) -> SetupFile:
+    return SetupFile.model_validate({"output": {"smoothing": asked}, "tools": {"1": {"gauge_length": 80.0}}})
+
+
+@pytest.mark.parametrize("controller", LEVELS)
+def test_levels_stand_where_operations_begin(controller: str) -> None:
+    rough, fine, off = LEVELS[controller]
+    made = good(convert(part(), MACHINE, controller, setup(ROUGH="roughing", FINE="finishing")))
+    first, then = made.text.index(rough), made.text.rindex(fine)
+    cuts = [m.start() for m in re.finditer(r"Z-1\b", made.text)]
+    assert len(cuts) == 3 and first < cuts[0] < then < cuts[1]
+    assert not off or re.search(rf"(?m)(^|N\d+ ){re.escape(off)}$", made.text[cuts[2]:])
+
+
+@pytest.mark.parametrize("controller", LEVELS)
+def test_a_level_that_takes_more_is_found_in_the_operation_that_must_not(controller: str, tmp_path: Path) -> None:
+    """The finishing blocks replaced by the roughing ones: what is allowed counts by operation, not by program."""
+    rough, fine, _ = LEVELS[controller]
+    asked = setup(ROUGH="roughing", FINE="finishing")
+    text = good(convert(part(), MACHINE, controller, asked)).text
+    if controller == "heidenhain-tnc640":
+        rough, fine = "32.1 T0.005", "32.1 T0.003"
+    file = tmp_path / "part.nc"
+
+    def found(text: str) -> set[str]:
+        file.write_text(text)
+        return {d.code for d in verify(file, part(), machine(MACHINE), controller, asked).diagnostics
+                if d.code.startswith("verify.")}
+    assert found(text) == set()
+    at = text.rindex(fine)
+    assert found(text[:at] + rough + text[at + len(fine):]) == {"verify.smoothing"}
+
+
+def test_the_bound_counts_the_most_that_an_operation_leaves_to_the_control() -> None:
+    plain, rough = (good(convert(part(), MACHINE, "haas-ngc", one)) for one in (setup(), setup(ROUGH="roughing")))
+    assert plain.shares["smoothing"] == pytest.approx(0.003) and rough.shares["smoothing"] == pytest.approx(0.005)
+    assert rough.shares["linearising"] < plain.shares["linearising"]
+    refused = convert(part(), MACHINE, "haas-ngc", setup(ROUGH=0.02))
+    assert codes(refused.diagnostics) >= {"tolerance.smoothing"}
+
+
+@pytest.mark.parametrize(("controller", "asked", "block"), [
+    ("haas-ngc", 0.001, "G187 P3 E0.001"), ("siemens-840d", 0.001, "CYCLE832(0.001,_ORI_FINISH,0.015)"),
+    ("heidenhain-tnc640", 0.001, "CYCL DEF 32.1 T0.001"), ("linuxcnc", 0.0015, "G64 P0.001 Q0.0005"),
+    ("fanuc-30i", 0.003, "G05.1 Q1 R10"), ("fanuc-30i", 0.006, "G05.1 Q1 R1")])
+def test_a_tolerance_in_the_place_of_a_level(controller: str, asked: float, block: str) -> None:
+    assert block in good(convert(part(), MACHINE, controller, setup(FINE=asked))).text
+
+
+@pytest.mark.parametrize(("controller", "asked", "follow"), [
+    ("haas-ngc", {"FINE": "mirror"}, {"FINE": "finishing"}), ("haas-ngc", {"FINISH": "finishing"}, {"FINE": "finishing"}),
+    ("fanuc-30i", {"FINE": 0.0001}, {"FINE": 0.002}), ("generic-iso", {"FINE": 0.001}, {})])
+def test_what_the_control_or_the_file_has_not_is_refused_with_what_it_has(controller: str, asked: dict[str, str | float],
+                                                                          follow: dict[str, str | float]) -> None:
+    made = convert(part(), MACHINE, controller, setup(**asked))
+    fault = next(d for d in made.diagnostics if d.code == "setup.smoothing")
+    assert not made.ok and ("level" in fault.hint or any(str(v) in fault.hint for v in (*follow, *follow.values())))
+    good(convert(part(), MACHINE, controller, setup(**follow)))
+
+
+@pytest.mark.parametrize("word", ["G05.1 Q1 R5", "G05 P10000", "G61.1"])
+def test_a_word_of_the_shop_states_what_it_may_move_by(word: str, tmp_path: Path) -> None:
+    """In its documented spelling; what it takes counts in the bound, and more than its share is found."""
+    own = shop_file(tmp_path, f'program.path_tolerance = ["{word}"]\nkinematics.smoothing_fixed = 0.004\n'
+                    f'smoothing_words = {{ "{word}" = 0.004 }}\n', "fanuc-30i")
+    made = good(convert(part(), MACHINE, own, setup()))
+    assert f"\n{word}\n" in made.text and made.shares["smoothing"] == 0.004
+    own.write_text(own.read_text().replace("= 0.004 }", "= 0.006 }"))
+    assert "verify.smoothing" in codes(convert(part(), MACHINE, own, setup()).diagnostics)
+    own.write_text(own.read_text().split("smoothing_words")[0])
+    assert not convert(part(), MACHINE, own, setup()).ok or word == "G05.1 Q1 R5"
+
+
+def test_it_is_not_changed_while_a_mode_is_on_where_the_control_cannot() -> None:
+    """Fanuc: two operations under one G43.4; with restarts each begins outside of it."""
+    turn = [f"GOTO/{x},0,5,{0.01 * x},0,{(1.0 - (0.01 * x)**2)**0.5:.9f}" for x in range(0, 20, 4)]
+    body = [line for name in ("ROUGH", "FINE") for line in (
+        f"TOOL PATH/{name},TOOL,T1", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600",
+        "RAPID", "GOTO/0,0,20,0,0,1", *turn, "RAPID", "GOTO/16,0,20,0.16,0,0.987117014", "END-OF-PATH")]
+    path = toolpath(*body, head=["UNITS/MM"])
+    asked = setup(ROUGH="roughing", FINE="finishing")
+    made = convert(path, "mikron-ucp710", "fanuc-30i", asked, output="tcp")
+    again = asked.model_copy(update={"output": asked.output.model_copy(update={"restart": True})})
+    text = good(convert(path, "mikron-ucp710", "fanuc-30i", again, output="tcp")).text
+    assert "G05.1 Q1 R10" in text and text.index("G49", text.index("G43.4")) < text.index("G05.1 Q1 R10")
+    if made.ok:  # the mode was left between the operations
+        assert made.text.index("G49", made.text.index("G43.4")) < made.text.index("G05.1 Q1 R10")
+    else:
+        assert "output.smoothing_mode" in codes(made.diagnostics)
