@@ -14,6 +14,7 @@ from postproc.cli.console import (
     Json,
     controller_of,
     machine_of,
+    no_program,
     own_files,
     progress_bar,
     refuse_inputs,
@@ -133,6 +134,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     from postproc.pipeline.convert import convert as run
     from postproc.proof import command
     from postproc.report import summary
+    from postproc.setup_sheet.offers import offers
     from postproc.writing.program_files import program_files
 
     outputs: dict[Path, str | bytes] = {}
@@ -145,7 +147,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         result = replace(result, diagnostics=(*result.diagnostics, *why))
         time = estimate_of(result)  # all before a file is written
         values, text = summary.as_dict(result, str(output), time), summary.as_text(result, str(output), time)
-        more: list[Diagnostic] = []
+        more = offers(result, path, machine, controller)
         if result.ok:
             texts, more = program_files(output, result.text, result.files or {})
             refuse_inputs(list(texts)[:-1], inputs)
@@ -213,6 +215,26 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
     report((*result.diagnostics, *more), json, stages, as_text(stages))
 
 
+@app.command(epilog="Example: postproc explain travel.exceeded")
+def explain(code: Annotated[str, typer.Argument(metavar="CODE", help="as in the brackets of a message")] = "",
+            json: Json = "") -> None:
+    """Explain a code of a message: what it is about, what to do, an example; without one list all codes."""
+    from dataclasses import asdict
+
+    from postproc.explain.pages import pages, unknown
+    from toolpaths.diagnostics import DiagnosticError, error
+
+    known = pages()
+    with shown_errors(json):
+        if code and code.strip("[]") not in known:
+            raise DiagnosticError([error("file.no-code", f"there is no code {code!r}", hint=unknown(code.strip("[]")))])
+    if not code:
+        report((), json, {"codes": list(known)}, "\n".join(known))
+        return
+    page = known[code.strip("[]")]
+    report((), json, asdict(page), page.text())
+
+
 @app.command(epilog="Example: postproc inspect part.cls --json -")
 def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
             json: Json = "") -> None:
@@ -223,7 +245,8 @@ def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", 
     from toolpaths.cl.inspect import summary as text_of
     from toolpaths.cl.read import read_file
 
-    with progress_bar() as progress:
+    with shown_errors(json), progress_bar() as progress:
+        no_program(file)
         result = read_file(file, units=options.units or None, dialect=options.dialect or None,
                            allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
     found = figures(result)
@@ -272,6 +295,7 @@ def _options(tolerance: float, axis_tolerance: float, feed_mode: FeedModeChoice,
 def _read(file: Path, options: Options, progress: Progress) -> tuple[Toolpath, list[Diagnostic]]:
     import toolpaths
 
+    no_program(file)
     return toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
                           allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
 

@@ -1,18 +1,28 @@
-"""What every command has: help as usage lines are written, and the option that raises the size of the files it reads."""
+"""What every command has: options on files, on what is said, on warnings; defaults of the job file; plain usage lines."""
 
 from __future__ import annotations
 
 import sys
 from functools import cache
 from shutil import get_terminal_size
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 from typer.core import TyperArgument, TyperGroup, TyperOption
 
+from postproc.cli.job_defaults import given_defaults
+from postproc.cli.says import SAYS
+
 MaxFileSize = Annotated[float | None, typer.Option("--max-file-size", metavar="MB", min=0.001, max=1e9, is_eager=True,
                                                    callback=lambda context, value: _hold(context, value),
                                                    help="largest input file that is read (default 1000 MB)")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", is_eager=True, callback=lambda context, value: _set("quiet", value),
+                                     help="say warnings and errors only")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", is_eager=True,
+                                       callback=lambda context, value: _set("verbose", value),
+                                       help="say each stage as it begins")]
+Strict = Annotated[bool, typer.Option("--strict", is_eager=True, callback=lambda context, value: _set("strict", value),
+                                      help="warnings are errors: nothing is written")]
 
 
 PIPE = 120
@@ -57,13 +67,20 @@ class Group(TyperGroup):
         self.context_settings = {**self.context_settings, "terminal_width": width()}
         for command in self.commands.values():
             if not isinstance(command, TyperGroup):
-                command.params.append(_option())
+                command.params += _options()
                 for param in command.params:
                     _plainly(param)
 
     def list_commands(self, ctx: object) -> list[str]:
         """Names in the order of the journey."""
         return sorted(self.commands, key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER))
+
+    def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]  # of click's own
+        """The command, with the defaults of the job file."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if command is not None and not isinstance(command, TyperGroup):
+            given_defaults(command, rest, ctx)
+        return name, command, rest
 
 
 def _plainly(param: object) -> None:
@@ -83,14 +100,22 @@ def _hold(context: typer.Context, value: float | None) -> None:
         context.with_resource(largest_file(value * MEGABYTE))
 
 
+def _set(name: Literal["quiet", "verbose", "strict"], value: bool) -> None:
+    """How much this command says."""
+    setattr(SAYS, name, value)
+
+
 @cache
-def _option() -> Any:
-    """The option as typer makes it, without a value that commands would have to take."""
-    def command(max_file_size: MaxFileSize = None) -> None:
-        """Nothing but the option."""
+def _options() -> list[Any]:
+    """The options as typer makes them, without values that commands would have to take."""
+    def command(max_file_size: MaxFileSize = None, quiet: Quiet = False, verbose: Verbose = False,
+                strict: Strict = False) -> None:
+        """Nothing but the options."""
 
     lone = typer.Typer(add_completion=False)
     lone.command()(command)
-    option = next(p for p in typer.main.get_command(lone).params if p.name == "max_file_size")
-    option.expose_value = False
-    return option
+    names = ("max_file_size", "quiet", "verbose", "strict")
+    options = [p for p in typer.main.get_command(lone).params if p.name in names]
+    for option in options:
+        option.expose_value = False
+    return options

@@ -14,6 +14,7 @@ from postproc.control.modes import table_axes
 from postproc.job.job import Job
 from postproc.pipeline.stage_values import CompiledStage
 from postproc.readback.comparison.length_margins import length_matters
+from postproc.setup.model import stated_value
 
 
 def header_lines(made: CompiledStage) -> list[str]:
@@ -32,6 +33,7 @@ def header_lines(made: CompiledStage) -> list[str]:
         header.append("tool numbers of the set-up: " + ", ".join(numbers))
     if any(d.code == "feed.of_setup" for d in made.diagnostics):
         header.append(f"feed {made.setup.output.feed:g} mm/min of the set-up where the CL file states none")
+    header += [f"ASSUMED, state it before cutting: {key} = {stated_value(made.setup, key)}" for key in made.setup.assumed]
     if made.motion is not None:
         header.append(feeds_line())
     header += [f"T{number}: {what}, of the set-up" for number, what in job.stated]

@@ -50,6 +50,7 @@ from postproc.readback.comparison.slow_moves import with_fingerprint
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
 from postproc.setup.system import with_system
+from postproc.verification.planned_words import check_planned
 from postproc.verification.proof_text import with_statement
 from postproc.verification.read_back import read_back
 from postproc.verification.second_witness import second_witness
@@ -138,7 +139,7 @@ def solved(made: PlacedStage, progress: Progress | None) -> tuple[PlacedStage | 
     path, found = build_path(job.modes, job.kinematics, made.moves, job.space, job.home_rows(), job.operation,
                              shares["linearising"], shares["axis_linearising"] * DEG, made.toolpath.file, progress,
                              made.drawing)
-    found = with_system(found, job.work_system, job.placement)
+    found = with_system(found, job.work_system, job.placement, job.moves.axis)
     if path is None:
         return made, found
     return handed_on(SolvedStage, made, path=with_short_turns(path, made.moves, job.control, job.kinematics)), found
@@ -155,7 +156,7 @@ def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage
     far = check_travel(path, job.moves, job.control, job.kinematics, file)[0]
     far += check_reach(path, job.moves, job.control, file)
     if has_errors(far):
-        return made, with_system(far, job.work_system, job.placement)
+        return made, with_system(far, job.work_system, job.placement, job.moves.axis)
     better, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
                                        options.tolerance, job.axis_tolerance, writing_of(job, moves),
                                        only_canned(job.toolpath, job.controller), options.error_beyond, file)
@@ -170,7 +171,7 @@ def checked(made: CorrectedStage, progress: Progress | None) -> tuple[CheckedSta
     found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
     found += check_reach(path, job.moves, job.control, file)
     found += check_singular(path, job.moves, job.control, job.setup.joints.singular_distance, file)
-    return handed_on(CheckedStage, made, extents=extents), with_system(found, job.work_system, job.placement)
+    return handed_on(CheckedStage, made, extents=extents), with_system(found, job.work_system, job.placement, job.moves.axis)
 
 
 def planned(made: CheckedStage, progress: Progress | None) -> tuple[PlannedStage, DiagnosticList]:
@@ -237,6 +238,9 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
                                   others={name: text.encode() for name, text in made.files.items()},
                                   of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.program,
                                                                                       made.controller))
+    if comparison is not None and made.motion is not None and not has_errors(found):
+        found = [*found, *check_planned(made.path, made.moves, on_written(made.compensation, made.motion.needed),
+                                        made.options.merge_feeds, comparison, job)]
     if comparison is not None and not has_errors(found):
         witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison,
                                        b"" if made.files else made.text)

@@ -32,8 +32,8 @@ FAULTS = (
     Fault("rapids from the wrong rows", "reader", "_kinds", "kind[rapids[rapids < n]] = Kind.RAPID",
           "kind[rapids[rapids < n] - 1] = Kind.RAPID"),
     Fault("cutter's diameter as its radius", "reader", "tldata",
-          "key: v * b.scale for key, v in zip(names, n, strict=False)",
-          "key: 0.5 * v * b.scale for key, v in zip(names, n, strict=False)",
+          "fields[key] = value * b.scale",
+          "fields[key] = 0.5 * value * b.scale",
           why="no word of the program depends on it; header only"),
     Fault("feed per revolution as per minute", "reader", "feed_in", "FeedMode.PER_REVOLUTION", "FeedMode.PER_TIME",
           ("per turn", "contact")),
@@ -102,8 +102,8 @@ FAULTS = (
     Fault("out of the hole 1 mm too low", "cycles", "_legs",
           "max(cycle.clearance, out) * axis, Phase.RETRACT, Kind.RAPID",
           "(max(cycle.clearance, out) - 1.0) * axis, Phase.RETRACT, Kind.RAPID",
-          why="rapids between holes at the level of RTRCTO,AUTO: the second witness compares retract "
-          "planes that a number states; no cut changes"),
+          why="one program passes: behind its only hole the tool rises on along the axis of the hole, by a rapid of the CL "
+          "file; no cut and no rapid off that axis changes"),
     Fault("down to the hole from 1 mm under its plane", "cycles", "_legs",
           "(top + cycle.clearance * axis, Phase.APPROACH", "(top + (cycle.clearance - 1.0) * axis, Phase.APPROACH"),
     Fault("last hole of a cycle not drilled", "cycles", "cycle", "b.cycle.set(b.row, -1)",
