@@ -67,6 +67,7 @@ ANYTHING = {
     "machines/geometric_error/__init__.py": LAZY, "postproc/__init__.py": LAZY,
     "machines/kinematics/base.py": "kinematics of a kind that only the form knows",
     "machines/models.py": "a value before pydantic checks it",
+    "postproc/setup/model.py": "the value of any key",
     "postproc/setup/spindle.py": "a value before pydantic checks it",
     "postproc/cli/options.py": "words of a Literal",
     "postproc/feedrate/rest_to_rest.py": "a profile of ruckig, which states no types",

@@ -248,8 +248,9 @@ def test_help_says_what_each_option_takes(words: tuple[str, ...]) -> None:
             assert one.metavar, one.name
     page = " ".join(run(*words, "--help").stdout.split())
     usage = page.partition("Usage: ")[2].partition(" Arguments: ")[0]
-    names = [one.metavar for one in PAGES[words].params if one.param_type_name == "argument"]
-    assert usage.startswith(f"postproc {' '.join([*words, '[OPTIONS]', *names])} ")
+    names = [one.metavar if one.required else f"[{one.metavar}]" for one in PAGES[words].params
+             if one.param_type_name == "argument"]
+    assert f"{usage} ".startswith(f"postproc {' '.join([*words, '[OPTIONS]', *names])} ")
     assert not re.search(r"<=x|x>=|<str>|<path>|\.\.\.\.", page)
     if "--dialect" in page:
         assert f"{{{','.join(DIALECTS)}}}" in page.replace(" ", "").replace("│", "")
