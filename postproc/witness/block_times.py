@@ -21,7 +21,7 @@ _KINDS = ("XYZ", "UVW", "ABC")
 def seconds_of(e: ExecutedBlocks) -> Array:
     """(E,) s of every block at the feed in force; meaningless for rapids.
 
-    Per minute the feed is that of the tip where X, Y, Z are the tip; of axis positions by `rule`: "all" the
+    Per minute the feed is that of the tip where X, Y, Z are the tip; of machine coordinates by `rule`: "all" the
     root of the squares of all words, "geometry" X, Y, Z before all others, else X, Y, Z before U, V, W before
     A, B, C. In inverse time a block takes 1/F minutes, an arc its angle over F where the control has it so.
     """

@@ -84,12 +84,12 @@ class IsoWriter(Writer):
             self.length_off = not self.length_off
 
     def feed_texts(self, values: Floats) -> list[str]:
-        """The numbers of feed words: the controller's decimals, two more for feeds below 1."""
-        places = self.controller.format.feed_decimals
+        """The numbers of feed words: the controller's decimals, more of them for feeds below 1."""
+        places, more = self.controller.format.feed_decimals, self.controller.format.small_feed_decimals
         result = self.number_text(values, places)
         small = np.flatnonzero(values < 1.0)
         if len(small):
-            for k, text in zip(small.tolist(), self.number_text(values[small], places + 2), strict=True):
+            for k, text in zip(small.tolist(), self.number_text(values[small], places + more), strict=True):
                 result[k] = text
         return result
 

@@ -112,7 +112,7 @@ class IsoReader(Reader):
         """A fresh LinuxCNC's cycles return to R until G98 is stated (measured on 2.9; later it keeps the mode
         of the program before)."""
         cycles = codes(words, "G", CYCLES)[0]
-        if self.controller is None or self.controller.writer != "linuxcnc" or not len(cycles):
+        if self.controller is None or not self.controller.cycles.plane_at_start or not len(cycles):
             return
         stated = codes(words, "G", GROUPS["level"])[0]
         if not (stated <= cycles[0]).any():
