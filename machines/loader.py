@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
@@ -18,7 +19,7 @@ from machines.machine import ClampCodes, Limits, Machine, Timing, Turns
 from machines.models import ControlModel, KeyProblem, KinematicsModel, MachineModel, register_beyond
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
-from toolpaths.units import DEG
+from toolpaths.units import DEG, PER_MINUTE
 
 DATA = Path(__file__).parent / "data"
 KIND, OLDER = ("kinematics", "kind"), ("kinematics", "family")
@@ -158,7 +159,9 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         timing=Timing(timing.tool_change, timing.clamp, timing.unclamp, frozenset(timing.assumed)),
         control_kinematics=model.control_kinematics(), file=file.file,
         stop=model.control.stop or "" if model.control is not None else "",
-        hooks=model.hooks, length_register=register_beyond(control.length_register),
+        rapids=control.rapids or "", largest_feed=control.largest_feed * PER_MINUTE if control.largest_feed else math.inf,
+        cutting_velocity=_cutting_velocity(model, kinematics), hooks=model.hooks,
+        length_register=register_beyond(control.length_register),
         radius_register=None if control.radius_register is None else register_beyond(control.radius_register),
         clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
         turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))
@@ -171,6 +174,14 @@ def _limits(model: MachineModel, kinematics: Kinematics) -> Limits:
     velocity, acceleration, jerk = np.array([(a.velocity, a.acceleration, a.jerk) for a in axes]).T * scale
     assumed = frozenset(f"{name}.{key}" for name in names for key in model.axes[name].assumed)
     return Limits(travel[:, 0], travel[:, 1], velocity, acceleration, jerk, assumed)
+
+
+def _cutting_velocity(model: MachineModel, kinematics: Kinematics) -> tuple[float, ...]:
+    """Of each axis, mm/s or rad/s; () where no axis states one."""
+    axes = [model.axes[name] for name in kinematics.axis_names]
+    if all(axis.cutting_velocity is None for axis in axes):
+        return ()
+    return tuple(float(v) for v in np.array([a.cutting_velocity or a.velocity for a in axes]) * _scale(kinematics))
 
 
 def _scale(kinematics: Kinematics) -> Any:

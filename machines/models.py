@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from machines.choices import Park, RolloverRule, Stop
+from machines.choices import Park, Rapids, RolloverRule, Stop
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from machines.machine import ControlKinematics
@@ -88,6 +88,9 @@ class AxisModel(UserModel):
     """mm/s2 or deg/s2"""
     jerk: Positive
     """mm/s3 or deg/s3"""
+    cutting_velocity: Positive | None = None
+    """mm/s or deg/s that the axis is moved with at feed at most, where that is less than its velocity, which is
+    that of rapids. Fanuc: parameter 1430, under look-ahead 1432; default: the velocity"""
     home: float
     """position for tool change and programme start, mm or degrees"""
     modulo: bool = False
@@ -139,7 +142,12 @@ class ControlModel(UserModel):
     """what a stop (M0; M1 where its switch is on) switches off: "spindle and coolant", "spindle" or "nothing"; the builder's
     PLC decides on most controls. Default: what the controller file has ([stops])"""
 
-
+    rapids: Rapids | None = None
+    """path of rapids that move several axes: "straight" or "dog-leg", each axis at its own speed. Fanuc: parameter 1401#1
+    LRP; Haas: setting 335; Siemens: RTLION, RTLIOF. Default: what the controller file has ([kinematics] rapids)"""
+    largest_feed: Positive | None = None
+    """mm/min, as F words have it: the largest cutting feed of the machine, which the control clamps greater feeds to or
+    refuses. Fanuc: parameter 1422; default: none but the velocities of the axes"""
     length_register: Register = "T"
     """the length register H of a tool for which the CL file names none or the tool's number T: "T", or "T +
     20"; of controls that name registers"""
@@ -204,6 +212,10 @@ class MachineModel(UserModel):
             elif axis.travel == "unlimited" and not rotary[name]:
                 yield KeyProblem("machine.travel", ("axes", name, "travel"),
                                  f"linear axis {name} cannot have unlimited travel", "write travel = [lower, upper] in mm")
+            elif (axis.cutting_velocity or 0.0) > axis.velocity:
+                yield KeyProblem("machine.cutting-velocity", ("axes", name, "cutting_velocity"),
+                                 f"axis {name} has cutting_velocity = {axis.cutting_velocity:g}, more than its velocity "
+                                 f"{axis.velocity:g}", "the velocity is that of rapids: write one that is not greater")
             elif problem := _modulo_problem(name, axis, rotary[name]) or _clamp_problem(name, axis, rotary[name]):
                 yield problem
             elif not axis.range[0] <= axis.home <= axis.range[1]:

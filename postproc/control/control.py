@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from machines.choices import Rapids
 from machines.kinematics.base import Kinematics
 from machines.kinematics.frames import reference_x
 from machines.machine import Machine
@@ -28,7 +29,6 @@ XYZ = ("X", "Y", "Z")
 PLACES = 200
 """of a machine's travel at which it is looked at"""
 InterpolationMode = Literal["axes", "tcp", "tilted"]
-Rapids = Literal["straight", "dog-leg"]
 FeedLength = Literal["xyz-first", "all", "geometry"]
 
 

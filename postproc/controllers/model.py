@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from machines.choices import RolloverRule, Stop
+from machines.choices import Rapids, RolloverRule, Stop
 from machines.user_file import UserModel, load_toml
 from postproc.controllers.spelling import Codes, Comment, Format, ProgramBlocks, SubprogramFormat, Tools
 from postproc.controllers.texts import CYCLE_VALUES, placeholders
@@ -109,7 +109,7 @@ class InterpolationRules(UserModel):
 
     linear: Literal["joints"] = "joints"
     """straight in the joints, where words are axis positions"""
-    rapids: Literal["straight", "dog-leg"] = "straight"
+    rapids: Rapids = "straight"
     """dog-leg: every axis at its own rapid speed, so that the tool leaves the straight line"""
     modules: bool = False
     """the controller can run the kinematics named in a machine's [control] table; programs then hold the tip"""

@@ -17,10 +17,12 @@ from postproc.control.modes import OutputModes, Refused, output_modes
 from postproc.control.rollover import rollovers
 from postproc.controllers.model import ControllerFile
 from postproc.job.pivots import control_kinematics
+from postproc.job.rapids import safe_rapids
 from postproc.job.rounding import Rounding, decimals, helix_bound, rounding_bound
 from postproc.path.links import SafeSpace, safe_space
 from postproc.reference.events import register_changes, tool_changes
 from postproc.reference.hole_depths import unfit_holes
+from postproc.reference.largest_feed import limited_feeds
 from postproc.reference.length_registers import by_rule, own_registers
 from postproc.reference.moves import Moves, build_moves
 from postproc.reference.records import checked_records, plain_records
@@ -29,7 +31,7 @@ from postproc.reference.split_operations import cut_operations
 from postproc.reference.stated_feeds import without_feed
 from postproc.reference.tool_numbers import numbered
 from postproc.reference.unnumbered_tools import measured_length
-from postproc.setup.model import Placement, SetupFile, part_placement, work_frame
+from postproc.setup.model import Placement, SetupFile, Stock, part_placement, work_frame
 from postproc.setup.system import standing
 from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, warning
@@ -71,10 +73,14 @@ class Job:
         box = self.setup.rewind.stock
         if box is None or self.control.plane is not None:
             return None
-        sides = np.array([box.low, box.high])
-        corners = sides[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]
-        placed = self.placement.points(corners) - self.control.origin
+        placed = self.placement.points(_corners(box)) - self.control.origin
         return np.stack([placed.min(axis=0), placed.max(axis=0)])
+
+    @property
+    def stock_corners(self) -> Floats | None:
+        """(8, 3) corners of the set-up's stock in the table frame; None without."""
+        box = self.setup.rewind.stock
+        return None if box is None else self.placement.points(_corners(box))
 
     @property
     def work_system(self) -> Frame:
@@ -183,6 +189,11 @@ class Job:
         return [int(k) for k in np.flatnonzero(begins & self.moves.link)]
 
 
+def _corners(box: Stock) -> Floats:
+    """(8, 3)"""
+    return np.asarray(np.array([box.low, box.high])[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)])
+
+
 def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) -> ControllerFile:
     """The controller that knows the codes of the shop's own blocks, and the number of the program."""
     return controller.with_shop(machine.hooks.under(setup.hooks).passive, setup.output.program_number)
@@ -219,6 +230,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     axis_tolerance = options.axis_tolerance * DEG
     moves, found = build_moves(toolpath, setup, axis_tolerance)
     diagnostics += [*found, *_default_feed(toolpath, setup)]
+    moves, found = limited_feeds(moves, toolpath, machine.largest_feed)
+    diagnostics += found
     moves = moves.placed(placement)
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     origin = placement.points(np.array([frame.origin]))[0]
@@ -232,7 +245,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     corrects = errors is not None and errors.corrected_by == "post"  # tables that are corrected do not stand at zero
     entry = "table" if corrects or controller.modes.tcp is None else controller.modes.tcp.frame
-    control = Control(machine, law, origin, largest, law, rapids=controller.kinematics.rapids, entry_frame=entry,
+    control = Control(machine, law, origin, largest, law, entry_frame=entry,
+                      rapids=machine.rapids or controller.kinematics.rapids,
                       feed_rule=controller.feed.length, own_kinematics=own,
                       helix_planes=controller.arcs.helix_planes,
                       rolls=rolls, measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
@@ -242,7 +256,15 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
               modes, errors, tuple(stated))
-    return job, diagnostics + _tool_lengths(job) + _unused_tools(job)
+    return _with_rapids(job), diagnostics + _tool_lengths(job) + _unused_tools(job)
+
+
+def _with_rapids(job: Job) -> Job:
+    """With rapids split where the control would leave their line, but where they are fed instead."""
+    if job.setup.output.rapids_as_feed:
+        return job
+    return replace(job, moves=safe_rapids(job.moves, job.modes, job.kinematics, job.operation, job.space, job.stock_corners,
+                                          (job.options.tolerance, job.axis_tolerance)))
 
 
 def _work_offset(controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:

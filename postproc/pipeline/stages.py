@@ -135,7 +135,7 @@ def solved(made: PlacedStage, progress: Progress | None) -> tuple[PlacedStage | 
     job, shares = made.job, made.shares
     path, found = build_path(job.modes, job.kinematics, made.moves, job.space, job.home_rows(), job.operation,
                              shares["linearising"], shares["axis_linearising"] * DEG, made.toolpath.file, progress,
-                             made.drawing)
+                             made.drawing, made.setup.output.rapids_as_feed)
     found = with_system(found, job.work_system, job.placement)
     if path is None:
         return made, found

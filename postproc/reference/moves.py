@@ -80,10 +80,12 @@ class Moves:
     def without_pecks(self) -> Moves:
         """The rows but those of pecks: a hole is then one straight path to its bottom."""
         keep = self.phase != Phase.PECK
-        if bool(keep.all()):
-            return self
+        return self if bool(keep.all()) else self.take(keep)
+
+    def take(self, rows: Ints | Bools) -> Moves:
+        """Some of the rows, or rows several times."""
         names = [name for name in self.__dataclass_fields__ if name != "arcs"]
-        columns: dict[str, Any] = {name: taken(getattr(self, name), keep) for name in names}
+        columns: dict[str, Any] = {name: taken(getattr(self, name), rows) for name in names}
         return replace(self, **columns)
 
     def run_by(self, owner: Ints) -> Bools:

@@ -15,7 +15,7 @@ _ASIDE = {"description", "placement"}
 """keys that change no word of a program: what `place` may choose from"""
 _LATER: tuple[tuple[str, ...], ...] = (
     ("hooks",), ("output", "stop_between_tools"), ("output", "program_number"), ("output", "program_name"),
-    ("clearance", "index"))
+    ("clearance", "index"), ("output", "rapids_as_feed"))
 """keys that set-ups have not always had: at their defaults they are left out, so that programs keep their fingerprint"""
 _LATER_OF_TOOLS = ("tip_acceleration", "tip_jerk", "axis_rate")
 """likewise, of each tool"""
