@@ -7,15 +7,16 @@ from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from pydantic import create_model
 
 import machines.kinds as kinds
+from machines.choices import BoughtOption
 from machines.kind_check import build_faults, contract_faults
 from machines.kinematics.base import Kinematics
-from machines.machine import ClampCodes, Limits, Machine, Timing, Turns
+from machines.machine import ClampCodes, ControlOptions, Limits, Machine, Timing, Turns
 from machines.models import ControlModel, KeyProblem, KinematicsModel, MachineModel, register_beyond
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
@@ -160,7 +161,7 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         control_kinematics=model.control_kinematics(), file=file.file,
         stop=model.control.stop or "" if model.control is not None else "",
         rapids=control.rapids or "", largest_feed=control.largest_feed * PER_MINUTE if control.largest_feed else math.inf,
-        cutting_velocity=_cutting_velocity(model, kinematics), hooks=model.hooks,
+        cutting_velocity=_cutting_velocity(model, kinematics), options=_options(file, control), hooks=model.hooks,
         length_register=register_beyond(control.length_register),
         radius_register=None if control.radius_register is None else register_beyond(control.radius_register),
         clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
@@ -174,6 +175,14 @@ def _limits(model: MachineModel, kinematics: Kinematics) -> Limits:
     velocity, acceleration, jerk = np.array([(a.velocity, a.acceleration, a.jerk) for a in axes]).T * scale
     assumed = frozenset(f"{name}.{key}" for name in names for key in model.axes[name].assumed)
     return Limits(travel[:, 0], travel[:, 1], velocity, acceleration, jerk, assumed)
+
+
+def _options(file: UserFile, control: ControlModel) -> ControlOptions:
+    """What the file says of the options of the control, and where."""
+    fitted = {name: bool(value) for name in get_args(BoughtOption) if (value := getattr(control, name)) is not None}
+    origins = {name: file.origin(("control", name)) for name in fitted}
+    return ControlOptions(fitted, {name: (at.file, at.line) for name, at in origins.items()}, control.tip_frame or "",
+                          control.power_on)
 
 
 def _cutting_velocity(model: MachineModel, kinematics: Kinematics) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from machines.choices import Park, Rapids, RolloverRule, Stop
+from machines.choices import BoughtOption, Park, Rapids, RolloverRule, Stop
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
@@ -70,6 +70,31 @@ class ClampCodes:
 
 
 @dataclass(frozen=True)
+class ControlOptions:
+    """What the machine file says of the options of the control, each with the file and line that say so.
+
+    Attributes:
+        fitted: True or False by option; what is not in it is not confirmed
+        stated: file and line by option
+        tip_frame: "table" or "entry" as in [modes.tcp] frame, "" where the file does not say
+        power_on: codes in force before every program
+    """
+
+    fitted: Mapping[BoughtOption, bool] = field(default_factory=dict)
+    stated: Mapping[BoughtOption, tuple[str, int]] = field(default_factory=dict)
+    tip_frame: Literal["table", "entry", ""] = ""
+    power_on: tuple[str, ...] = ()
+
+    def absent(self, option: BoughtOption) -> bool:
+        """True where the file says that the control has it not."""
+        return not self.fitted.get(option, True)
+
+    def confirmed(self, option: BoughtOption) -> bool:
+        """True where it says that it has."""
+        return self.fitted.get(option, False)
+
+
+@dataclass(frozen=True)
 class ControlKinematics:
     """A kinematics module that the control itself runs, so that programs hold tip coordinates in the part.
 
@@ -106,6 +131,7 @@ class Machine:
         rapids: path of rapids of several axes, "" where the machine file does not say
         largest_feed: mm/s, the largest cutting feed; infinite where the machine file does not say
         cutting_velocity: per joint, mm/s or rad/s, largest at feed; () where that is the velocity of rapids
+        options: what the file says of the options of the control
         hooks: blocks of the shop at certain places of a program
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
@@ -131,6 +157,7 @@ class Machine:
     rapids: Rapids | Literal[""] = ""
     largest_feed: float = math.inf
     cutting_velocity: tuple[float, ...] = ()
+    options: ControlOptions = field(default_factory=ControlOptions)
     hooks: HooksModel = field(default_factory=HooksModel)
 
     def __post_init__(self) -> None:

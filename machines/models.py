@@ -142,6 +142,25 @@ class ControlModel(UserModel):
     """what a stop (M0; M1 where its switch is on) switches off: "spindle and coolant", "spindle" or "nothing"; the builder's
     PLC decides on most controls. Default: what the controller file has ([stops])"""
 
+    tilted_planes: bool | None = None
+    """the option of tilted work planes is fitted (Fanuc G68.2, Haas G254 DWO, Siemens CYCLE800, Heidenhain PLANE); false:
+    it is not. Default, here and below: not confirmed, it is used and the head of the program names it"""
+    tip_control: bool | None = None
+    """the option of tool-centre-point control (G43.4, G234 TCPC, TRAORI, TCPM)"""
+    smoothing: bool | None = None
+    """the option of the control's own smoothing (Fanuc G05.1 Q1); false: its blocks are left out"""
+    rigid_tapping: bool | None = None
+    """the option of rigid tapping (Fanuc M29); false: taps need a floating holder, where the cycle allows one"""
+    helical: bool | None = None
+    """the option of helical interpolation; false: helices are written as lines"""
+    splines: bool | None = None
+    """the option of spline interpolation"""
+    tip_frame: Literal["table", "entry"] | None = None
+    """what X, Y, Z are the tip in, where a rotary table stands turned when tool-centre-point control is switched on (Fanuc
+    parameter 19696#5 WKP); default: as the controller file has it ([modes.tcp] frame)"""
+    power_on: tuple[Annotated[str, Field(pattern=r"^G[0-9]+(\.[0-9]+)?$")], ...] = ()
+    """codes that this machine puts in force before every program (Fanuc parameter 3402), next to those of the controller
+    file ([start] codes)"""
     rapids: Rapids | None = None
     """path of rapids that move several axes: "straight" or "dog-leg", each axis at its own speed. Fanuc: parameter 1401#1
     LRP; Haas: setting 335; Siemens: RTLION, RTLIOF. Default: what the controller file has ([kinematics] rapids)"""

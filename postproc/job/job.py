@@ -195,8 +195,9 @@ def _corners(box: Stock) -> Floats:
 
 
 def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) -> ControllerFile:
-    """The controller that knows the codes of the shop's own blocks, and the number of the program."""
-    return controller.with_shop(machine.hooks.under(setup.hooks).passive, setup.output.program_number)
+    """The controller with its options, the codes of the shop's own blocks, and the number of the program."""
+    passive = machine.hooks.under(setup.hooks).passive
+    return controller.fitted(machine.options).with_shop(passive, setup.output.program_number)
 
 
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,

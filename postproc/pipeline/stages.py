@@ -52,7 +52,7 @@ from postproc.setup.system import with_system
 from postproc.verification.proof_text import with_statement
 from postproc.verification.read_back import read_back
 from postproc.verification.second_witness import second_witness
-from postproc.writing.unwritable import unwritable
+from postproc.writing.unwritable import floating_taps, unwritable
 from postproc.writing.writers import writer_for
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.units import DEG
@@ -195,6 +195,8 @@ def compiled(made: PlannedStage, progress: Progress | None) -> tuple[CompiledSta
                                             None if compensation is None else compensation.apart)
     found += unwritable(made.controller, program, made.toolpath.cycles, made.toolpath.file,
                         job.control.length_on_z)
+    found += floating_taps(made.controller, program, made.toolpath.cycles, made.machine.options.absent("rigid_tapping"),
+                           made.toolpath.file)
     return handed_on(CompiledStage, made, program=program, feeds=feeds), found
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from postproc.compile.program import PER_MINUTE, Hole, Program, Section
 from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
+from postproc.path.model import ARC
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
 
@@ -52,6 +53,19 @@ class WriterState:
         self.taken: set[int] = set()
         self.ahead: tuple[int, list[str]] = (0, [])
         self.restate()
+
+    def options(self, modes: list[Mode]) -> list[str]:
+        """What its modes need, and further options that the program needs, which the machine file does not confirm."""
+        needed = [text.replace("{work_offset}", self.offset_name) for mode in modes
+                  for text in (mode.option, *mode.relies_on) if text]
+        p, rules = self.program, self.controller
+        arcs = np.flatnonzero(p.code == ARC)
+        third = [p.letters.index("ZYX"[plane - 17]) for plane in p.plane[arcs].tolist()]
+        rising = p.words[arcs, third] != p.words[arcs - 1, third]
+        taps = any(hole.key.startswith("TAP") for hole in p.holes)
+        others = ((rules.program.smoothing_option, True), (rules.arcs.helical_option, bool(rising.any())),
+                  (rules.cycles.rigid_option, taps))
+        return needed + [text for text, used in others if text and used]
 
     def restate(self) -> None:
         """State motion code and feed with the next block."""
