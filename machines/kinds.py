@@ -47,7 +47,7 @@ def known() -> list[str]:
     """All registered kinds, the built-in ones first.
 
     Raises:
-        KindFault: where a file of `POSTPROC_KINDS` cannot be run or registers nothing.
+        KindFault: where files of `POSTPROC_KINDS` cannot be used.
     """
     return list(dict.fromkeys([*BUILT_IN, *sorted(_registered()), *sorted(_in_files())]))
 
@@ -93,7 +93,7 @@ def _registered() -> dict[str, list[EntryPoint]]:
 def _loaded(point: EntryPoint) -> type[KinematicsModel]:
     try:
         model = point.load()
-    except Exception as fault:  # code of others: whatever it raises
+    except (Exception, SystemExit) as fault:  # code of others: whatever it raises
         raise KindFault(f"kind {point.name!r} ({point.value}) is not imported: {type(fault).__name__}: {fault}",
                         "correct or reinstall the package that registers it") from fault
     if not (isinstance(model, type) and issubclass(model, KinematicsModel)):
@@ -103,9 +103,20 @@ def _loaded(point: EntryPoint) -> type[KinematicsModel]:
 
 
 def _in_files() -> dict[str, type[KinematicsModel]]:
-    """Models of the files of `POSTPROC_KINDS` by kind."""
-    named = [part for part in os.environ.get(FILES, "").split(os.pathsep) if part]
-    return {kind: model for part in named for kind, model in _of_file(str(Path(part).resolve())).items()}
+    """Models of the files of `POSTPROC_KINDS` by kind.
+
+    Raises:
+        KindFault: where a file cannot be run or registers nothing, or two of them define one kind.
+    """
+    named = dict.fromkeys(str(Path(part).resolve()) for part in os.environ.get(FILES, "").split(os.pathsep) if part)
+    found, where = dict[str, type[KinematicsModel]](), dict[str, str]()
+    for file in named:
+        for kind, model in _of_file(file).items():
+            if kind in where:
+                raise KindFault(f"kind {kind!r} is defined twice: in {where[kind]} and in {file}",
+                                f"name one of them in {FILES}, or give one another word")
+            found[kind], where[kind] = model, file
+    return found
 
 
 @cache
@@ -113,7 +124,7 @@ def _of_file(file: str) -> dict[str, type[KinematicsModel]]:
     hint = f"correct the file, or take it out of {FILES}"
     try:
         module = _run(Path(file))
-    except Exception as fault:  # code of others: whatever it raises
+    except (Exception, SystemExit) as fault:  # code of others: whatever it raises
         raise KindFault(f"{file}, named in {FILES}, is not run: {type(fault).__name__}: {fault}", hint) from fault
     found = {kind: model for model in vars(module).values() for kind in _words(model, module.__name__)}
     if not found:

@@ -312,14 +312,30 @@ def _diagnostic(file: UserFile, model: type[BaseModel], fault: _Fault) -> Diagno
         return file.problem("file.unknown-key", path, f"unknown key {key!r}",
                             nearest(str(path[-1]), _known_keys(model, path[:-1])))
     if fault.kind == "missing":
-        where = f"to [{dotted(path[:-1])}]" if path[1:] else "at the top"
-        return file.problem("file.missing-key", path, f"key {key!r} is missing",
-                            f"add {path[-1]} = ... {where}")
+        return file.problem("file.missing-key", path, f"key {key!r} is missing", _added(model, path))
     if code:
         return file.problem(code, path, f"{key}: {fault.message}" if key else fault.message, fault.hint)
     code = "file.range" if any(word in fault.kind for word in _RANGE) else "file.type"
     hint = _described(model, path) if fault.kind == "string_pattern_mismatch" else fault.hint
     return file.problem(code, path, f"{key} = {_shown(fault.value)}: {fault.message}", hint)
+
+
+def _added(model: type[BaseModel], path: KeyPath) -> str:
+    """What to write for a missing key: a table with all that it must have, or a key at its place."""
+    needed = [name for name in _known_keys(model, path) if all(
+        m.model_fields[name].is_required() for m in _tables(model, path) if name in m.model_fields)]
+    if needed:
+        return f"add a table [{dotted(path)}] with {', '.join(f'{name} = ...' for name in needed)}"
+    where = f"to [{dotted(path[:-1])}]" if path[1:] else "at the top"
+    return f"add {path[-1]} = ... {where}"
+
+
+def _tables(model: type[BaseModel], path: KeyPath) -> list[type[BaseModel]]:
+    """The models that the table at the path may have."""
+    found: list[Any] = [model]
+    for part in path:
+        found = [inner for kind in found for inner in _inside(kind, part)]
+    return [one for kind in found for one in _models(kind)]
 
 
 def _described(model: type[BaseModel], path: Sequence[str | int]) -> str:

@@ -32,7 +32,7 @@ gauge_length = 95.5
 
 
 @dataclass(frozen=True)
-class Manner:
+class SpellingOptions:
     """How the file writes it: MULTAX, and where the approach stands to ROTATE and the CSYS remark of its position."""
 
     multax: bool = False
@@ -60,14 +60,14 @@ def csys(angle: float, height: float) -> list[str]:
     return [f"$$-> CSYS / {text[0]},  $", f"\t    {text[1]},  $", f"\t    {text[2]}"]
 
 
-def goto(point: tuple[float, ...], run_options: Manner) -> list[str]:
+def goto(point: tuple[float, ...], run_options: SpellingOptions) -> list[str]:
     """A point of the position's frame."""
     scale = 1.0 if run_options.units == "MM" else 25.4
     text = "GOTO / " + ", ".join(number(v / scale, 10) for v in point)
     return [f"{text}, $", " 0.0000000000, 0.0000000000, 1.0000000000"] if run_options.multax else [text]
 
 
-def subroutine(n: int, points: tuple[tuple[float, ...], ...], run_options: Manner) -> list[str]:
+def subroutine(n: int, points: tuple[tuple[float, ...], ...], run_options: SpellingOptions) -> list[str]:
     """DEFSUB with cuts and the retract."""
     lines = [f"DEFSUB / {n}", "FEDRAT / 250.000000,  MMPM"]
     for point in points[:-1]:
@@ -76,7 +76,7 @@ def subroutine(n: int, points: tuple[tuple[float, ...], ...], run_options: Manne
 
 
 def position(n: int, angle: float, step: float, approach: tuple[float, ...], height: float,
-             run_options: Manner) -> list[str]:
+             run_options: SpellingOptions) -> list[str]:
     """One position of the table: ROTATE, remark, approach and the call."""
     scale = 1.0 if run_options.units == "MM" else 25.4
     move = ["RAPID", *goto(approach, run_options)]
@@ -89,7 +89,7 @@ def position(n: int, angle: float, step: float, approach: tuple[float, ...], hei
     return [line for name in order for line in parts[name]] + call
 
 
-def text_of(run_options: Manner) -> str:
+def text_of(run_options: SpellingOptions) -> str:
     """The whole file."""
     lines = ["$$ A round part on a fourth axis: Pro/CLfile text, indexed by ROTATE, subroutines between TRANS.",
              "$$-> MFGNO / INDEXED", "PARTNO / INDEXED", "MACHIN / UNCX01, 1",
@@ -107,7 +107,8 @@ def text_of(run_options: Manner) -> str:
     return "\n".join([*lines, f"ROTATE / AAXIS, INCR, {last:.3f}, CCLW", "FINI"]) + "\n"
 
 
-FILES = {"creo_rotate.ncl": lambda: text_of(Manner()), "creo_rotate_multax.ncl": lambda: text_of(Manner(multax=True)),
+FILES = {"creo_rotate.ncl": lambda: text_of(SpellingOptions()),
+         "creo_rotate_multax.ncl": lambda: text_of(SpellingOptions(multax=True)),
          "indexing.setup.toml": lambda: SETUP}
 
 

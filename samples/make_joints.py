@@ -20,8 +20,8 @@ def leaning(tilt: Floats | float, heading: Floats | float) -> Floats:
 
 def singular_pass() -> str:
     """Passes along x over a ridge, the axis on the path from -12 to 12 degrees of lean."""
-    nx = NxFile(("continuous 5-axis: three passes over a ridge, the tool axis leans from -12 to 12 degrees on the way; in",
-                 "the first it goes through +z, in the second it passes 0.01 degrees beside it, in the third 0.5 degrees.",
+    nx = NxFile(("continuous 5-axis: three passes over a ridge, the tool axis leans from -12 to 12 degrees along it; in",
+                 "the first it goes through +z, in the second it passes 0.01 degrees next to it, in the third 0.5 degrees.",
                  "Top of the ridge at the origin, mm."), decimals=5, axis_decimals=9)
     tilt = np.linspace(-12, 12, 33)
     for name, miss, y in (("THROUGH", 0.0, -8.0), ("BESIDE", 0.01, 0.0), ("APART", 0.5, 8.0)):

@@ -24,7 +24,7 @@ gauge_length = 120.0
 
 
 def upside_down() -> str:
-    """A way round a corner and a slanted edge, both in the machining system."""
+    """A path round a corner and a slanted edge, both in the machining system."""
     nx = NxFile(("machining system MSYS turned upside down in the model and 493 mm away from its origin: z down, x and y",
                  "changed. With upside_down.setup.toml that system stands on the table, z up. Top of the part at its z = 0,",
                  "mm."), decimals=4)

@@ -235,7 +235,7 @@ GOTO / -3.5, -1.5, 1.
 rapid
 goto/-3.5,-1.5,.1
 FEDRAT / 10.0,  IPM
-GOTO / -3.5, -1.5, -.05   $$ down beside the plate
+GOTO / -3.5, -1.5, -.05   $$ down next to the plate
 FEDRAT / 24., IPM
 GOTO  /    3.5000,   -1.5000,   -0.0500
 GODLTA / 0, .4, 0

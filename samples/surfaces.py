@@ -182,7 +182,7 @@ def tour() -> Sample:
     tip = np.column_stack((50 * np.sin(2 * np.pi * t), 40 * np.sin(4 * np.pi * t), 20 + 15 * np.cos(2 * np.pi * t)))
     rows = [f"GOTO / {numbers(p, 5)}, {numbers(a, 9)}" for p, a in zip(tip, axis, strict=True)]
     head = ["$$ 5-axis tour of tool directions in free space: cone, 60 degrees of tilt, through the pole, 0.5 degrees",
-            "$$ beside it, fixed axis. Short enough to simulate; tip within 60 mm of the origin in each coordinate.",
+            "$$ next to it, fixed axis. Short enough to simulate; tip within 60 mm of the origin in each coordinate.",
             "PARTNO TOOL AXIS TOUR", "UNITS / MM", "LOADTL / 1", "CUTTER / 6., 3.", "SPINDL / 5000, RPM, CLW",
             "MULTAX / ON", "RAPID", rows[0], "FEDRAT / 1500., MMPM"]
     expected = {"points": len(rows), "rapids": 1, "arcs": 0, "cycles": 0, "holes": 0, "operations": 1, "starts": 0,

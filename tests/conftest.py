@@ -8,7 +8,7 @@ from functools import cache
 
 import pytest
 
-from tests import compile_once, cover, environment, rewrite_once
+from tests import compile_once, cover, environment, one_command, rewrite_once
 from tests.linuxcnc import interpreter, simulator
 from tests.processor_time import (
     pytest_addoption,
@@ -44,6 +44,7 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 20)
     gc.enable()
     compile_once.install()
+    one_command.install()
 
 
 @cache

@@ -6,10 +6,12 @@ import ast
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 from machines.kinds import BUILT_IN
+from postproc.controllers.model import WriterName
 from tests.source import ROOT, nodes, product
 
 OWN_FILES = "machines/kinematics/"
@@ -28,6 +30,28 @@ def concrete_kinds() -> set[str]:
         before = len(kinds)
         kinds |= {name for name, above in bases.items() if above & kinds}
     return kinds - {"Kinematics"}
+
+
+OWN_PATH = "postproc/cycle_time/source.py"
+"""LinuxCNC's planner, which has a model of its own, blends and takes feeds over as no other control does"""
+
+
+def asked_of_writers() -> set[str]:
+    """Files that compare the dialect of a controller file with words; where it is looked up in a table is a registry."""
+    return {path.relative_to(ROOT).as_posix() for path in product() for node in nodes(path) if isinstance(node, ast.Compare)
+            for side in (node.left, *node.comparators) if isinstance(side, ast.Attribute) and side.attr == "writer"}
+
+
+def test_each_dialect_has_its_line_in_every_table_of_dialects() -> None:
+    """Writer, reader, form of tool tables: a table without a dialect would end in a KeyError where it is asked."""
+    tables = {path.relative_to(ROOT).as_posix(): {ast.literal_eval(key) for key in node.value.keys if key is not None}
+              for path in product() for node in nodes(path) if isinstance(node, ast.AnnAssign)
+              and isinstance(node.value, ast.Dict) and ast.unparse(node.annotation).startswith("dict[WriterName, ")}
+    assert len(tables) == 3 and all(names == set(get_args(WriterName)) for names in tables.values()), tables
+
+
+def test_what_controls_do_is_data_of_their_files() -> None:
+    assert asked_of_writers() == {OWN_PATH}
 
 
 def names_in(nodes: list[ast.expr]) -> set[str]:

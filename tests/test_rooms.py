@@ -55,6 +55,8 @@ FLOORS = (
     ("postproc.cycle_time", "how long a program takes, with a band"),
     ("postproc.placement", "where the part stands on the table"),
     ("postproc.report", "summary, trace, residual field"),
+    ("postproc.setup_sheet", "a new set-up: facts, questions, a place that fits"),
+    ("postproc.explain", "a page for each code of a message"),
     ("postproc.cli", "the command line"),
 )
 """(room, what it does): a room imports only rooms before it"""

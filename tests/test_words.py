@@ -28,7 +28,7 @@ INSTEAD = {
     "machines on rods": "parallel-kinematic machines", "turned plane": "tilted work plane",
     "arcs resolved": "arcs split into lines", "no control is below": "lower bound",
     "goes to:": "time by activity:", "held by the feed": "limited by programmed feed", "lost by": "rejected:",
-    "sense of the arcs": "arc direction", "best alone": "fastest for this pass",
+    "sense of the arcs": "arc direction", "axis positions": "machine coordinates", "best alone": "fastest for this pass",
 }
 WORDS = re.compile(r"(?<![\w.-])(" + "|".join(sorted(INSTEAD, key=len, reverse=True)) + r")(?![\w-])",
                    re.IGNORECASE)
@@ -39,6 +39,10 @@ PLACES = {
     ("machines/calibration/machine_run.py", "X way"): "that column",
     ("machines/calibration/run.py", "way"): "that column",
     ("machines/geometric_error/tables/readings.py", "way"): "group of a regular expression",
+    ("postproc/cycle_time/log.py", "position (S, A): axis positions, mm and degrees"): "columns of a log, no output mode",
+    ("samples/calibration/make_measurements.py", "X way"): "that column",
+    ("samples/surfaces.py", "One way, along +y"): "passes that are all cut in one direction",
+    ("samples/make_joints.py", '("BESIDE", 0.01, 0.0)'): "name of an operation in a sample",
     ("postproc/cli/error_files.py", "told"): "key of JSON",
     ("postproc/cli/error_text.py", "told"): "key of JSON",
 }
@@ -72,6 +76,16 @@ def test_documents(path: Path) -> None:
     wrong = [f"{name}:{number}: {word}: write {INSTEAD[word]}" for number, line in enumerate(
         path.read_text("utf-8").splitlines(), 1) for word in found(name, line)]
     assert wrong == []
+
+
+def test_comments_of_files_that_shops_copy() -> None:
+    """Machines, controllers, samples, builds: all that their files say, and comments of the code."""
+    files = [ROOT / "Makefile", ROOT / "pyproject.toml", *sorted((ROOT / "samples").rglob("*.py"))]
+    files += [path for top in ("machines", "postproc", "samples") for path in sorted((ROOT / top).rglob("*.toml"))]
+    lines = [(path, number, line if path in files else line.partition("#")[2]) for path in (*files, *CODE)
+             for number, line in enumerate(path.read_text("utf-8").splitlines(), 1)]
+    assert [f"{path.relative_to(ROOT)}:{number}: {word}: write {INSTEAD[word]}" for path, number, line in lines
+            for word in found(str(path.relative_to(ROOT)), line)] == []
 
 
 def test_texts_of_the_code() -> None:

@@ -66,6 +66,20 @@ def read_input(path: str | Path, *, standard_input: bool = False) -> bytes:
         return _bounded(stream, size)
 
 
+def first_bytes(path: str | Path, count: int) -> bytes:
+    """The beginning of a file; b"" where it cannot be read, which reading it says.
+
+    Standard input is not looked at.
+    """
+    if str(path) == "-" or not is_regular(path):
+        return b""
+    try:
+        with _opened(path) as stream:
+            return stream.read(count)
+    except OSError:
+        return b""
+
+
 def check_input(path: str | Path) -> os.stat_result:
     """The state of a regular file that is not too large, before it is opened.
 

@@ -21,14 +21,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from toolpaths.arrays import Array
+from toolpaths.arrays import Array, Bools, Ints, taken
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Owner = TypeVar("Owner", bound=type)
+Table = TypeVar("Table", bound="DataclassInstance")
 TABLE = "__arrays__"
 _LETTER = re.compile(r"[A-Za-z]\w*")
 _ANNOTATED = re.compile(r"\b(?:(Floats|Ints|Bools)|NDArray\[np\.(\w+)\])")
@@ -84,6 +88,16 @@ def arrays(**shapes: str) -> Callable[[Owner], Owner]:
         return cls
 
     return marked
+
+
+def rows_of(table: Table, letter: str, index: Ints | Bools | slice) -> Table:
+    """The same value with some of its rows: of every field whose first length is `letter`; None stays.
+
+    Rows that are kept once for all (`toolpaths.arrays.shared`) are kept once again.
+    """
+    shapes = {name: shape.rpartition(": ")[2].split() for name, shape in getattr(type(table), TABLE).items()}
+    columns = {name: getattr(table, name) for name, shape in shapes.items() if shape[:1] == [letter]}
+    return replace(table, **{name: taken(values, index) for name, values in columns.items() if values is not None})
 
 
 def declared(cls: type) -> dict[str, tuple[str, str]]:

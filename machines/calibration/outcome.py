@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from machines.calibration.noise import CHANCE, Noise
+from machines.calibration.remedies import TableFault
 from machines.calibration.result_figures import CalibrationFigures, parameters
 from machines.calibration.run import CalibrationRun
-from machines.calibration.unit_and_sign_checks import TableFault
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.files.implausible_errors import too_large
 
@@ -107,7 +107,7 @@ def _residual(run: CalibrationRun, figures: CalibrationFigures, noise: Noise | N
 def _silent(run: CalibrationRun, noise: Noise, message: str, found: TableFault | None, stated: str) -> None:
     """Less is left than the stated noise leaves."""
     if found is not None:
-        run.problem("calibrate.slip", f"{message}, less than such noise leaves", f"{found.words}; {stated}")
+        run.problem("calibrate.slip", f"{message}, less than such noise leaves", f"{found}; {stated}")
     elif noise.left < MUTE:
         run.problem("calibrate.silent", f"{message}, less than any noise leaves",
                     f"look at the unit of the readings; {stated}")
@@ -120,7 +120,7 @@ def _loud(run: CalibrationRun, figures: CalibrationFigures, noise: Noise, messag
     """More is left than the stated noise leaves: refused, unless it is asked for."""
     accepted = run.checked.accept_residual
     if found is not None and not (found.size and accepted):
-        run.problem("calibrate.slip", message, f"{found.words}; {stated}" if found.size else found.words)
+        run.problem("calibrate.slip", message, f"{found}; {stated}" if found.size else str(found))
         return
     without = figures["rms_instrument"]
     explains = "" if figures["rms_after"] <= LITTLE * without else (

@@ -9,7 +9,7 @@ seen: the errors found only have it too.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from machines.calibration.machine_fit import Measurements, problem_of
 from machines.calibration.measurement_file import ReversalModel
 from machines.calibration.noise import Noise, noise_of
 from machines.calibration.problem import CalibrationProblem, solve
+from machines.calibration.remedies import Remedy, TableChange, TableFault, TriedRemedy
 from machines.calibration.reversal import identify, reversal_span
 from machines.calibration.rotary_bench import PARTS, Bench
 from machines.calibration.rotary_fit import rotary_span
@@ -42,25 +43,7 @@ EDGE = 1e-6
 ROWS = 400
 """of a table that faults are looked for in"""
 PAIRS = ((0, 1), (1, 2), (0, 2))
-TENFOLD = {"ten times as large": 10.0, "a tenth as large": 0.1}
-
-
-@dataclass(frozen=True)
-class TableFault:
-    """What explains the readings: `words` with the remedy; `size` True where it is their unit, for which the
-    noise alone may speak."""
-
-    words: str
-    size: bool
-
-
-@dataclass(frozen=True)
-class TriedRemedy:
-    """A fault put right: in words, what is then left; `size` as in `TableFault`."""
-
-    words: str
-    noise: Noise | None
-    size: bool = False
+TENFOLD: dict[TableChange, float] = {"tenfold": 10.0, "tenth": 0.1}
 
 
 def machine_table_fault(start: ErrorModel, kinematics: Kinematics, measured: Measurements, wanted: Sequence[str],
@@ -102,36 +85,36 @@ def _roughly(problem: CalibrationProblem) -> float | None:
 
 
 def _positions(m: Measurements, kinematics: Kinematics, travel: tuple[Floats, Floats],
-               units: Sequence[str]) -> Iterable[tuple[str, Measurements]]:
-    """Faults of the columns of the axes in words, and the measurements without them; all inside travel."""
+               units: Sequence[str]) -> Iterable[tuple[Remedy, Measurements]]:
+    """Faults of the columns of the axes, and the measurements without them; all inside travel."""
     names, one = kinematics.axis_names, np.eye(len(kinematics.axis_names))
     rotary = np.array(kinematics.rotary)
     moved = np.ptp(m.q, axis=0) + np.abs(m.q).max(axis=0) > 0.0
-    found = [(f"with {names[j]} turned round", m.q * (1.0 - 2.0 * one[j])) for j in np.flatnonzero(moved)]
+    found = [(Remedy("sign", names[j]), m.q * (1.0 - 2.0 * one[j])) for j in np.flatnonzero(moved)]
     for a in range(len(names)):
         for b in range(a + 1, len(names)):
             if rotary[a] == rotary[b] and (m.q[:, a] != m.q[:, b]).any():
-                found.append((f"with {names[a]} and {names[b]} changed over", m.q[:, _swapped(len(names), a, b)]))
+                found.append((Remedy("columns", f"{names[a]} and {names[b]}"), m.q[:, _swapped(len(names), a, b)]))
     groups = [[int(j)] for j in np.flatnonzero(moved)]
     groups += [np.flatnonzero(moved & (rotary == turns)).tolist() for turns in (False, True)]
     for group in [g for g in groups if g and (len(g) == 1 or len({units[j] for j in g}) == 1)]:
         who = ", ".join(f"{names[j]}" for j in group)
-        found += [(f"with {who} {words}", m.q * (1.0 + (size - 1.0) * one[group].sum(axis=0)))
-                  for words, size in _sizes(units[group[0]])]
-    for words, q in found:
+        found += [(remedy, m.q * (1.0 + (size - 1.0) * one[group].sum(axis=0)))
+                  for remedy, size in _sizes(who, units[group[0]])]
+    for remedy, q in found:
         inside = (q >= travel[0] - EDGE).all() and (q <= travel[1] + EDGE).all()
         if inside and np.isfinite(kinematics.forward(q)[0]).all():
-            yield words, replace(m, q=q)
+            yield remedy, replace(m, q=q)
     if m.approaches is not None and m.approaches.any():
-        yield "with the approach directions turned round", replace(m, approaches=-m.approaches)
+        yield Remedy("sign", "the approach directions"), replace(m, approaches=-m.approaches)
     if m.kind == "along" and m.toward is not None:
         for k, x in enumerate("xyz"):
             if abs(m.toward[k]) < 1.0 - TURNED:
-                yield f"with toward along {x}", replace(m, toward=one[k, :3])
+                yield Remedy("toward", to=x), replace(m, toward=one[k, :3])
 
 
 def _other_directions(m: Measurements, start: ErrorModel,
-                      kinematics: Kinematics) -> Iterable[tuple[str, Measurements]]:
+                      kinematics: Kinematics) -> Iterable[tuple[Remedy, Measurements]]:
     """Readings along x, y, z of the machine, turned to those of the table frame by how the slides move the tip."""
     if m.kind != "position":
         return
@@ -143,7 +126,7 @@ def _other_directions(m: Measurements, start: ErrorModel,
     turn = slides @ np.linalg.inv(straight)
     if np.abs(turn - np.eye(3)).max() > TURNED:
         read = np.einsum("nij,nj->ni", turn, m.read)
-        yield "with dx, dy, dz along the machine instead of the table", replace(m, read=read)
+        yield Remedy("frame"), replace(m, read=read)
 
 
 def _readings(problem: CalibrationProblem, read: Floats, columns: Sequence[str],
@@ -153,40 +136,40 @@ def _readings(problem: CalibrationProblem, read: Floats, columns: Sequence[str],
     rates = problem.jacobian(problem.guess)[:, problem.free] / problem.sigma[:, None]
     span = _span(rates)
     without = problem.predict(problem.guess)
-    for words, other, size in _changed(table, columns, units):
+    for remedy, other, size in _changed(table, columns, units):
         y = (other.ravel() - without) / problem.sigma
-        yield TriedRemedy(words, noise_of(y - span @ (span.T @ y), span.shape[1]), size)
+        yield TriedRemedy(remedy, noise_of(y - span @ (span.T @ y), span.shape[1]), size)
 
 
 def _changed(table: Floats, columns: Sequence[str],
-             units: Sequence[str]) -> Iterable[tuple[str, Floats, bool]]:
-    """Readings (..., C) with each fault put right, in words; True where they have another size."""
+             units: Sequence[str]) -> Iterable[tuple[Remedy, Floats, bool]]:
+    """Readings (..., C) with each fault put right; True where they have another size."""
     count = len(columns)
     kinds = [k for k in ({0, 1, 2}, {3, 4, 5}) if max(k) < count] if count > 1 else []
     groups = [list(range(count))] if len({u in LENGTHS for u in units}) == 1 else []
     groups += [sorted(k) for k in kinds if len(k) < count or not groups]
     groups += [[j] for j in range(count)] if count > 1 else []
     if len({u in LENGTHS for u in units}) == 1:
-        yield "with all readings turned round", -table, False
+        yield Remedy("sign", "all readings"), -table, False
     for group in groups:
         factor = np.isin(np.arange(count), group)
         if len({units[j] for j in group}) == 1:
             who = ", ".join(columns[j] for j in group)
-            for words, size in _sizes(units[group[0]]):
-                yield f"with {who} {words}", np.where(factor, size, 1.0) * table, True
+            for remedy, size in _sizes(who, units[group[0]]):
+                yield remedy, np.where(factor, size, 1.0) * table, True
         if len(group) == 1:
-            yield f"with {columns[group[0]]} turned round", np.where(factor, -1.0, 1.0) * table, False
+            yield Remedy("sign", columns[group[0]]), np.where(factor, -1.0, 1.0) * table, False
     for kind in kinds:
         for a, b in PAIRS:
             i, j = sorted(kind)[a], sorted(kind)[b]
-            yield f"with {columns[i]} and {columns[j]} changed over", table[..., _swapped(count, i, j)], False
+            yield Remedy("columns", f"{columns[i]} and {columns[j]}"), table[..., _swapped(count, i, j)], False
 
 
-def _sizes(unit: str) -> list[tuple[str, float]]:
-    """Other units that numbers under `unit` may be in, with the header to write, and what they are larger by."""
+def _sizes(what: str, unit: str) -> list[tuple[Remedy, float]]:
+    """Other units that numbers under `unit` may be in, and what they are larger by."""
     known = LENGTHS if unit in LENGTHS else ANGLES
-    return [(f"in {other} (write [{other}] in the header)", size / known[unit]) for other, size in known.items()
-            if other != unit] + list(TENFOLD.items())
+    return [*((Remedy("unit", what, other), size / known[unit]) for other, size in known.items() if other != unit),
+            *((Remedy(change, what), size) for change, size in TENFOLD.items())]
 
 
 def rotary_table_fault(bench: Bench, readings: Floats, sigma: Floats, harmonics: int,
@@ -200,32 +183,26 @@ def rotary_table_fault(bench: Bench, readings: Floats, sigma: Floats, harmonics:
         return noise_of(y - span @ (span.T @ y), span.shape[1])
 
     def tried() -> Iterable[TriedRemedy]:
-        for words, other, size in _changed(readings, PARTS, units):
-            yield TriedRemedy(words, left(other), size)
-        for size_words, other in _both_sizes(readings, units):
-            yield TriedRemedy(size_words, left(other), True)
-        for words, other in _rearranged(readings):
-            yield TriedRemedy(words, left(other))
+        for remedy, other, size in _changed(readings, PARTS, units):
+            yield TriedRemedy(remedy, left(other), size)
+        for change, factor in TENFOLD.items():
+            yield TriedRemedy(Remedy(change, "all readings"), left(factor * readings), True)
+        for remedy, other in _rearranged(readings):
+            yield TriedRemedy(remedy, left(other))
 
     return _best(left(readings), tried)
 
 
-def _both_sizes(readings: Floats, units: Sequence[str]) -> Iterable[tuple[str, Floats]]:
-    """All six readings ten times as large, or a tenth."""
-    return ((f"with all readings {words}", size * readings) for words, size in TENFOLD.items())
-
-
-def _rearranged(readings: Floats) -> Iterable[tuple[str, Floats]]:
+def _rearranged(readings: Floats) -> Iterable[tuple[Remedy, Floats]]:
     """Set-ups and steps of readings (m, n, ...) counted otherwise, where the same ones are there."""
     back = np.roll(readings[:, ::-1], 1, axis=1)
-    others = [("with the set-ups in the other order", readings[::-1]),
-              ("with the steps counted in the other direction", back)]
-    others += [(f"with set-up {k} turned round", np.where(
+    others = [(Remedy("order"), readings[::-1]), (Remedy("steps"), back)]
+    others += [(Remedy("sign", f"set-up {k}"), np.where(
         (np.arange(len(readings)) == k).reshape(-1, *[1] * (readings.ndim - 1)), -readings, readings))
         for k in range(len(readings))] if len(readings) > 1 else []
     if readings.shape[0] == readings.shape[1]:
-        others.append(("with the columns setup and step changed over", np.swapaxes(readings, 0, 1)))
-    return ((words, other) for words, other in others if (np.isfinite(other) == np.isfinite(readings)).all())
+        others.append((Remedy("columns", "the columns setup and step"), np.swapaxes(readings, 0, 1)))
+    return ((remedy, other) for remedy, other in others if (np.isfinite(other) == np.isfinite(readings)).all())
 
 
 def reversal_table_fault(readings: Floats, sigma: float, given: ReversalModel,
@@ -242,13 +219,13 @@ def reversal_table_fault(readings: Floats, sigma: float, given: ReversalModel,
 
     def tried() -> Iterable[TriedRemedy]:
         other = [(-k) % n for k in shifts]
-        yield TriedRemedy(f"with the indexer turned in the other direction, shifts = {other},",
+        yield TriedRemedy(Remedy("indexer", to=str(other)),
                           identify(readings, sigma, given.zeroed, shifts=other).result.noise)
-        for words, size in _sizes(unit):
-            yield TriedRemedy(f"with reading {words}", left(size * readings), True)
-        for words, rearranged in _rearranged(readings):
-            if "steps" not in words:
-                yield TriedRemedy(words, left(rearranged))
+        for remedy, size in _sizes("reading", unit):
+            yield TriedRemedy(remedy, left(size * readings), True)
+        for remedy, rearranged in _rearranged(readings):
+            if remedy.change != "steps":
+                yield TriedRemedy(remedy, left(rearranged))
 
     return _best(left(readings), tried)
 
@@ -285,10 +262,7 @@ def _best(now: Noise | None, tried: Callable[[], Iterable[TriedRemedy]]) -> Tabl
     if not all(one.size for one in alike):
         alike = [one for one in alike if not one.size]
     left = next(noise.left for one, noise in known if one is alike[0])
-    words = " or ".join(one.words for one in alike[:SHOWN])
-    return TableFault(f"{words} only {left:.3g} times would be left" if now.left > 1.0
-                      else f"{words} {left:.3g} times is left",
-                      all(one.size for one in alike))
+    return TableFault(tuple(one.remedy for one in alike[:SHOWN]), left, now.left > 1.0, all(one.size for one in alike))
 
 
 def _nearer(noise: Noise, now: Noise) -> bool:

@@ -20,16 +20,15 @@ BLOCK = 8192
 
 def turn(direction: Floats, cos: Floats, sin: Floats, v: Columns) -> list[Floats | float]:
     """v turned about the unit `direction` (3,) (Rodrigues); about an axis of coordinates two columns change."""
-    whole = np.flatnonzero(np.abs(direction) == 1.0)
-    if len(whole):
-        i = int(whole[0])
+    d: list[float] = direction.tolist()
+    i = next((i for i in range(3) if abs(d[i]) == 1.0), -1)
+    if i >= 0:
         j, k = (i + 1) % 3, (i + 2) % 3
-        signed = sin if direction[i] > 0.0 else -sin
+        signed = sin if d[i] > 0.0 else -sin
         result = list(v)
         result[j], result[k] = cos * v[j] - signed * v[k], signed * v[j] + cos * v[k]
         return result
     along = dot(direction, v)
-    d = [float(x) for x in direction]
     return [along * d[i] + cos * (v[i] - along * d[i]) + sin * (d[j] * v[k] - d[k] * v[j])
             for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
 
@@ -100,7 +99,8 @@ def of_rows(rows: Floats) -> list[Floats | float]:
 
 def of_one(vector: Floats) -> list[Floats | float]:
     """Columns of one vector (3,): plain numbers."""
-    return [float(x) for x in vector]
+    result: list[Floats | float] = vector.tolist()
+    return result
 
 
 def to_rows(v: Columns, n: int) -> Floats:

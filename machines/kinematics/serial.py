@@ -135,8 +135,11 @@ class Serial(Kinematics):
 
     def _turning(self, q: Floats) -> Turning:
         """Cosine and sine (N,) of each rotary joint of q (N, J)."""
-        index = {joint.name: self.axis_names.index(joint.name) for joint in self._turns}
-        return {name: (np.cos(q[:, j]), np.sin(q[:, j])) for name, j in index.items()}
+        return {name: (np.cos(q[:, j]), np.sin(q[:, j])) for name, j in self._turning_columns}
+
+    @cached_property
+    def _turning_columns(self) -> list[tuple[str, int]]:
+        return [(joint.name, self.axis_names.index(joint.name)) for joint in self._turns]
 
     def _sweep(self, chain: Sequence[Joint], q: Floats | None, turning: Turning,
                carried: Sequence[Columns]) -> list[list[Floats | float]]:

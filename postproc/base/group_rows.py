@@ -9,6 +9,8 @@ from toolpaths.arrays import Ints
 
 def groups(*columns: Ints) -> list[Ints]:
     """The row numbers (ascending) of each set of equal values in columns (N,), in order of the values."""
+    if len(columns[0]) and all((column == column[0]).all() for column in columns):
+        return [np.arange(len(columns[0]))]
     order = np.lexsort(columns[::-1])
     changes = np.zeros(len(order), dtype=bool)
     for column in columns:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,6 +14,7 @@ from postproc.cli.console import (
     Json,
     controller_of,
     machine_of,
+    no_program,
     own_files,
     progress_bar,
     refuse_inputs,
@@ -54,6 +55,7 @@ from toolpaths.choices import FieldEnding, GivenDialect, GivenUnit
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
+    from postproc.base.progress import Progress
     from postproc.pipeline.result import PostResult
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
@@ -65,7 +67,8 @@ app.add_typer(machine_app, name="machine")
 app.add_typer(setup_app, name="setup")
 app.add_typer(controller_app, name="controller")
 app.add_typer(errors_app, name="errors")
-app.command(epilog="Example: postproc calibrate reversal.toml -o errors.toml")(calibrate)
+app.command(short_help="Identify a machine's errors from measurements, each with its uncertainty.",
+            epilog="Example: postproc calibrate reversal.toml -o errors.toml")(calibrate)
 app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc")(time)
 app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog=PLACES)(place)
@@ -131,6 +134,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     from postproc.pipeline.convert import convert as run
     from postproc.proof import command
     from postproc.report import summary
+    from postproc.setup_sheet.offers import offers
     from postproc.writing.program_files import program_files
 
     outputs: dict[Path, str | bytes] = {}
@@ -143,7 +147,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         result = replace(result, diagnostics=(*result.diagnostics, *why))
         time = estimate_of(result)  # all before a file is written
         values, text = summary.as_dict(result, str(output), time), summary.as_text(result, str(output), time)
-        more: list[Diagnostic] = []
+        more = offers(result, path, machine, controller)
         if result.ok:
             texts, more = program_files(output, result.text, result.files or {})
             refuse_inputs(list(texts)[:-1], inputs)
@@ -211,6 +215,26 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
     report((*result.diagnostics, *more), json, stages, as_text(stages))
 
 
+@app.command(epilog="Example: postproc explain travel.exceeded")
+def explain(code: Annotated[str, typer.Argument(metavar="CODE", help="as in the brackets of a message")] = "",
+            json: Json = "") -> None:
+    """Explain a code of a message: what it is about, what to do, an example; without one list all codes."""
+    from dataclasses import asdict
+
+    from postproc.explain.pages import pages, unknown
+    from toolpaths.diagnostics import DiagnosticError, error
+
+    known = pages()
+    with shown_errors(json):
+        if code and code.strip("[]") not in known:
+            raise DiagnosticError([error("file.no-code", f"there is no code {code!r}", hint=unknown(code.strip("[]")))])
+    if not code:
+        report((), json, {"codes": list(known)}, "\n".join(known))
+        return
+    page = known[code.strip("[]")]
+    report((), json, asdict(page), page.text())
+
+
 @app.command(epilog="Example: postproc inspect part.cls --json -")
 def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
             json: Json = "") -> None:
@@ -221,7 +245,8 @@ def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", 
     from toolpaths.cl.inspect import summary as text_of
     from toolpaths.cl.read import read_file
 
-    with progress_bar() as progress:
+    with shown_errors(json), progress_bar() as progress:
+        no_program(file)
         result = read_file(file, units=options.units or None, dialect=options.dialect or None,
                            allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
     found = figures(result)
@@ -267,9 +292,10 @@ def _options(tolerance: float, axis_tolerance: float, feed_mode: FeedModeChoice,
                    tuple(w.upper() for w in allow_unknown or ()))
 
 
-def _read(file: Path, options: Options, progress: Any) -> tuple[Toolpath, list[Diagnostic]]:
+def _read(file: Path, options: Options, progress: Progress) -> tuple[Toolpath, list[Diagnostic]]:
     import toolpaths
 
+    no_program(file)
     return toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
                           allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
 

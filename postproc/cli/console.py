@@ -9,14 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from postproc.cli.says import SAYS
+
 if TYPE_CHECKING:
     from machines.machine import Machine
-    from toolpaths.diagnostics import Diagnostic
+    from postproc.base.progress import Progress
+    from postproc.controllers.model import ControllerFile
+    from toolpaths.diagnostics import Diagnostic, Severity
 
 Json = Annotated[str, typer.Option("--json", metavar="FILE", help="write the figures as JSON; - for standard output")]
 
 SCHEMA_VERSION = 1
 """of the JSON objects of all commands; it rises where a key changes its meaning or goes"""
+ALIKE = 4
+"""diagnostics of one code and one remedy up to which each is shown"""
 LONGEST_NAME = 255
 """characters that the name of a file may have"""
 
@@ -34,7 +40,7 @@ def controller_of(name: str) -> str:
     return name
 
 
-def controller_file(name: str) -> Any:
+def controller_file(name: str) -> ControllerFile:
     """The controller of a name or a file.
 
     Raises:
@@ -49,6 +55,22 @@ def controller_file(name: str) -> Any:
     return spec
 
 
+def no_program(file: Path) -> None:
+    """An error where a program of a control stands in the place of a CL file; standard input is not looked at.
+
+    Raises:
+        DiagnosticError: says what it is.
+    """
+    from postproc.cycle_time.source import looks_like_gcode
+    from toolpaths.diagnostics import DiagnosticError, error
+    from toolpaths.input_files import first_bytes
+
+    if looks_like_gcode(first_bytes(file, 20_000)):
+        raise DiagnosticError([error("file.program", "this is G-code, a program of a control, not a CL file", file=str(file),
+                                     hint="name the CL file that it was made from; postproc verify GCODE FILE compares the "
+                                     "two, postproc time GCODE estimates its time")])
+
+
 @contextmanager
 def shown_errors(json: str) -> Iterator[None]:
     """Diagnostics that a library call raises, as output and exit code 1."""
@@ -61,19 +83,30 @@ def shown_errors(json: str) -> Iterator[None]:
 
 
 @contextmanager
-def progress_bar() -> Iterator[Any]:
+def progress_bar() -> Iterator[Progress]:
     """A bar on standard error for long work; silent where that is no terminal."""
     import sys
 
-    if not sys.stderr.isatty():
+    if SAYS.verbose:
+        said: list[str] = []
+        yield lambda stage, at, total: _say(stage, said)
+        return
+    if SAYS.quiet or not sys.stderr.isatty():
         yield lambda stage, at, total: None
         return
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import Progress as Bar
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    with Bar(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("")
         yield lambda stage, at, total: bar.update(task, description=stage, completed=at, total=total)
+
+
+def _say(stage: str, said: list[str]) -> None:
+    """Each stage once, as it begins."""
+    if said[-1:] != [stage]:
+        said.append(stage)
+        typer.echo(stage, err=True)
 
 
 def _plain(value: object) -> object:
@@ -96,20 +129,58 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
     `outputs` (path -> content, the one that needs the others last) and the file of the figures are written
     together: all, or where one fails none.
     """
-    from toolpaths.diagnostics import has_errors
+    from toolpaths.diagnostics import Severity, has_errors
 
+    passed = not has_errors(diagnostics)
+    if SAYS.strict:
+        diagnostics = as_errors(diagnostics)
     ok = not has_errors(diagnostics)
+    if passed and not ok:  # by --strict alone
+        unwritten = {"output": None} if "output" in values else {}
+        values = values | unwritten | {"diagnostics": [d.as_dict() for d in diagnostics]}
+        text, outputs = "", {}
     more, failed = _written(target, _headed(values, ok), dict(outputs or {}))
-    for d in (*diagnostics, *more):
-        typer.echo(str(d), err=True)
+    for line in lines_of((*diagnostics, *more), Severity.WARNING if SAYS.quiet else Severity.INFO):
+        typer.echo(line, err=True)
     if failed and outputs:
         values, text = {"diagnostics": [d.as_dict() for d in (*diagnostics, *more)]}, ""
     if target == "-":
         print_json(rounded(_headed(values, ok and not failed)))
-    elif text:
+    elif text and not SAYS.quiet:
         typer.echo(text)
     if failed or not ok:
         raise typer.Exit(1)
+
+
+def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
+    """Diagnostics for people: of many with one code and one remedy the first, and where the others are; of one
+    wrong number one line. JSON has them all."""
+    groups: dict[tuple[Severity, str, str], list[Diagnostic]] = {}
+    for d in diagnostics:
+        if d.severity >= least:
+            groups.setdefault((d.severity, d.code, d.hint), []).append(d)
+    shown: list[str] = []
+    said: set[tuple[Severity, str, str]] = set()
+    for d in diagnostics:
+        key = d.severity, d.code, d.hint
+        group = groups.get(key, [])
+        if len(group) <= ALIKE:
+            shown += [str(d)] if d.severity >= least else []
+        elif key not in said:
+            said.add(key)
+            lines = sorted({line for one in group[1:] for line in one.lines})
+            where = f", lines {', '.join(map(str, lines[:6]))}{', ...' if len(lines) > 6 else ''}" if lines else ""
+            shown += [str(d), f"  and {len(group) - 1} more [{d.code}]{where}: --json names them all"]
+    return shown
+
+
+def as_errors(diagnostics: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
+    """The diagnostics with warnings as errors."""
+    from dataclasses import replace
+
+    from toolpaths.diagnostics import Severity
+
+    return tuple(replace(d, severity=Severity.ERROR) if d.severity is Severity.WARNING else d for d in diagnostics)
 
 
 def _headed(values: dict[str, Any], ok: bool) -> dict[str, Any]:

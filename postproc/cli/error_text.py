@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from toolpaths.table_text import table_text
+
+if TYPE_CHECKING:
+    from machines.geometric_error.actual.model import ErrorModel
+    from machines.geometric_error.exchange.exports import MadeMap, NotOfJoint, Screws
+    from toolpaths.diagnostics import Diagnostic
+
+_NOT_OF_JOINT: dict[NotOfJoint, str] = {
+    "leans": "its axis leans, and the error is not about the axis",
+    "reference off the axis": "the reference point of its axis lies next to the axis: the error moves the tool sideways too"}
 
 
 def check_text(file: str, found: dict[str, Any]) -> str:
@@ -85,7 +94,7 @@ def export_text(found: dict[str, Any]) -> str:
     return "\n".join([*(f"{name}: written" for name in found["files"]), *found["told"]])
 
 
-def table_figures(model: Any, lost: dict[str, float]) -> tuple[dict[str, Any], list[str]]:
+def table_figures(model: ErrorModel, lost: dict[str, float]) -> tuple[dict[str, Any], list[str]]:
     """(figures, text) of tables per axis of a model that lose `lost`, um and arcsec by component."""
     noted = ["dimensions of legs stay in the model file: they have no tables per axis"] if model.rods is not None else []
     for unit, names in (("um", "XYZ"), ("arcsec", "ABC")):
@@ -95,8 +104,8 @@ def table_figures(model: Any, lost: dict[str, float]) -> tuple[dict[str, Any], l
     return {"losses": lost}, noted
 
 
-def screw_figures(model: Any, screws: Any, names: dict[str, str], lost: dict[str, float], worst: list[tuple[float, float]],
-                  tool_length: float) -> tuple[dict[str, Any], list[str]]:
+def screw_figures(model: ErrorModel, screws: Screws, names: dict[str, str], lost: dict[str, float],
+                  worst: list[tuple[float, float]], tool_length: float) -> tuple[dict[str, Any], list[str]]:
     """(figures, text) of `Screws` of a model in files of these names; `worst` tip (um) and axis (arcsec)
     before and after, with a tool of that length (mm)."""
     before, left = worst
@@ -108,11 +117,11 @@ def screw_figures(model: Any, screws: Any, names: dict[str, str], lost: dict[str
               f"{before[0]:.2f} um, {left[0]:.2f} um after; axis {before[1]:.2f} arcsec, {left[1]:.2f} arcsec after"]
     if model.covariance is not None:
         noted.append("lost: the covariance of what these files hold, as they have no place for it; a --rest keeps its own")
-    noted += [f"{name} is left: {why}" for name, why in screws.left.items()]
+    noted += [f"{name} is left: {_NOT_OF_JOINT[why]}" for name, why in screws.left.items()]
     return {"losses": lost, "worst_tip_um": [before[0], left[0]], "worst_axis_arcsec": [before[1], left[1]]}, noted
 
 
-def screw_warning(names: list[str], file: str, rest: object) -> Any:
+def screw_warning(names: list[str], file: str, rest: object) -> Diagnostic:
     """That the control now corrects these, and which model the post-processor then takes."""
     from toolpaths.diagnostics import warning
 
@@ -121,12 +130,13 @@ def screw_warning(names: list[str], file: str, rest: object) -> Any:
                    "again", file=file, hint=hint)
 
 
-def map_figures(model: Any, made: Any) -> tuple[dict[str, Any], list[str]]:
+def map_figures(model: ErrorModel, made: MadeMap) -> tuple[dict[str, Any], list[str]]:
     """(figures, text) of a `MadeMap` of a model."""
     from machines.geometric_error.tables.csv_table import UNITS
 
     um, arcsec = UNITS["um"], UNITS["arcsec"]
     lattice = made.model.map
+    assert lattice is not None
     figures: dict[str, Any] = {"nodes": {x: len(n) for x, n in zip(lattice.letters, lattice.nodes, strict=True)}}
     noted = [f"{lattice.table.size // 6} nodes: " + ", ".join(f"{x} {n}" for x, n in figures["nodes"].items())]
     for where, loss in (("inside the lattice", made.inside), ("over the work volume", made.volume)):

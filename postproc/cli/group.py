@@ -1,18 +1,29 @@
-"""What every command has: the option that raises the size of the files it reads."""
+"""What every command has: help as usage lines are written, options on the size of input files, on how much is said, on
+warnings; defaults of the job file."""
 
 from __future__ import annotations
 
 import sys
 from functools import cache
 from shutil import get_terminal_size
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperArgument, TyperGroup, TyperOption
+
+from postproc.cli.job_defaults import given_defaults
+from postproc.cli.says import SAYS
 
 MaxFileSize = Annotated[float | None, typer.Option("--max-file-size", metavar="MB", min=0.001, max=1e9, is_eager=True,
                                                    callback=lambda context, value: _hold(context, value),
                                                    help="largest input file that is read (default 1000 MB)")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", is_eager=True, callback=lambda context, value: _set("quiet", value),
+                                     help="say warnings and errors only")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", is_eager=True,
+                                       callback=lambda context, value: _set("verbose", value),
+                                       help="say each stage as it begins")]
+Strict = Annotated[bool, typer.Option("--strict", is_eager=True, callback=lambda context, value: _set("strict", value),
+                                      help="warnings are errors: nothing is written")]
 
 
 PIPE = 120
@@ -24,6 +35,31 @@ def width() -> int:
     return get_terminal_size((PIPE, 24)).columns if sys.stdout.isatty() else PIPE
 
 
+ORDER = ("convert", "verify", "inspect", "trace", "time", "orient", "place", "calibrate", "errors", "machine", "controller",
+         "setup")
+"""commands as the help lists them, the first ones first; others follow"""
+
+
+class Argument(TyperArgument):
+    """A file or name as usage lines have it, FILE, without typer's braces and names of types."""
+
+    def get_usage_pieces(self, ctx: object) -> list[str]:
+        """The name; in brackets where it may be left out."""
+        return [self.display_name_raw if self.required else f"[{self.display_name_raw}]"]
+
+    def display_type_rich(self, ctx: object) -> None:
+        """Nothing: the text says what it is."""
+
+
+class Option(TyperOption):
+    """An option whose range is written as `1 to 300`."""
+
+    def _get_number_range_help_str(self) -> str | None:
+        if self.min is None or self.max is None:
+            return None if self.min is None else f"at least {self.min:g}"
+        return f"{self.min:g} to {self.max:g}"
+
+
 class Group(TyperGroup):
     """Commands with the option, each of them; help in the width of the terminal."""
 
@@ -32,7 +68,29 @@ class Group(TyperGroup):
         self.context_settings = {**self.context_settings, "terminal_width": width()}
         for command in self.commands.values():
             if not isinstance(command, TyperGroup):
-                command.params.append(_option())
+                command.params += _options()
+                for param in command.params:
+                    _plainly(param)
+
+    def resolve_command(self, ctx: typer.Context, args: list[str]) -> Any:  # type: ignore[override]  # of click's own
+        """The command, with the defaults of the job file."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if command is not None and not isinstance(command, TyperGroup):
+            given_defaults(command, rest, ctx)
+        return name, command, rest
+
+    def list_commands(self, ctx: object) -> list[str]:
+        """Names in the order of the journey."""
+        return sorted(self.commands, key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER))
+
+
+def _plainly(param: object) -> None:
+    """Let typer write it as above."""
+    if isinstance(param, TyperArgument):
+        param.metavar = param.metavar or param.name.upper()
+        param.__class__ = Argument
+    elif isinstance(param, TyperOption):
+        param.__class__ = Option
 
 
 def _hold(context: typer.Context, value: float | None) -> None:
@@ -43,14 +101,22 @@ def _hold(context: typer.Context, value: float | None) -> None:
         context.with_resource(largest_file(value * MEGABYTE))
 
 
+def _set(name: Literal["quiet", "verbose", "strict"], value: bool) -> None:
+    """How much this command says."""
+    setattr(SAYS, name, value)
+
+
 @cache
-def _option() -> Any:
-    """The option as typer makes it, without a value that commands would have to take."""
-    def command(max_file_size: MaxFileSize = None) -> None:
-        """Nothing but the option."""
+def _options() -> list[Any]:
+    """The options as typer makes them, without values that commands would have to take."""
+    def command(max_file_size: MaxFileSize = None, quiet: Quiet = False, verbose: Verbose = False,
+                strict: Strict = False) -> None:
+        """Nothing but the options."""
 
     lone = typer.Typer(add_completion=False)
     lone.command()(command)
-    option = next(p for p in typer.main.get_command(lone).params if p.name == "max_file_size")
-    option.expose_value = False
-    return option
+    names = ("max_file_size", "quiet", "verbose", "strict")
+    options = [p for p in typer.main.get_command(lone).params if p.name in names]
+    for option in options:
+        option.expose_value = False
+    return options

@@ -34,6 +34,7 @@ from postproc.cli.options import (
 if TYPE_CHECKING:
     from machines.machine import Machine
     from postproc.base.options import Options
+    from postproc.base.progress import Progress
     from postproc.orientation.plans.choice import OrientationChoice
     from toolpaths.diagnostics import Diagnostic
 
@@ -104,7 +105,7 @@ def _check(passes: list[int]) -> None:
 
 
 def _chosen(file: Path, machine: Machine, controller: str, options: Options,
-            progress: Any) -> tuple[OrientationChoice | None, list[Diagnostic]]:
+            progress: Progress) -> tuple[OrientationChoice | None, list[Diagnostic]]:
     """The choice for a file; None where a diagnostic is an ERROR."""
     import toolpaths
     from postproc.pipeline.convert import choose_axes

@@ -26,6 +26,7 @@ from postproc.cli.options import (
 if TYPE_CHECKING:
     from machines.machine import Machine
     from postproc.base.options import Options
+    from postproc.base.progress import Progress
     from postproc.placement.place import PlacementChoice
     from toolpaths.diagnostics import Diagnostic
 
@@ -106,7 +107,7 @@ def _check(setup: Path) -> None:
 
 
 def _chosen(file: Path, machine: Machine, controller: str, options: Options,
-            progress: Any) -> tuple[PlacementChoice | None, list[Diagnostic]]:
+            progress: Progress) -> tuple[PlacementChoice | None, list[Diagnostic]]:
     """The choice for a file; None where a diagnostic is an ERROR."""
     import toolpaths
     from postproc.placement.place import place as run

@@ -22,6 +22,7 @@ from postproc.cli.options import (
 if TYPE_CHECKING:
     from machines.machine import Machine
     from postproc.base.options import Options
+    from postproc.base.progress import Progress
     from postproc.cycle_time.blocks import MotionBlocks
     from postproc.cycle_time.model import CycleTimeModel
     from postproc.cycle_time.phases import BlockTimes
@@ -94,7 +95,7 @@ def _check(output: str, calibrate: str) -> None:
 
 
 def _blocks(file: Path, machine: Machine, controller: str, model: str, options: Options, override: float,
-            progress: Any) -> tuple[MotionBlocks | None, CycleTimeModel | None, BlockTimes | None, list[Diagnostic]]:
+            progress: Progress) -> tuple[MotionBlocks | None, CycleTimeModel | None, BlockTimes | None, list[Diagnostic]]:
     """The blocks of a CL file (converted first) or of a program, the model of the control, and times that are planned."""
     from postproc.controllers.model import load_controller
     from postproc.cycle_time.model import load_model, model_name

@@ -21,11 +21,6 @@ STATES_RETRACT = ("{retract}", "{second}")
 """one of them stands in cycles that state the level they retract to"""
 
 
-_BACK_TO_THE_FIRST = ("linuxcnc", "iso")
-"""writers for controls that, before a hole which ends at the first level of its sequence, bring a tool that
-stands at the plane of the hole to that level on the path there (see `readback.cycles.legs`)"""
-
-
 def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows, control: Control,
              controller: ControllerFile, skip: Bools) -> tuple[Bools, list[Hole]]:
     """Blocks of holes that the controller can drill by itself, and the holes; not among blocks that a switch may `skip`.
@@ -33,7 +28,7 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows,
     Native where the tool stands along Z of the words, the kind is in the controller's table and the retract
     ends at the clearance plane, at the level that the tool came from, or at one that the cycle states. Cycles
     that feed out and then rise higher end at the clearance plane, the rest is a rapid behind them. Controls
-    of `_BACK_TO_THE_FIRST` go back to the first level of a sequence only from there.
+    that rise first (`cycles.rises_first`) go back to the first level of a sequence only from there.
     """
     native = np.zeros(len(path), dtype=bool)
     holes: list[Hole] = []
@@ -62,7 +57,7 @@ def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows,
         # A command before the hole ends the sequence: what the control takes for its first level then is where the tool is.
         low = level < initial - 1e-9
         cut = previous_last == first - 1 and (cut or (low and int(moves.row[path.move[first]]) in switched))
-        low = cut or (low and controller.writer in _BACK_TO_THE_FIRST)
+        low = cut or (low and controller.cycles.rises_first)
         key = cycle_key(toolpath.cycles[int(moves.cycle[path.move[first]])].kind,
                         int(turning[moves.row[path.move[first]]]))
         if not _states_retract(controller, key):

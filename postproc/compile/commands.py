@@ -177,13 +177,19 @@ class _Writing:
 
     def _loads(self, at: int, event: Event) -> bool:
         """True where a tool change follows at the same place."""
-        return any(e.word == "LOADTL" and (e.index, e.line) in self.changes and e.index == event.index
-                   for e in self.toolpath.events[at + 1:at + 20])
+        return any(e.word == "LOADTL" and (e.index, e.line) in self.changes for e in self._near(at, event))
+
+    def _near(self, at: int, event: Event) -> list[Event]:
+        """The records behind one at the same place, as far as the next twenty."""
+        events, last = self.toolpath.events, at + 1
+        while last < min(at + 20, len(events)) and events[last].index == event.index:
+            last += 1
+        return list(events[at + 1:last])
 
     def _tool(self, at: int, event: Event, out: list[Command], moves_on: bool) -> None:
         key = event.index, event.line
         if key in self.changes:
-            follows = {e.word for e in self.toolpath.events[at + 1:at + 20] if e.index == event.index}
+            follows = {e.word for e in self._near(at, event)}
             change = self.state.change(self.changes[key], follows, moves_on)
             if key in self.stops:
                 at = next(k for k, c in enumerate(change) if c.name == "CHANGE_TOOL")

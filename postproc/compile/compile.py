@@ -100,7 +100,7 @@ def _moved(commands: Commands, new: Ints) -> Commands:
 
 
 def _mapped(feeds: Feeds, moves: Moves, path: JointPath, job: Job) -> list[Diagnostic]:
-    """Cuts that turn rotary axes under axis positions, per minute as the controller has no inverse time."""
+    """Cuts that turn rotary axes under machine coordinates, per minute as the controller has no inverse time."""
     if job.controller.feed.inverse_time or job.options.feed_mode != "auto" or not len(job.control.rotary):
         return []
     axes = np.array([frame.control.law == "axes" for frame in path.frames])[path.frame]

@@ -138,7 +138,7 @@ class RadiusCompensation:
         if self.lacking:
             result.append(error("cutcom.mode", "CUTCOM in an output mode in which the controller has no cutter compensation",
                                 file=file, lines=self.lacking[:6], count=len(self.lacking),
-                                hint="write the operation in axis positions or in a tilted plane (--output-mode)"))
+                                hint="write the operation in machine coordinates or in a tilted plane (--output-mode)"))
         for code, lines, what in (("cutcom.tilted", self.tilted, "CUTCOM while the tool is tilted"),
                                   ("cutcom.turning", self.turning(), "the tool turns or leans while CUTCOM is on")):
             if lines:
@@ -156,7 +156,7 @@ class RadiusCompensation:
         return f"; where CUTCOM names none that is {names}, by the number of the tool's length register"
 
     def turning(self) -> list[int]:
-        """Lines of cuts under compensation that lean off Z, or turn rotary axes between axis positions."""
+        """Lines of cuts under compensation that lean off Z, or turn rotary axes between machine coordinates."""
         path, moves = self.path, self.moves
         laws = np.array([frame.control.law for frame in path.frames])[path.frame]
         leans = (np.abs(moves.axis[path.move, 2]) <= UPRIGHT) & (laws != "tilted")

@@ -31,7 +31,7 @@ CommandName = Literal[
 """canonical functions without motion, named as in NIST RS274/NGC where that has them"""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Command:
     """A canonical function without motion, e.g. ("START_SPINDLE_CLOCKWISE", (1200.0,)); `line` is its CL line.
 

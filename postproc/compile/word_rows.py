@@ -63,7 +63,7 @@ def _words(path: JointPath, q: Floats, rows: Ints, tool: Ints, kinematics: Calla
            lengths: Callable[[int], float], rounds: Ints | None) -> Floats:
     """Unrounded words of joints q (K, J) under the law and with the tool of the blocks `rows` (K,).
 
-    With `rounds` (decimals) rotary words are rounded first where words are axis positions, and the slides are
+    With `rounds` (decimals) rotary words are rounded first where words are machine coordinates, and the slides are
     those that then bring the tip to its place.
     """
     words = np.empty_like(q)

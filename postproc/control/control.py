@@ -29,6 +29,9 @@ XYZ = ("X", "Y", "Z")
 PLACES = 200
 """of a machine's travel at which it is looked at"""
 InterpolationMode = Literal["axes", "tcp", "tilted"]
+MODE_NAMES: dict[InterpolationMode, str] = {"axes": "machine coordinates without RTCP", "tcp": "tool-centre-point control",
+                                            "tilted": "tilted work planes"}
+"""as heads of programs, warnings and documents name them"""
 FeedLength = Literal["xyz-first", "all", "geometry"]
 
 

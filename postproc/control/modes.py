@@ -1,4 +1,4 @@
-"""The output mode of each run: axis positions, tool-centre-point mode or tilted plane; by rule or as asked for."""
+"""The output mode of each run: machine coordinates, tool-centre-point mode or tilted plane; by rule or as asked for."""
 
 from __future__ import annotations
 

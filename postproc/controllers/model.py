@@ -18,6 +18,8 @@ from toolpaths.diagnostics import Diagnostic
 Worded = Annotated[str, placeholders("letter", "value")]
 
 
+WriterName = Literal["iso", "linuxcnc", "fanuc", "haas", "siemens", "heidenhain"]
+"""dialects: each has a writer, a reader and a form of tool tables"""
 LengthState = Literal["any", "off", "on"]
 """whether the length register is in force where a mode begins"""
 
@@ -31,6 +33,8 @@ class ArcRules(UserModel):
     """mm; larger arcs are written as lines"""
     helix_planes: tuple[Literal[17, 18, 19], ...] = (17, 18, 19)
     """planes in which an arc may move along the third axis too"""
+    helix_by_angle: bool = False
+    """helices state the angle that they sweep, not their end (Klartext CP IPA): its last decimal moves the end"""
     start: tuple[str, ...] = ()
     """blocks of the safe start in programs that hold arcs in G18 or G19"""
     helical_option: str = ""
@@ -80,6 +84,11 @@ class Cycles(UserModel):
     the control's cycles are rigid alone, taps are then refused"""
     dwell_milliseconds: bool = False
     """the dwell of a cycle is a whole number of ms, else s"""
+    rises_first: bool = False
+    """before a hole that ends at the first level of its sequence, a tool that stands at the plane of the hole is brought to
+    that level on the path there (RS274/NGC)"""
+    plane_at_start: bool = False
+    """cycles return to the R plane until the program states the level (LinuxCNC when it is switched on)"""
     peck_relief: float = Field(default=0.254, ge=0.0)
     """mm before the last depth to which the tool returns rapidly"""
 
@@ -96,7 +105,7 @@ class FeedRules(UserModel):
     least_inverse_rate: float = Field(default=0.0, ge=0.0)
     """mm/min below which inverse time runs X, Y, Z faster than asked (LinuxCNC 0.1)"""
     length: Literal["xyz-first", "all", "geometry"] = "xyz-first"
-    """what a feed per minute refers to where X, Y, Z are axis positions: X, Y, Z before rotary axes, all axes
+    """what a feed per minute refers to where X, Y, Z are machine coordinates: X, Y, Z before rotary axes, all axes
     alike, or the geometry axes before all others"""
     arc_inverse: Literal["length", "radius", "refuse"] = "length"
     """inverse time in arcs: speed by length, speed by radius, or not allowed"""
@@ -118,7 +127,7 @@ class InterpolationRules(UserModel):
     """Which motion lies between two blocks."""
 
     linear: Literal["joints"] = "joints"
-    """straight in the joints, where words are axis positions"""
+    """straight in the joints, where words are machine coordinates"""
     rapids: Rapids = "straight"
     """dog-leg: every axis at its own rapid speed, so that the tool leaves the straight line"""
     modules: bool = False
@@ -226,7 +235,7 @@ class TiltedMode(Mode):
 
 
 class Modes(UserModel):
-    """Output modes next to axis positions."""
+    """Output modes next to machine coordinates."""
 
     tcp: TcpMode | None = None
     """tool-centre-point mode"""
@@ -257,7 +266,7 @@ class ControllerFile(UserModel):
 
     description: str
     """one line for people"""
-    writer: Literal["iso", "linuxcnc", "fanuc", "haas", "siemens", "heidenhain"] = "iso"
+    writer: WriterName = "iso"
     """class that adds what data cannot say"""
     sources: tuple[str, ...] = ()
     """documents that the rules come from"""

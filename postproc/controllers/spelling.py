@@ -28,7 +28,9 @@ class Format(UserModel):
     rotary_decimals: int = Field(default=4, ge=0, le=9)
     """of A, B, C, degrees"""
     feed_decimals: int = Field(default=4, ge=0, le=9)
-    """of F; two more below 1"""
+    """of F"""
+    small_feed_decimals: int = Field(default=2, ge=0, le=6)
+    """how many more where F is below 1"""
     speed_decimals: int = Field(default=6, ge=0, le=6)
     """of S"""
     trim_zeros: bool = True

@@ -6,7 +6,7 @@ of them follows from the approach directions of its axes, and these from the wor
 is as near as rounding lets it be; else those are taken that bring it nearest: by the approach directions that
 the words themselves make, by other approach directions, by last decimals next to. Approach directions by
 which the next block does not begin count a little: it would first take up what they are off by. So do, where
-words are axis positions, steps back by less than an axis loses: who takes the approach direction of an axis
+words are machine coordinates, steps back by less than an axis loses: who takes the approach direction of an axis
 for the sign of its last step sees another machine there. The walk itself is the loop of `backlash_steps_loop`.
 """
 
@@ -49,7 +49,7 @@ class BlockEnds:
         later: (3, K, T) what happens to the moves between the end and the place where the tip counts (bottom of a hole)
         goes_on: (K, T) approach direction by which the next block begins, 0 where the joint rests; weight:
             (K,) of what its beginning is off by next to what this end is
-        plain: (K,) blocks whose words are axis positions
+        plain: (K,) blocks whose words are machine coordinates
         near: (K,) what rounding may leave; enough: (K,) what is not looked for farther off
         free: (K, 3) 1 for words X, Y, Z that may be changed, else 0
         like: (K,) block before whose steps a block takes, -1 for its own

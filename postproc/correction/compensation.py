@@ -1,7 +1,7 @@
 """Geometric errors of the machine corrected in the blocks of a path.
 
 Every block end gets the joints at which the machine with errors has its tool where the nominal one would have
-it. What the nominal control makes of those joints (axis positions, tip, tilted plane) is written. Blocks at
+it. What the nominal control makes of those joints (machine coordinates, tip, tilted plane) is written. Blocks at
 one orientation (3+2, arcs, cycles, lines at standing rotary axes) keep one, corrected as a whole. Points are
 added, and arcs split into lines, only where the motion between corrected ends would leave the nominal motion
 by more than the share of the tolerance that it gets. Home positions are the machine's own and stay.

@@ -90,7 +90,7 @@ class ErrorContext:
         """Find `approach` from the corrected `path` and its words (K, J) at block ends, and `drift` where
         that is by mean approach directions.
 
-        Where words are axis positions their last change says.
+        Where words are machine coordinates their last change says.
         A joint that the correction alone moves turns back too: what it loses is more than what it moves by;
         inside a hole, which is moved as a whole, it does so by shares. Where joints do not run straight it is
         the sign of the last moment.
@@ -335,7 +335,7 @@ def bent_blocks(path: JointPath, rotary: Bools) -> Bools:
 
 
 def axis_positions(path: JointPath, tools: Ints) -> Bools:
-    """(K,) blocks whose words, and those of the block before, are axis positions with the same tool; home is left out."""
+    """(K,) blocks in machine coordinates, as the block before, with the same tool; home is left out."""
     same = np.append(False, (np.diff(path.frame) == 0) & (np.diff(tools) == 0))
     law = np.array([frame.control.law == "axes" for frame in path.frames])[path.frame]
     return np.asarray(same & law & ~path.home & ~np.append(False, path.home[:-1]))

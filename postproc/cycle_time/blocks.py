@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 
 from machines.machine import Machine
-from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, shared, taken
-from toolpaths.shapes import arrays
+from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, shared
+from toolpaths.shapes import arrays, rows_of
 
 
 class CornerMode(IntEnum):
@@ -154,10 +153,7 @@ class MotionBlocks:
         """Some of the blocks; the pauses stay with the last block that is left before them."""
         rows = np.arange(len(self))[rows]
         moved = replace(self.pauses, block=np.searchsorted(rows, self.pauses.block, side="right") - 1)
-        here = as_slice(rows)
-        columns: dict[str, Any] = {f.name: taken(getattr(self, f.name), here) for f in fields(self)
-                                   if isinstance(getattr(self, f.name), np.ndarray)}
-        return replace(self, pauses=moved, **columns)
+        return replace(rows_of(self, "E", as_slice(rows)), pauses=moved)
 
     @property
     def xyz(self) -> Floats:

@@ -31,16 +31,21 @@ from postproc.reference.split_operations import cut_operations
 from postproc.reference.stated_feeds import without_feed
 from postproc.reference.tool_numbers import numbered
 from postproc.reference.unnumbered_tools import measured_length
-from postproc.setup.model import Placement, SetupFile, Stock, part_placement, work_frame
+from postproc.setup.model import Placement, SetupFile, Stock, part_placement, stated_value, work_frame
 from postproc.setup.system import standing
 from toolpaths.arrays import Floats, Ints, shared, taken
-from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, warning
+from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Frame, Role, Toolpath
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
     from machines.geometric_error.actual.model import ErrorModel
+
+
+OF_SETUP = frozenset({"tool.number", "tool.same_number", "tool.length", "feed.missing", "spindle.not_started",
+                      "spindle.no_speed"})
+"""codes of what a set-up answers: where nothing else is wrong all that is missing is reported at once"""
 
 
 @dataclass(frozen=True)
@@ -157,10 +162,10 @@ class Job:
 
     @cached_property
     def rounding(self) -> Rounding:
-        """What the rounding of the words may cost, helices by angle (Klartext) counted besides."""
+        """What the rounding of the words may cost, with that of the angles of helices."""
         found = rounding_bound(self.control, self.kinematics(int(self.moves.tool[0])), self.moves,
                                decimals(self.control, self.controller), self.modes.cutting_laws(), self.options.tolerance)
-        if self.controller.writer != "heidenhain" or not self.controller.arcs.enabled:
+        if not (self.controller.arcs.enabled and self.controller.arcs.helix_by_angle):
             return found
         places = self.controller.format
         return replace(found, tip=found.tip + helix_bound(self.moves, 10.0 ** -places.linear_decimals,
@@ -205,6 +210,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`:
     output modes that "auto" passes over."""
     toolpath, diagnostics = numbered(toolpath, setup, options.setup)
+    diagnostics += _assumed(setup, options)
     toolpath, found = plain_records(toolpath, controller)
     diagnostics += found
     toolpath, stated = with_defaults(toolpath, setup)
@@ -226,10 +232,12 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     frame, found = work_frame(setup, toolpath, options.setup)
     diagnostics += found
-    if placement is None or frame is None or has_errors(diagnostics):
+    errors = {d.code for d in diagnostics if d.severity is Severity.ERROR}
+    if placement is None or frame is None or not errors <= OF_SETUP:
         return None, diagnostics
     axis_tolerance = options.axis_tolerance * DEG
     moves, found = build_moves(toolpath, setup, axis_tolerance)
+    found = [d for d in found if not (errors and d.code == "feed.no_speed")]  # follows from the speed that is missing
     diagnostics += [*found, *_default_feed(toolpath, setup)]
     moves, found = limited_feeds(moves, toolpath, machine.largest_feed)
     diagnostics += found
@@ -240,11 +248,11 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     law: InterpolationMode = "tcp" if tip_law else "axes"
     own, found = control_kinematics(machine, setup, options)
     diagnostics += found
-    errors, found = _error_model(machine, options)
+    geometric, found = _error_model(machine, options)
     diagnostics += found
     rolls, found = rollovers(machine, controller)
     diagnostics += found
-    corrects = errors is not None and errors.corrected_by == "post"  # tables that are corrected do not stand at zero
+    corrects = geometric is not None and geometric.corrected_by == "post"  # tables that are corrected do not stand at zero
     entry = "table" if corrects or controller.modes.tcp is None else controller.modes.tcp.frame
     control = Control(machine, law, origin, largest, law, entry_frame=entry,
                       rapids=machine.rapids or controller.kinematics.rapids,
@@ -256,8 +264,14 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
                                 decimals(control, controller), refused)
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
-              modes, errors, tuple(stated))
-    return _with_rapids(job), diagnostics + _tool_lengths(job) + _unused_tools(job)
+              modes, geometric, tuple(stated))
+    return None if errors else _with_rapids(job), diagnostics + _tool_lengths(job) + _unused_tools(job)
+
+
+def _assumed(setup: SetupFile, options: Options) -> list[Diagnostic]:
+    """Values of the set-up that nobody has stated."""
+    return [warning("setup.assumed", f"{key} = {stated_value(setup, key)} is assumed: nobody has stated it",
+                    file=options.setup, hint="state yours, and take its name out of `assumed`") for key in setup.assumed]
 
 
 def _with_rapids(job: Job) -> Job:
@@ -291,14 +305,14 @@ def _program_number(toolpath: Toolpath, controller: ControllerFile, setup: Setup
 def _measured(control: Control, controller: ControllerFile, axis: Floats, setup: SetupFile,
               options: Options) -> list[Diagnostic]:
     """Where a tool cannot be measured into the work offset: its length stands along Z of the words only where
-    every rotary axis carries the part and the words are axis positions, and where the control adds none of its own."""
+    every rotary axis carries the part and the words are machine coordinates, and where the control adds none of its own."""
     if setup.output.tool_call:
         return []
     name = control.machine.name
     if control.base == "tcp":
         why = f"the control runs the kinematics of {name} and needs the length of the tool"
     elif words_depend_on_length(control, control.machine.kinematics, axis) or not control.length_on_z:
-        why = f"on {name} the axis positions depend on the tool's length in other directions than Z"
+        why = f"on {name} the machine coordinates depend on the tool's length in other directions than Z"
     elif controller.keeps_length:
         why = "this control adds the length of the tool in the spindle by itself"
     else:
@@ -354,6 +368,7 @@ def _tool_lengths(job: Job) -> list[Diagnostic]:
     """A missing gauge length is an error where program words depend on it, else a warning: travel leaves it out."""
     used = sorted({int(t) for t in np.unique(job.moves.tool)})
     missing = sorted({max(job.number_of(t), 0) for t in used if job.gauge_length(t) == 0.0})
+    missing = [n for n in missing if n > 0 or not job.setup.output.tool_call]
     if not missing:
         return []
     if not job.setup.output.tool_call:
@@ -363,8 +378,8 @@ def _tool_lengths(job: Job) -> list[Diagnostic]:
     names = ", ".join(f"T{n}" for n in missing)
     hint = "add to the set-up: " + ", ".join(f"[tools.{n}] gauge_length = ..." for n in missing[:6])
     if words_depend_on_length(job.control, job.machine.kinematics, job.moves.axis):
-        return [error("tool.length", f"no gauge length for {names}: on {job.machine.name} the axis positions depend on it",
-                      file=job.toolpath.file, hint=hint)]
+        return [error("tool.length", f"no gauge length for {names}: on {job.machine.name} the machine coordinates depend on "
+                      "it", file=job.toolpath.file, hint=hint)]
     return [warning("tool.length", f"no gauge length for {names}: travel is checked as if it were 0", hint=hint,
                     file=job.toolpath.file)]
 

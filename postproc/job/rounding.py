@@ -24,7 +24,7 @@ LEVER = 0.1
 class Rounding:
     """Largest deviation that the rounding of words can make: tip in mm, axis in rad.
 
-    `made_up` is True where axis positions of the slides are those for the rounded rotary words, so that these
+    `made_up` is True where machine coordinates of the slides are those for the rounded rotary words, so that these
     move the tip no more.
     """
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints, as_slice, repeated, shared, taken
-from toolpaths.shapes import arrays
+from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, shared
+from toolpaths.shapes import arrays, rows_of
 from toolpaths.toolpath import Arcs, Kind
 
 
@@ -49,13 +49,11 @@ class Refined:
 
 def cut(moves: Moves, origin: Ints, u0: Floats, u1: Floats, tip: Floats, axis: Floats) -> Refined:
     """Parts u0..u1 (R,) of the moves `origin` (R,), which end at tips and axes (R, 3)."""
-    part, given = (u0 > 0.0) | (u1 < 1.0), as_slice(origin)
-    names = [name for name in moves.__dataclass_fields__ if name != "arcs"]
-    columns: dict[str, Any] = {name: taken(getattr(moves, name), given) for name in names}
-    arc, arcs = _arcs(moves, columns["arc"], u1 - u0, part)
-    columns |= {"tip": tip, "axis": axis, "seconds": shared(columns["seconds"] * (u1 - u0)),
-                "link": columns["link"] & (u0 == 0.0), "arc": arc}
-    return Refined(replace(moves, **columns, arcs=arcs), origin, u0, u1, repeated(False, len(origin)))
+    part, of = (u0 > 0.0) | (u1 < 1.0), rows_of(moves, "M", as_slice(origin))
+    arc, arcs = _arcs(moves, of.arc, u1 - u0, part)
+    parts = replace(of, tip=tip, axis=axis, seconds=shared(of.seconds * (u1 - u0)), link=of.link & (u0 == 0.0), arc=arc,
+                    arcs=arcs)
+    return Refined(parts, origin, u0, u1, repeated(False, len(origin)))
 
 
 def _arcs(moves: Moves, arc: Ints, share: Floats, part: Bools) -> tuple[Ints, Arcs]:
@@ -82,17 +80,23 @@ def with_rewinds(refined: Refined, rows: Ints, cuts: Bools, feed: float | None) 
     order = np.sort(np.concatenate([np.arange(len(refined.origin)), rows]), kind="stable")
     new = np.append(False, np.diff(order) == 0)
     moves, behind = refined.moves, rows + 1
-    columns: dict[str, Any] = {name: getattr(moves, name)[order] for name in moves.__dataclass_fields__ if name != "arcs"}
-    columns["kind"][new] = np.where(cuts, Kind.FEED, Kind.RAPID)
-    columns["link"][new], columns["arc"][new] = True, -1
-    columns["feed"][new] = np.where(cuts, _feeds(moves, behind) if feed is None else feed, np.nan)
-    columns["seconds"][new] = np.nan
-    for name in ("row", "hole", "phase", "cycle", "line"):
-        columns[name][new] = getattr(moves, name)[behind]
     served = order + new
+    before, after = rows_of(moves, "M", order), rows_of(moves, "M", served)
+    feeds = np.where(cuts, _feeds(moves, behind) if feed is None else feed, np.nan)
+    with_new = replace(
+        before, kind=_put(before.kind, new, np.where(cuts, Kind.FEED, Kind.RAPID)), link=before.link | new,
+        arc=_put(before.arc, new, -1), feed=_put(before.feed, new, feeds), seconds=_put(before.seconds, new, np.nan),
+        row=after.row, hole=after.hole, phase=after.phase, cycle=after.cycle, line=after.line)
     u0 = refined.u0[served]
-    return Refined(replace(moves, **columns), refined.origin[served], u0, np.where(new, u0, refined.u1[order]),
+    return Refined(with_new, refined.origin[served], u0, np.where(new, u0, refined.u1[order]),
                    refined.rewind[order] | new)
+
+
+def _put(values: Array, rows: Bools, given: npt.ArrayLike) -> Array:
+    """A copy of a column with other values in some rows."""
+    result = values.copy()
+    result[rows] = given
+    return result
 
 
 def _feeds(moves: Moves, rows: Ints) -> Floats:

@@ -145,10 +145,13 @@ def _without_choice(machine: Machine, tools: dict[int, Kinematics], moves: Moves
 def _reached(tools: dict[int, Kinematics], moves: Moves, starts: Ints,
              tolerance: float) -> tuple[Floats, Floats]:
     """Axes (R, 3) that the machine can take with the tool of each run, and by how much (R,) rad they are moved."""
-    if len(tools) == 1 or moves.axis.strides[0] == 0:
-        found = [reachable_axes(kin, moves.axis, tolerance) for kin in tools.values()]
-        if all(not moved.any() for _, moved in found):
-            return found[0]
+    if moves.axis.strides[0] == 0 and len(moves) and all(
+            not reachable_axes(kin, moves.axis[:1], tolerance)[1].any() for kin in tools.values()):
+        return moves.axis, repeated(0.0, len(moves))
+    if len(tools) == 1:
+        axis, moved = reachable_axes(next(iter(tools.values())), moves.axis, tolerance)
+        if not moved.any():
+            return axis, moved
     axis, moved = np.array(moves.axis), np.zeros(len(moves))
     of_run = np.repeat(moves.tool[starts], np.diff(np.append(starts, len(moves))))
     for rows in groups(of_run):

@@ -12,6 +12,7 @@ import postproc.path.faults as faults
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.base.memory import give_back
+from postproc.base.progress import Progress
 from postproc.control.modes import OutputModes, WordFrame
 from postproc.joints.run_plan import RunPlan, plan_moves
 from postproc.path.blocks import LEG, PathBuilder, add_run, rapid_codes
@@ -28,8 +29,6 @@ from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,7 @@ def _elsewhere(kin: Kinematics, tip: Floats, q: Floats) -> Bools:
 def no_path(moves: Moves, row: int, file: str) -> Diagnostic:
     """The error where no linking move leads to row `row` of the moves."""
     return error("link.blocked", "no linking move stays above the safe planes", file=file, lines=[int(moves.line[row])],
-                 hint="give clearance.centre and a larger clearance.distance in the set-up")
+                 hint="move the part in the set-up (part.origin), or lower clearance.margin")
 
 
 def broken(machine: Machine, moves: Moves, rows: Ints, q: Floats, file: str) -> list[Diagnostic]:

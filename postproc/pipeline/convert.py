@@ -9,13 +9,14 @@ from pathlib import Path as FilePath
 from machines.loader import load as load_machine
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.base.progress import Progress
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.job.job import prepare, with_shop
 from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
-from postproc.pipeline.stages import Progress, staged
+from postproc.pipeline.stages import staged
 from postproc.setup.fingerprint import fingerprint
 from postproc.setup.model import SetupFile, load_setup
 from postproc.setup.system import standing

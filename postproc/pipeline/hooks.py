@@ -98,7 +98,8 @@ def written(controller: ControllerFile) -> Iterator[str]:
                                                      "without_smoothing"})
     rest = controller.model_dump(include={"codes", "subprograms", "subprogram_files", "arcs", "cycles", "rollover"},
                                  exclude={"rollover": {"needs", "default", "rules"}, "subprograms": {"place", "file"},
-                                          "subprogram_files": {"place", "file"}, "cycles": {"rigid_only", "rigid_option", "floating"}, "arcs": {"helical_option"}})
+                                          "subprogram_files": {"place", "file"}, "arcs": {"helical_option"},
+                                          "cycles": {"rigid_only", "rigid_option", "floating"}})
     modes = [mode for mode in (controller.modes.tcp, controller.modes.tilted) if mode is not None]
     texts = [*_texts(program), *_texts(rest), *(t for mode in modes for t in (*mode.start, *mode.enter, *mode.leave))]
     for text in texts:

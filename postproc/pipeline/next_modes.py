@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.control.control import InterpolationMode
+from postproc.control.control import MODE_NAMES, InterpolationMode
 from postproc.control.modes import ASKED, OutputModes, Refused
 from postproc.job.job import Job
 from postproc.pipeline.result import PostResult
@@ -20,8 +20,6 @@ TURNS = 3
 """conversions in which only the operations that errors name take the next mode; then all of that mode do"""
 SAME_IN_ALL = frozenset({"reach.axis", "reach.position", "axis.spin"})
 """errors that no output mode changes"""
-NAMES: dict[InterpolationMode, str] = {"axes": "axis positions", "tcp": "the tool-centre-point mode",
-                                       "tilted": "a tilted plane"}
 ASK_AUTO = "--output-mode auto takes the next mode where one cannot be proved"
 NONE_DOES = "no output mode of this control and machine is proved for it: "
 COARSER = "a coarser --tolerance may do; else report CL file, machine and controller file as a fault of postproc"
@@ -40,7 +38,7 @@ def with_next_modes(result: PostResult, staged: StagedAgain) -> PostResult:
         more = _refusals(made, turn)
         if not more or not _depends(made):
             break
-        why |= dict.fromkeys(more, _reason(made))
+        why |= _reasons(made, more)
         refused |= more
         made = staged(replace(result, refused=refused))
         tried.add(_assigned(made))
@@ -60,7 +58,7 @@ def _depends(made: PostResult) -> bool:
     """True where another output mode may do better; not where the two readings of a program differ, a fault of ours."""
     if made.job is None or not _auto(made.job.modes):
         return False
-    errors = [d for d in made.diagnostics if d.severity is Severity.ERROR]
+    errors = _errors(made)
     return not any(d.code.startswith("witness.") for d in errors) and any(d.code not in SAME_IN_ALL for d in errors)
 
 
@@ -84,7 +82,7 @@ def _refusals(made: PostResult, turn: int) -> frozenset[tuple[int, Interpolation
     modes = made.job.modes
     free = {(k, some[0]) for k in _auto(modes) for constant in (True, False)
             if len(some := modes.possible(k, constant)) > 1}
-    named = free & set(_named(made, made.job))
+    named = free & set(_named(made, made.job, {line for d in _errors(made) for line in d.lines}))
     if named and turn < TURNS:
         return frozenset(named)
     laws = {law for _, law in named or free}
@@ -92,10 +90,9 @@ def _refusals(made: PostResult, turn: int) -> frozenset[tuple[int, Interpolation
     return frozenset((k, law) for k, law in free if law == worst)
 
 
-def _named(made: PostResult, job: Job) -> Iterator[tuple[int, InterpolationMode]]:
-    """(operation, mode) of the blocks that errors name, by line of the CL file."""
-    errors = [d for d in made.diagnostics if d.severity is Severity.ERROR]
-    lines = np.array(sorted({line for d in errors for line in d.lines}), dtype=np.int64)
+def _named(made: PostResult, job: Job, of: set[int]) -> Iterator[tuple[int, InterpolationMode]]:
+    """(operation, mode) of the blocks that errors name, by their lines `of` the CL file."""
+    lines = np.array(sorted(of), dtype=np.int64)
     path = made.path
     if path is not None and len(lines):
         laws = np.array([_LAWS.index(frame.control.law) for frame in path.frames])
@@ -107,8 +104,17 @@ def _named(made: PostResult, job: Job) -> Iterator[tuple[int, InterpolationMode]
             yield from ((k, job.modes.law(k, constant)) for constant in (True, False))
 
 
-def _reason(made: PostResult) -> Diagnostic:
-    return next(d for d in made.diagnostics if d.severity is Severity.ERROR)
+def _errors(made: PostResult) -> list[Diagnostic]:
+    return [d for d in made.diagnostics if d.severity is Severity.ERROR]
+
+
+def _reasons(made: PostResult, modes: Refused) -> dict[tuple[int, InterpolationMode], Diagnostic]:
+    """Why each (operation, mode) is passed over: the first error that names a block of it, else the first of all."""
+    assert made.job is not None
+    errors, found = _errors(made), dict[tuple[int, InterpolationMode], Diagnostic]()
+    for one in reversed(errors):
+        found |= dict.fromkeys(_named(made, made.job, set(one.lines)), one)
+    return {mode: found.get(mode, errors[0]) for mode in modes}
 
 
 def _each_alone(made: PostResult) -> Iterator[Refused]:
@@ -122,24 +128,20 @@ def _each_alone(made: PostResult) -> Iterator[Refused]:
 
 def _said(first: PostResult, made: PostResult,
           why: dict[tuple[int, InterpolationMode], Diagnostic]) -> PostResult:
-    """With a warning for each mode that another was taken for: operations, both modes, the reason."""
+    """With a warning for each mode that another was taken for and each kind of reason: operations, both modes, reason."""
     assert first.job is not None and made.job is not None
-    path, groups = made.toolpath, dict[tuple[InterpolationMode, InterpolationMode], list[int]]()
-    pairs = zip(_assigned(first), _assigned(made), strict=True)
-    for before, after in pairs:
+    path, groups = made.toolpath, dict[tuple[InterpolationMode, InterpolationMode, str], list[int]]()
+    used, found = _in_use(made), []
+    why = _reasons(first, frozenset((k, law) for modes in _assigned(first) for k, law in enumerate(modes))) | why
+    for before, after in zip(_assigned(first), _assigned(made), strict=True):
         for k, (old, new) in enumerate(zip(before, after, strict=True)):
-            if old != new and k not in groups.setdefault((old, new), []):
-                groups[old, new].append(k)
-    used = _in_use(made)
-    found = []
-    for (old, new), some in groups.items():
-        rows = [k for k in some if (k, new) in used]
-        if not rows:
-            continue
-        reason = why.get((rows[0], old), _reason(first))
+            if old != new and (k, new) in used and k not in groups.setdefault((old, new, why[k, old].code), []):
+                groups[old, new, why[k, old].code].append(k)
+    for (old, new, _), rows in groups.items():
+        reason = why[rows[0], old]
         names = ", ".join(path.operations[k].name or f"operation {k + 1}" for k in rows[:_SHOWN])
         more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
-        found.append(warning("output.next_mode", f"{names}{more}: written in {NAMES[new]}, since in {NAMES[old]} "
+        found.append(warning("output.next_mode", f"{names}{more}: written in {MODE_NAMES[new]}, since in {MODE_NAMES[old]} "
                              f"[{reason.code}] {reason.message}", file=path.file, count=len(rows),
                              lines=[path.operations[k].line for k in rows[:_SHOWN]],
                              hint=f'[output.operations] of the set-up with "{new}" for it asks for that mode'))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from postproc.base.options import Options
-from postproc.orientation.passes.parallel_map import Progress
+from postproc.base.progress import Progress
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import bettered, planned_choice, unsolved
 from postproc.pipeline.proved_axes import proved
@@ -37,7 +37,7 @@ def oriented(start: PostResult, stages: Stages,
         return start.with_found(found), None
     made, more = proved(choice, plan, program_of)
     choice, found = bettered(made.choice), [*found, *more, *unsolved(made.choice, plan)]
-    return start.with_found(found, toolpath=choice.toolpath(plan), choice=choice), made.program
+    return replace(start.with_found(found), toolpath=choice.toolpath(plan), choice=choice), made.program
 
 
 def common(options: Options) -> Options:

@@ -9,10 +9,12 @@ import numpy as np
 from postproc.base.header_words import LENGTHS_PENDING, PENDING, corrected_by_control, corrected_here, feeds_line, model_mark
 from postproc.base.version import VERSION
 from postproc.compile.program import Program
+from postproc.control.control import MODE_NAMES
 from postproc.control.modes import table_axes
 from postproc.job.job import Job
 from postproc.pipeline.stage_values import CompiledStage
 from postproc.readback.comparison.length_margins import length_matters
+from postproc.setup.model import stated_value
 
 
 def header_lines(made: CompiledStage) -> list[str]:
@@ -31,6 +33,7 @@ def header_lines(made: CompiledStage) -> list[str]:
         header.append("tool numbers of the set-up: " + ", ".join(numbers))
     if any(d.code == "feed.of_setup" for d in made.diagnostics):
         header.append(f"feed {made.setup.output.feed:g} mm/min of the set-up where the CL file states none")
+    header += [f"ASSUMED, state it before cutting: {key} = {stated_value(made.setup, key)}" for key in made.setup.assumed]
     if made.motion is not None:
         header.append(feeds_line())
     header += [f"T{number}: {what}, of the set-up" for number, what in job.stated]
@@ -105,6 +108,4 @@ def _corrections(made: CompiledStage) -> list[str]:
 
 def _meanings(program: Program) -> str:
     """What the words of a program mean, in order of first use."""
-    names = {"axes": "machine coordinates without RTCP", "tcp": "tool-centre-point control",
-             "tilted": "tilted work planes"}
-    return ", ".join(dict.fromkeys(names[section.law] for section in program.sections))
+    return ", ".join(dict.fromkeys(MODE_NAMES[section.law] for section in program.sections))

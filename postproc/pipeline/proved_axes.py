@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from postproc.pipeline.result import PostResult
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 
+if TYPE_CHECKING:
+    from postproc.collision.bodies import Touch
+
 Convert = Callable[[OrientationChoice], PostResult]
 _ROUNDS = 24
 """programs that are made of plans chosen again"""
@@ -27,14 +31,34 @@ _OF_BODIES = "collision."
 
 
 @dataclass(frozen=True)
+class _Touched:
+    """The pair that is through each other most, and in which part of a program: on the path to pass `number`,
+    which begins at CL `line`, or `inside` it; None: on the path home."""
+
+    touch: Touch
+    number: int | None
+    line: int = 0
+    inside: bool = False
+
+    def __str__(self) -> str:
+        if self.number is None:
+            return f"{self.touch} on the move home"
+        return f"{self.touch} {'in' if self.inside else 'on the move to'} pass {self.number} (line {self.line})"
+
+
+@dataclass(frozen=True)
 class _Blame:
-    """What a program was refused for: `links` (number n leads to pass n, the last one home) and `passes`, and
-    why; `bodies` where it is what tools touch."""
+    """What a program was refused for: `links` (number n leads to pass n, the last one home) and `passes`, and its
+    first error, or what tools touch there."""
 
     links: frozenset[int]
     passes: frozenset[int]
-    why: str
-    bodies: bool
+    why: Diagnostic | _Touched
+
+    def __str__(self) -> str:
+        if isinstance(self.why, _Touched):
+            return str(self.why)
+        return self.why.message + (f" (line {self.why.lines[0]})" if self.why.lines else "")
 
 
 @dataclass(frozen=True)
@@ -58,14 +82,14 @@ def proved(choice: OrientationChoice, plan: Orientation, convert: Convert) -> tu
     Where nothing else is left, `auto` is the fastest of the other plans whose program is written; where none is, the first
     choice stands, with a warning: the conversion will say its errors.
     """
-    passed: list[tuple[OrientationPlan, str]] = []
+    passed: list[tuple[OrientationPlan, _Blame]] = []
     now = first = Proved.of(choice, plan, convert)
     for _ in range(_ROUNDS):
         if now.program.ok:
             return now, _noted(passed, now.choice, plan)
         blame = _blame(now.choice, now.program)
-        passed.append((now.choice.plans[plan], blame.why))
-        if not blame.bodies and _of_the_file(now, plan, convert):
+        passed.append((now.choice.plans[plan], blame))
+        if not isinstance(blame.why, _Touched) and _of_the_file(now, plan, convert):
             return first, [_unproved(first, plan, passed)]
         after = _again(now.choice, plan, blame)
         if after is None:
@@ -105,7 +129,7 @@ def _blame(choice: OrientationChoice, program: PostResult) -> _Blame:
         return _touched(choice.work, program)
     rows = [int(row) for d in errors for row in np.flatnonzero(np.isin(choice.work.moves.line, d.lines))[:1]]
     links, passes = _split(_parts(choice.work, choice.work.moves.row[rows]))
-    return _Blame(links, passes, errors[0].message + (f" (line {errors[0].lines[0]})" if errors[0].lines else ""), False)
+    return _Blame(links, passes, errors[0])
 
 
 def _touched(work: PassContext, program: PostResult) -> _Blame:
@@ -124,7 +148,7 @@ def _touched(work: PassContext, program: PostResult) -> _Blame:
     touched = touching_parts(motion, executed, job, comparison.owner, part)
     worst = min(touched, key=lambda part: touched[part].distance - touched[part].limit)
     links, passes = _split(np.array(sorted(touched), dtype=np.int64))
-    return _Blame(links, passes, f"{touched[worst]} {_where(work, worst)}", True)
+    return _Blame(links, passes, _in_part(work, worst, touched[worst]))
 
 
 def _parts(work: PassContext, rows: Ints, first: Ints | bool = True) -> Ints:
@@ -140,12 +164,11 @@ def _split(parts: Ints) -> tuple[frozenset[int], frozenset[int]]:
     return frozenset(parts[parts >= 0].tolist()), frozenset((-1 - parts[parts < 0]).tolist())
 
 
-def _where(work: PassContext, part: int) -> str:
-    """Part of a program in words."""
+def _in_part(work: PassContext, part: int, touch: Touch) -> _Touched:
     if part == len(work.passes):
-        return "on the move home"
+        return _Touched(touch, None)
     n = part if part >= 0 else -1 - part
-    return f"{'on the move to' if part >= 0 else 'in'} pass {n} (line {work.passes[n].line})"
+    return _Touched(touch, n, work.passes[n].line, inside=part < 0)
 
 
 def _of_the_file(made: Proved, plan: Orientation, convert: Convert) -> bool:
@@ -155,7 +178,7 @@ def _of_the_file(made: Proved, plan: Orientation, convert: Convert) -> bool:
     return not mine.isdisjoint(keep)
 
 
-def _noted(passed: list[tuple[OrientationPlan, str]], choice: OrientationChoice,
+def _noted(passed: list[tuple[OrientationPlan, _Blame]], choice: OrientationChoice,
            plan: Orientation) -> list[Diagnostic]:
     """What was passed over before a plan whose program is written."""
     if not passed:
@@ -167,7 +190,7 @@ def _noted(passed: list[tuple[OrientationPlan, str]], choice: OrientationChoice,
                  f"{'; '.join(reasons[:_NOTED])}{more}", file=choice.work.toolpath.file)]
 
 
-def _unproved(made: Proved, plan: Orientation, passed: list[tuple[OrientationPlan, str]]) -> Diagnostic:
+def _unproved(made: Proved, plan: Orientation, passed: list[tuple[OrientationPlan, _Blame]]) -> Diagnostic:
     """No plan was found whose program is written."""
     tried = f", nor are those of {len(passed) - 1} other plans" if len(passed) > 1 else ""
     return warning("orient.unproved", f"the program of {plan} for {made.program.controller_name} is refused{tried}: "

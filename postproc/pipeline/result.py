@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
 
 from machines.machine import Machine
 from postproc.base.options import Options
@@ -78,9 +78,9 @@ class PostResult:
         """True where nothing stands against writing the text."""
         return not has_errors(self.diagnostics)
 
-    def with_found(self, found: list[Diagnostic], **values: Any) -> PostResult:
-        """With more diagnostics, and other values."""
-        return replace(self, diagnostics=(*self.diagnostics, *found), **values)
+    def with_found(self, found: list[Diagnostic]) -> PostResult:
+        """With more diagnostics."""
+        return replace(self, diagnostics=(*self.diagnostics, *found))
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,3 @@ class VerifyResult:
     def ok(self) -> bool:
         """True where the program does what the CL file says."""
         return self.comparison is not None and not has_errors(self.diagnostics)
-
-
-def shared_fields(kind: type[Any], other: object) -> dict[str, Any]:
-    """The values that a dataclass has under the names of fields of `kind`."""
-    return {one.name: getattr(other, one.name) for one in fields(kind) if hasattr(other, one.name)}

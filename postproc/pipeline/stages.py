@@ -6,10 +6,11 @@ Each stage is a pure function: what the one before has handed on, and progress, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path as FilePath
 from typing import Any
 
+from postproc.base.progress import Progress
 from postproc.compile.compile import compile_program, writing_of
 from postproc.compile.cycle_refusals import only_canned
 from postproc.compile.feed import PlannedTimes as PlannedFeeds
@@ -25,7 +26,7 @@ from postproc.path.turn_steps import with_short_turns
 from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.program_header import header_lines
 from postproc.pipeline.program_lines import cl_lines
-from postproc.pipeline.result import PostResult, StageName, shared_fields
+from postproc.pipeline.result import PostResult, StageName
 from postproc.pipeline.smoothed_stages import ExcludedPasses, written_moves
 from postproc.pipeline.stage_values import (
     BegunStage,
@@ -49,6 +50,7 @@ from postproc.readback.comparison.slow_moves import with_fingerprint
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
 from postproc.setup.system import with_system
+from postproc.verification.planned_words import check_planned
 from postproc.verification.proof_text import with_statement
 from postproc.verification.read_back import read_back
 from postproc.verification.second_witness import second_witness
@@ -57,7 +59,6 @@ from postproc.writing.writers import writer_for
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.units import DEG
 
-Progress = Callable[[str, int, int], None]
 DiagnosticList = list[Diagnostic]
 _STRETCH = 1_000_000
 """characters of a program that are looked at together"""
@@ -79,7 +80,9 @@ class Stage:
 def staged(result: PostResult, progress: Progress | None = None,
            left: ExcludedPasses = frozenset()) -> PostResult:
     """A conversion through all stages, up to the first that finds an error; `left`: passes that --smooth leaves."""
-    made: Any = BegunStage(**shared_fields(BegunStage, result), left=left)
+    made: Any = BegunStage(result.options, result.machine, result.controller, result.controller_name, result.setup,
+                           result.diagnostics, result.toolpath, result.choice, result.source, result.asked, left,
+                           result.refused)
     for stage in STAGES:
         made, found = stage.run(made, progress)
         result = replace(_recorded(result, made, found), reached=stage.name)
@@ -91,8 +94,8 @@ def staged(result: PostResult, progress: Progress | None = None,
 
 def _recorded(result: PostResult, made: BegunStage, found: DiagnosticList) -> PostResult:
     """With what a stage has handed on; the text only stands in it at the end."""
-    known = shared_fields(PostResult, made)
-    return result.with_found(found, **{name: known[name] for name in known.keys() - {"text", "files", "diagnostics"}})
+    known = {one.name for one in fields(result)} - {"text", "files", "diagnostics"}
+    return replace(result.with_found(found), **{name: value for name, value in vars(made).items() if name in known})
 
 
 def prepared(begun: BegunStage, progress: Progress | None) -> tuple[BegunStage | PreparedStage, DiagnosticList]:
@@ -136,7 +139,7 @@ def solved(made: PlacedStage, progress: Progress | None) -> tuple[PlacedStage | 
     path, found = build_path(job.modes, job.kinematics, made.moves, job.space, job.home_rows(), job.operation,
                              shares["linearising"], shares["axis_linearising"] * DEG, made.toolpath.file, progress,
                              made.drawing, made.setup.output.rapids_as_feed)
-    found = with_system(found, job.work_system, job.placement)
+    found = with_system(found, job.work_system, job.placement, job.moves.axis)
     if path is None:
         return made, found
     return handed_on(SolvedStage, made, path=with_short_turns(path, made.moves, job.control, job.kinematics)), found
@@ -153,7 +156,7 @@ def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage
     far = check_travel(path, job.moves, job.control, job.kinematics, file)[0]
     far += check_reach(path, job.moves, job.control, file)
     if has_errors(far):
-        return made, with_system(far, job.work_system, job.placement)
+        return made, with_system(far, job.work_system, job.placement, job.moves.axis)
     better, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
                                        options.tolerance, job.axis_tolerance, writing_of(job, moves),
                                        only_canned(job.toolpath, job.controller), options.error_beyond, file)
@@ -168,7 +171,7 @@ def checked(made: CorrectedStage, progress: Progress | None) -> tuple[CheckedSta
     found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
     found += check_reach(path, job.moves, job.control, file)
     found += check_singular(path, job.moves, job.control, job.setup.joints.singular_distance, file)
-    return handed_on(CheckedStage, made, extents=extents), with_system(found, job.work_system, job.placement)
+    return handed_on(CheckedStage, made, extents=extents), with_system(found, job.work_system, job.placement, job.moves.axis)
 
 
 def planned(made: CheckedStage, progress: Progress | None) -> tuple[PlannedStage, DiagnosticList]:
@@ -237,6 +240,9 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
                                   others={name: text.encode() for name, text in made.files.items()},
                                   of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.program,
                                                                                       made.controller))
+    if comparison is not None and made.motion is not None and not has_errors(found):
+        found = [*found, *check_planned(made.path, made.moves, on_written(made.compensation, made.motion.needed),
+                                        made.options.merge_feeds, comparison, job)]
     if comparison is not None and not has_errors(found):
         witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison,
                                        b"" if made.files else made.text)

@@ -10,6 +10,7 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.base.progress import Progress
 from postproc.controllers.model import load_controller
 from postproc.job.job import prepare
 from postproc.orientation.candidates.ranking import load_compiler
@@ -18,7 +19,7 @@ from postproc.path.links import safe_space
 from postproc.placement.bodies import adjacent
 from postproc.placement.oriented_times import OrientedTimer
 from postproc.placement.place_times import TimedPlace, Timer
-from postproc.placement.search import FoundPlaces, PlaceSearch, Progress
+from postproc.placement.search import FoundPlaces, PlaceSearch
 from postproc.placement.space import ANGLES, Space, space_of
 from postproc.setup.model import PartPlacement, SetupFile, part_placement
 from postproc.setup.system import standing

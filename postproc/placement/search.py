@@ -5,11 +5,11 @@ Places that travel rules out are never planned, nor are those whose bound is not
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from postproc.base.progress import Progress
 from postproc.placement.place_times import TimedPlace, Timer
 from postproc.placement.reasons import Obstacle, SmallTable
 from postproc.placement.region import Region, region_of
@@ -17,7 +17,6 @@ from postproc.placement.space import ANGLES, FINE, Space
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
-Progress = Callable[[str, int, int], None]
 EQUAL = 2e-4
 """part of the time by which places are equal; travel margin decides among them"""
 _SPREAD, _SEEDS = 64, 6

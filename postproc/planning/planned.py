@@ -21,6 +21,7 @@ from postproc.feedrate.trajectory import JointTrajectory
 from postproc.path.model import JointPath
 from postproc.planning.pass_geometry import PassGeometry, pass_geometry
 from postproc.planning.planned_errors import PlannedCorrection
+from postproc.planning.sampled_limits import worst_ratio
 from postproc.planning.steady_feed import CORNER, steady_seconds
 from postproc.reference.moves import Moves
 from postproc.setup.model import ToolSetup
@@ -32,6 +33,8 @@ from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.units import DEG
 
 ORDERS: tuple[MotionOrder, ...] = get_args(MotionOrder)
+BEYOND = 0.002
+"""share of a limit that round-off of derivatives may take; `steady_feed.ROUNDING` keeps half of it free"""
 
 
 def joint_limits(limits: Limits) -> JointLimits:
@@ -198,7 +201,23 @@ def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnosti
     stopping, diagnostics = source.geometry(CORNER)
     if diagnostics:
         return None, diagnostics
-    return PlannedMotion(source, steady_seconds([(one, source.bounds_of(one)) for one in stopping], len(source.path))), []
+    needed = steady_seconds([(one, source.bounds_of(one)) for one in stopping], len(source.path))
+    beyond = _limits_exceeded(stopping, needed, source)
+    return (None, beyond) if beyond else (PlannedMotion(source, needed), [])
+
+
+def _limits_exceeded(passes: list[PassGeometry], needed: Floats, source: Source) -> list[Diagnostic]:
+    """An error where blocks that take the seconds (K,) needed exceed a limit of the machine file at sampled places."""
+    worst, where, count = 1.0 + BEYOND, 0, 0
+    for one in passes:
+        ratio = worst_ratio(one, needed[one.block], source.machine.limits)
+        count += int((ratio > 1.0 + BEYOND).sum())
+        if len(ratio) and ratio.max() > worst:
+            worst, where = float(ratio.max()), int(source.moves.line[source.path.move[one.block[ratio.argmax()]]])
+    if not count:
+        return []
+    return [error("plan.limits", f"a planned feed would take {worst:.3f} times what an axis can do", file=source.file,
+                  lines=[where], count=count, hint="--feed programmed needs no plan")]
 
 
 def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits,

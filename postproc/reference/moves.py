@@ -6,7 +6,6 @@ This is the reference that output is made from and that read-back compares with.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, sha
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves
-from toolpaths.shapes import arrays
+from toolpaths.shapes import arrays, rows_of
 from toolpaths.toolpath import Arcs, Kind, Role, Toolpath
 from toolpaths.units import DEG
 
@@ -84,9 +83,7 @@ class Moves:
 
     def take(self, rows: Ints | Bools) -> Moves:
         """Some of the rows, or rows several times."""
-        names = [name for name in self.__dataclass_fields__ if name != "arcs"]
-        columns: dict[str, Any] = {name: taken(getattr(self, name), rows) for name in names}
-        return replace(self, **columns)
+        return rows_of(self, "M", rows)
 
     def run_by(self, owner: Ints) -> Bools:
         """(E,) True for blocks that run a move of the CL file itself, by the move that each serves: not those of

@@ -78,9 +78,7 @@ def check_numbers(toolpath: Toolpath, report: Report) -> None:
     lines = toolpath.line[(toolpath.kind != Kind.RAPID) | (toolpath.cycle >= 0)]
     used, first = np.unique(cutting, return_index=True)
     known: dict[int, list[tuple[Tool, int]]] = {}
-    taken = {t.number for t in toolpath.tools} | {int(numbers(e)[0]) for e in toolpath.events
-                                                  if e.word in TOOL_WORDS and numbers(e)}
-    unused = (n for n in count(1) if n not in taken)
+    own = _own_numbers(toolpath, [toolpath.tools[k] for k in used.tolist() if k >= 0])
     for index, at in sorted(zip(used.tolist(), first.tolist(), strict=True), key=lambda pair: pair[1]):
         if index < 0 or toolpath.tools[index].number <= 0:
             continue
@@ -88,21 +86,36 @@ def check_numbers(toolpath: Toolpath, report: Report) -> None:
         others = known.setdefault(tool.number, [])
         other = next((o for o in others if differ(o[0], tool)), None)
         if other:
-            hint = (f"cutting begins at lines {other[1]} and {line}; {_remedy(other[0], tool, next(unused))}"
-                    "number them in the CAM system")
+            hint = f"cutting begins at lines {other[1]} and {line}; {_remedy(other[0], tool, own)}"
             named = other[0].name or tool.name or other[0].shape or tool.shape
             report(Severity.ERROR if named else Severity.WARNING, "tool.same_number", "different tools have the number "
                    f"{tool.number}: {_called(other[0])} and {_called(tool)}", other[1], hint)
         others.append((tool, line))
 
 
-def _remedy(a: Tool, b: Tool, free: int) -> str:
-    """How the set-up keeps two tools of one number apart: by name, where these differ; the second gets `free`."""
+def _own_numbers(toolpath: Toolpath, tools: list[Tool]) -> dict[str, int]:
+    """By name, numbers that keep all different tools of one number apart: the first keeps it, the others get free ones."""
+    taken = {t.number for t in toolpath.tools} | {int(numbers(e)[0]) for e in toolpath.events
+                                                  if e.word in TOOL_WORDS and numbers(e)}
+    unused = (n for n in count(1) if n not in taken)
+    first: dict[int, Tool] = {}
+    found: dict[str, int] = {}
+    for tool in tools:
+        kept = first.setdefault(tool.number, tool)
+        if tool.number > 0 and kept is not tool and kept.name and tool.name and differ(kept, tool) and (
+                tool.name.upper() != kept.name.upper()):
+            found.setdefault(kept.name, kept.number)
+            if tool.name not in found:
+                found[tool.name] = next(unused)
+    return found
+
+
+def _remedy(a: Tool, b: Tool, own: dict[str, int]) -> str:
+    """How the set-up keeps all tools of one number apart: by name, where these differ."""
     if not a.name or not b.name or a.name.upper() == b.name.upper():
-        return ""
-    first, second = json.dumps(a.name, ensure_ascii=False), json.dumps(b.name, ensure_ascii=False)
-    return (f"number them by name in the set-up ([tool_numbers] {first} = {a.number}, {second} = {free}, "
-            "on lines of their own), or ")
+        return "number them in the CAM system"
+    lines = "\n".join(f"{json.dumps(name, ensure_ascii=False)} = {number}" for name, number in own.items())
+    return f"number them in the CAM system, or by name in the set-up:\n[tool_numbers]\n{lines}"
 
 
 def _called(tool: Tool) -> str:

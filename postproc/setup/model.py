@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import BaseModel, Field, model_validator
 
 from machines.hooks import HooksModel
 from machines.user_file import UserModel, read_toml, validate
@@ -176,6 +176,8 @@ class SetupFile(UserModel):
     """A set-up. Everything has a default: part frame on the table frame, first system of the file as work offset."""
 
     description: str = ""
+    assumed: list[str] = Field(default_factory=list)
+    """keys whose values nobody has stated, e.g. assumed = ["tools.1.spindle", "output.feed"]: convert warns of each"""
     work_offset: str = ""
     """name of the system of the CL file that is the work offset; default: its first"""
     work_offset_code: str = Field(default="G54", pattern=r"^(G[0-9]+(\.[0-9])?( P[0-9]+)?|preset [0-9]+)$")
@@ -201,6 +203,22 @@ class SetupFile(UserModel):
     bodies: BodiesModel | None = None
     """part, table and fixtures that the tools must not touch"""
     orientation: OrientationLimits = OrientationLimits()
+
+    @model_validator(mode="after")
+    def _assumed_keys(self) -> SetupFile:
+        for key in self.assumed:
+            if stated_value(self, key) is None:
+                raise ValueError(f"assumed names {key!r}, which the set-up does not state")
+        return self
+
+
+def stated_value(setup: SetupFile, key: str) -> Any:
+    """The value of a dotted key, None where there is none."""
+    value: Any = setup
+    for step in key.split("."):
+        value = value.get(step) if isinstance(value, dict) else getattr(value, step, None) if isinstance(
+            value, BaseModel) and step in type(value).model_fields else None
+    return value
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.setup.model import PartPlacement, Placement, SetupFile, part_placement, system_of, work_frame
+from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, Severity, info
 from toolpaths.toolpath import Frame, Toolpath
 from toolpaths.units import DEG
@@ -67,9 +68,16 @@ def _text(values: Iterable[float], places: int) -> str:
     return f"({', '.join(f'{round(v, places) + 0.0:g}' for v in values)})"
 
 
-def with_system(found: list[Diagnostic], frame: Frame, placement: Placement) -> list[Diagnostic]:
-    """Errors of travel and reach, their hints with the system of the CL file that does not stand upright on the table."""
+def with_system(found: list[Diagnostic], frame: Frame, placement: Placement, axes: Floats) -> list[Diagnostic]:
+    """Errors of travel and reach, their hints with the system of the CL file that does not stand upright on the table.
+
+    Nothing is said of a system that would turn the tool axes `axes` (N, 3) of the moves, in the table frame, to come
+    from below.
+    """
     said = _stands(frame, placement)
+    upright = placement.inverse().directions(axes) @ np.array(frame.rotation)
+    if bool((upright[:, 2] < 0.0).mean() > (axes[:, 2] < 0.0).mean()):
+        said = ""
     return [replace(d, hint=f"{d.hint}; {said}" if d.hint else said)
             if said and d.code in BEYOND and d.severity is Severity.ERROR else d for d in found]
 

@@ -22,6 +22,7 @@ from postproc.readback.execution.poses import arc_sweeps, begins, coordinates
 from postproc.reference.coolant import COMMANDS, switching
 from postproc.setup.model import SetupFile
 from postproc.witness.evidence import Case, ExecutedBlocks, Testimony
+from postproc.witness.machine import merged
 from postproc.witness.second_reading import testify
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -74,6 +75,9 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
         before, end = coordinates(motion, rows)
         return end - before
 
+    def approach_at(rows: Ints, t: float | Floats) -> Floats:
+        return poses.approach(motion, rows, t)
+
     by_tip = np.asarray(motion.frame > 0) | (control.base == "tcp")
     lengthless = np.array([f.law == "axes" for f in motion.frames])[motion.frame]
     lengthless = lengthless & (not control.length_on_z) & (not job.controller.keeps_length)
@@ -82,11 +86,26 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
                           arc_sweeps(motion, control), motion.feed, motion.inverse, motion.inch, by_tip, control.feed_rule,
                           job.controller.feed.arc_inverse == "radius", motion.tool, motion.spindle, motion.rpm,
                           motion.coolant,
-                          motion.dwell, motion.pitch, motion.hole, motion.register, lengthless, steps, joints_at, poses_at)
+                          motion.dwell, motion.pitch, motion.hole, motion.register, lengthless, steps, joints_at, poses_at,
+                          approach_at if job.corrects else None)
+
+
+def error_tables(file: str | Path) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """An error model file as parsed, over its bases, and its CSV tables by their paths, which stand in it."""
+    parsed, tables = list[dict[str, Any]](), dict[str, bytes]()
+    for one in base_chain(file):
+        own = tomllib.loads(read_input(one).decode("utf-8-sig"))
+        for cites in (*own.get("components", {}).values(), own.get("map", {})):
+            if "table" in cites:
+                path = one.parent / cites["table"]
+                cites["table"] = str(path)
+                tables[str(path)] = read_input(path)
+        parsed.append(own)
+    return merged(parsed), tables
 
 
 def offset_joints(control: Control) -> Floats | None:
-    """(J,) joints of the program's zero; None where words are no axis positions by it, or it holds a tool's length."""
+    """(J,) joints of the program's zero; None where words are no machine coordinates by it, or it holds a tool's length."""
     if control.base == "tcp" or control.measured or not control.machine.kinematics.straight_slides:
         return None
     return np.asarray(control.work_offset / _units(control.machine.axis_names))
@@ -110,9 +129,11 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
         why = "the tool axes were chosen" if options.orient != "keep" else "the path is not as it was read from a file"
         return Testimony((), (f"all ({why})",)), []
     control, codes = job.control, job.controller.codes
+    errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})
     case = Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
-                named := "{register}" in codes.length_offset, job.machine.length_register if named else 0,
+                *errors, named := "{register}" in codes.length_offset,
+                job.machine.length_register if named else 0,
                 sum(COMMANDS[kind] for kind, (on, _) in switching(codes).items() if on),
                 program=as_bytes(program) if control.rolls or job.machine.clamp_codes else b"",
                 clamps={a: (c.clamp, c.unclamp) for a, c in job.machine.clamp_codes.items()} if program else {},

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from postproc.controllers.model import ControllerFile
+from postproc.controllers.model import ControllerFile, WriterName
 from postproc.job.job import Job
 from postproc.reference.events import tool_loads
 from postproc.setup.model import SetupFile, ToolSetup
@@ -294,5 +294,5 @@ def _separated(lines: list[str], rows: _Rows) -> None:
 
 
 _Form = Callable[[list[str], _Rows], None]
-_FORMS: dict[str, _Form] = {"linuxcnc": _linuxcnc, "iso": _linuxcnc, "fanuc": _offsets, "haas": _offsets,
+_FORMS: dict[WriterName, _Form] = {"linuxcnc": _linuxcnc, "iso": _linuxcnc, "fanuc": _offsets, "haas": _offsets,
                             "siemens": _siemens, "heidenhain": _klartext}

@@ -94,7 +94,7 @@ def _walk(tip: Any, axis: Any, sweep: Any, targets: Any, directions: Any, arc: A
             off, turn = _apart(tip[k], goal), _apart(axis[k], along)
             off_after, turn_after = _apart(tip[k + 1], goal), _apart(axis[k + 1], along)
             if (off <= 2e-3 and turn <= 1e-5) or off_after > off or turn_after > turn + 1e-9 or (
-                    off_after > 0.5 * off and turn_after > 0.5 * turn):
+                    off_after > 0.5 * off and turn_after > 0.5 * turn + 1e-9):
                 break
             k += 1
         j = k

@@ -28,7 +28,7 @@ def seconds_of(e: ExecutedBlocks, length: Array, unit: Array) -> Array:
 def lengths_of(e: ExecutedBlocks) -> tuple[Array, Array]:
     """(E,) mm or degrees of every block that its feed per minute refers to, (E,) the unit of the feed: 25.4 for inch.
 
-    Per minute the feed is that of the tip where X, Y, Z are the tip; of axis positions by `rule`: "all" the
+    Per minute the feed is that of the tip where X, Y, Z are the tip; of machine coordinates by `rule`: "all" the
     root of the squares of all words, "geometry" X, Y, Z before all others, else X, Y, Z before U, V, W before
     A, B, C. In inverse time a block takes 1/F minutes, an arc its angle over F where the control has it so.
     """

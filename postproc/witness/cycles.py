@@ -47,7 +47,7 @@ def _stated(made: WitnessCycle, r: Record, dialect: WitnessDialect, scale: float
     if start is not None:
         made = replace(made, clearance=start * scale)
     out = r.after("RTRCTO", "RETURN")
-    made = replace(made, retract=math.nan if out is None else out * scale)
+    made = replace(made, retract=out * scale if out is not None else math.inf if "AUTO" in r.words else made.retract)
     steps = tuple(v * scale for v in _steps(r) if v > 0.0)
     rest = r.after("DWELL") or 0.0
     rest = math.nan if "REV" in r.words else rest

@@ -27,6 +27,10 @@ class Case:
     bent_rapids: bool = False
     planned: bool = False
     errors: bool = False
+    """True where the program corrects geometric errors of the machine"""
+    error_model: dict[str, Any] = field(default_factory=dict)
+    """the parsed error model file over its bases, its tables named as in `error_tables`; empty where there is no file"""
+    error_tables: dict[str, bytes] = field(default_factory=dict)
     registers: bool = True
     """False: the control has no length registers to be named, a tool brings its own length along"""
     register_beyond: int = 0
@@ -62,6 +66,8 @@ class ExecutedBlocks:
             the joints hold the tool's length already
         joints_at: joints (K, J) of blocks (K,) at a fraction of each
         poses_at: (tip, axis) of blocks as the reader has them: the claim that rods are held against
+        approach_at: from which direction joints (K, J) are where they are, 1 forwards, -1 backwards; None where
+            no errors depend on it
     """
 
     letters: tuple[str, ...]
@@ -89,6 +95,7 @@ class ExecutedBlocks:
     steps: Callable[[Array], Array]
     joints_at: Callable[[Array, Any], Array]
     poses_at: Callable[[Array, Any], tuple[Array, Array]]
+    approach_at: Callable[[Array, Any], Array] | None = None
 
     def __len__(self) -> int:
         return len(self.line)

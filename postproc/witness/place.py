@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 
 from postproc.witness.commanded import ARC, HOLE, LINE, Commanded, unit
+from postproc.witness.errors import ErrorChain
 from postproc.witness.evidence import Case, ExecutedBlocks
 from postproc.witness.machine import Chain, Rods
 from postproc.witness.text import Array
 
 CHUNK = 100_000
+PLAY = 0.5
+"""mm or rad that no axis loses by turning back"""
 
 
 class Unplaced(Exception):
@@ -54,16 +57,16 @@ def zero_of(setup: dict[str, Any], c: Commanded, place: tuple[Array, Array]) -> 
 
 @dataclass(frozen=True)
 class Poses:
-    """Poses of a program's blocks by this witness's own kinematics; on rods those of the reader, held against the rods.
+    """Poses of a program's blocks by this witness's own kinematics; on rods those of the reader, held against the rods,
+    and without a machine those of the reader alone.
 
+    `misfits`: how far poses of the reader are off, where they are looked at: mm (axis by 1000) and the block.
     `uncalled`: number of the tool in the spindle where the set-up lets the program call none.
-    `own` False: the machine has geometric errors that the program corrects; poses are then those of the reader.
     """
 
     case: Case
     executed: ExecutedBlocks
-    machine: Chain | Rods | None
-    own: bool
+    machine: Chain | ErrorChain | Rods | None
     misfits: list[tuple[float, int]]
     uncalled: int = 0
 
@@ -106,14 +109,30 @@ class Poses:
 
     def _some(self, rows: Array, t: float) -> tuple[Array, Array]:
         e, length = self.executed, self.lengths(rows)
-        if isinstance(self.machine, Chain) and self.own:
+        if isinstance(self.machine, Chain):
             return self.machine.pose(self.joints(rows, t), e.letters, length)
         tip, axis = e.poses_at(rows, t)
-        if isinstance(self.machine, Rods) and self.own:
-            off = self.machine.misfit(self.joints(rows, t) if t < 1.0 else e.joints[rows], e.letters, tip, axis, length)
-            worst = int(np.nan_to_num(off, nan=np.inf).argmax())
-            self.misfits.append((float(np.nan_to_num(off[worst], nan=np.inf)), int(rows[worst])))
+        if isinstance(self.machine, Rods):
+            self._note(rows, self.machine.misfit(self.joints(rows, t), e.letters, tip, axis, length))
+        elif isinstance(self.machine, ErrorChain):
+            q = self.joints(rows, t)
+            own = self.machine.pose(q, e.letters, length, self._approach(rows, t, q))
+            self._note(rows, np.fmax(np.abs(own[0] - tip).max(axis=1), 1000.0 * np.abs(own[1] - axis).max(axis=1)))
+            return own
         return tip, axis
+
+    def _approach(self, rows: Array, t: float, q: Array) -> Array:
+        """(K, J) approach directions: by the motion of joints that go straight by more than any play, else those of the
+        reader."""
+        if self.executed.approach_at is None:
+            return np.zeros(q.shape)
+        step, said = q - self.before(rows), self.executed.approach_at(rows, t)
+        sure = (np.abs(step) > PLAY) & self.executed.straight[rows][:, None]
+        return np.asarray(np.where(sure, np.sign(step), said))
+
+    def _note(self, rows: Array, off: Array) -> None:
+        worst = int(np.nan_to_num(off, nan=np.inf).argmax())
+        self.misfits.append((float(np.nan_to_num(off[worst], nan=np.inf)), int(rows[worst])))
 
 
 @dataclass(frozen=True)

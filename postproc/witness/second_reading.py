@@ -10,8 +10,9 @@ import numpy as np
 from postproc.witness.clamps import check_clamps
 from postproc.witness.clfile import commanded
 from postproc.witness.commanded import ARC, LINE, Commanded
+from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Case, ExecutedBlocks, Finding, Testimony
-from postproc.witness.machine import ROD, Chain, kinematics_of, largest_feed, merged
+from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
 from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.states import (
@@ -45,17 +46,24 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
     if not len(c) or not c.known.any():
         return _nothing("all: " + (", ".join(missing) or "no position was understood"), began)
     table = merged(case.machine)
-    machine = kinematics_of(table) if not case.errors else None
+    machine = _machine(case, table)
     if machine is None:
-        missing.append("kinematics (machine with geometric errors: poses of the read-back)" if case.errors
+        missing.append("kinematics (parallel machine with geometric errors: poses of the read-back)" if case.errors
                        else "kinematics (no machine file of a known kind: poses of the read-back)")
-    poses = Poses(case, executed, machine, machine is not None, [],
+    poses = Poses(case, executed, machine, [],
                   max(int(tools_of(c, case.setup).max(initial=0)), 0))
     with np.errstate(all="ignore"):
         found, worst, counts, silent = _compare(case, executed, c, place, poses, table)
     compared = [f"{n} {what}" for what, n in counts.items() if n]
     return Testimony(tuple(compared), (*missing, *silent), tuple(found), int(c.known.sum()), *worst,
                      process_time() - began)
+
+
+def _machine(case: Case, table: dict[str, object]) -> Chain | ErrorChain | Rods | None:
+    """With its errors where the program corrects them; None where this witness does not know it."""
+    if not case.errors:
+        return kinematics_of(table)
+    return error_chain(table, case.error_model, case.error_tables) if case.error_model else None
 
 
 def _nothing(why: str, began: float) -> Testimony:
@@ -135,10 +143,13 @@ def _arriving(axis: Array) -> str:
 
 
 def _rods(poses: Poses) -> list[Finding]:
-    """Rods that miss their length where the tool is said to be."""
+    """Rods that miss their length where the tool is said to be; a machine with errors that has it elsewhere."""
     worst = max(poses.misfits, default=(0.0, 0))
     if worst[0] <= ROD:
         return []
+    if isinstance(poses.machine, ErrorChain):
+        return [Finding("errors", f"the machine with its geometric errors has the tool {worst[0]:.6f} mm from where "
+                        "it is said to be", 0, int(poses.executed.line[worst[1]]))]
     said = f"rods miss their length by {worst[0]:.6f} mm"
     if math.isinf(worst[0]):
         said = "a carriage stands on the wrong side of its rod"

@@ -276,12 +276,15 @@ def check_holes(w: Walked, c: Commanded, case: Case, match: Array, most: float) 
     bad: dict[str, list[tuple[int, int]]] = {}
     holes = np.flatnonzero((t.kind == BOTTOM) & (match >= 0))
     edges = np.searchsorted(w.owner, np.append(holes, 0)[:-1], side="left")
-    for i, first in zip(holes.tolist(), edges.tolist(), strict=True):
+    levels = _initial_levels(w, c, holes, match, case.tolerance)
+    for i, first, level in zip(holes.tolist(), edges.tolist(), levels, strict=True):
         last = int(match[i])
         blocks = np.arange(first, last + 1)
         if len(blocks):
             rpm = float(c.rpm[t.row[i]])
-            for what in _hole_faults(w, i, blocks, _limited(c.cycles[c.cycle[t.row[i]]], rpm, most), rpm, case.tolerance):
+            cycle = _limited(c.cycles[c.cycle[t.row[i]]], rpm, most)
+            for what in [*_hole_faults(w, i, blocks, cycle, rpm, case.tolerance),
+                         *_retract_fault(w, i, last, cycle, level, case.tolerance)]:
                 bad.setdefault(what, []).append((i, last))
     return [Finding("hole", what, int(c.line[t.row[at[0][0]]]), int(e.line[at[0][1]]), len(at))
             for what, at in bad.items()], len(holes)
@@ -320,15 +323,44 @@ def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: flo
     wanted = cycle.feed if cycle.per_turn else cycle.feed / rpm if rpm > 0.0 else math.nan
     if cycle.kind == "TAP" and abs(abs(pitch) - wanted) > 0.001 * wanted + 1e-4:
         found.append(f"the thread has a pitch of {abs(pitch):g} mm, by the CL file {wanted:g} mm")
-    low = cycle.retract - _risen(w, i, int(blocks[-1]), cycle.depth, tolerance) if math.isfinite(cycle.retract) else 0.0
-    if low > tolerance + 1e-6:
-        found.append(f"the tool leaves the hole {low:.4f} mm below the retract plane of the CL file")
     out = blocks[-1] + 1
     if cycle.kind in _FEED_OUT and out < len(e) and e.code[out] == 0:
         found.append("the tool leaves the hole in rapid, the CL file asks for feed")
     if cycle.kind != "TAP":
         found += _feed_fault(w, blocks[fed & (depth > reached + 1e-3)], cycle, rpm)
     return found
+
+
+def _initial_levels(w: Walked, c: Commanded, holes: Array, match: Array, tolerance: float) -> list[float]:
+    """Height along its axis from which the tool came to the run of holes that each belongs to; NaN where the program
+    links to them."""
+    t, result = w.targets, list[float]()
+    for n, i in enumerate(holes.tolist()):
+        along, before = t.axis[i], i - 2
+        if n and holes[n - 1] == i - 2 and t.row[i] == t.row[i - 2] + 1 and (t.axis[i - 2] == along).all():
+            result.append(result[-1])
+            continue
+        result.append(math.nan)
+        if before < 0 or match[before] < 0 or match[i - 1] < 0 or w.gap[match[i - 1]] or (t.axis[before] != along).any() \
+                or c.tool[t.row[before]] != c.tool[t.row[i]]:
+            continue
+        level = float(t.tip[before] @ along)
+        blocks = slice(int(match[before]), int(match[i - 1]) + 1)
+        if (w.tip[blocks] @ along).max() <= max(level, float(t.tip[i - 1] @ along)) + 2.0 * tolerance:
+            result[-1] = level
+    return result
+
+
+def _retract_fault(w: Walked, i: int, last: int, cycle: WitnessCycle, level: float, tolerance: float) -> list[str]:
+    """That the tool leaves a hole below the retract plane, that of RTRCTO,AUTO at the `level` from which it came, or
+    below the start plane."""
+    t = w.targets
+    back = level - float(t.tip[i] @ t.axis[i]) - cycle.depth
+    wanted = np.nanmax([cycle.clearance, back if math.isinf(cycle.retract) else cycle.retract])
+    low = float(wanted) - _risen(w, i, last, cycle.depth, tolerance)
+    if low <= tolerance + 1e-6:
+        return []
+    return [f"the tool leaves the hole {low:.4f} mm below the retract plane of the CL file"]
 
 
 def _risen(w: Walked, i: int, last: int, depth: float, tolerance: float) -> float:

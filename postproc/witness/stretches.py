@@ -117,7 +117,7 @@ def turns_of(poses: Poses) -> Array:
 def _pose_of(poses: Poses, rows: Array, q: Array, t: Array) -> Array:
     from postproc.witness.machine import Chain
 
-    if isinstance(poses.machine, Chain) and poses.own:
+    if isinstance(poses.machine, Chain):
         return poses.machine.pose(q, poses.executed.letters, poses.lengths(rows))[0]
     return poses.executed.poses_at(rows, t)[0]
 

@@ -33,29 +33,39 @@ class IsoWriter(Writer):
 
     def heads(self, first: int, last: int) -> list[str]:
         """Motion, plane and feed mode codes, '' where they stand already."""
-        p, codes = self.program, self.controller.codes
-        names = (codes.traverse, codes.feed, codes.arc_cw, codes.arc_ccw)
         result = [""] * (last - first)
-        changes = self.changes[self.changes.searchsorted(first + 1):self.changes.searchsorted(last)]
-        for row in (0, *(changes - first).tolist()) if last > first else ():
-            code, home, words = p.code.item(first + row), p.home.item(first + row), []
-            code += code == 2 and p.ccw.item(first + row)
-            plane, mode = p.plane.item(first + row), p.mode.item(first + row)
-            if code and mode != self.mode:
-                words.append(codes.inverse_time if mode == INVERSE else codes.per_minute)
-                self.mode = mode
-                if self.controller.feed.cleared_by_mode_change:
-                    self.feed = ""
-            if code >= 2 and plane != self.plane:
-                words.append(codes.planes[str(plane)])
-                self.plane = plane
-            if home:
-                words.append(codes.machine_coordinates)
-            if home or names[code] != self.motion:
-                words.append(names[code])
-                self.motion = names[code]
-            result[row] = "".join(self.space + w for w in words)
+        if not result:
+            return result
+        begin, end = self.changes.searchsorted((first + 1, last)).tolist()
+        states: list[list[int]] = self.change_states[begin - 1:end].tolist()
+        states[0][3] = self.program.home.item(first)
+        for row, state in zip((0, *(self.changes[begin:end] - first).tolist()), states, strict=True):
+            result[row] = self.head(*state)
         return result
+
+    def head(self, code: int, plane: int, mode: int, home: int) -> str:
+        """Those of one block."""
+        codes, motion, words = self.controller.codes, self.motion_codes[code], ""
+        if code and mode != self.mode:
+            words = self.space + (codes.inverse_time if mode == INVERSE else codes.per_minute)
+            self.mode = mode
+            if self.controller.feed.cleared_by_mode_change:
+                self.feed = ""
+        if code >= 2 and plane != self.plane:
+            words += self.space + codes.planes[str(plane)]
+            self.plane = plane
+        if home:
+            words += self.space + codes.machine_coordinates
+        if home or motion != self.motion:
+            words += self.space + motion
+            self.motion = motion
+        return words
+
+    @cached_property
+    def motion_codes(self) -> tuple[str, str, str, str]:
+        """Traverse, feed and the two senses of an arc."""
+        codes = self.controller.codes
+        return codes.traverse, codes.feed, codes.arc_cw, codes.arc_ccw
 
     def add_length(self, heads: list[str], first: int, last: int) -> None:
         """The length register off in machine coordinates, and in force with the first block that states Z after that."""
@@ -74,17 +84,25 @@ class IsoWriter(Writer):
             self.length_off = not self.length_off
 
     def feed_texts(self, values: Floats) -> list[str]:
-        """The numbers of feed words: the controller's decimals, two more for feeds below 1."""
-        places = self.controller.format.feed_decimals
+        """The numbers of feed words: the controller's decimals, more of them for feeds below 1."""
+        places, more = self.controller.format.feed_decimals, self.controller.format.small_feed_decimals
         result = self.number_text(values, places)
         small = np.flatnonzero(values < 1.0)
-        for k, text in zip(small.tolist(), self.number_text(values[small], places + 2), strict=True):
-            result[k] = text
+        if len(small):
+            for k, text in zip(small.tolist(), self.number_text(values[small], places + more), strict=True):
+                result[k] = text
         return result
 
     def feed_text(self, value: float) -> str:
-        """One of them."""
-        return self.feed_texts(np.array([value]))[0]
+        """One of them; kept, as short stretches repeat few feeds."""
+        if value not in self.known_feeds:
+            self.known_feeds[value] = self.feed_texts(np.array([value]))[0]
+        return self.known_feeds[value]
+
+    @cached_property
+    def known_feeds(self) -> dict[float, str]:
+        """Their texts by value."""
+        return {}
 
     @cached_property
     def homes(self) -> Ints:
@@ -99,9 +117,18 @@ class IsoWriter(Writer):
     @cached_property
     def changes(self) -> Ints:
         """Blocks, in order, with a motion, plane or feed mode that the block before has not, or in machine coordinates."""
+        state = self._states(slice(None))
+        return np.flatnonzero(np.append(True, (state[1:, :3] != state[:-1, :3]).any(axis=1)) | self.program.home)
+
+    @cached_property
+    def change_states(self) -> Ints:
+        """Of those blocks, the number of `motion_codes`, plane, feed mode and 1 for machine coordinates."""
+        return self._states(self.changes)
+
+    def _states(self, rows: Ints | slice) -> Ints:
         p = self.program
-        state = np.stack([np.where(p.code == 2, 2 + p.ccw, p.code), p.plane, p.mode])
-        return np.flatnonzero(np.append(True, (state[:, 1:] != state[:, :-1]).any(axis=0)) | p.home)
+        code, ccw = p.code[rows], p.ccw[rows]
+        return np.stack([np.where(code == 2, 2 + ccw, code), p.plane[rows], p.mode[rows], p.home[rows]], axis=1)
 
     def feeds(self, first: int, last: int) -> list[str]:
         """Feed words, '' where the feed stands already (each block of inverse time states it)."""
@@ -111,7 +138,9 @@ class IsoWriter(Writer):
         rows = stated[stated.searchsorted(begin):stated.searchsorted(end)]
         if end > begin and (not len(rows) or rows[0] != begin):
             rows = np.append(begin, rows)
-        for k, text in zip(rows.tolist(), self.feed_texts(self.program.feed[cutting[rows]]), strict=True):
+        values = self.program.feed[cutting[rows]]
+        texts = self.feed_texts(values) if len(rows) > 1 else [self.feed_text(v) for v in values.tolist()]
+        for k, text in zip(rows.tolist(), texts, strict=True):
             if needed[k] or text != self.feed:
                 result[int(cutting[k]) - first] = f"{self.space}F{text}"
             self.feed = text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from functools import cached_property
 from textwrap import wrap
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from postproc.compile.program import PER_MINUTE, Hole, Program, Section
 from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
 from postproc.path.model import ARC
+from postproc.reference.coolant import CoolantCommand, switching
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
 
@@ -88,6 +90,21 @@ class WriterState:
     def clean(self, text: str) -> str:
         """The text without characters that a comment must not hold, cut to the line length."""
         return clean(self.controller, text)
+
+    # ---- codes ------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def fixed(self) -> dict[str, str]:
+        """The commands that are one code whatever they carry."""
+        codes = self.controller.codes
+        return {"STOP_SPINDLE_TURNING": codes.spindle_stop, "PROGRAM_STOP": codes.stop,
+                "OPTIONAL_PROGRAM_STOP": codes.optional_stop,
+                "CANCEL_TOOL_LENGTH_OFFSET": codes.length_cancel, "CUTTER_COMPENSATION_OFF": codes.compensation_off}
+
+    @cached_property
+    def switching(self) -> dict[CoolantCommand, tuple[str, str]]:
+        """The controller's codes for each kind of coolant (`postproc.reference.coolant`)."""
+        return switching(self.controller.codes)
 
     # ---- numbers -------------------------------------------------------------------------------------------
 

@@ -16,7 +16,7 @@ from postproc.compile.program import PER_MINUTE, Command, Hole
 from postproc.control.rollover import HALF
 from postproc.controllers.model import Mode
 from postproc.controllers.texts import blocks_of
-from postproc.reference.coolant import COMMANDS, switching
+from postproc.reference.coolant import COMMANDS
 from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name
 from toolpaths.arrays import Ints
 
@@ -260,16 +260,12 @@ class Writer(WriterState, ABC):
 
     def command(self, command: Command) -> Iterator[str]:
         """The blocks of one canonical command."""
-        codes = self.controller.codes
-        fixed = {"STOP_SPINDLE_TURNING": codes.spindle_stop, "PROGRAM_STOP": codes.stop,
-                 "OPTIONAL_PROGRAM_STOP": codes.optional_stop,
-                 "CANCEL_TOOL_LENGTH_OFFSET": codes.length_cancel, "CUTTER_COMPENSATION_OFF": codes.compensation_off}
-        if command.name in fixed:
+        if command.name in self.fixed:
             if command.name == "STOP_SPINDLE_TURNING":
                 self.turning = None if command.skip else False
             elif command.name in ("PROGRAM_STOP", "OPTIONAL_PROGRAM_STOP"):
                 self.turning, self.cooling = self.turning and None, self.cooling and None
-            yield fixed[command.name]
+            yield self.fixed[command.name]
         elif command.name == "COOLANT_OFF" or command.name in COMMANDS:
             yield from self.coolant(command)
         elif command.name in ("ENTER_SECTION", "LEAVE_SECTION"):
@@ -330,13 +326,13 @@ class Writer(WriterState, ABC):
             yield from self.coolant_off()
             self.flowing = self.flowing if command.skip else 0
         if asked:
-            yield switching(self.controller.codes)[asked][0]
+            yield self.switching[asked][0]
         self.flowing |= wanted
         self.cooling = None if command.skip else bool(wanted)
 
     def coolant_off(self) -> list[str]:
         """The codes that end what may flow: those of kinds that have one of their own, and the one for all others."""
-        own = {off: COMMANDS[name] for name, (_, off) in switching(self.controller.codes).items() if off}
+        own = {off: COMMANDS[name] for name, (_, off) in self.switching.items() if off}
         result = [off for off, bits in own.items() if self.flowing & bits]
         rest = self.cooling is None or not result or self.flowing & ~sum(own.values())
         return [*result, self.controller.codes.coolant_off] if rest else result

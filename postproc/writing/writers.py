@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from postproc.compile.program import Program
-from postproc.controllers.model import ControllerFile
+from postproc.controllers.model import ControllerFile, WriterName
 from postproc.writing.writer import Writer
 from toolpaths.arrays import Floats
 from toolpaths.toolpath import Cycle
@@ -15,7 +15,7 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
     """The writer that the controller file names.
 
     Args:
-        length_offsets: axis positions of Z are less the tool's length, which a register of the control adds
+        length_offsets: machine coordinates of Z are less the tool's length, which a register of the control adds
         smoothing, axis_smoothing: mm and degrees left to the controller's own smoothing
         work_offset: the set-up's code, G54 to G59.3
         name: of the program, where the controller's programs hold one
@@ -29,7 +29,8 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
     from postproc.writing.linuxcnc import LinuxcncWriter
     from postproc.writing.siemens import SiemensWriter
 
-    writers: dict[str, type[Writer]] = {"iso": IsoWriter, "linuxcnc": LinuxcncWriter, "fanuc": FanucWriter,
-                                        "haas": HaasWriter, "siemens": SiemensWriter, "heidenhain": KlartextWriter}
+    writers: dict[WriterName, type[Writer]] = {
+        "iso": IsoWriter, "linuxcnc": LinuxcncWriter, "fanuc": FanucWriter, "haas": HaasWriter, "siemens": SiemensWriter,
+        "heidenhain": KlartextWriter}
     return writers[controller.writer](controller, program, cycles, length_offsets, smoothing, work_offset, axis_smoothing,
                                       name, subprograms, stock)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ def only(tmp_path: Path, text: str = GOOD) -> object:
 def test_an_unknown_kind_lists_what_is_registered(tmp_path, monkeypatch) -> None:
     monkeypatch.delenv(kinds.FILES, raising=False)
     fault = only(tmp_path)
-    assert fault.code == "machine.kind" and "registered are serial, linear-delta, h4-linear" in fault.message
+    assert fault.code == "machine.kind" and f"registered are {', '.join(kinds.BUILT_IN)}" in fault.message
     assert kinds.GROUP in fault.hint and kinds.FILES in fault.hint
     monkeypatch.setenv(kinds.FILES, str(SAMPLE))  # what the hint says
     assert machines.load(tmp_path / "m.toml").structure == "scissors"
@@ -81,7 +82,7 @@ def test_a_package_registers_a_kind_by_its_metadata(tmp_path, monkeypatch) -> No
 
 def test_files_that_are_no_kinds_are_refused_with_what_is_wrong(tmp_path, monkeypatch) -> None:
     broken = tmp_path / "broken.py"
-    for text, words in (("1 / 0", "is not run: ZeroDivisionError"),
+    for text, words in (("1 / 0", "is not run: ZeroDivisionError"), ("import sys; sys.exit(0)", "is not run: SystemExit"),
                         ("nothing = 1", "holds no kind of machine")):
         broken.write_text(text)
         kinds._of_file.cache_clear()
@@ -89,6 +90,22 @@ def test_files_that_are_no_kinds_are_refused_with_what_is_wrong(tmp_path, monkey
         fault = only(tmp_path)
         assert fault.code == "machine.kind" and words in fault.message and str(broken) in fault.message
     assert machines.load("mill-3axis").name == "mill-3axis"
+    kinds._of_file.cache_clear()
+
+
+def test_one_kind_in_two_files_is_refused(tmp_path, monkeypatch) -> None:
+    second = tmp_path / "second.py"
+    second.write_text(SAMPLE.read_text())
+    monkeypatch.setenv(kinds.FILES, os.pathsep.join([str(SAMPLE), str(second)]))
+    fault = only(tmp_path)
+    assert fault.code == "machine.kind" and f"defined twice: in {SAMPLE.resolve()} and in {second}" in fault.message
+    assert "name one of them" in fault.hint and machines.load("mill-3axis").name == "mill-3axis"
+    monkeypatch.setenv(kinds.FILES, os.pathsep.join([str(second), str(second)]))  # one of them, as the hint says
+    assert machines.load(tmp_path / "m.toml").structure == "scissors"
+    second.write_text(SAMPLE.read_text().replace('"scissors"', '"shears"'))
+    kinds._of_file.cache_clear()
+    monkeypatch.setenv(kinds.FILES, os.pathsep.join([str(SAMPLE), str(second)]))  # another word, as it says too
+    assert {"scissors", "shears"} <= set(kinds.known())
     kinds._of_file.cache_clear()
 
 

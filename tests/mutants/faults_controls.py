@@ -84,7 +84,7 @@ FAULTS = (
     Fault("tool change without its number", "writer of haas", "Writer.change_tool",
           "tool_change.format(number=number)", "tool_change.format(number='1')"),
     Fault("arcs read in the other direction", "reader of linuxcnc", "_motion", "== 3)", "== 2)"),
-    Fault("G43 H not read", "reader of linuxcnc", "IsoReader.tools", "if c == 43 else -1.0)", "if c == 0 else -1.0)"),
+    Fault("G43 H not read", "reader of linuxcnc", "IsoReader.tools", "np.where(code == 43,", "np.where(code == 0,"),
     Fault("dwell read in ms", "reader of linuxcnc", "IsoReader.seconds", "return float(words.value[low + here[0]])",
           "return 0.001 * float(words.value[low + here[0]])", ("helix linuxcnc", "helix iso")),
     Fault("G93 read as G94", "reader of linuxcnc", "modal_state", "feed_mode == 93, feed_mode == 95",

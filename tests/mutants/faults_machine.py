@@ -109,11 +109,9 @@ FAULTS = (
           "return inserted(path, *(x[:0] for x in between(path, work, starts, allowed)))",
           why="what is left is inside the tolerance, as the read-back on the machine with errors measures"),
     Fault("component errors x 1.2", "compensation", "SerialErrors.torsors", "result[part] = result[part] + values",
-          "result[part] = result[part] + 1.2 * values",
-          why="read-back and correction take the errors from one model; the text says that the second "
-          "witness does not compare the kinematics of a machine with errors"),
+          "result[part] = result[part] + 1.2 * values"),
     Fault("error of the next axis", "compensation", "SerialErrors.torsors", "result[part] = result[part] + values",
-          "result[(part + 1) % 6] = result[(part + 1) % 6] + values", why="as above where the errors are small"),
+          "result[(part + 1) % 6] = result[(part + 1) % 6] + values"),
     Fault("rotary joints as they were", "compensation", "unstated", "result[k - 1, kept] = result[k, kept]", "pass",
           why="what is left is inside the tolerance, as the read-back on the machine with errors measures"),
     Fault("points between looked for at their ends only", "compensation", "between",
@@ -170,13 +168,15 @@ FAULTS = (
           "np.concatenate([_rows(lattice, p, p.first) + o for p, o in zip(taken, offset, "
           "strict=True)])[::-1][::-1] * 1.0 + 6.283185307179586 * " "np.array(stage.lattice.limits.upper > 1e3)"),
     Fault("planned feed + 2 %", "planning", "plan_feeds", "np.fmax(needed, planned.needed)",
-          "np.fmax(needed, planned.needed) / 1.02", ("fast planned",),
-          why="the programmed feed stays the limit; that a plan keeps acceleration and jerk is "
-          "measured by the tests of the planner, not by the proof"),
+          "np.fmax(needed, planned.needed) / 1.02", ("fast planned",)),
     Fault("planned seconds of the block before", "planning", "plan_feeds", "np.fmax(needed, planned.needed)",
-          "np.fmax(needed, np.roll(planned.needed, 1))", ("fast planned", "planned"),
-          why="a plan that is slower than needed: the proof holds planned feeds from above only, by "
-          "the feed of the CL file"),
+          "np.fmax(needed, np.roll(planned.needed, 1))", ("fast planned", "planned")),
+    Fault("planned by jerk limits 1.1 times too high", "planning", "joint_limits", "limits.jerk)", "1.1 * limits.jerk)",
+          ("fast planned",)),
+    Fault("planned by acceleration limits 1.1 times too high", "planning", "joint_limits", "limits.acceleration,",
+          "1.1 * limits.acceleration,", ("fast planned",)),
+    Fault("planned without the jerk of a block", "planning", "span_speed", "orders, strict=True), 1)",
+          "orders[:2], strict=False), 1)", ("fast planned",)),
     Fault("rounding of words to one place less", "planning", "decimals", "f.linear_decimals).astype",
           "f.linear_decimals - 2).astype"),
 )

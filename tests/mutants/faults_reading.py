@@ -102,8 +102,8 @@ FAULTS = (
     Fault("out of the hole 1 mm too low", "cycles", "_legs",
           "max(cycle.clearance, out) * axis, Phase.RETRACT, Kind.RAPID",
           "(max(cycle.clearance, out) - 1.0) * axis, Phase.RETRACT, Kind.RAPID",
-          why="rapids between holes at the level of RTRCTO,AUTO: the second witness compares retract "
-          "planes that a number states; no cut changes"),
+          why="one program passes: behind its only hole the tool rises on along the axis of the hole, by a rapid of the CL "
+          "file; no cut and no rapid off that axis changes"),
     Fault("down to the hole from 1 mm under its plane", "cycles", "_legs",
           "(top + cycle.clearance * axis, Phase.APPROACH", "(top + (cycle.clearance - 1.0) * axis, Phase.APPROACH"),
     Fault("last hole of a cycle not drilled", "cycles", "cycle", "b.cycle.set(b.row, -1)",

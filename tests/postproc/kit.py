@@ -38,6 +38,20 @@ def toolpath(*lines: str, head: list[str] | None = None) -> Toolpath:
     return path
 
 
+SIDES = {"five_faces.cls": (0, 1, 2), "five_tilted.cls": (0, 1, 2), "h4a_indexed.cls": (0, 1, 4, 5, 6)}
+"""operations of samples with many sides alike that show each kind of work"""
+
+
+@cache
+def few_sides(name: str) -> Toolpath:
+    """A CL sample, of those with many sides alike some `SIDES` under their own head."""
+    head, *operations = re.split(r"(?m)^(?=TOOL PATH/)", (SAMPLES / name).read_text())
+    text = head + "".join(operations[k] for k in SIDES.get(name, range(len(operations))))
+    path, found = toolpaths.read_bytes(text, file=name)
+    assert not has_errors(found), [str(d) for d in found]
+    return path
+
+
 def goto(tip: np.ndarray, axis: np.ndarray | None = None) -> list[str]:
     """GOTO records of tips (N, 3) and axes (N, 3), 12 decimals."""
     rows = np.asarray(tip) if axis is None else np.hstack([tip, axis])

@@ -24,7 +24,7 @@ DENSE = np.linspace(0.0, 1.0, 13)[1:]
 @pytest.fixture(autouse=True)
 def first_mode(monkeypatch: pytest.MonkeyPatch) -> None:
     """Conversions in the mode that comes first: the generic reader knows no codes of modes, so that `auto`
-    would take axis positions next."""
+    would take machine coordinates next."""
     monkeypatch.setattr("postproc.pipeline.convert.with_next_modes", lambda begun, staged: staged(begun))
 
 

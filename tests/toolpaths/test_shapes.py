@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from toolpaths.arrays import Array, Bools, Floats, Ints
-from toolpaths.shapes import TABLE, arrays, declared
+from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
+from toolpaths.shapes import TABLE, arrays, declared, rows_of
 
 WITNESS = "postproc.witness."
 """shares no code with the rest"""
@@ -188,3 +188,26 @@ def test_what_a_class_does_when_made_comes_first_and_heirs_check_their_own() -> 
     assert Heir(np.zeros((2, 3)), np.zeros(2)).line.shape == (2,)
     with pytest.raises(ValueError, match=r"Heir\.line has shape \(3,\), expected \(2,\)"):
         Heir(np.zeros((2, 3)), np.zeros(3))
+
+
+def test_rows_are_taken_of_the_fields_that_have_them() -> None:
+    @dataclass(frozen=True)
+    @arrays(tip="N 3", kind="int8: N", ends="N+1", other="M", extra="N")
+    class Values:
+        tip: Floats
+        kind: Array
+        ends: Floats
+        other: Floats
+        extra: Floats | None = None
+        name: str = ""
+
+    values = Values(np.arange(12.0).reshape(4, 3), np.arange(4), np.arange(5.0), np.arange(7.0), name="a")
+    with pytest.raises(ValueError, match=r"ends has shape \(5,\), expected \(3,\)"):
+        rows_of(values, "N", np.array([True, False, False, True]))
+    made = rows_of(rows_of(values, "M", slice(2, 4)), "N", np.array([3, 0, 0, 1]))
+    assert made.tip[:, 0].tolist() == [9.0, 0.0, 0.0, 3.0]
+    assert made.kind.tolist() == [3, 0, 0, 1] and made.kind.dtype == np.int8
+    assert made.other.tolist() == [2.0, 3.0] and made.ends is not None and made.extra is None and made.name == "a"
+    once = replace(made, kind=repeated(np.int8(2), 4), extra=np.arange(4.0))
+    taken = rows_of(once, "N", np.array([2, 1, 1, 0]))
+    assert taken.kind.strides == (0,) and taken.extra is not None and taken.extra.tolist() == [2.0, 1.0, 1.0, 0.0]

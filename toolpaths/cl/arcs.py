@@ -172,5 +172,5 @@ def _check_radius(start: Floats, end: Floats, r: CircleRecords, log: DiagnosticL
 def _check_sense(sweep: Floats, line: Ints, log: DiagnosticLog) -> None:
     long = sweep % _TURN > math.pi + 1e-3
     if (len(sweep) >= _SENSE_LEAST and long.sum() > 0.5 * len(sweep)) or (len(sweep) >= _SENSE_ALL and long.all()):
-        log.warning("cl.arc-sense", f"{int(long.sum())} of {len(sweep)} arcs sweep more than 180 degrees: the sense "
-                    "of the circles is likely that of another system", int(line[long][0]), "name it with --dialect")
+        log.warning("cl.arc-sense", f"{int(long.sum())} of {len(sweep)} arcs sweep more than 180 degrees: the "
+                    "direction of circles is likely that of another system", int(line[long][0]), "name it with --dialect")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Literal, TypedDict
 
 from toolpaths.choices import CycleKind
 from toolpaths.cl.feeds import UNITS
@@ -21,8 +22,9 @@ _OTHER = frozenset({"DIAMET", "TLANGL", "TIMES", "BACK", "CSKDIA"})
 _UNUSED = frozenset({"OFFSET", "REPEAT", "PARAMS", "ORIENT", "PLUNGE"})
 """What the hole would be drilled otherwise for: reported, with their numbers."""
 _PLAIN = frozenset({"G98", "G99", "AUTO", "MANUAL", "ON", "REV", "", "SEC", "NEXT"})
-_SIMPLE = {"FEDTO": "depth", "DEPTH": "depth", "RAPTO": "rapto", "CLEAR": "clear", "TPI": "threads",
-           "PITCH": "pitch", "DIAMET": "diameter", "TLANGL": "angle"}
+_SIMPLE: dict[str, Literal["depth", "rapto", "clear", "threads", "pitch", "diameter", "angle"]] = {
+    "FEDTO": "depth", "DEPTH": "depth", "RAPTO": "rapto", "CLEAR": "clear", "TPI": "threads", "PITCH": "pitch",
+    "DIAMET": "diameter", "TLANGL": "angle"}
 
 
 CYCLE_WORDS = frozenset({*KINDS, *_RETRACT, *_PECKS, *_OTHER, *_UNUSED, *_PLAIN, *_SIMPLE, *UNITS, "INIT", "OFF", "DWELL",
@@ -57,6 +59,24 @@ class CycleValues:
     strange: tuple[str, ...] = field(default=(), compare=False)
 
 
+class StatedValues(TypedDict, total=False):
+    """Fields of `CycleValues` that words of a record, or the places of its numbers, state."""
+
+    depth: float
+    rapto: float
+    clear: float
+    retract: float | None
+    feed: tuple[float, str] | None
+    threads: float
+    pitch: float
+    steps: tuple[float, ...]
+    dwell: float
+    revolutions: float
+    diameter: float
+    angle: float
+    placed: bool
+
+
 def kind_of(words: tuple[Word, ...]) -> tuple[CycleKind, tuple[Word, ...]]:
     """(kind, the words after it): of several the one that says more than DRILL."""
     n = 0
@@ -68,7 +88,7 @@ def kind_of(words: tuple[Word, ...]) -> tuple[CycleKind, tuple[Word, ...]]:
 
 def values(v: CycleValues, words: tuple[Word, ...]) -> CycleValues:
     """`v` with the parameters `words`; numbers without a word go to `free` in their order."""
-    found: dict[str, object] = {}
+    found: StatedValues = {}
     free: list[float] = []
     steps: list[float] = []
     empty: list[str] = []
@@ -93,8 +113,7 @@ def values(v: CycleValues, words: tuple[Word, ...]) -> CycleValues:
         found.setdefault("rapto", math.nan)
     if steps:
         found["steps"] = tuple(steps)
-    stated = {**found, "free": tuple(free), "empty": tuple(empty), "strange": tuple(strange)}
-    return replace(v, **stated)  # type: ignore[arg-type]  # by names of fields
+    return replace(v, **found, free=tuple(free), empty=tuple(empty), strange=tuple(strange))
 
 
 def _unit_alone(words: tuple[Word, ...]) -> bool:
@@ -102,7 +121,7 @@ def _unit_alone(words: tuple[Word, ...]) -> bool:
     return bool(words) and words[0] in UNITS and not (len(words) > 1 and isinstance(words[1], float))
 
 
-def _label(word: str, n: list[float], following: Word, found: dict[str, object], free: list[float],
+def _label(word: str, n: list[float], following: Word, found: StatedValues, free: list[float],
            steps: list[float], empty: list[str], strange: list[str]) -> int:
     """Take the numbers `n` that belong to `word`; how many were taken."""
     if word in _PECKS:
@@ -130,7 +149,7 @@ def _label(word: str, n: list[float], following: Word, found: dict[str, object],
     return min(1, len(n)) if word in _SIMPLE or word in ("DWELL", "REV") else 0
 
 
-def _feed(word: str, n: list[float], found: dict[str, object], free: list[float], empty: list[str]) -> int:
+def _feed(word: str, n: list[float], found: StatedValues, free: list[float], empty: list[str]) -> int:
     """f, unit where two or more free numbers stand before the unit (depth, feed), else unit, f."""
     if "depth" not in found and len(free) >= 2:
         found["feed"] = (free.pop(), word)
@@ -145,7 +164,7 @@ def _feed(word: str, n: list[float], found: dict[str, object], free: list[float]
     return 1
 
 
-def _retract(word: str, n: list[float], following: Word, found: dict[str, object], empty: list[str]) -> int:
+def _retract(word: str, n: list[float], following: Word, found: StatedValues, empty: list[str]) -> int:
     if word == "AUTO":
         found["retract"] = None
         return 0

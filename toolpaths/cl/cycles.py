@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from toolpaths.choices import CycleKind
 from toolpaths.cl.build import Heights, ToolpathBuilder
-from toolpaths.cl.cycle_words import KINDS, CycleValues, kind_of, values
+from toolpaths.cl.cycle_words import KINDS, CycleValues, StatedValues, kind_of, values
 from toolpaths.cl.feeds import feed_in
 from toolpaths.cl.text.dialects import Planes
 from toolpaths.cl.text.statements import Statement, Word
@@ -114,7 +114,7 @@ def _placed(v: CycleValues, planes: Planes) -> CycleValues:
     """Numbers without a word by their place: depth, then feed where no unit stands, then clearance and
     retract; in the posts that say RAPTO from the clearance, this stands next to it, and goes without a retract plane."""
     free = list(v.free)
-    found: dict[str, object] = {}
+    found: StatedValues = {}
     if math.isnan(v.depth) and free:
         found["depth"], found["placed"] = free.pop(0), True
         if v.feed is None and free:
@@ -124,7 +124,7 @@ def _placed(v: CycleValues, planes: Planes) -> CycleValues:
     if planes not in _COUNTED_DOWN and v.retract is not None and math.isnan(v.retract) and free:
         found["retract"] = free.pop(0)
     strange = tuple(f"{x:g}" for x in free if x not in (0.0, found.get("retract", v.retract)))
-    return replace(v, **found, free=(), strange=(*v.strange, *strange))  # type: ignore[arg-type]  # by names of fields
+    return replace(v, **found, free=(), strange=(*v.strange, *strange))
 
 
 _COUNTED_DOWN = (Planes.BOTTOM, Planes.DOWN, Planes.OVER_BOTTOM)

@@ -40,7 +40,7 @@ def tool_path(b: ToolpathBuilder, s: Statement) -> None:
     begin_operation(b, name, tool_name)
     b.open_paths.append((b.line, name))
     if tool_name:
-        describe(b, name=tool_name)
+        describe(b, {"name": tool_name})
 
 
 def open_paths(b: ToolpathBuilder) -> None:

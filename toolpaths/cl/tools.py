@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from itertools import takewhile
-from typing import Any
+from typing import Literal, TypedDict
 
 from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.text.statements import Statement
@@ -19,30 +19,47 @@ TURNING = frozenset({"TURN", "GROOVE", "THREAD", "TURNING"})
 _MAX_NUMBER = 10 ** 9
 _NOT_SHAPE = {"name", "length_register"}
 _CUTTER_ANGLES = (4, 5)
+_SIZES: tuple[Literal["diameter", "corner_radius", "length"], ...] = ("diameter", "corner_radius", "length")
+_MILL_ANGLES: tuple[Literal["taper", "tip_angle"], ...] = ("taper", "tip_angle")
+_DRILL_ANGLES: tuple[Literal["taper", "tip_angle"], ...] = ("tip_angle",)
 _ISO_REGISTER = 3
 _SELECTED = "number selected"
 _SHORT_TOOLNO = 5
 """number, kind and three sizes; longer forms follow the user's table, and CUTTER has the sizes"""
 
 
+class ToolFields(TypedDict, total=False):
+    """What records state of a tool: the fields of `Tool` but its number."""
+
+    name: str
+    shape: str
+    diameter: float
+    corner_radius: float
+    length: float
+    taper: float
+    tip_angle: float
+    flute_length: float
+    length_register: int
+    cutter: tuple[float, ...]
+
+
 @dataclass
 class _State:
     number: int = 0
     row: int = -1
-    fields: dict[str, Any] = field(default_factory=dict)
-    by_number: dict[int, dict[str, Any]] = field(default_factory=dict)
+    fields: ToolFields = field(default_factory=ToolFields)
+    by_number: dict[int, ToolFields] = field(default_factory=dict)
 
 
 def _state(b: ToolpathBuilder) -> _State:
     state = b.memory.setdefault("tools", _State())
     assert isinstance(state, _State)
     if state.row != b.row:
-        kept = state.fields.get("length_register")
-        state.row, state.fields = b.row, {} if kept is None else {"length_register": kept}
+        state.row, state.fields = b.row, _register_field(state.fields.get("length_register"))
     return state
 
 
-def describe(b: ToolpathBuilder, **fields: Any) -> None:
+def describe(b: ToolpathBuilder, fields: ToolFields) -> None:
     """Add what is known of the tool in use from here on."""
     state = _state(b)
     state.fields.update(fields)
@@ -158,7 +175,7 @@ def toolno(b: ToolpathBuilder, s: Statement) -> None:
         b.turns()
     kind = next((w for w in s.words if isinstance(w, str) and w), "")
     size = [w for w in s.words[1:] if isinstance(w, float)]
-    fields: dict[str, Any] = {"shape": kind} if kind else {}
+    fields: ToolFields = {"shape": kind} if kind else {}
     register = s.after("OSETNO")
     if kind not in TURNING and size and register is None and len(s.words) <= _SHORT_TOOLNO:
         fields["diameter"] = size[0] * b.scale
@@ -166,12 +183,11 @@ def toolno(b: ToolpathBuilder, s: Statement) -> None:
             fields["corner_radius"] = size[1] * b.scale
     if s.numbers and 0 <= s.numbers[0] < _MAX_NUMBER:
         _renumber(_state(b), int(s.numbers[0]))
-    describe(b, **fields, **_register_field(b, register))
+    describe(b, fields | _register_field(_register(b, register)))
 
 
-def _register_field(b: ToolpathBuilder, register: float | None) -> dict[str, Any]:
-    found = _register(b, register)
-    return {} if found is None else {"length_register": int(found)}
+def _register_field(register: float | None) -> ToolFields:
+    return {} if register is None else {"length_register": int(register)}
 
 
 def cutcom(b: ToolpathBuilder, s: Statement) -> None:
@@ -179,7 +195,7 @@ def cutcom(b: ToolpathBuilder, s: Statement) -> None:
     and CUTCOM/ON right before the CUTCOM that says the side."""
     register = s.after("LENGTH")
     if register is not None and s.words[0] == "ON":
-        describe(b, **_register_field(b, register))
+        describe(b, _register_field(_register(b, register)))
     elif s.words != ("ON",) or not b.next_statement_is("CUTCOM"):
         b.event("CUTCOM", tuple(w for w in s.words if w != ""))
 
@@ -192,16 +208,16 @@ def tldata(b: ToolpathBuilder, s: Statement) -> None:
     shape = kinds[0] if kinds else ""
     if shape in TURNING and kinds[1:2] != ["MILL"]:
         b.turns()
-        describe(b, shape=shape)
+        describe(b, {"shape": shape})
         return
-    names = ("diameter", "corner_radius", "length")
-    fields: dict[str, Any] = {key: v * b.scale for key, v in zip(names, n, strict=False)}
-    if shape == "DRILL":
-        fields |= {"tip_angle": math.radians(n[3])} if len(n) > 3 else {}
-        fields |= {"flute_length": n[4] * b.scale} if len(n) > 4 else {}
-    else:
-        fields |= {key: math.radians(v) for key, v in zip(("taper", "tip_angle"), n[3:], strict=False)}
-    describe(b, shape=shape, **fields)
+    fields: ToolFields = {"shape": shape}
+    for key, value in zip(_SIZES, n, strict=False):
+        fields[key] = value * b.scale
+    for angle, value in zip(_DRILL_ANGLES if shape == "DRILL" else _MILL_ANGLES, n[3:], strict=False):
+        fields[angle] = math.radians(value)
+    if shape == "DRILL" and len(n) > 4:
+        fields["flute_length"] = n[4] * b.scale
+    describe(b, fields)
 
 
 def cutter(b: ToolpathBuilder, s: Statement) -> None:
@@ -212,21 +228,21 @@ def cutter(b: ToolpathBuilder, s: Statement) -> None:
             b.log.warning("cl.cutter", f"CUTTER/{s.body} names no diameter", b.line)
         return
     params = tuple(v if i in _CUTTER_ANGLES else v * b.scale for i, v in enumerate(n[:7]))
-    corner = {"corner_radius": params[1]} if len(params) > 1 else {}
-    describe(b, diameter=params[0], cutter=params, **corner)
+    corner: ToolFields = {"corner_radius": params[1]} if len(params) > 1 else {}
+    describe(b, {"diameter": params[0], "cutter": params, **corner})
 
 
 def flute_length(b: ToolpathBuilder, s: Statement) -> None:
     """CSI_SET_FLUTE_LENGTH/length."""
     if s.numbers:
-        describe(b, flute_length=s.numbers[0] * b.scale)
+        describe(b, {"flute_length": s.numbers[0] * b.scale})
 
 
 def tprint(b: ToolpathBuilder, s: Statement) -> None:
     """TPRINT/name, ...: the name of the tool."""
     name = s.body.split(",")[0].strip()
     if name:
-        describe(b, name=name)
+        describe(b, {"name": name})
 
 
 def select(b: ToolpathBuilder, s: Statement) -> None:

@@ -68,12 +68,12 @@ class ActualSerial(Actual):
 
     def place(self, w: Floats, direction: Floats | None = None) -> ToolPlace:
         """See the base class."""
-        tip, axis, side = self._sweep(w, direction, self.tool())
+        tip, axis, side = self._sweep(w, direction, self.tool)
         return tip, axis, side
 
     def aim(self, w: Floats, direction: Floats | None = None) -> tuple[Floats, Floats]:
         """See the base class."""
-        tip, axis = self._sweep(w, direction, self.tool()[:2])
+        tip, axis = self._sweep(w, direction, self.tool[:2])
         return tip, axis
 
     def _sweep(self, q: Floats, direction: Floats | None, tool: Sequence[Floats]) -> Floats:
@@ -88,6 +88,7 @@ class ActualSerial(Actual):
                 rows[part] = columns.to_rows(vector, len(q[part]))
         return result
 
+    @cached_property
     def tool(self) -> tuple[Floats, Floats, Floats]:
         """(tip, axis, x), each (3,), at q = 0, as the spindle's errors leave them."""
         return actual_tool(self.kinematics.tool_axis, self.kinematics.tool_length, self.errors)

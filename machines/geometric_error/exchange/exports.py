@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -84,6 +85,10 @@ def travel(machine: Machine, turns: float = 0.5) -> dict[str, tuple[float, float
 
 # ---- screw compensation ------------------------------------------------------------------------------------
 
+NotOfJoint = Literal["leans", "reference off the axis"]
+"""why a joint cannot take a positioning error back"""
+
+
 @dataclass(frozen=True)
 class Screws:
     """Screw compensation of LinuxCNC: text per joint letter, tables, losses (mm or rad), the model that the
@@ -94,7 +99,7 @@ class Screws:
     losses: dict[str, float]
     held: ErrorModel
     rest: ErrorModel
-    left: Mapping[str, str]
+    left: Mapping[str, NotOfJoint]
     """positioning errors that are not along or about the joint, and why"""
 
 
@@ -141,14 +146,14 @@ def _goes_beyond(machine: Machine, letter: str, span: tuple[float, float]) -> bo
     return bool(machine.limits.lower[j] < span[0] - SAME or machine.limits.upper[j] > span[1] + SAME)
 
 
-def _not_of_joint(model: ErrorModel, machine: Machine, component: Component) -> str:
-    """Why the joint cannot take a positioning error back; "" where it can."""
+def _not_of_joint(model: ErrorModel, machine: Machine, component: Component) -> NotOfJoint | None:
+    """Why the joint cannot take a positioning error back; None where it can."""
     letter = component.name.axis
     if leans(machine, letter):
-        return "its axis leans, and the error is not about the axis"
+        return "leans"
     if letter in ROTARY and not on_line(model, machine, letter):
-        return "the reference point of its axis lies next to the axis, so that it moves the tool sideways too"
-    return ""
+        return "reference off the axis"
+    return None
 
 
 def leans(machine: Machine, letter: str) -> bool:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from postproc.orientation.passes.passes import Pass
-from postproc.orientation.passes.reasons import HALF_TURN, BrokenLimit, Touching
+from postproc.orientation.passes.reasons import HALF_TURN, BrokenLimit, LimitedAngle, Touching
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
@@ -34,9 +34,7 @@ class CollisionBodies(Protocol):
 class _Bound:
     """An angle that must be inside [low, high], rad, at every point of a pass."""
 
-    name: str
-    what: str
-    """what the angle is measured from, where the name does not say it"""
+    limited: LimitedAngle
     values: Floats
     """(M, K)"""
     low: float
@@ -116,13 +114,13 @@ class AllowedAxes:
         at, limits = one.contact, self.limits
         if not len(at):
             lean = angle_between(axes, one.axis)[:, None]
-            return [_Bound("tilt", " from the axis of the CL file", lean, 0.0, self.tilt)]
+            return [_Bound("tilt from the CL axis", lean, 0.0, self.tilt)]
         least = off_centre(limits, one.radius)
-        result = [_Bound("tilt", " from the surface normal", at.inclination(axes), least, self.tilt)]
+        result = [_Bound("tilt from the normal", at.inclination(axes), least, self.tilt)]
         if limits.lead is not None:
-            result.append(_Bound("lead", "", at.lead(axes), limits.lead[0] * DEG, limits.lead[1] * DEG))
+            result.append(_Bound("lead", at.lead(axes), limits.lead[0] * DEG, limits.lead[1] * DEG))
         if limits.tilt is not None:
-            result.append(_Bound("tilt sideways", "", at.tilt(axes), limits.tilt[0] * DEG, limits.tilt[1] * DEG))
+            result.append(_Bound("tilt sideways", at.tilt(axes), limits.tilt[0] * DEG, limits.tilt[1] * DEG))
         return result
 
 
@@ -148,7 +146,7 @@ def _noted(one: Pass, bound: _Bound, k: int) -> BrokenLimit:
     """A limit that is broken at place k."""
     line = int(one.contact.line[k]) if len(one.contact) else None
     high = HALF_TURN if bound.high >= np.pi else bound.high / DEG
-    return BrokenLimit(bound.name, bound.what, float(bound.values[0, k]) / DEG, bound.low / DEG, high, line)
+    return BrokenLimit(bound.limited, float(bound.values[0, k]) / DEG, bound.low / DEG, high, line)
 
 
 def own_outside(one: Pass, limits: OrientationLimits) -> BrokenLimit | None:

@@ -17,10 +17,10 @@ from itertools import repeat
 from multiprocessing import get_context
 from typing import Any, TypeVar
 
+from postproc.base.progress import Progress
 from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import PassContext
 
-Progress = Callable[[str, int, int], None]
 T = TypeVar("T")
 CHUNK = 8
 """passes that are done one after the other"""

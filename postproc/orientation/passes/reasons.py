@@ -63,18 +63,24 @@ class Refusal:
         return "out of reach" + (nearest if self.missing > 0.0 else "")
 
 
+LimitedAngle = Literal["tilt from the CL axis", "tilt from the normal", "lead", "tilt sideways"]
+"""angles of a tool axis that are limited"""
+_ANGLE: dict[LimitedAngle, tuple[str, str]] = {
+    "tilt from the CL axis": ("tilt", " from the axis of the CL file"), "lead": ("lead", ""),
+    "tilt from the normal": ("tilt", " from the surface normal"), "tilt sideways": ("tilt sideways", "")}
+"""what each is called, and what it is measured from where the name does not say it"""
+
+
 @dataclass(frozen=True)
 class BrokenLimit:
     """The limit of tool axes that one breaks worst.
 
     Attributes:
-        name, origin: what the angle is called, and what it is measured from where the name does not say it
         angle, low, high: degrees at the worst place, and what is allowed
         line: of the CL file, None where only the axis of the pass is known
     """
 
-    name: str
-    origin: str
+    limited: LimitedAngle
     angle: float
     low: float
     high: float
@@ -82,10 +88,11 @@ class BrokenLimit:
 
     def __str__(self) -> str:
         where = "" if self.line is None else f" at line {self.line}"
+        name, origin = _ANGLE[self.limited]
         low, high = f"{self.low:.3f}", f"{self.high:.3f}"
-        between = f"{low} to {high}" if self.low != 0.0 or not self.origin else high
+        between = f"{low} to {high}" if self.low != 0.0 or not origin else high
         allowed = f"at least {low}" if self.high >= HALF_TURN else between
-        return f"{self.name} {self.angle:.3f} degrees{self.origin}{where}, allowed {allowed}"
+        return f"{name} {self.angle:.3f} degrees{origin}{where}, allowed {allowed}"
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.base.options import Options, Orientation
+from postproc.base.progress import Progress
 from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.candidates import tried
 from postproc.orientation.candidates.infeasible_passes import REACH, out_of_travel, unfit
@@ -16,7 +17,7 @@ from postproc.orientation.candidates.ranking import load_compiler
 from postproc.orientation.candidates.search import APART, PassSearch, Rejection
 from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.limit_checks import limit_faults
-from postproc.orientation.passes.parallel_map import PassFault, Progress, each_pass
+from postproc.orientation.passes.parallel_map import PassFault, each_pass
 from postproc.orientation.passes.pass_bodies import pass_bodies
 from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.orientation.passes.reasons import Slower

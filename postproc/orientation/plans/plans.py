@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.options import Orientation
+from postproc.base.progress import Progress
 from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.search import PassSearch
 from postproc.orientation.passes.allowed import AllowedAxes
-from postproc.orientation.passes.parallel_map import Progress, each_pass
+from postproc.orientation.passes.parallel_map import each_pass
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.index_time import PassEnds, all_ends, links_between, unwinding
 from postproc.orientation.plans.shortest_sequence import groupwise, shortest

@@ -1,7 +1,7 @@
 """By how much the length of a tool at the machine may differ from its gauge length before its program fails.
 
 Where only the table turns, the length register takes a difference up and the tip stays where it is. It does
-not where the tool turns and words are axis positions, on platforms whose slides the words are, and under
+not where the tool turns and words are machine coordinates, on platforms whose slides the words are, and under
 corrections that were made for one length. The program is executed once more with all tools longer by `STEP`:
 how far that takes tips, axes and joints of every block is linear in the length where the axis is the same, as it is here.
 """

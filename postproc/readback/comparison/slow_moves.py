@@ -77,21 +77,21 @@ def check_slow(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, own
     asked = _asked(moves, owner, cutting, tip, length)
     total, again = _by_move(owner, cutting, seconds, len(moves)), _pecked(moves, owner, cutting, tip, length)
     total = total / again
-    rules = _Slack.of(job, bool(motion.inch.any()))
+    rules = Slack.of(job, bool(motion.inch.any()))
     slack = rules.seconds + rules.length / np.where(moves.feed > 0.0, moves.feed, np.inf)
     check = (moves.kind != Kind.RAPID) & ~moves.link & (match >= 0) & np.isfinite(asked) & np.isfinite(total) & (total > 0.0)
     check &= ~_taps(job, moves)
     spare = np.pad(np.where(check, np.maximum(asked - total, 0.0), 0.0), 1)
     either = 2.0 * job.options.tolerance / np.where(moves.feed > 0.0, moves.feed, np.inf)
     slack = slack + np.minimum(spare[:-2] + spare[2:], either)
-    share = rules.share + _rounded(motion, job, owner, cutting, len(moves))
+    share = rules.share + feed_rounding(motion, job, owner, cutting, len(moves))
     run = _runs(motion, moves, owner, cutting, check)
     # What the axes need only adds to what is allowed: it is looked at where the feed alone would not explain the time.
     look = _too_long(total, asked, slack, share, run, check)
     if not look.any():
         return []
     cutting &= look[np.minimum(owner, len(moves) - 1)]
-    needs = _needed(motion, executed, moves, owner, cutting)
+    needs = axis_seconds(motion, executed, moves, owner, cutting)
     allowed = _allowed(owner, cutting, needs, tip, seconds, asked, again, len(moves))
     slow = np.flatnonzero(_too_long(total, np.where(look, allowed, asked), slack, share, run, look))
     if not len(slow):
@@ -112,7 +112,7 @@ def _asked(moves: Moves, owner: Ints, cutting: Bools, tip: Floats, length: Float
 
 
 @dataclass(frozen=True)
-class _Slack:
+class Slack:
     """What rounding explains: share of the time, s, and mm of a move's length."""
 
     share: float
@@ -120,7 +120,7 @@ class _Slack:
     length: float
 
     @classmethod
-    def of(cls, job: Job, inch: bool = False) -> _Slack:
+    def of(cls, job: Job, inch: bool = False) -> Slack:
         """Of a job; programs that correct geometric errors take up lost motion on the path."""
         unit = INCH if inch else 1.0
         if job.corrects:
@@ -151,12 +151,12 @@ def _runs(motion: Motion, moves: Moves, owner: Ints, cutting: Bools, check: Bool
     return np.concatenate([[0], np.cumsum(~joined)])
 
 
-def _rounded(motion: Motion, job: Job, owner: Ints, cutting: Bools, moves: int) -> Floats:
+def feed_rounding(motion: Motion, job: Job, owner: Ints, cutting: Bools, moves: int) -> Floats:
     """(M,) share of a move's time that the last decimal of its feed words may change."""
     least = np.full(moves + 1, np.inf)
     rows = np.flatnonzero(cutting & (motion.feed > 0.0))
     np.minimum.at(least, owner[rows], motion.feed[rows])
-    places = job.controller.format.feed_decimals + 2 * (least < 1.0) * (job.controller.writer != "heidenhain")
+    places = job.controller.format.feed_decimals + job.controller.format.small_feed_decimals * (least < 1.0)
     return np.asarray(10.0**-places.astype(np.float64) / least)[:-1]
 
 
@@ -175,7 +175,7 @@ def _taps(job: Job, moves: Moves) -> Bools:
     return np.asarray((moves.phase == Phase.DRILL) & taps[moves.cycle])
 
 
-def _needed(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, cutting: Bools) -> Floats:
+def axis_seconds(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, cutting: Bools) -> Floats:
     """(E,) s that the velocities of the axes ask of each block; in arcs those of X, Y, Z at the programmed feed."""
     needs = _least(motion, executed, cutting)
     control = executed.control
@@ -227,7 +227,7 @@ def check_fed_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Move
     needs = _least(motion, executed, rows)
     travel = np.concatenate([[np.inf], lengths(np.diff(tip, axis=0))])
     feed = np.where(down & (moves.feed[m] > 0.0), moves.feed[m], np.inf)
-    grain = _Slack.of(job, bool(motion.inch.any())).length
+    grain = Slack.of(job, bool(motion.inch.any())).length
     spot = np.where(down & (moves.seconds[m] > 0.0), moves.seconds[m], 0.0)
     allowed = np.fmax(np.fmax(needs, spot), travel / feed)
     machine = executed.control.machine

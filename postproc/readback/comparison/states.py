@@ -155,7 +155,7 @@ def check_lengths(motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
 
 def _registers_of(motion: Motion, job: Job, rows: Ints, named: Ints) -> Ints:
     """(K,) length register that should be in force in the blocks `rows`: that which the CL file names (K,);
-    none where axis positions hold the length of the tool already, and where the program calls none. A control
+    none where machine coordinates hold the length of the tool already, and where the program calls none. A control
     that takes the length with every tool change and cannot cancel it has it in force in any case (0 in its
     table, `tool.length_twice`)."""
     if job.control.length_on_z or job.controller.keeps_length:

@@ -66,14 +66,15 @@ class IsoReader(Reader):
         """Tools that M6 loads, and length registers by G43 H and G49."""
         tool, register = number_of(words, "T"), number_of(words, "H")
         change, _ = codes(words, "M", (6,))
-        new += [(int(b), LOADED, float(tool[b])) for b in change if tool[b] >= 0]
+        named = change[tool[change] >= 0]
+        new += [(b, LOADED, number) for b, number in zip(named.tolist(), tool[named].tolist(), strict=True)]
         lost = change[~(tool[change] >= 0)]
         if len(lost):
             found.append(error("gcode.tool", "M6 without a tool number", file=file, lines=line[lost][:6].tolist(),
                                count=len(lost)))
         blocks, code = codes(words, "G", (43, 49))
-        new += [(int(b), REGISTER, float(np.nan_to_num(register[b], nan=-1.0)) if c == 43 else -1.0)
-                for b, c in zip(blocks, code, strict=True)]
+        put = np.where(code == 43, np.nan_to_num(register[blocks], nan=-1.0), -1.0)
+        new += [(b, REGISTER, h) for b, h in zip(blocks.tolist(), put.tolist(), strict=True)]
 
     def rests(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
               found: list[Diagnostic]) -> None:
@@ -111,7 +112,7 @@ class IsoReader(Reader):
         """A fresh LinuxCNC's cycles return to R until G98 is stated (measured on 2.9; later it keeps the mode
         of the program before)."""
         cycles = codes(words, "G", CYCLES)[0]
-        if self.controller is None or self.controller.writer != "linuxcnc" or not len(cycles):
+        if self.controller is None or not self.controller.cycles.plane_at_start or not len(cycles):
             return
         stated = codes(words, "G", GROUPS["level"])[0]
         if not (stated <= cycles[0]).any():

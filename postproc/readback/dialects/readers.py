@@ -8,7 +8,7 @@ from typing import Literal
 from machines.choices import Stop
 from machines.machine import ClampCodes
 from postproc.control.rollover import Rollover
-from postproc.controllers.model import ControllerFile
+from postproc.controllers.model import ControllerFile, WriterName
 from postproc.readback.dialects.base import Reader
 from toolpaths.arrays import Floats
 
@@ -25,6 +25,7 @@ def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Float
     from postproc.readback.dialects.klartext import KlartextReader
     from postproc.readback.dialects.siemens import SiemensReader
 
-    readers: dict[str, type[Reader]] = {"iso": IsoReader, "linuxcnc": IsoReader, "fanuc": FanucReader, "haas": HaasReader,
-                                        "siemens": SiemensReader, "heidenhain": KlartextReader}
+    readers: dict[WriterName, type[Reader]] = {
+        "iso": IsoReader, "linuxcnc": IsoReader, "fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader,
+        "heidenhain": KlartextReader}
     return readers[controller.writer](letters, controller, home, stop, rolls, clamps)

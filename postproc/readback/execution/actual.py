@@ -121,7 +121,13 @@ class ActualBlockPoses(BlockPoses):
 
     def actual(self, number: int) -> Actual:
         """The machine with errors at the tip of a tool by its number."""
-        return self.model.on(self.kinematics(number))
+        if number not in self._actual:
+            self._actual[number] = self.model.on(self.kinematics(number))
+        return self._actual[number]
+
+    @cached_property
+    def _actual(self) -> dict[int, Actual]:
+        return {}
 
     @cached_property
     def _bidirectional(self) -> list[int]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from machines.geometric_error.actual.error_rates import ErrorRates, joined, pivot_rates, standing_arm
 from machines.kinematics.base import Kinematics
+from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.readback.execution import assembly
@@ -57,9 +58,7 @@ class BlockPoses:
     def _placed(self, motion: Motion, rows: Ints, position: Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of machine coordinates (K, J) with the tools and registers of the blocks `rows`."""
         tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
-        tool, register = motion.tool[rows], motion.register[rows]
-        for number, h in {*zip(tool.tolist(), register.tolist(), strict=True)}:
-            k = np.flatnonzero((tool == number) & (register == h))
+        for k, (number, h) in alike(motion.tool[rows], motion.register[rows]):
             kin, offset = self.kinematics(number), self.lengths.get(h, 0.0) if h >= 0 else 0.0
             if self.before is None:
                 tip[k], axis[k] = self._pose(position[k], kin, offset)
@@ -301,6 +300,5 @@ def arc_sweeps(motion: Motion, control: Control) -> Floats:
 
 def alike(*columns: Ints) -> Iterator[tuple[Ints, tuple[int, ...]]]:
     """(rows, values) of columns (K,), by their values."""
-    kinds, inverse = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
-    for number, values in enumerate(kinds.tolist()):
-        yield np.flatnonzero(inverse.ravel() == number), tuple(values)
+    for rows in groups(*columns):
+        yield rows, tuple(column.item(rows[0]) for column in columns)

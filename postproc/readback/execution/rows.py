@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats, Ints, joined
-from toolpaths.shapes import arrays
+from toolpaths.shapes import arrays, rows_of
 
 if TYPE_CHECKING:
     from postproc.readback.execution.offsets import Offsets
@@ -47,9 +47,7 @@ class BlockSection:
 
     def cut(self, first: int, last: int) -> BlockSection:
         """Blocks first to before last."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        parts: dict[str, Any] = {name: value[first:last] for name, value in values.items() if isinstance(value, np.ndarray)}
-        return replace(self, first=self.first + first, **parts)
+        return replace(rows_of(self, "N", slice(first, last)), first=self.first + first)
 
     @cached_property
     def has_steps(self) -> bool:

@@ -219,6 +219,14 @@ def test_help_is_instant_and_lists_the_commands() -> None:
     assert not re.search(r"\| +(numpy|numba|pydantic)\s*$", got.stderr, re.MULTILINE)
 
 
+def test_help_lists_commands_from_convert_to_files_and_cuts_none_short() -> None:
+    root = typer.main.get_command(app)
+    page = run("--help").stdout
+    first = re.findall(r"^  (?:│ )?([a-z]+) {2,}", page.partition("Commands:")[2], re.MULTILINE)
+    assert first[:4] == ["convert", "verify", "inspect", "trace"] and set(first) == set(root.commands)
+    assert "..." not in page.partition("Commands:")[2]
+
+
 def commands(group: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
     for name, command in group.commands.items():
         if hasattr(command, "commands"):
@@ -239,6 +247,10 @@ def test_help_says_what_each_option_takes(words: tuple[str, ...]) -> None:
         if one.param_type_name == "option" and not one.is_flag:
             assert one.metavar, one.name
     page = " ".join(run(*words, "--help").stdout.split())
+    usage = page.partition("Usage: ")[2].partition(" Arguments: ")[0]
+    names = [one.metavar for one in PAGES[words].params if one.param_type_name == "argument"]
+    assert usage.startswith(f"postproc {' '.join([*words, '[OPTIONS]', *names])} ")
+    assert not re.search(r"<=x|x>=|<str>|<path>|\.\.\.\.", page)
     if "--dialect" in page:
         assert f"{{{','.join(DIALECTS)}}}" in page.replace(" ", "").replace("│", "")
 

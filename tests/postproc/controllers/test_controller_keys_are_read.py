@@ -34,8 +34,8 @@ OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "modes.tcp", "
 """keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py,
 test_compensated_arcs.py, test_parts.py, test_rollover.py, test_options.py, test_hooks_refused.py, test_output_quality.py and
 test_output_modes*.py show what they do"""
-READ_BACK = {"cycles.peck_relief"}
-"""how the control moves inside a canned cycle, which the read-back follows and no block states"""
+READ_BACK = {"cycles.peck_relief", "cycles.plane_at_start", "arcs.helix_by_angle"}
+"""how the control moves inside a canned cycle, which the read-back follows and no block states, and what rounding moves"""
 OTHER: dict[str, Any] = {
     "writer": "iso", "format.line_length": 40, "program.passive": ["M19"], "program.path_tolerance": [],
     "format.speed_decimals": 0,
@@ -67,6 +67,10 @@ FLAT = ["PPRINT/NOTE A LONG TEXT FOR PEOPLE", "COOLNT/FLOOD", "RAPID", "GOTO/0,0
         "CYCLE/OFF", "RAPID", "GOTO/60,0,50", "LOADTL/2",
         "RAPID", "GOTO/0,0,5", "GOTO/1,0,5"]
 PECK = ["RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,5,STEP,2,MMPM,100,RAPTO,3,RTRCTO,20", "GOTO/40,0,0", "CYCLE/OFF"]
+SLOW = ["RAPID", "GOTO/0,0,5", "FEDRAT/MMPM,0.1234567", "GOTO/0.001,0,5"]
+LEVELS = ["RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,5,MMPM,100,CLEAR,3", "GOTO/40,0,0",
+          "CYCLE/DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,50", "GOTO/50,0,0", "CYCLE/OFF"]
+"""the second hole begins at the plane of the first and ends at the level of before"""
 NX = ["TOOL PATH/A,TOOL,T", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1", "SPINDL/RPM,1000,CLW"]
 ARCS = ["RAPID", "GOTO/10,0,5,0,0,1", "FEDRAT/MMPM,600", "GOTO/10,0,0", "CIRCLE/0,0,0,0,0,-1,10,0.03,0.5,10,0",
         "GOTO/0,10,0",
@@ -113,7 +117,9 @@ def texts(controller: str | Path) -> Iterator[str]:
     """What becomes of each path, one after the other: its program, or the errors."""
     for lines, head, name, mode in ((FLAT, HEAD, "mill-3axis", "auto"), (ARCS, NX, "mill-3axis", "auto"),
                                     (TURN, HEAD, "mikron-ucp710", "auto"), (INSERTED, HEAD, "mill-3axis", "auto"),
-                                    (PECK, HEAD, "mill-3axis", "auto"), (TURN, HEAD, "linuxcnc-xyzac-trt", "auto"),
+                                    (PECK, HEAD, "mill-3axis", "auto"),
+                                    (SLOW, HEAD, "mill-3axis", "auto"), (LEVELS, HEAD, "mill-3axis", "auto"),
+                                    (TURN, HEAD, "linuxcnc-xyzac-trt", "auto"),
                                     (TURN, HEAD, "mikron-ucp710", "inverse-time")):
         try:
             made = convert(toolpath(*lines, head=head), name, controller, feed_mode=mode)
@@ -130,7 +136,7 @@ def usual() -> tuple[str, ...]:
 
 
 def test_the_paths_use_everything() -> None:
-    assert [t.startswith("%") for t in usual()] == [True, True, True, False, True, True, True], usual()
+    assert [t.startswith("%") for t in usual()] == [True, True, True, False, True, True, True, True, True], usual()
 
 
 def test_the_read_back_follows_the_controls_pecks(tmp_path: Path) -> None:

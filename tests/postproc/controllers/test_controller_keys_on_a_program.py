@@ -65,6 +65,15 @@ def outcome(result: PostResult) -> str:
     return text or " ".join(sorted({d.code for d in result.diagnostics if d.severity.name == "ERROR"}))
 
 
+def test_helices_by_angle_are_rounded_by_it(tmp_path: Path) -> None:
+    """The last decimal of the angle moves the end of a helix: it stands in the bound of the rounding."""
+    shop = tmp_path / "shop.toml"
+    shop.write_text('base = "heidenhain-tnc640"\narcs.helix_by_angle = false\n')
+    by_angle, by_end = (made(name, "helix") for name in ("heidenhain-tnc640", shop))
+    assert by_angle.job is not None and by_end.job is not None and by_angle.ok
+    assert by_angle.job.rounding.tip - by_end.job.rounding.tip > 5e-6  # 10 mm by half of 0.0001 degrees
+
+
 @pytest.mark.parametrize(("controller", "key", "value", "what"), KEYS, ids=lambda v: str(v)[:40])
 def test_each_key_counts(controller: str, key: str, value: str, what: str, tmp_path: Path) -> None:
     shop, plain = (tmp_path / f"{controller}-{name}.toml" for name in ("shop", "plain"))

@@ -17,7 +17,6 @@ import pytest
 from scipy.spatial import cKDTree
 
 import postproc
-import toolpaths
 from postproc.base.options import Options
 from postproc.pipeline.result import PostResult
 from postproc.reference.holes import Phase
@@ -25,6 +24,7 @@ from postproc.verification.residual_errors import after_formatting
 from tests.machines.independent_machine import Errors, Machine
 from tests.machines.random_error_files import Draw
 from tests.postproc.independent_reader import End, read
+from tests.postproc.kit import few_sides
 from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
@@ -126,10 +126,9 @@ def converted(case: Case, corrected: bool = True) -> Run:
     setup = "h4a" if machine.startswith("h4a") else "delta" if machine == "uranesx" else "tools"
     with TemporaryDirectory() as folder:
         file = Draw(Path(folder), own, seed).write()
-        path, found = toolpaths.read(SAMPLES / sample)
         options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"), output=mode,
                           error_model=str(file) if corrected else "")
-        result = postproc.convert(path, machine, controller, options=options, diagnostics=found)
+        result = postproc.convert(few_sides(sample), machine, controller, options=options)
         return run_of(result, own, Errors(file), controller)
 
 

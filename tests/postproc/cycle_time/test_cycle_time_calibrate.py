@@ -55,10 +55,16 @@ def fit(truth: CycleTimeModel, rng: np.random.Generator) -> CalibratedModel:
     return made
 
 
+@cache
+def with_jerk() -> CalibratedModel:
+    rng = np.random.default_rng(4)
+    return fit(hidden(rng), rng)
+
+
 def test_hidden_parameters_are_found_and_bands_hold_on_other_programs() -> None:
     rng = np.random.default_rng(8)
     inside, off, narrower = [], [], []
-    for _ in range(4):
+    for _ in range(3):
         truth = hidden(rng)
         made = fit(truth, rng)
         off.append([abs(np.log(made.values[name][0] / getattr(truth, name))) / made.values[name][1]
@@ -92,12 +98,11 @@ def test_a_control_without_jerk_is_recognised() -> None:
     rng = np.random.default_rng(3)
     truth = hidden(rng).model_copy(update={"jerk": False})
     assert not fit(truth, rng).model.jerk
-    assert fit(hidden(rng), rng).model.jerk
+    assert with_jerk().model.jerk
 
 
 def test_the_model_is_a_file(tmp_path: Path) -> None:
-    rng = np.random.default_rng(4)
-    made = fit(hidden(rng), rng).model
+    made = with_jerk().model
     (tmp_path / "shop.toml").write_text(as_toml(made))
     loaded, found = load_model(tmp_path / "shop.toml")
     assert not found and loaded == made

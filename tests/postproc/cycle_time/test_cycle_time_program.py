@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -135,14 +137,16 @@ def test_programs_and_cl_files_are_distinguished() -> None:
         assert not looks_like_gcode(text), text
 
 
-def test_cycles_return_to_r_until_linuxcnc_is_reported_otherwise() -> None:
-    """Measured: a fresh LinuxCNC without G98 or G99; other controls begin with G98."""
+def test_cycles_return_to_r_until_linuxcnc_is_reported_otherwise(tmp_path: Path) -> None:
+    """Measured: a fresh LinuxCNC without G98 or G99; other controls begin with G98. It is a key of the controller file."""
+    shop = tmp_path / "shop.toml"
+    shop.write_text('base = "generic-iso"\ncycles.plane_at_start = true\n')
     text = f"{HEAD}\nG0 Z300\nF900\n{{}}G81 X5 Y5 Z280 R290\nX10\nG80"
 
     def last(level: str, controller: str = "linuxcnc") -> float:
         return float(blocks(text.format(level), controller=controller).end[-1, 2])
     assert last("") == last("G99 ") == 290.0
-    assert last("G98 ") == last("", "generic-iso") == 300.0
+    assert last("G98 ") == last("", "generic-iso") == 300.0 and last("", str(shop)) == 290.0
 
 
 def test_faults_of_a_program_are_reported() -> None:

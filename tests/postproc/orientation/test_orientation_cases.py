@@ -216,7 +216,7 @@ def test_an_angle_for_passes_in_many_directions() -> None:
     ("siemens-840d", "per-pass", 2), ("heidenhain-tnc640", "per-pass", 2),
     pytest.param("linuxcnc", "auto", 12, marks=pytest.mark.slow)])
 def test_a_flat_cutter_on_a_trunnion(controller: str, plan: Orientation, count: int) -> None:
-    """C at 45 degrees, A at 0, in planes or as axis positions; tips and axes of the file are as they were."""
+    """C at 45 degrees, A at 0, in planes or as machine coordinates; tips and axes of the file are as they were."""
     path = strips([0.0] * count, "16,1")
     result = written("mikron-ucp710", path, controller, plan)
     assert near(45.0, standing(result, "C")) and standing(result, "A") == {0.0}

@@ -14,7 +14,7 @@ import postproc
 import postproc.readback.execution.frames as frames
 import toolpaths
 from postproc.base.options import Options
-from postproc.control.control import tool_frames
+from postproc.control.control import MODE_NAMES, tool_frames
 from postproc.pipeline.next_modes import COARSER
 from postproc.pipeline.result import PostResult
 from postproc.readback.execution.frames import tool_frame
@@ -100,7 +100,25 @@ def test_one_operation_takes_the_next_mode_and_the_warning_names_it(controller: 
     said = [d for d in result.diagnostics if d.code == "output.next_mode"]
     assert len(said) == 1 and said[0].severity is Severity.WARNING and said[0].count == 2
     assert all(name in said[0].message for name in BOTTOM) and "planted" in said[0].message
-    assert "axis positions" in said[0].message and "tilted plane" in said[0].message and len(said[0].lines) == 2
+    assert f"written in {MODE_NAMES['axes']}, since in {MODE_NAMES['tilted']} [" in said[0].message
+    assert len(said[0].lines) == 2
+
+
+def test_each_operation_is_named_with_its_own_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, planted = frames._wrong_pose, list[int]()
+
+    def wrong(law, control, kin, q, file, line):
+        if law.rotation is not None and law.rotation[2, 2] < -0.999:
+            planted.append(line)
+            return [error(f"planted.{len(planted)}", f"planted in block {line}", file=file, lines=[line])]
+        return whole(law, control, kin, q, file, line)
+    monkeypatch.setattr(frames, "_wrong_pose", wrong)
+    result = casting("siemens-840d")
+    assert result.ok, errors_of(result)
+    said = {d.message.partition(":")[0]: d for d in result.diagnostics if d.code == "output.next_mode"}
+    assert set(said) == set(BOTTOM) and len(planted) == 2
+    for k, name in enumerate(BOTTOM):
+        assert f"[planted.{k + 1}] planted in block {planted[k]} " in said[name].message
 
 
 def test_all_operations_take_the_next_mode_where_none_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Laws of words: the same part by axis positions, by the tip and in a tilted plane, hand-written for every dialect.
+"""Laws of words: the same part by machine coordinates, by the tip and in a tilted plane, hand-written for every dialect.
 
 Tips and axes come from homogeneous matrices of the kit, angles of planes from formulas written here.
 """

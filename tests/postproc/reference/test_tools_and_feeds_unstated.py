@@ -115,7 +115,7 @@ def test_two_tools_of_one_number_are_refused_and_the_set_up_is_named() -> None:
     third = TWO.split("END-OF-PATH")[0].replace("EM12", "EM8").replace("MILL,12", "MILL,8").replace("TOOL,0", "TOOL,1")
     text = third + "END-OF-PATH\n" + TWO.replace("TOOL,0", "TOOL,3")
     hint = said(converted(text), "tool.same_number").hint
-    assert '[tool_numbers] "EM12" = 3, "EM6" = 2' in hint, "1 is the number of another tool"
+    assert '[tool_numbers]\n"EM12" = 3\n"EM6" = 2' in hint, "1 is the number of another tool"
     assert converted(text, of=setup(tool_numbers={"EM12": 3, "EM6": 2})).ok
     assert '[tool_numbers]\n"EM12" = 1\n"EM6" = 2' in said(converted(TWO), "tool.number").hint
 

@@ -18,7 +18,7 @@ from toolpaths import read
 
 GOLDEN = Path(__file__).parents[2] / "golden"
 PROGRAMS = {
-    "head, axis positions": ("short_five_axis.apt", "head-table", "generic-iso", "tools", ""),
+    "head, machine coordinates": ("short_five_axis.apt", "head-table", "generic-iso", "tools", ""),
     "fork head, two tools": ("five_tilted.cls", "nutating-head", "linuxcnc", "tools", ""),
     "six rods": ("pocket.cls", "uranesx", "linuxcnc", "delta", ""),
     "delta": ("pocket.cls", "delta-star", "generic-iso", "delta", ""),
@@ -72,7 +72,7 @@ def test_a_register_takes_up_the_length_where_only_the_table_turns() -> None:
 
 
 def test_head_summary_and_figures_state_the_margin(tmp_path: Path) -> None:
-    result = made("head, axis positions")
+    result = made("head, machine coordinates")
     (one,) = result.comparison.lengths
     assert f"({one.line()})" in result.text and one.line() in as_text(result, "part.ngc")
     assert 0.0 < one.shorter < 0.1 and f"by -{np.floor(one.shorter * 1000.0) / 1000.0:.3f} mm, then tolerance" in one.line()

@@ -84,7 +84,7 @@ def run(*args: str) -> tuple[int, str]:
 
 
 def test_verify_takes_the_lengths_of_the_table(tmp_path: Path) -> None:
-    """A head in axis positions: a hundredth too long is inside the tolerance, two are not; a missing tool is named."""
+    """A head in machine coordinates: a hundredth too long is inside the tolerance, two are not; a missing tool is named."""
     given = ("-m", "head-table", "-c", "generic-iso", "--setup", str(SAMPLES / "tools.setup.toml"))
     program, table = tmp_path / "part.nc", tmp_path / "tools.tbl"
     assert run("convert", str(CL), *given, "-o", str(program))[0] == 0

@@ -37,6 +37,7 @@ def verdict(result: PostResult, text: str, *severities: Severity) -> set[str]:
             if d.severity in (severities or (Severity.ERROR,))}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", CONTROLS)
 @pytest.mark.parametrize(("asked", "most"),
                          [(15915.507752, 0), (795.774715, 1), (79.577472, 2), (7.957747, 3)])
@@ -58,6 +59,7 @@ def test_coolant_and_spindle_are_not_switched_off_and_on_at_one_place(controller
         assert result.ok and strip(result.text) == strip(plain.text), pair
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", CONTROLS)
 @pytest.mark.parametrize(("events", "code"), [
     (("COOLNT/OFF", "DELAY/2", "COOLNT/FLOOD"), "M9"), (("COOLNT/OFF", "OPSTOP", "COOLNT/FLOOD"), "M9"),
@@ -130,6 +132,7 @@ def indexing(controller: str, index: str, output: str) -> PostResult:
                             Options(output=output))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("output", ["auto", "axes"])
 @pytest.mark.parametrize("controller", CONTROLS)
 def test_the_tool_is_home_while_rotary_axes_are_turned(controller: str, output: str) -> None:

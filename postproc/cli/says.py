@@ -1,0 +1,24 @@
+"""How much a command says, by its options -q, -v and --strict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass
+class Says:
+    """Set by the options of the command that runs.
+
+    Attributes:
+        quiet: notes, figures and the job file's line are left out
+        verbose: each stage is named as it begins
+        strict: warnings are errors
+    """
+
+    quiet: bool = False
+    verbose: bool = False
+    strict: bool = False
+
+
+SAYS = Says()
+"""of the command that runs: every command sets all three before it begins"""

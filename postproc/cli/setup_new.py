@@ -1,0 +1,190 @@
+"""The command `postproc setup new`. Heavy packages are imported inside, so that --help is instant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from postproc.cli.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.cli.options import (
+    Allow,
+    AxisToleranceOption,
+    ClFile,
+    DialectOption,
+    MachineName,
+    ToleranceOption,
+    UnitsOption,
+)
+
+if TYPE_CHECKING:
+    from postproc.base.options import Options
+    from postproc.setup_sheet.make import SetupSheet
+    from postproc.setup_sheet.questions import GivenAnswers, Question
+
+EXAMPLES = """Example: postproc setup new part.cls -m mikron-ucp710 -c fanuc-30i -o part.setup.toml
+
+It asks for what neither the CL file nor the machine states; options answer before it asks; --yes writes assumed
+values and marks them. The place of the part is one that travel allows, and the set-up is written where the conversion
+with it is proved."""
+_ALL_TOOLS = "of tool N, or without N= of all tools; may be repeated"
+
+
+def setup_new(file: ClFile, machine: MachineName,
+              output: Annotated[Path, typer.Option("-o", "--output", metavar="S.toml", help="set-up file to write")],
+              controller: Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER",
+                                                      help="controller for which it is proved")] = "linuxcnc",
+              yes: Annotated[bool, typer.Option("--yes", help="ask nothing: write assumed values, marked so")] = False,
+              force: Annotated[bool, typer.Option("--force", help="replace a file that there is already")] = False,
+              gauge_length: Annotated[list[str] | None, typer.Option("--gauge-length", metavar="[N=]MM",
+                                                                     help=f"gauge length {_ALL_TOOLS}")] = None,
+              spindle: Annotated[list[str] | None, typer.Option("--spindle", metavar="[N=]RPM", help="spindle speed where "
+                                                                f"the CL file states none, {_ALL_TOOLS}")] = None,
+              feed: Annotated[float | None, typer.Option("--feed", metavar="MM/MIN", min=0.001, max=2e5,
+                                                         help="feed of cuts for which the CL file states none")] = None,
+              coolant: Annotated[str, typer.Option("--coolant", metavar="KIND", help="where the CL file states none: off, "
+                                                   "flood, mist, through, air")] = "",
+              work_offset_code: Annotated[str, typer.Option("--work-offset-code", metavar="CODE", help="register of the "
+                                                            "work offset, as the control names it")] = "G54",
+              tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
+              units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None, json: Json = "") -> None:
+    """Write the set-up of a CL file: what the files state, what is asked for, a place that fits; proved."""
+    from postproc.base.options import Options
+
+    refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), **own_files(machine, controller)})
+    if output.exists() and not force:
+        raise typer.BadParameter(f"{output} exists; --force replaces it", param_hint="-o")
+    given = _given(gauge_length or [], spindle or [], feed, coolant)
+    options = Options(tolerance, axis_tolerance, units=units, dialect=dialect,
+                      allow_unknown=tuple(w.upper() for w in allow_unknown or ()))
+    values: dict[str, Any] = {}
+    with shown_errors(json), progress_bar() as progress:
+        sheet = _made(file, machine, controller, options, given, yes, work_offset_code, progress)
+    text = ""
+    outputs: dict[Path, str | bytes] = {}
+    if sheet.text:
+        outputs[output] = sheet.text
+        text = _text(sheet, output, file, machine, controller, units)
+    values = _values(sheet, output)
+    report(sheet.diagnostics, json, values, text, outputs)
+
+
+def _made(file: Path, machine: str, controller: str, options: Options, given: GivenAnswers, yes: bool, code: str,
+          progress: Any) -> SetupSheet:
+    import toolpaths
+    from postproc.setup_sheet.make import new_setup
+
+    asked, m = _Asking(), machine_of(machine)
+    path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
+                                 allow_unknown=options.allow_unknown)
+    try:
+        return new_setup(path, m, controller, options, given, None if yes else asked, yes, found, code, progress)
+    except EOFError:
+        return new_setup(path, m, controller, options, asked.added(given), None, False, found, code, progress)
+
+
+class _Asking:
+    """Asks on the terminal until an answer fits; the last gauge length and speed are offered for the next tool."""
+
+    def __init__(self) -> None:
+        self.last: dict[str, float | str] = {}
+        self.done: list[tuple[Question, float | str]] = []
+
+    def __call__(self, question: Question) -> float | str:
+        from dataclasses import replace
+
+        from postproc.setup_sheet.questions import parsed
+
+        one = question if question.default is not None else replace(question, default=self.last.get(question.kind))
+        while True:
+            typer.echo(one.prompt(), nl=False, err=True)
+            value, wrong = parsed(one, _line())
+            if value is not None and not wrong:
+                self.last[question.kind] = value
+                self.done.append((question, value))
+                return value
+            typer.echo(wrong, err=True)
+
+    def added(self, given: GivenAnswers) -> GivenAnswers:
+        """The options of the command line with what was answered before standard input ended."""
+        from dataclasses import replace
+
+        result = given
+        for question, value in self.done:
+            if question.kind == "coolant":
+                result = replace(result, coolant=str(value))
+            elif question.kind == "feed":
+                result = replace(result, feed=float(value))
+            elif question.kind == "spindle":
+                result = replace(result, spindle={**result.spindle, question.number: float(value)})
+            else:
+                result = replace(result, gauge_length={**result.gauge_length, question.number: float(value)})
+        return result
+
+
+def _line() -> str:
+    """One line of standard input.
+
+    Raises:
+        EOFError: where it has ended.
+    """
+    import sys
+
+    line = sys.stdin.readline()
+    if not line:
+        raise EOFError
+    return line
+
+
+def _given(lengths: list[str], speeds: list[str], feed: float | None, coolant: str) -> GivenAnswers:
+    from typing import get_args
+
+    from postproc.setup.spindle import CoolantKind
+    from postproc.setup_sheet.questions import GivenAnswers
+
+    if coolant and coolant not in get_args(CoolantKind):
+        raise typer.BadParameter(f"{coolant!r} is not available; choose from {', '.join(get_args(CoolantKind))}",
+                                 param_hint="--coolant")
+    return GivenAnswers(_numbers(lengths, "--gauge-length", 2000.0), _numbers(speeds, "--spindle", 200000.0), feed, coolant)
+
+
+def _numbers(values: list[str], option: str, most: float) -> dict[int, float]:
+    """By tool number, 0 for all; wrong use where a value is none."""
+    result = {}
+    for text in values:
+        number, _, value = text.rpartition("=")
+        try:
+            tool, size = int(number.lstrip("Tt") or 0), float(value)
+        except ValueError:
+            raise typer.BadParameter(f"{text!r} is neither a number nor N=number", param_hint=option) from None
+        if not 0.0 < size <= most or tool < 0:
+            raise typer.BadParameter(f"{text!r} is not above 0 and at most {most:g}", param_hint=option)
+        result[tool] = size
+    return result
+
+
+def _values(sheet: SetupSheet, output: Path) -> dict[str, Any]:
+    place = sheet.fit.place if sheet.fit is not None else None
+    return {"output": str(output) if sheet.text else None, "questions": len(sheet.questions),
+            "answers": [{"key": key, "value": one.value, "source": one.source} for key, one in sheet.answers],
+            "assumed": sheet.assumed if sheet.text else [],
+            "tool_numbers": sheet.facts.numbers if sheet.facts is not None else {},
+            "part": place.part.model_dump(mode="json") if place is not None and sheet.text else None,
+            "place_reason": place.why if place is not None and sheet.text else "",
+            "places_tried": sheet.fit.tried if sheet.fit is not None else 0,
+            "diagnostics": [d.as_dict() for d in sheet.diagnostics]}
+
+
+def _text(sheet: SetupSheet, output: Path, file: Path, machine: str, controller: str, units: str) -> str:
+    """What was written, and the command that uses it."""
+    assert sheet.fit is not None
+    place, questions = sheet.fit.place, len(sheet.questions)
+    assumed = f", {len(sheet.assumed)} assumed" if sheet.assumed else ""
+    given = f" --units {units}" if units else ""
+    lines = [f"written: {output}, proved by a conversion", f"{questions} question{'s' * (questions != 1)}{assumed}"]
+    if place is not None:
+        lines.append(f"part: {place.why}")
+    lines.append(f"next: postproc convert {file} -m {machine} -c {controller} --setup {output}{given} -o "
+                 f"{file.with_suffix('.nc').name}")
+    return "\n".join(lines)

@@ -1,0 +1,134 @@
+"""A new set-up: facts of the files -> questions -> answers -> a place that fits, proved by a conversion -> text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from machines.machine import Machine
+from postproc.base.options import Options
+from postproc.controllers.model import load_controller
+from postproc.setup.model import SetupFile
+from postproc.setup_sheet.facts import SheetFacts, facts_of
+from postproc.setup_sheet.place import Fit, Progress, fitted
+from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, questions_of
+from postproc.setup_sheet.text import SheetHead, sheet_text, sheet_values
+from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, require, warning
+from toolpaths.toolpath import Toolpath
+
+
+@dataclass(frozen=True)
+class SetupSheet:
+    """What came of it: `text` is "" where a diagnostic is an ERROR.
+
+    Attributes:
+        questions: all that the files leave open
+        answers: by key of the set-up
+    """
+
+    text: str
+    diagnostics: tuple[Diagnostic, ...]
+    facts: SheetFacts | None = None
+    questions: tuple[Question, ...] = ()
+    answers: tuple[tuple[str, Answer], ...] = ()
+    fit: Fit | None = None
+
+    @property
+    def assumed(self) -> list[str]:
+        """Keys that --yes has assumed."""
+        return list(self.fit.setup.assumed) if self.fit is not None else []
+
+
+def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, options: Options, given: GivenAnswers,
+              ask: Callable[[Question], float | str] | None, assume: bool, found: list[Diagnostic],
+              code: str = "G54", progress: Progress | None = None) -> SetupSheet:
+    """The set-up of a file on a machine and a control, proved by a conversion.
+
+    Args:
+        given: answers of the command line
+        ask: asks for one value; None: nobody can be asked
+        assume: questions without an answer take what is assumed, marked so
+        found: what reading the file found
+        code: register of the work offset
+    """
+    spec, faults = load_controller(controller)
+    require(faults)
+    assert spec is not None
+    known = [*found, *(d for d in toolpath.faults if d not in found)]
+    if has_errors(known):
+        return SetupSheet("", tuple(known))
+    facts = facts_of(toolpath, machine, spec, options)
+    if facts.refused:
+        return SetupSheet("", (*known, *facts.refused), facts)
+    questions = questions_of(facts)
+    answers, left = answered(questions, given, ask, assume)
+    known += _unused(given, facts, toolpath)
+    for tool in () if facts.lengths else facts.tools:  # not needed, but given: travel is checked with it
+        length = given.gauge_length.get(tool.number, given.gauge_length.get(0))
+        if length is not None:
+            answers[f"tools.{tool.number}.gauge_length"] = Answer(length, "answered")
+    if left:
+        return SetupSheet("", (*known, _open(left, toolpath.file)), facts, tuple(questions), tuple(answers.items()))
+    values = sheet_values(facts, answers, toolpath.name or Path(toolpath.file).name, code)
+    setup = SetupFile.model_validate({**values, "work_offset": toolpath.frames[0].name})
+    fit = fitted(toolpath, machine, controller, setup, options, found, progress)
+    made = SetupSheet("", tuple(known), facts, tuple(questions), tuple(answers.items()), fit)
+    if not fit.result.ok:
+        return _with(made, _not_fitted(fit), text="")
+    head = SheetHead(Path(toolpath.file).name, machine.name, fit.result.controller_name, toolpath.units,
+                     _units(found, options), options.tolerance, options.axis_tolerance)
+    return _with(made, _assumed(made, fit), text=sheet_text(head, facts, answers, fit, toolpath))
+
+
+def _units(found: list[Diagnostic], options: Options) -> str:
+    """Where the units come from."""
+    if options.units:
+        return f"answered (--units {options.units}: state it to convert too)"
+    said = next((d.severity for d in found if d.code == "cl.no-units"), None)
+    if said is None:
+        return "stated by the CL file"
+    if said is Severity.INFO:
+        return "by the unit of the feeds in the CL file, which has no UNITS record"
+    return "ASSUMED: the CL file states none; where it is in inches, write this file again with --units inch"
+
+
+def _with(made: SetupSheet, more: list[Diagnostic], text: str) -> SetupSheet:
+    return SetupSheet(text, (*made.diagnostics, *more), made.facts, made.questions, made.answers, made.fit)
+
+
+def _open(left: list[Question], file: str) -> Diagnostic:
+    """All that still has to be given, in one list."""
+    lines = [f"  {one.text}{f', {one.unit}' if one.unit else ''}: {one.option}" for one in left]
+    said = f"{len(left)} value{'s' * (len(left) > 1)} nobody has stated:\n" + "\n".join(lines)
+    return error("setup.unanswered", said, file=file, hint="run it on a terminal, give the options, or --yes to write "
+                 "assumed values that are marked so")
+
+
+def _unused(given: GivenAnswers, facts: SheetFacts, toolpath: Toolpath) -> list[Diagnostic]:
+    """Answers for tools that the file does not cut with."""
+    used = {tool.number for tool in facts.tools}
+    wrong = sorted({n for n in (*given.gauge_length, *given.spindle) if n and n not in used})
+    if not wrong:
+        return []
+    return [error("setup.no_such_tool", f"{', '.join(f'T{n}' for n in wrong)}: the CL file cuts with no such tool",
+                  file=toolpath.file, hint=f"it cuts with {', '.join(f'T{n}' for n in sorted(used))}")]
+
+
+def _assumed(made: SetupSheet, fit: Fit) -> list[Diagnostic]:
+    """What was assumed, as a warning each."""
+    keys = {one.key: one for one in made.questions}
+    values = dict(made.answers)
+    return [warning("setup.assumed", f"{key} = {values[key].value} {keys[key].unit} is assumed: nobody has stated it",
+                    hint=f"state it by {keys[key].option}, or in the file, and take its name out of `assumed`")
+            for key in fit.setup.assumed]
+
+
+def _not_fitted(fit: Fit) -> list[Diagnostic]:
+    """Why no place fits, next to what stands against the first."""
+    errors = [d for d in fit.result.diagnostics if d.severity is Severity.ERROR]
+    said = [info("place.found", f"{fit.tried} place{'s' * (fit.tried > 1)} tried, none is possible"
+                 + "".join(f"; {why}" for why in fit.lacks[:3]),
+                 hint="a machine with more travel, shorter tools, or a file for each side of the part")]
+    said = said if fit.tried > 1 or fit.lacks else []
+    return [*errors, *said]

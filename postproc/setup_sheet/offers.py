@@ -1,0 +1,27 @@
+"""What is offered where a conversion is refused: the command that asks for all that is missing, a place that fits."""
+
+from __future__ import annotations
+
+from postproc.job.job import OF_SETUP
+from postproc.pipeline.result import PostResult
+from postproc.setup_sheet.place import found_place
+from toolpaths.diagnostics import Diagnostic, Severity, info
+from toolpaths.toolpath import Toolpath
+
+
+def offers(result: PostResult, toolpath: Toolpath, machine: str, controller: str) -> list[Diagnostic]:
+    """Notes behind the errors of a conversion; `machine` and `controller` as the command was given them.
+
+    Args:
+        toolpath: as it was read
+    """
+    if result.ok:
+        return []
+    codes = {d.code for d in result.diagnostics if d.severity is Severity.ERROR}
+    missing = sorted(codes & OF_SETUP)
+    if missing:
+        file = toolpath.file or "part.cls"
+        return [info("setup.offered", f"a set-up answers all of this: {', '.join(missing)}",
+                     hint=f"postproc setup new {file} -m {machine} -c {controller} -o part.setup.toml asks for all of "
+                     "them at once, and finds a place that fits")]
+    return found_place(result, toolpath)

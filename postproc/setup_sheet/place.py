@@ -1,0 +1,189 @@
+"""A place of the part that travel allows: where [part] has it, else the place of most margin, proved by a conversion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from machines.machine import Machine
+from postproc.base.options import Options
+from postproc.orientation.passes.passes import PassContext, work_of
+from postproc.path.links import safe_space
+from postproc.pipeline.convert import convert
+from postproc.pipeline.result import PostResult
+from postproc.placement.region import region_of
+from postproc.placement.space import ANGLES, Space, angles_of, space_of
+from postproc.setup.model import PartPlacement, Placement, SetupFile
+from postproc.setup.place import PlacementLimits
+from postproc.setup.system import BEYOND
+from postproc.setup_sheet.attitudes import Attitude, attitudes_of
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, Severity, info
+from toolpaths.toolpath import Toolpath
+from toolpaths.units import DEG
+
+Progress = Callable[[str, int, int], None]
+PLACES = frozenset({*BEYOND, "link.blocked", "path.jump", "reach.axis", "singular.distance", "verify.link", "verify.travel",
+                    "collision.clear"})
+"""codes of errors that another place or attitude may put right"""
+_ATTITUDES, _PROOFS = 12, 6
+"""attitudes that are looked at; conversions before giving up"""
+_ROUND = 2.0
+"""mm of margin from which a place is rounded to whole mm"""
+_MOST = 20_000
+"""rows of a path for which a refusal looks for a place by itself"""
+
+
+@dataclass(frozen=True)
+class FoundPlace:
+    """[part] with its attitude, and mm that every axis stays inside travel there (NaN where none was computed)."""
+
+    part: PartPlacement
+    attitude: Attitude
+    margin: float
+
+    @property
+    def why(self) -> str:
+        """Why the part stands there."""
+        where = "origin on the table's origin" if np.isnan(self.margin) else (
+            f"all axes stay {self.margin:.0f} mm inside travel" if self.margin >= 1.0 else "where travel allows it")
+        return f"{self.attitude.why}; {where}"
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The set-up with a place that was proved, or the best that was tried with what stands against it.
+
+    Attributes:
+        place: None where [part] is that of the set-up
+        tried: places that were converted
+        lacks: of attitudes in which no place fits, why
+    """
+
+    setup: SetupFile
+    result: PostResult
+    place: FoundPlace | None
+    tried: int
+    lacks: tuple[str, ...]
+
+
+def fitted(toolpath: Toolpath, machine: Machine, controller: str | Path, setup: SetupFile, options: Options,
+           found: list[Diagnostic], progress: Progress | None = None) -> Fit:
+    """The first place that a conversion proves; arguments as of `convert`, `found` is what reading found."""
+    def converted(one: SetupFile) -> PostResult:
+        return convert(toolpath, machine, controller, one, options, list(found), progress)
+
+    attitudes = attitudes_of(toolpath, machine, options.axis_tolerance * DEG)
+    begin = FoundPlace(_part(attitudes[0], np.zeros(3)), attitudes[0], np.nan)
+    first = converted(placed_at(setup, begin))
+    if first.ok or not _beyond(first):
+        return Fit(placed_at(setup, begin), first, begin, 1, ())
+    tried, lacks = 1, list[str]()
+    for place in _places(toolpath, machine, setup, options, attitudes, lacks):
+        result = converted(placed_at(setup, place))
+        tried += 1
+        if result.ok:
+            return Fit(placed_at(setup, place), result, place, tried, tuple(lacks))
+        if tried > _PROOFS:
+            break
+    return Fit(placed_at(setup, begin), first, begin, tried, tuple(lacks))
+
+
+def placed_at(setup: SetupFile, place: FoundPlace) -> SetupFile:
+    """The set-up with another [part]."""
+    return setup.model_copy(update={"part": place.part})
+
+
+def _beyond(result: PostResult) -> bool:
+    """True where every error may be one of the place."""
+    return all(d.code in PLACES for d in result.diagnostics if d.severity is Severity.ERROR)
+
+
+def found_place(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
+    """What `place` would find for a conversion that is refused by travel or reach: a note with [part], or why
+    no place fits; nothing for other refusals. `toolpath` is as it was read."""
+    if result.ok or not _beyond(result):
+        return []
+    if len(toolpath) > _MOST:
+        return [_note("postproc setup new looks for a place that fits", "")]
+    setup = result.setup
+    lacks = list[str]()
+    attitudes = attitudes_of(toolpath, result.machine, result.options.axis_tolerance * DEG)
+    options = replace(result.options, error_model="", orient="keep")
+    place = next(_places(toolpath, result.machine, setup, options, attitudes, lacks), None)
+    if place is None:
+        return [_note("no place of the part was found that travel allows" + "".join(f"; {why}" for why in lacks[:3]),
+                      "a machine with more travel, or a file for each side of the part")]
+    p = place.part
+    origin, x, y = ([round(v, 9) for v in vector] for vector in (p.origin, p.x_axis, p.y_axis))
+    return [_note(f"travel allows another place: {place.why}",
+                  f"[part] origin = {origin}, x_axis = {x}, y_axis = {y} in the set-up; postproc place finds the fastest "
+                  "near it, postproc setup new writes and proves it")]
+
+
+def _note(message: str, hint: str) -> Diagnostic:
+    return info("place.found", message, hint=hint)
+
+
+def _places(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options, attitudes: list[Attitude],
+            lacks: list[str]) -> Iterator[FoundPlace]:
+    """Places of most margin, the likely attitudes first; why an attitude has none goes to `lacks`."""
+    reached = [one for one in attitudes if one.unreachable == 0.0]
+    if not reached:
+        best = attitudes[0]
+        lacks.append(f"however the part is turned, {machine.name} cannot take every tool axis of the cuts: at best (the "
+                     f"part {best.why}) {100.0 * best.unreachable:.0f} % of them are beyond its rotary axes")
+        return
+    work, _ = work_of(toolpath, machine, setup.model_copy(update={"part": PartPlacement()}), options, turning=False)
+    if work is None:
+        return
+    space = _space(work, setup, machine)
+    for one in reached[:_ATTITUDES]:
+        place, why = _deepest(work, space, one, setup.joints.singular_distance)
+        if place is not None:
+            yield place
+        elif why not in lacks:
+            lacks.append(why)
+
+
+def _space(work: PassContext, setup: SetupFile, machine: Machine) -> Space:
+    """Everywhere within reach of the machine."""
+    safe = safe_space(work.moves, setup, work.placement)
+    size = float(np.abs(safe.corners).max())
+    limits = np.concatenate([machine.limits.lower, machine.limits.upper])[np.tile(~np.array(machine.rotary), 2)]
+    far = float(np.abs(limits[np.isfinite(limits)]).max(initial=1000.0)) + size
+    box = machine.kinematics.workspace
+    low, high = (np.full(3, -far), np.full(3, far)) if machine.kinematics.straight_slides or box is None else (
+        box.lower - size, box.upper + size)
+    x, y, z = ((float(a), float(b)) for a, b in zip(low, high, strict=True))
+    return space_of(PlacementLimits(x=x, y=y, z=z), Placement(np.eye(3), np.zeros(3)),
+                    (safe.corners.min(axis=0), safe.corners.max(axis=0)))
+
+
+def _deepest(work: PassContext, space: Space, one: Attitude, least: float) -> tuple[FoundPlace | None, str]:
+    """The place of most margin in an attitude, or why there is none."""
+    angles = angles_of(one.turn)
+    region, refused = region_of(work, space, angles, least)
+    if region is None:
+        return None, str(refused)
+    try:
+        place, margin, lack = region.deepest(*space.room(angles))
+    except ArithmeticError as fault:
+        return None, str(fault)
+    if not margin >= 0.0:
+        return None, f"at best {lack}"
+    if margin > _ROUND:
+        near = np.round(place)
+        at = float(region.margins(near[None, :])[0])
+        place, margin = (near, at) if at >= 0.0 else (place, margin)
+    return FoundPlace(_part(one, place[:ANGLES]), one, margin), ""
+
+
+def _part(one: Attitude, origin: Floats) -> PartPlacement:
+    """[part] of an attitude; quarter turns as 0, 1, -1."""
+    x, y = ((np.round(one.turn[:, k], 15) + 0.0).tolist() for k in (0, 1))
+    at = (np.round(origin, 6) + 0.0).tolist()
+    return PartPlacement(origin=(at[0], at[1], at[2]), x_axis=(x[0], x[1], x[2]), y_axis=(y[0], y[1], y[2]))

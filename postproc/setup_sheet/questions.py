@@ -1,0 +1,149 @@
+"""The questions of a new set-up: each for one value that no file states, its unit, what is allowed, what is assumed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from postproc.setup.spindle import CoolantKind
+from postproc.setup_sheet.facts import SheetFacts, ToolFacts
+
+QuestionKind = Literal["gauge_length", "spindle", "feed", "coolant"]
+AnswerSource = Literal["answered", "assumed"]
+ASSUMED_SPEED = 1000.0
+"""rev/min, for a first run in the air: no cutting speed"""
+ASSUMED_FEED = 100.0
+"""mm/min, likewise"""
+ASSUMED_LENGTH = 150.0
+"""mm, longer where CAM draws a longer cutter"""
+_ABOVE_CUTTER = 50.0
+"""mm from the end of a cutter, as CAM draws it, to the gauge point, where that is assumed"""
+_LARGEST: dict[QuestionKind, float] = {"gauge_length": 2000.0, "spindle": 200000.0, "feed": 200000.0}
+_UNITS: dict[QuestionKind, str] = {"gauge_length": "mm", "spindle": "rev/min", "feed": "mm/min", "coolant": ""}
+_OPTIONS: dict[QuestionKind, str] = {"gauge_length": "--gauge-length", "spindle": "--spindle", "feed": "--feed",
+                             "coolant": "--coolant"}
+
+
+@dataclass(frozen=True)
+class Question:
+    """One value that is asked for; `number` is that of the tool, 0 for all.
+
+    Attributes:
+        text: what is asked, without its unit
+        default: taken where the answer is empty, None where there is none
+        assumed: what --yes takes, None: nothing, the key is left out
+    """
+
+    kind: QuestionKind
+    number: int
+    text: str
+    default: float | str | None
+    assumed: float | str | None
+
+    @property
+    def key(self) -> str:
+        """Its key in the set-up, as `assumed` names it."""
+        return f"tools.{self.number}.{self.kind}" if self.number else f"output.{self.kind}"
+
+    @property
+    def unit(self) -> str:
+        """Of the answer."""
+        return _UNITS[self.kind]
+
+    @property
+    def option(self) -> str:
+        """The option that answers it."""
+        value = "KIND" if self.kind == "coolant" else {"mm": "MM", "rev/min": "RPM"}.get(self.unit, "MM/MIN")
+        return f"{_OPTIONS[self.kind]} {f'{self.number}=' if self.number else ''}{value}"
+
+    def prompt(self) -> str:
+        """What stands before the answer."""
+        default = "" if self.default is None else f" [{self.default:g}]" if isinstance(self.default, float) else (
+            f" [{self.default}]")
+        return f"{self.text}{f', {self.unit}' if self.unit else ''}{default}: "
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A value with where it comes from."""
+
+    value: float | str
+    source: AnswerSource
+
+
+@dataclass(frozen=True)
+class GivenAnswers:
+    """Answers on the command line: by tool number, 0 for all tools."""
+
+    gauge_length: Mapping[int, float] = field(default_factory=dict)
+    spindle: Mapping[int, float] = field(default_factory=dict)
+    feed: float | None = None
+    coolant: str = ""
+
+    def of(self, question: Question) -> float | str | None:
+        """The answer to a question, None where there is none."""
+        if question.kind == "feed":
+            return self.feed
+        if question.kind == "coolant":
+            return self.coolant or None
+        known = self.gauge_length if question.kind == "gauge_length" else self.spindle
+        return known.get(question.number, known.get(0))
+
+
+def questions_of(facts: SheetFacts) -> list[Question]:
+    """All that the files leave open, in the order of the set-up file."""
+    result = []
+    for tool in facts.tools:
+        if facts.lengths:
+            result.append(Question("gauge_length", tool.number, f"{tool.called}: gauge length, from the gauge point of the "
+                                   "spindle to the tip", None, _length(tool)))
+        if not tool.speed:
+            result.append(Question("spindle", tool.number, f"{tool.called}: spindle speed", None, ASSUMED_SPEED))
+    if facts.without_feed:
+        result.append(Question("feed", 0, f"feed of {facts.without_feed} moves that cut without one", None, ASSUMED_FEED))
+    if not any(tool.coolant for tool in facts.tools):
+        result.append(Question("coolant", 0, f"coolant ({', '.join(get_args(CoolantKind))})", "off", "off"))
+    return result
+
+
+def _length(tool: ToolFacts) -> float:
+    """The gauge length that is assumed, mm."""
+    if tool.cutter is None:
+        return ASSUMED_LENGTH
+    return max(ASSUMED_LENGTH, 10.0 * math.ceil((tool.cutter + _ABOVE_CUTTER) / 10.0))
+
+
+def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
+    """The value of an answer, and what is wrong with it ("" where nothing is)."""
+    text = text.strip()
+    if not text:
+        return question.default, "" if question.default is not None else "a value is needed"
+    if question.kind == "coolant":
+        known = get_args(CoolantKind)
+        return (text.lower(), "") if text.lower() in known else (None, f"{text!r} is not one of {', '.join(known)}")
+    try:
+        value = float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
+    except ValueError:
+        return None, f"{text!r} is not a number"
+    if not 0.0 < value <= _LARGEST[question.kind]:
+        return None, f"{text} is not above 0 and at most {_LARGEST[question.kind]:g} {question.unit}"
+    return value, ""
+
+
+def answered(questions: list[Question], given: GivenAnswers, ask: Callable[[Question], float | str] | None,
+             assume: bool) -> tuple[dict[str, Answer], list[Question]]:
+    """The answers by key, and the questions that have none: from the command line, by asking, else assumed."""
+    result, left = dict[str, Answer](), list[Question]()
+    for question in questions:
+        value = given.of(question)
+        if value is not None:
+            result[question.key] = Answer(value, "answered")
+        elif assume and question.assumed is not None:
+            result[question.key] = Answer(question.assumed, "assumed")
+        elif ask is not None:
+            result[question.key] = Answer(ask(question), "answered")
+        else:
+            left.append(question)
+    return result, left

@@ -1,0 +1,111 @@
+"""postproc.toml: found upwards from the CL file, taken where the command line leaves an option out, named when it is."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+import typer
+
+from postproc.cli.app import app
+from postproc.setup.job_file import JobFile
+from tests.postproc.cli.test_cli import run
+from tests.postproc.kit import HEAD
+
+LINES = ["RAPID", "GOTO/0,0,5", "GOTO/0,0,0", "GOTO/9,0,0", "RAPID", "GOTO/9,0,5"]
+JOB = 'machine = "mill-3axis"\ncontroller = "haas-ngc"\nsetup = "s.toml"\ntolerance = 0.02\n'
+
+
+@pytest.fixture
+def part(tmp_path: Path) -> Path:
+    """A CL file below a job file."""
+    folder = tmp_path / "job" / "cl" / "side1"
+    folder.mkdir(parents=True)
+    file = folder / "part.apt"
+    file.write_text("\n".join([*HEAD, *LINES, "FINI"]))
+    (tmp_path / "job" / "postproc.toml").write_text(JOB)
+    (tmp_path / "job" / "s.toml").write_text("[tools.1]\ngauge_length = 100.0\n")
+    return file
+
+
+def test_the_command_takes_what_is_left_out_and_names_the_file(part: Path, tmp_path: Path) -> None:
+    out = tmp_path / "p.nc"
+    got = run("convert", part, "-o", out)
+    assert got.exit_code == 0, got.stderr
+    assert got.stderr.splitlines()[0] == (
+        f"{tmp_path}/job/postproc.toml: machine mill-3axis, controller haas-ngc, "
+        f"setup {tmp_path}/job/s.toml, tolerance 0.02")
+    text = out.read_text()
+    assert "(CONTROLLER HAAS-NGC)" in text and "(TOLERANCE 0.02 MM" in text and "GAUGE LENGTH 100" in text
+    assert run("verify", out, part).exit_code == 0
+    assert run("trace", part, "--line", "7").exit_code == 0 and run("time", part).exit_code == 0
+    assert "mill-3axis" in run("setup", "new", part, "-o", tmp_path / "n.toml", "--yes").stderr
+
+
+def test_the_command_line_goes_before_it(part: Path, tmp_path: Path) -> None:
+    out = tmp_path / "p.nc"
+    for words in (["-c", "linuxcnc"], ["-clinuxcnc"], ["--controller=linuxcnc"]):
+        got = run("convert", part, *words, "--tolerance", "0.01", "-o", out)
+        assert got.exit_code == 0 and "controller" not in got.stderr.splitlines()[0], words
+        assert "(controller linuxcnc)" in out.read_text() and "(tolerance 0.01 mm" in out.read_text()
+
+
+def test_the_nearest_counts_and_without_one_nothing_changes(part: Path, tmp_path: Path) -> None:
+    (part.parent / "postproc.toml").write_text('controller = "linuxcnc"\n')
+    got = run("convert", part, "-o", tmp_path / "p.nc")
+    assert got.exit_code == 2 and "--machine" in got.stderr, "the file above is not read besides"
+    (part.parent / "postproc.toml").unlink()
+    (tmp_path / "job" / "postproc.toml").unlink()
+    assert run("convert", part, "-o", tmp_path / "p.nc").exit_code == 2
+
+
+def test_faults_of_the_file_have_their_line_and_json(part: Path, tmp_path: Path) -> None:
+    (tmp_path / "job" / "postproc.toml").write_text(JOB + "tolerence = 0.01\n")
+    got = run("convert", part, "-o", tmp_path / "p.nc", "--json", "-")
+    assert got.exit_code == 1 and not (tmp_path / "p.nc").exists()
+    (fault,) = json.loads(got.stdout)["diagnostics"]
+    assert (fault["code"], fault["lines"]) == ("file.unknown-key", [5]) and "tolerance" in fault["hint"]
+    (tmp_path / "job" / "postproc.toml").write_text("tolerance = 0.01\n")  # as the hint says
+    assert run("convert", part, "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.nc").exit_code == 0
+
+
+def commands(command: object, names: tuple[str, ...] = ()) -> dict[str, set[str]]:
+    """Parameters by command."""
+    inner = getattr(command, "commands", None)
+    if inner is None:
+        return {" ".join(names): {p.name for p in command.params}}
+    return {name: found for key, one in inner.items() for name, found in commands(one, (*names, key)).items()}
+
+
+def test_every_key_is_an_option_and_every_command_with_a_machine_and_a_cl_file_takes_it(part: Path) -> None:
+    found = commands(typer.main.get_command(app))
+    assert set(JobFile.model_fields) <= found["convert"]
+    on_cl_files = sorted(name for name, names in found.items() if {"machine", "dialect"} <= names)
+    assert on_cl_files == ["convert", "orient", "place", "setup new", "time", "trace", "verify"]
+    for name in on_cl_files:
+        got = run(*name.split(), *(["x.nc"] if name == "verify" else []), part, "--no-such-option")
+        assert re.search(r"postproc\.toml: .*machine mill-3axis", got.stderr), name
+
+
+def test_strict_makes_warnings_errors(part: Path, tmp_path: Path) -> None:
+    (tmp_path / "job" / "s.toml").write_text("")
+    out = tmp_path / "p.nc"
+    got = run("convert", part, "-o", out, "--strict", "--json", "-")
+    values = json.loads(got.stdout)
+    assert got.exit_code == 1 and not out.exists() and values["ok"] is False and values["output"] is None
+    assert [d["code"] for d in values["diagnostics"] if d["severity"] == "error"] == ["tool.length"]
+    (tmp_path / "job" / "s.toml").write_text("[tools.1]\ngauge_length = 100.0\n")  # as the hint says
+    assert run("convert", part, "-o", out, "--strict").exit_code == 0 and out.exists()
+
+
+def test_quiet_and_verbose(part: Path, tmp_path: Path) -> None:
+    out = tmp_path / "p.nc"
+    got = run("convert", part, "-o", out, "-q")
+    assert got.exit_code == 0 and got.stdout == "" and got.stderr == "" and out.exists()
+    (tmp_path / "job" / "s.toml").write_text("")
+    assert "warning [tool.length]" in run("convert", part, "-o", out, "--quiet").stderr
+    stages = run("convert", part, "-o", out, "-v").stderr.splitlines()
+    assert {"blocks", "read back"} <= set(stages)
+    assert "blocks" not in run("convert", part, "-o", out).stderr.splitlines(), "the option is for one command"

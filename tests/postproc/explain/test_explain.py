@@ -1,0 +1,52 @@
+"""postproc explain: every code of the source has a page, no page is without a code; a wrong one is named."""
+
+from __future__ import annotations
+
+import json
+import re
+
+from postproc.explain.pages import pages
+from tests.explained_codes import MADE, ROOT, codes
+from tests.postproc.cli.test_cli import run
+
+HOW = "run python tests/explained_codes.py"
+
+
+def test_every_code_has_a_page_and_every_page_a_code() -> None:
+    found, known = set(codes()), set(pages())
+    assert found - known == set(), HOW
+    assert known - found == set(), HOW
+
+
+def test_messages_and_remedies_are_those_of_the_source() -> None:
+    changed = [code for code, one in codes().items() if tuple(one["messages"]) != pages()[code].messages
+               or tuple(one["remedies"]) != pages()[code].remedies]
+    assert changed == [], HOW
+
+
+def test_codes_of_the_examples_of_bad_files_have_pages() -> None:
+    """Codes by what is raised, not by how the source is read."""
+    raised = {said[1] for file in (ROOT / "tests" / "bad").glob("*.*")
+              if (said := re.match(r"\$\$ expect: \w+ (\S+)", file.read_bytes().decode("latin-1")))}
+    assert len(raised) >= 50 and raised <= set(pages())
+
+
+def test_codes_put_together_are_codes_of_the_source() -> None:
+    for area in {code.split(".")[0] for code in MADE}:
+        assert any(f'f"{area}.{{' in path.read_text("utf-8") for path in (ROOT / "postproc").rglob("*.py")), area
+
+
+def test_each_page_says_what_to_do() -> None:
+    for page in pages().values():
+        assert len(page.about) > 10 and len(page.first) > 20 and page.text().startswith(page.code)
+    assert sum(bool(page.example) for page in pages().values()) > 40
+
+
+def test_the_command() -> None:
+    got = run("explain", "[travel.exceeded]")
+    assert got.exit_code == 0 and "axis ... goes to" in got.stdout and "place.found" in got.stdout
+    assert run("explain").stdout.split() == sorted(pages())
+    wrong = run("explain", "travel.exceded", "--json", "-")
+    assert wrong.exit_code == 1 and "travel.exceeded" in json.loads(wrong.stdout)["diagnostics"][0]["hint"]
+    assert "codes begin with" in run("explain", "nonsense").stderr
+    assert json.loads(run("explain", "cl.cycle", "--json", "-").stdout)["example"]

@@ -1,0 +1,244 @@
+"""postproc setup new: what it writes converts and is proved, nothing is invented in silence, one list of what is missing."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import postproc
+import toolpaths
+from postproc.base.options import Options
+from postproc.cli.app import app
+from postproc.controllers.model import load_controller
+from postproc.setup.model import load_setup, part_placement
+from postproc.setup_sheet.facts import facts_of
+from postproc.setup_sheet.make import SetupSheet, new_setup
+from postproc.setup_sheet.questions import ASSUMED_FEED, ASSUMED_SPEED, GivenAnswers, parsed, questions_of
+from tests.postproc.kit import SAMPLES, machine
+from tests.practice_files import CASES, SHAPES, practice_file
+
+MACHINES = (("mill-3axis", "haas-ngc"), ("head-table", "fanuc-30i"), ("mikron-ucp710", "linuxcnc"))
+FITTING = [("pocket.cls", "uranesx", "linuxcnc"), ("five_faces.cls", "mikron-ucp710", "heidenhain-tnc640"),
+           ("dialects/solidworks.clt", "head-table", "siemens-840d"), ("indexed_4axis.cls", "mill-4axis", "linuxcnc"),
+           ("systems/upside_down.cls", "mikron-ucp710", "fanuc-30i"), ("joints/turned_over.cls", "trunnion-bc", "haas-ngc"),
+           ("dialects/inch_creo.ncl", "mill-3axis", "generic-iso")]
+"""samples on machines of their size, every control"""
+
+
+def run(*words: object, stdin: str = "", code: int = 0) -> Any:
+    result = CliRunner().invoke(app, [*map(str, words)], input=stdin)
+    assert result.exit_code == code, result.output
+    return result
+
+
+def sheet(file: Path, name: str, controller: str, given: GivenAnswers | None = None) -> SetupSheet:
+    path, found = toolpaths.read(file)
+    return new_setup(path, machine(name), controller, Options(), given or GivenAnswers(), None, True, found)
+
+
+def proved(file: Path, made: SetupSheet, name: str, controller: str, folder: Path) -> Any:
+    """The conversion with the set-up as its text has it; every fault fails the test."""
+    assert made.text, [str(d) for d in made.diagnostics]
+    written = folder / "new.setup.toml"
+    written.write_text(made.text)
+    setup, found = load_setup(written)
+    assert setup is not None and not found, found
+    path, found = toolpaths.read(file)
+    result = postproc.convert(path, machine(name), controller, setup, diagnostics=found)
+    assert result.ok and result.comparison is not None, [str(d) for d in result.diagnostics]
+    return result
+
+
+def bare(folder: Path, case: str = "nothing but points", shape: str = "nx") -> Path:
+    one = next(s for s in SHAPES if s.name == shape)
+    made = folder / f"part.{one.ending}"
+    made.write_text(practice_file(one, CASES[case]))
+    return made
+
+
+@pytest.mark.covering
+@pytest.mark.parametrize(("name", "controller"), MACHINES)
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("shape", [s.name for s in SHAPES])
+def test_what_is_written_converts(shape: str, case: str, name: str, controller: str, tmp_path: Path) -> None:
+    file = bare(tmp_path, case, shape)
+    made = sheet(file, name, controller)
+    result = proved(file, made, name, controller, tmp_path)
+    setup = tomllib.loads(made.text)
+    assumed = {key for key, answer in made.answers if answer.source == "assumed" and answer.value != "off"}
+    assert set(setup.get("assumed", [])) == assumed
+    assert {d.message.split(" = ")[0] for d in result.diagnostics if d.code == "setup.assumed"} == assumed
+    assert result.text.count("ASSUMED") == len(assumed)
+    for line in made.text.splitlines():  # every value with its reason
+        assert line.startswith(("#", "[", "assumed =")) or not line or re.search(r"#\s+\S", line), line
+    rpm, feeds = result.job.toolpath.events, result.toolpath.feed
+    if "spindle" in CASES[case]:
+        assert any(e.word == "SPINDL" and ASSUMED_SPEED in e.values for e in rpm)
+    else:
+        assert "spindle" not in made.text.replace("# spindle", ""), "the file states it"
+    assert np.isfinite(feeds).any() == ("feed" not in CASES[case])
+    assert setup["output"].get("feed") == (ASSUMED_FEED if "feed" in CASES[case] else None)
+
+
+@pytest.mark.covering(of=("name", "controller"))
+@pytest.mark.parametrize(("sample", "name", "controller"), FITTING)
+def test_samples_convert_with_what_is_written(sample: str, name: str, controller: str, tmp_path: Path) -> None:
+    made = sheet(SAMPLES / sample, name, controller)
+    proved(SAMPLES / sample, made, name, controller, tmp_path)
+
+
+@pytest.mark.parametrize(("case", "name"), [("from below", "mikron-ucp710"), ("from the side", "mill-3axis"),
+                                            ("from below", "mill-3axis")])
+def test_the_tool_comes_from_above(case: str, name: str, tmp_path: Path) -> None:
+    file = bare(tmp_path, case)
+    made = sheet(file, name, "linuxcnc")
+    setup = proved(file, made, name, "linuxcnc", tmp_path).setup
+    placement, _ = part_placement(setup)
+    assert placement is not None
+    path, _ = toolpaths.read(file)
+    np.testing.assert_allclose(placement.directions(path.axis)[:, 2], 1.0, atol=1e-12)
+
+
+def test_a_system_that_is_upside_down_turns_no_part_over(tmp_path: Path) -> None:
+    """The MSYS of the file hangs upside down, the tool axes do not: the part stays as it is."""
+    text = practice_file(SHAPES[0], CASES["complete"]).replace(
+        "MSYS/0.0000,0.0000,0.0000,1.0000000,0.0000000,0.0000000,0.0000000,1.0000000,0.0000000",
+        "MSYS/0.0000,0.0000,0.0000,1.0000000,0.0000000,0.0000000,0.0000000,-1.0000000,0.0000000").replace(
+        "0.00000,0.00000,1.00000", "0.00000,0.00000,-1.00000")
+    file = tmp_path / "part.cls"
+    file.write_text(text)
+    path, _ = toolpaths.read(file)
+    assert path.frames[0].rotation[2][2] == -1.0 and (path.axis[:, 2] == 1.0).all()
+    made = sheet(file, "mikron-ucp710", "linuxcnc")
+    assert tomllib.loads(made.text)["part"]["x_axis"] == [1.0, 0.0, 0.0]
+    assert tomllib.loads(made.text)["part"]["y_axis"] == [0.0, 1.0, 0.0]
+    proved(file, made, "mikron-ucp710", "linuxcnc", tmp_path)
+
+
+def test_free_numbers_for_all_tools_at_once(tmp_path: Path) -> None:
+    lines = ["UNITS/MM", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,100"]
+    for name, load in (("A", "LOAD/TOOL,2"), ("B", "LOAD/TOOL,0"), ("C", "LOAD/TOOL,0"), ("D", "LOAD/TOOL,2")):
+        lines += [f"TOOL PATH/{name},TOOL,EM{name}", load, "SPINDL/RPM,1000,CLW", "RAPID", "GOTO/0,0,5", "GOTO/0,0,0",
+                  "GOTO/9,0,0", "RAPID", "GOTO/9,0,5", "END-OF-PATH"]
+    file = tmp_path / "four.cls"
+    file.write_text("\n".join(lines) + "\n")
+    made = sheet(file, "mill-3axis", "linuxcnc")
+    result = proved(file, made, "mill-3axis", "linuxcnc", tmp_path)
+    numbers = tomllib.loads(made.text)["tool_numbers"]
+    assert numbers == {"EMA": 2, "EMB": 1, "EMC": 3, "EMD": 4} and len(set(numbers.values())) == 4
+    assert [int(n) for n in re.findall(r"^T(\d+)\b", result.text, re.MULTILINE)] == [2, 1, 3, 4]
+
+
+def test_questions_are_asked_and_answered(tmp_path: Path) -> None:
+    file, out = bare(tmp_path), tmp_path / "s.toml"
+    words = ("setup", "new", file, "-m", "head-table", "-c", "fanuc-30i", "-o", out)
+    got = run(*words, stdin="fast\n-3\n8000\n350\nflood\n")
+    assert "'fast' is not a number" in got.stderr and "-3 is not above 0" in got.stderr
+    setup = tomllib.loads(out.read_text())
+    assert setup["tools"]["1"]["spindle"] == {"rpm": 8000, "direction": "clockwise"}
+    assert setup["output"] == {"default": "auto", "feed": 350, "coolant": "flood", "operations": {"SLOT": "auto"}}
+    assert "assumed" not in setup and "ASSUMED: the CL file states none" in out.read_text()  # the units
+    before = out.read_text()
+    assert run(*words, "--yes", code=2).stderr and out.read_text() == before, "no file is replaced without --force"
+    run(*words, "--yes", "--force", "--feed", "70")
+    assert tomllib.loads(out.read_text())["output"]["feed"] == 70 and out.read_text() != before
+
+
+def test_gauge_lengths_are_asked_for_where_words_depend_on_them(tmp_path: Path) -> None:
+    file, out = tmp_path / "five.cls", tmp_path / "s.toml"
+    file.write_bytes((SAMPLES / "dialects" / "nx.cls").read_bytes())
+    words = ("setup", "new", file, "-m", "head-table", "-o", out)
+    run(*words, stdin="120.5\n\n")  # the next tool is offered the last answer
+    assert {n: t["gauge_length"] for n, t in tomllib.loads(out.read_text())["tools"].items()} == {"1": 120.5, "2": 120.5}
+    run(*words, "--force", "--gauge-length", "2=90", "--gauge-length", "150")
+    assert {n: t["gauge_length"] for n, t in tomllib.loads(out.read_text())["tools"].items()} == {"1": 150, "2": 90}
+    got = run(*words, "--force", "--yes", "--gauge-length", "7=90", code=1)
+    assert "setup.no_such_tool" in got.stderr and "T1, T2" in got.stderr
+
+
+def test_what_nobody_answers_is_one_list(tmp_path: Path) -> None:
+    file, out = bare(tmp_path), tmp_path / "s.toml"
+    got = run("setup", "new", file, "-m", "mill-3axis", "-o", out, "--json", "-", stdin="900\n", code=1)
+    assert not out.exists()
+    values = json.loads(got.stdout)
+    (fault,) = [d for d in values["diagnostics"] if d["severity"] == "error"]
+    assert fault["code"] == "setup.unanswered" and fault["message"].startswith("2 values")
+    assert "--feed MM/MIN" in fault["message"] and "--coolant KIND" in fault["message"]
+    assert values["answers"] == [{"key": "tools.1.spindle", "value": 900.0, "source": "answered"}]
+
+
+@pytest.mark.parametrize("machine_name", ["mill-3axis", "head-table"])
+def test_convert_reports_all_that_is_missing_at_once_and_the_command_it_offers_works(machine_name: str,
+                                                                                   tmp_path: Path,
+                                                                                   monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "part.cls"
+    bare(tmp_path, "from the side" if machine_name == "head-table" else "nothing but points")
+    if machine_name == "head-table":
+        lines = file.read_text().splitlines()
+        file.write_text("\n".join(x for x in lines if not x.startswith(("SPINDL", "FEDRAT", "LOAD"))) + "\n")
+    words = ("convert", file, "-m", machine_name, "-c", "haas-ngc", "-o", "p.nc")
+    got = run(*words, code=1)
+    expected = {"tool.number", "spindle.not_started", "feed.missing"}
+    assert set(re.findall(r"error \[([\w.]+)\]", got.stderr)) == expected
+    offered = re.search(r"(postproc setup new .*?\.toml) asks", got.stderr)
+    assert offered
+    run(*shlex.split(offered[1])[1:], "--yes")
+    run(*words, "--setup", "part.setup.toml")
+    assert Path("p.nc").exists()
+
+
+def test_a_refusal_by_travel_names_a_place_that_works(tmp_path: Path) -> None:
+    file, out, setup = bare(tmp_path, "far off"), tmp_path / "p.nc", tmp_path / "s.toml"
+    words = ("convert", file, "-m", "mill-3axis", "-c", "linuxcnc", "-o", out)
+    got = run(*words, code=1)
+    found = re.search(r"\[part\] (origin = \[.*?\]), (x_axis = \[.*?\]), (y_axis = \[.*?\]) in the set-up", got.stderr)
+    assert found and "place.found" in got.stderr
+    setup.write_text("[part]\n" + "\n".join(found.groups()) + "\n")
+    run(*words, "--setup", setup)
+    assert out.exists()
+
+
+def test_what_no_place_puts_right_is_explained(tmp_path: Path) -> None:
+    made = sheet(SAMPLES / "five_faces.cls", "mill-3axis", "linuxcnc")
+    assert not made.text
+    notes = [d for d in made.diagnostics if d.code == "place.found"]
+    assert notes and "however the part is turned, mill-3axis cannot take every tool axis" in notes[0].message
+    assert any(d.code == "reach.axis" for d in made.diagnostics)
+
+
+def test_faults_that_no_set_up_answers_are_refused_at_once() -> None:
+    path, found = toolpaths.read(SAMPLES / "pocket.cls")
+    turned = replace(path, operations=tuple(replace(op, turning=True) for op in path.operations))
+    made = new_setup(turned, machine("mill-3axis"), "linuxcnc", Options(), GivenAnswers(), None, True, found)
+    assert not made.text and {d.code for d in made.diagnostics if d.severity == 2} == {"convert.turning"}
+    assert made.questions == ()
+
+
+def test_assumed_names_what_the_set_up_states(tmp_path: Path) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text('assumed = ["output.feed"]\n')
+    setup, found = load_setup(file)
+    assert setup is None and "output.feed" in found[0].message and found[0].lines
+    file.write_text('assumed = ["output.feed"]\n[output]\nfeed = 5.0\n')
+    assert load_setup(file)[0] is not None
+
+
+def test_answers_are_numbers_within_limits() -> None:
+    path, _ = toolpaths.read_bytes(practice_file(SHAPES[0], CASES["nothing but points"]), file="p.cls")
+    spec, _ = load_controller("linuxcnc")
+    assert spec is not None
+    speed, feed, coolant = questions_of(facts_of(path, machine("mill-3axis"), spec, Options()))
+    assert parsed(speed, "8000,5") == (8000.5, "") and parsed(feed, "")[1] == "a value is needed"
+    assert parsed(speed, "inf")[0] is None and parsed(speed, "nan")[0] is None and parsed(feed, "0")[0] is None
+    assert parsed(coolant, "") == ("off", "") and parsed(coolant, "Mist") == ("mist", "")
+    assert parsed(coolant, "oil")[0] is None
