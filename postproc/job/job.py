@@ -31,7 +31,7 @@ from postproc.reference.split_operations import cut_operations
 from postproc.reference.stated_feeds import without_feed
 from postproc.reference.tool_numbers import numbered
 from postproc.reference.unnumbered_tools import measured_length
-from postproc.setup.model import Placement, SetupFile, Stock, part_placement, stated_value, work_frame
+from postproc.setup.model import Placement, SetupFile, part_placement, stated_value, work_frame
 from postproc.setup.system import standing
 from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
@@ -78,14 +78,14 @@ class Job:
         box = self.setup.rewind.stock
         if box is None or self.control.plane is not None:
             return None
-        placed = self.placement.points(_corners(box)) - self.control.origin
+        placed = self.placement.points(box.corners) - self.control.origin
         return np.stack([placed.min(axis=0), placed.max(axis=0)])
 
     @property
     def stock_corners(self) -> Floats | None:
         """(8, 3) corners of the set-up's stock in the table frame; None without."""
         box = self.setup.rewind.stock
-        return None if box is None else self.placement.points(_corners(box))
+        return None if box is None else self.placement.points(box.corners)
 
     @property
     def work_system(self) -> Frame:
@@ -194,11 +194,6 @@ class Job:
         return [int(k) for k in np.flatnonzero(begins & self.moves.link)]
 
 
-def _corners(box: Stock) -> Floats:
-    """(8, 3)"""
-    return np.asarray(np.array([box.low, box.high])[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)])
-
-
 def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) -> ControllerFile:
     """The controller with its options, the codes of the shop's own blocks, and the number of the program."""
     passive = machine.hooks.under(setup.hooks).passive
@@ -240,8 +235,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     found = [d for d in found if not (errors and d.code == "feed.no_speed")]  # follows from the speed that is missing
     diagnostics += [*found, *_default_feed(toolpath, setup)]
     moves, found = limited_feeds(moves, toolpath, machine.largest_feed)
-    diagnostics += found
-    moves = moves.placed(placement)
+    moves, diagnostics = moves.placed(placement), diagnostics + found
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     origin = placement.points(np.array([frame.origin]))[0]
     largest = controller.arcs.largest_radius if controller.arcs.enabled else 0.0

@@ -149,6 +149,11 @@ class Stock(UserModel):
     high: SetupVector
     """its greatest x, y, z"""
 
+    @property
+    def corners(self) -> Floats:
+        """(8, 3)"""
+        return np.asarray(np.array([self.low, self.high])[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)])
+
 
 class RewindSettings(UserModel):
     """Unwinding an axis in the middle of a run, where its travel ends."""
