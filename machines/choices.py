@@ -10,5 +10,9 @@ RolloverRule = Literal["shortest", "sign", "none"]
 """which path the control takes to a word of a modulo axis"""
 Park = Literal["turn", "home"]
 """where an axis that turns on and on is parked"""
+BoughtOption = Literal["tilted_planes", "tip_control", "smoothing", "rigid_tapping", "helical", "splines"]
+"""option of a control that a shop has bought or not"""
+Rapids = Literal["straight", "dog-leg"]
+"""path of a rapid of several axes: the straight line, or every axis at its own rapid speed"""
 MotionOrder = Literal["velocity", "acceleration", "jerk"]
 """which derivative of a position a limit is of"""

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from pydantic import create_model
 
 import machines.kinds as kinds
+from machines.choices import BoughtOption
 from machines.kind_check import build_faults, contract_faults
 from machines.kinematics.base import Kinematics
-from machines.machine import ClampCodes, Limits, Machine, Timing, Turns
+from machines.machine import ClampCodes, ControlOptions, Limits, Machine, Timing, Turns
 from machines.models import ControlModel, KeyProblem, KinematicsModel, MachineModel, register_beyond
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
-from toolpaths.units import DEG
+from toolpaths.units import DEG, PER_MINUTE
 
 DATA = Path(__file__).parent / "data"
 KIND, OLDER = ("kinematics", "kind"), ("kinematics", "family")
@@ -158,7 +160,9 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         timing=Timing(timing.tool_change, timing.clamp, timing.unclamp, frozenset(timing.assumed)),
         control_kinematics=model.control_kinematics(), file=file.file,
         stop=model.control.stop or "" if model.control is not None else "",
-        hooks=model.hooks, length_register=register_beyond(control.length_register),
+        rapids=control.rapids or "", largest_feed=control.largest_feed * PER_MINUTE if control.largest_feed else math.inf,
+        cutting_velocity=_cutting_velocity(model, kinematics), options=_options(file, control), hooks=model.hooks,
+        length_register=register_beyond(control.length_register),
         radius_register=None if control.radius_register is None else register_beyond(control.radius_register),
         clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
         turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))
@@ -171,6 +175,22 @@ def _limits(model: MachineModel, kinematics: Kinematics) -> Limits:
     velocity, acceleration, jerk = np.array([(a.velocity, a.acceleration, a.jerk) for a in axes]).T * scale
     assumed = frozenset(f"{name}.{key}" for name in names for key in model.axes[name].assumed)
     return Limits(travel[:, 0], travel[:, 1], velocity, acceleration, jerk, assumed)
+
+
+def _options(file: UserFile, control: ControlModel) -> ControlOptions:
+    """What the file says of the options of the control, and where."""
+    fitted = {name: bool(value) for name in get_args(BoughtOption) if (value := getattr(control, name)) is not None}
+    origins = {name: file.origin(("control", name)) for name in fitted}
+    return ControlOptions(fitted, {name: (at.file, at.line) for name, at in origins.items()}, control.tip_frame or "",
+                          control.power_on)
+
+
+def _cutting_velocity(model: MachineModel, kinematics: Kinematics) -> tuple[float, ...]:
+    """Of each axis, mm/s or rad/s; () where no axis states one."""
+    axes = [model.axes[name] for name in kinematics.axis_names]
+    if all(axis.cutting_velocity is None for axis in axes):
+        return ()
+    return tuple(float(v) for v in np.array([a.cutting_velocity or a.velocity for a in axes]) * _scale(kinematics))
 
 
 def _scale(kinematics: Kinematics) -> Any:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from machines.choices import Park, RolloverRule, Stop
+from machines.choices import BoughtOption, Park, Rapids, RolloverRule, Stop
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
@@ -68,6 +70,31 @@ class ClampCodes:
 
 
 @dataclass(frozen=True)
+class ControlOptions:
+    """What the machine file says of the options of the control, each with the file and line that say so.
+
+    Attributes:
+        fitted: True or False by option; what is not in it is not confirmed
+        stated: file and line by option
+        tip_frame: "table" or "entry" as in [modes.tcp] frame, "" where the file does not say
+        power_on: codes in force before every program
+    """
+
+    fitted: Mapping[BoughtOption, bool] = field(default_factory=dict)
+    stated: Mapping[BoughtOption, tuple[str, int]] = field(default_factory=dict)
+    tip_frame: Literal["table", "entry", ""] = ""
+    power_on: tuple[str, ...] = ()
+
+    def absent(self, option: BoughtOption) -> bool:
+        """True where the file says that the control has it not."""
+        return not self.fitted.get(option, True)
+
+    def confirmed(self, option: BoughtOption) -> bool:
+        """True where it says that it has."""
+        return self.fitted.get(option, False)
+
+
+@dataclass(frozen=True)
 class ControlKinematics:
     """A kinematics module that the control itself runs, so that programs hold tip coordinates in the part.
 
@@ -101,6 +128,10 @@ class Machine:
         clamps: per joint, the codes that clamp and release it; () as by `ClampCodes()`
         length_register, radius_register: what H and D of a tool are more than its number where the CL file
             names none; None: D is no rule of its own
+        rapids: path of rapids of several axes, "" where the machine file does not say
+        largest_feed: mm/s, the largest cutting feed; infinite where the machine file does not say
+        cutting_velocity: per joint, mm/s or rad/s, largest at feed; () where that is the velocity of rapids
+        options: what the file says of the options of the control
         hooks: blocks of the shop at certain places of a program
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
@@ -123,11 +154,22 @@ class Machine:
     clamps: tuple[ClampCodes, ...] = ()
     length_register: int = 0
     radius_register: int | None = None
+    rapids: Rapids | Literal[""] = ""
+    largest_feed: float = math.inf
+    cutting_velocity: tuple[float, ...] = ()
+    options: ControlOptions = field(default_factory=ControlOptions)
     hooks: HooksModel = field(default_factory=HooksModel)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
         object.__setattr__(self, "clamps", self.clamps or (ClampCodes(),) * len(self.axis_names))
+
+    @cached_property
+    def cutting_limits(self) -> Limits:
+        """The limits of motion at feed: velocities no greater than `cutting_velocity`."""
+        if not self.cutting_velocity:
+            return self.limits
+        return replace(self.limits, velocity=np.minimum(self.limits.velocity, self.cutting_velocity))
 
     @property
     def clamp_codes(self) -> dict[str, ClampCodes]:

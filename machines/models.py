@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from machines.choices import Park, RolloverRule, Stop
+from machines.choices import Park, Rapids, RolloverRule, Stop
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from machines.machine import ControlKinematics
@@ -88,6 +88,9 @@ class AxisModel(UserModel):
     """mm/s2 or deg/s2"""
     jerk: Positive
     """mm/s3 or deg/s3"""
+    cutting_velocity: Positive | None = None
+    """mm/s or deg/s that the axis is moved with at feed at most, where that is less than its velocity, which is
+    that of rapids. Fanuc: parameter 1430, under look-ahead 1432; default: the velocity"""
     home: float
     """position for tool change and programme start, mm or degrees"""
     modulo: bool = False
@@ -139,7 +142,31 @@ class ControlModel(UserModel):
     """what a stop (M0; M1 where its switch is on) switches off: "spindle and coolant", "spindle" or "nothing"; the builder's
     PLC decides on most controls. Default: what the controller file has ([stops])"""
 
-
+    tilted_planes: bool | None = None
+    """the option of tilted work planes is fitted (Fanuc G68.2, Haas G254 DWO, Siemens CYCLE800, Heidenhain PLANE); false:
+    it is not. Default, here and below: not confirmed, it is used and the head of the program names it"""
+    tip_control: bool | None = None
+    """the option of tool-centre-point control (G43.4, G234 TCPC, TRAORI, TCPM)"""
+    smoothing: bool | None = None
+    """the option of the control's own smoothing (Fanuc G05.1 Q1); false: its blocks are left out"""
+    rigid_tapping: bool | None = None
+    """the option of rigid tapping (Fanuc M29); false: taps need a floating holder, where the cycle allows one"""
+    helical: bool | None = None
+    """the option of helical interpolation; false: helices are written as lines"""
+    splines: bool | None = None
+    """the option of spline interpolation"""
+    tip_frame: Literal["table", "entry"] | None = None
+    """what X, Y, Z are the tip in, where a rotary table stands turned when tool-centre-point control is switched on (Fanuc
+    parameter 19696#5 WKP); default: as the controller file has it ([modes.tcp] frame)"""
+    power_on: tuple[Annotated[str, Field(pattern=r"^G[0-9]+(\.[0-9]+)?$")], ...] = ()
+    """codes that this machine puts in force before every program (Fanuc parameter 3402), next to those of the controller
+    file ([start] codes)"""
+    rapids: Rapids | None = None
+    """path of rapids that move several axes: "straight" or "dog-leg", each axis at its own speed. Fanuc: parameter 1401#1
+    LRP; Haas: setting 335; Siemens: RTLION, RTLIOF. Default: what the controller file has ([kinematics] rapids)"""
+    largest_feed: Positive | None = None
+    """mm/min, as F words have it: the largest cutting feed of the machine, which the control clamps greater feeds to or
+    refuses. Fanuc: parameter 1422; default: none but the velocities of the axes"""
     length_register: Register = "T"
     """the length register H of a tool for which the CL file names none or the tool's number T: "T", or "T +
     20"; of controls that name registers"""
@@ -204,6 +231,10 @@ class MachineModel(UserModel):
             elif axis.travel == "unlimited" and not rotary[name]:
                 yield KeyProblem("machine.travel", ("axes", name, "travel"),
                                  f"linear axis {name} cannot have unlimited travel", "write travel = [lower, upper] in mm")
+            elif (axis.cutting_velocity or 0.0) > axis.velocity:
+                yield KeyProblem("machine.cutting-velocity", ("axes", name, "cutting_velocity"),
+                                 f"axis {name} has cutting_velocity = {axis.cutting_velocity:g}, more than its velocity "
+                                 f"{axis.velocity:g}", "the velocity is that of rapids: write one that is not greater")
             elif problem := _modulo_problem(name, axis, rotary[name]) or _clamp_problem(name, axis, rotary[name]):
                 yield problem
             elif not axis.range[0] <= axis.home <= axis.range[1]:

@@ -12,7 +12,7 @@ from postproc.compile.program import INVERSE, PER_MINUTE
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.controllers.model import FeedRules
-from postproc.path.model import ARC, JointPath
+from postproc.path.model import ARC, TRAVERSE, JointPath
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.shapes import arrays
 
@@ -66,13 +66,14 @@ def plan_feeds(path: JointPath, control: Control, step: Floats, asked: Floats, p
 def least_seconds(path: JointPath, control: Control, asked: Floats, step: Floats) -> Floats:
     """(K,) s that the velocities of the axes ask of each block, by its joints and by its rounded words, step (K, J)."""
     joints = np.concatenate([control.machine.home[None, :], path.q[:-1]])
-    velocity = control.machine.limits.velocity
+    cutting, rapid = control.machine.cutting_limits.velocity, control.machine.limits.velocity
+    velocity = cutting if cutting is rapid else np.where((path.code == TRAVERSE)[:, None], rapid, cutting)
     travel = np.abs(path.q - joints)
     joint = np.array([f.control.law == "axes" for f in path.frames])[path.frame][:, None] | np.array(control.machine.rotary)
     needed = (np.where(joint, np.maximum(travel, np.abs(step) / control.unit), travel) / velocity).max(axis=1)
     arc = (path.code == ARC) & ~_control_bends(path)
     if arc.any():
-        top = asked / velocity[control.xyz].min()
+        top = asked / cutting[control.xyz].min()
         needed = np.where(arc & np.isfinite(top), np.nan_to_num(path.seconds) * top, needed)
     return np.asarray(needed)
 
@@ -90,14 +91,15 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
     have no feed asked for."""
     cutting, arc = path.code != 0, path.code == ARC
     wanted = np.where(cutting, np.nan_to_num(path.seconds), np.nan)
-    seconds = np.fmax(wanted, needed)
-    slowed = cutting & (needed > wanted * (1.0 + 1e-9)) & (wanted > 0.0)
     turned = np.abs(step)[:, control.rotary].sum(axis=1)
     length = np.zeros(len(path))
     for law, k in path.by_control():
         length[k] = law.feed_units(step[k], unit)
     asked = asked / unit
     length = np.where(arc & np.isfinite(asked), wanted * asked, length)
+    needed = _with_largest(needed, length, wanted, control.machine.largest_feed)
+    seconds = np.fmax(wanted, needed)
+    slowed = cutting & (needed > wanted * (1.0 + 1e-9)) & (wanted > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         per_minute = 60.0 * length / seconds
         inverse = 60.0 / seconds
@@ -110,13 +112,22 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
         if law.tip_law:
             near = np.abs(length[k] - wanted[k] * asked[k]) <= _ROUNDING * length[k]
             same[k] |= cutting[k] & own[k] & near & (needed[k] <= (1.0 - _ROUNDING) * wanted[k]) & _moves_tip(step[k], law)
-    per_minute = np.where(same, 60.0 * asked, per_minute)
+    per_minute = np.minimum(np.where(same, 60.0 * asked, per_minute), 60.0 * control.machine.largest_feed)
     if rules.least_inverse_rate > 0.0:
         mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < rules.least_inverse_rate),
                         PER_MINUTE, mode)
     inverse = np.where(arc, by_radius, inverse)
     feed = np.where(cutting, np.where(mode == INVERSE, inverse, per_minute), np.nan)
     return Feeds(feed, mode.astype(np.int8), np.where(cutting, seconds, np.nan), slowed)
+
+
+def _with_largest(needed: Floats, length: Floats, wanted: Floats, largest: float) -> Floats:
+    """(K,) s needed where no feed word is above the largest cutting feed, mm/s, `length` (K,) being what it refers to.
+
+    What the rounding of a block's words adds to its length is no reason to slow it.
+    """
+    least = length / largest
+    return np.asarray(np.where(least > wanted * (1.0 + _ROUNDING), np.fmax(needed, least), needed))
 
 
 def _radius(path: JointPath) -> Floats:

@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from machines.choices import Rapids
 from machines.kinematics.base import Kinematics
 from machines.kinematics.frames import reference_x
 from machines.machine import Machine
@@ -31,7 +32,6 @@ InterpolationMode = Literal["axes", "tcp", "tilted"]
 MODE_NAMES: dict[InterpolationMode, str] = {"axes": "machine coordinates without RTCP", "tcp": "tool-centre-point control",
                                             "tilted": "tilted work planes"}
 """as heads of programs, warnings and documents name them"""
-Rapids = Literal["straight", "dog-leg"]
 FeedLength = Literal["xyz-first", "all", "geometry"]
 
 

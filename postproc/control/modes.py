@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from machines.choices import BoughtOption
 from machines.kinematics.base import Kinematics
 from postproc.base.options import Options, OutputMode
 from postproc.control.control import Control, InterpolationMode, tool_frames
@@ -27,6 +28,8 @@ PREFERRED: dict[bool, tuple[InterpolationMode, ...]] = {True: ("tilted", "axes",
 """modes that "auto" takes, the first that can be had: where the tool axis of a run stands still, and where it turns"""
 Refused = frozenset[tuple[int, InterpolationMode]]
 """(operation, mode) that "auto" passes over, because that mode could not be written or proved for it"""
+OPTION_OF: dict[OutputMode, BoughtOption] = {"tilted": "tilted_planes", "tcp": "tip_control"}
+"""the option of the control that an output mode needs"""
 CONSTANT = 0.1
 """share of the axis tolerance within which the tool axis of a run counts as standing still"""
 
@@ -180,6 +183,14 @@ def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
     for asked in np.unique(modes.asked).tolist():
         law = ASKED[asked]
         missing = modes.lacking[law] if law != "auto" else None
+        absent = OPTION_OF.get(law)
+        if absent and modes.control.machine.options.absent(absent):
+            where, line = modes.control.machine.options.stated[absent]
+            result.append(error("output.option", f"output mode {law} needs an option that the machine file says the control "
+                                f"has not: {absent} = false", file=where, lines=[line],
+                                hint=f"take {absent} out of [control] or state true where it is fitted; without it this "
+                                f"controller and machine have: {can}"))
+            continue
         if missing is not None:
             lines = [op.line for op, a in zip(toolpath.operations, modes.asked, strict=True) if a == asked and op.line]
             result.append(error("output.mode", f"output mode {law} is not possible: "

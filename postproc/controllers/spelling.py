@@ -133,6 +133,14 @@ class ProgramBlocks(UserModel):
     them ("G0-G64.9"), and the first words of statements ("TRANS", "CYCL DEF"), next to what the read-back knows"""
     path_tolerance: tuple[Annotated[str, placeholders("tolerance", "chain", "axis")], ...] = ()
     """blocks that set the control's own smoothing; {tolerance} and {chain} in mm, {axis} in degrees"""
+    path_tolerance_off: tuple[str, ...] = ()
+    """blocks that end it, before those of `ending`"""
+    exact_path: tuple[str, ...] = ()
+    """blocks that stand in the place of `path_tolerance` where the machine file says that the control has no smoothing"""
+    smoothing_option: str = ""
+    """the option that `path_tolerance` needs: a comment at the head, where the machine file does not confirm it"""
+    without_smoothing: str = ""
+    """what programs rely on without it: a comment at the head"""
     relies_on_turns: Annotated[str, placeholders("axes")] = ""
     """setting of the control that rotary words of 360 degrees and more need: a comment at the head of
     programs with such; {axes} are their letters"""

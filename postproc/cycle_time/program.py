@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -78,7 +79,7 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
                           origin.cl_line, origin.move, _tip_lengths(motion, control))
     per = np.where(_feed_inch(words, block, own_path), INCH / code.feed_parts, 1.0)
     turned = np.where(np.isnan(motion.pitch), override, 1.0)
-    blocks = replace(blocks, speed=_speeds(per, motion, blocks, by_radius) * turned)
+    blocks = replace(blocks, speed=_clamped(_speeds(per, motion, blocks, by_radius) * turned, blocks, machine))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
     blocks = _unrolled(blocks, motion, control, unit) if (motion.frame > 0).any() else blocks.take(moving)
     return replace(blocks, pauses=_with_indexing(blocks, machine))
@@ -205,6 +206,18 @@ def _speeds(unit: Floats, motion: Motion, blocks: MotionBlocks, by_radius: bool)
     rate = motion.feed * form.length / np.where(around > 0.0, around, 1.0)
     asked = np.where(motion.inverse, np.maximum(rate, least), per_minute) / 60.0
     return np.where(blocks.rapid, np.inf, asked)
+
+
+def _clamped(speed: Floats, blocks: MotionBlocks, machine: Machine) -> Floats:
+    """Speeds (E,) as the control runs them: at feed none above the largest cutting feed, of the machine and of each axis."""
+    if not math.isfinite(machine.largest_feed) and not machine.cutting_velocity:
+        return speed
+    form = shape(blocks)
+    linear = (form.first != 0.0).any(axis=1) | blocks.arc
+    with np.errstate(divide="ignore"):
+        own = (machine.cutting_limits.velocity / form.share).min(axis=1)
+    most = np.minimum(own, machine.largest_feed * np.where(linear, 1.0, DEG))
+    return np.asarray(np.where(blocks.rapid, speed, np.minimum(speed, most)))
 
 
 def _pauses(words: Words, block: Ints, line: Ints, motion: Motion, machine: Machine) -> Pauses:

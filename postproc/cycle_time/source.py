@@ -58,7 +58,8 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
         return None, found
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     law: InterpolationMode = "tcp" if tip_law else "axes"
-    control = Control(machine, law, placement.points(np.zeros((1, 3)))[0], base=law, rapids=controller.kinematics.rapids,
+    control = Control(machine, law, placement.points(np.zeros((1, 3)))[0], base=law,
+                      rapids=machine.rapids or controller.kinematics.rapids,
                       feed_rule=controller.feed.length, rolls=rollovers(machine, controller)[0])
     lengths = {int(number): tool.length for number, tool in setup.tools.items()}
     code, motion, more = _executed(data, controller, control, lengths, file, others)

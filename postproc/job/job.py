@@ -18,12 +18,14 @@ from postproc.control.rollover import rollovers
 from postproc.control.word_grid import WordGrid, word_grid
 from postproc.controllers.model import ControllerFile
 from postproc.job.pivots import control_kinematics
+from postproc.job.rapids import safe_rapids
 from postproc.job.rounding import Rounding, helix_bound, rounding_bound
 from postproc.job.smoothing import SmoothingPlan, smoothing_plan
 from postproc.job.units import other_units
 from postproc.path.links import SafeSpace, safe_space
 from postproc.reference.events import register_changes, tool_changes
 from postproc.reference.hole_depths import unfit_holes
+from postproc.reference.largest_feed import limited_feeds
 from postproc.reference.length_registers import by_rule, own_registers
 from postproc.reference.moves import Moves, build_moves
 from postproc.reference.records import checked_records, plain_records
@@ -79,10 +81,14 @@ class Job:
         box = self.setup.rewind.stock
         if box is None or self.control.plane is not None:
             return None
-        sides = np.array([box.low, box.high])
-        corners = sides[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]
-        placed = self.placement.points(corners) - self.control.origin
+        placed = self.placement.points(box.corners) - self.control.origin
         return np.stack([placed.min(axis=0), placed.max(axis=0)])
+
+    @property
+    def stock_corners(self) -> Floats | None:
+        """(8, 3) corners of the set-up's stock in the table frame; None without."""
+        box = self.setup.rewind.stock
+        return None if box is None else self.placement.points(box.corners)
 
     @property
     def work_system(self) -> Frame:
@@ -201,8 +207,9 @@ class Job:
 
 
 def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) -> ControllerFile:
-    """The controller that knows the codes of the shop's own blocks, the number of the program and its units."""
-    shop = controller.with_shop(machine.hooks.under(setup.hooks).passive, setup.output.program_number)
+    """The controller with its options, the codes of the shop's own blocks, the number of the program and its units."""
+    passive = machine.hooks.under(setup.hooks).passive
+    shop = controller.fitted(machine.options).with_shop(passive, setup.output.program_number)
     return shop.in_units(setup.output.units)
 
 
@@ -241,7 +248,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     moves, found = build_moves(toolpath, setup, axis_tolerance)
     found = [d for d in found if not (errors and d.code == "feed.no_speed")]  # follows from the speed that is missing
     diagnostics += [*found, *_default_feed(toolpath, setup)]
-    moves = moves.placed(placement)
+    moves, found = limited_feeds(moves, toolpath, machine.largest_feed)
+    moves, diagnostics = moves.placed(placement), diagnostics + found
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     origin = placement.points(np.array([frame.origin]))[0]
     largest = controller.arcs.largest_radius if controller.arcs.enabled else 0.0
@@ -254,7 +262,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     corrects = geometric is not None and geometric.corrected_by == "post"  # tables that are corrected do not stand at zero
     entry = "table" if corrects or controller.modes.tcp is None else controller.modes.tcp.frame
-    control = Control(machine, law, origin, largest, law, rapids=controller.kinematics.rapids, entry_frame=entry,
+    control = Control(machine, law, origin, largest, law, entry_frame=entry,
+                      rapids=machine.rapids or controller.kinematics.rapids,
                       feed_rule=controller.feed.length, degree_is_inch=controller.degree_is_inch, own_kinematics=own,
                       helix_planes=controller.arcs.helix_planes,
                       rolls=rolls, measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
@@ -264,13 +273,21 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
               modes, geometric, tuple(stated))
-    return None if errors else job, diagnostics + _tool_lengths(job) + _unused_tools(job)
+    return None if errors else _with_rapids(job), diagnostics + _tool_lengths(job) + _unused_tools(job)
 
 
 def _assumed(setup: SetupFile, options: Options) -> list[Diagnostic]:
     """Values of the set-up that nobody has stated."""
     return [warning("setup.assumed", f"{key} = {stated_value(setup, key)} is assumed: nobody has stated it",
                     file=options.setup, hint="state yours, and take its name out of `assumed`") for key in setup.assumed]
+
+
+def _with_rapids(job: Job) -> Job:
+    """With rapids split where the control would leave their line, but where they are fed instead."""
+    if job.setup.output.rapids_as_feed:
+        return job
+    return replace(job, moves=safe_rapids(job.moves, job.modes, job.kinematics, job.operation, job.space, job.stock_corners,
+                                          (job.options.tolerance, job.axis_tolerance)))
 
 
 def _work_offset(controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:

@@ -56,7 +56,8 @@ class _Stand:
 
 def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], moves: Moves, space: SafeSpace,
                home_rows: frozenset[int], operation: Ints, tolerance: float, axis_tolerance: float, file: str = "",
-               progress: Progress | None = None, drawing: RetractPlan | None = None) -> tuple[JointPath | None,
+               progress: Progress | None = None, drawing: RetractPlan | None = None,
+               rapids_as_feed: bool = False) -> tuple[JointPath | None,
                                                                                               list[Diagnostic]]:
     """Blocks for all moves (in the table frame).
 
@@ -66,6 +67,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         operation (M,): of each move
         tolerance, axis_tolerance: mm and rad that linearising may use
         drawing: what the set-up says about rewinds and preferred joints; default: its defaults
+        rapids_as_feed: rapids that would leave their line may be feed moves
     """
     machine, given, drawing = modes.control.machine, moves, drawing or RetractPlan.default(space)
     plan = plan_moves(machine, kinematics, moves, drawing.run_options(machine, axis_tolerance),
@@ -92,8 +94,8 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst)
     diagnostics += joint_faults.planned(plan, machine, given, file)
     diagnostics += cost(modes.tcp_code, longer, file)
-    return path, faults.merged(diagnostics) + faults.rapid_as_feed(path.code, path.move, path.seconds,
-                                                                   given, file)
+    return path, faults.merged(diagnostics) + faults.off_line(path.code, path.u, path.move, path.seconds,
+                                                              given, file, rapids_as_feed)
 
 
 def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count: int, turns: Ints,

@@ -120,12 +120,20 @@ def broken(machine: Machine, moves: Moves, rows: Ints, q: Floats, file: str) -> 
     return result
 
 
-def rapid_as_feed(code: Array, move: Ints, seconds: Floats, moves: Moves, file: str) -> list[Diagnostic]:
-    """Rapids that are written as feed moves (code 1, no time of their own), as the control would leave their line."""
-    rows = np.flatnonzero((code == 1) & (seconds == 0.0) & (moves.kind[move] == Kind.RAPID))
+def off_line(code: Array, u: Floats, move: Ints, seconds: Floats, moves: Moves, file: str,
+             rapids_as_feed: bool) -> list[Diagnostic]:
+    """Rapids that are feed moves (code 1, no time of their own), as the control would leave their line; an error where that
+    is not asked for. `u` (K,) is NaN for linking blocks."""
+    rows = np.flatnonzero((code == 1) & (seconds == 0.0) & ((moves.kind[move] == Kind.RAPID) | np.isnan(u)))
     if not len(rows):
         return []
     lines = np.unique(moves.line[move[rows]])
-    return [info("feed.rapid_as_feed", "G0 of several axes output as G1 (dog-leg rapids), at the speed of the slowest "
-                 "axis: the control's rapids would leave the straight line", file=file, lines=lines[:6].tolist(),
-                 count=len(lines))]
+    if rapids_as_feed:
+        return [info("feed.rapid_as_feed", "G0 of several axes output as G1 (dog-leg rapids), at the speed of the slowest "
+                     "axis: the control's rapids would leave the straight line", file=file, lines=lines[:6].tolist(),
+                     count=len(lines))]
+    return [error("rapid.off_line", "a rapid of several axes would leave its line, each axis running at its own speed "
+                  "(dog-leg), and no safe path of single axes is known", file=file, lines=lines[:6].tolist(),
+                  count=len(lines), hint='write rapids = "straight" under [control] of the machine file where the control '
+                  "keeps rapids straight (Fanuc 1401#1 LRP = 1, Haas setting 335), or rapids_as_feed = true under [output] "
+                  "of the set-up for G1 at the speed of the slowest axis, or convert with --output-mode tcp")]

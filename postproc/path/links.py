@@ -26,7 +26,7 @@ from toolpaths.toolpath import Kind
 
 RISE = 10.0
 """mm above the safe plane for index moves, so that their dips stay above it"""
-_MARGINS = (1.0, 0.4, 0.2, 0.1)
+MARGINS = (1.0, 0.4, 0.2, 0.1)
 """shares of the set-up's margin that are tried where travel is short"""
 _STEPS = (0, 1, 3, 7, 15)
 SAMPLES = 17
@@ -147,7 +147,7 @@ def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeS
     if turning is None:
         turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
     first: Link | None = None
-    for share in _MARGINS if space.distance is None else (1.0,):
+    for share in MARGINS if space.distance is None else (1.0,):
         link = _link(control, kin0, kin1, space, before, after, by_home, turning, share)
         if first is None:
             first = link

@@ -94,11 +94,13 @@ def carried_out(reader: Reader, controller: ControllerFile, clamps: set[float], 
 
 def written(controller: ControllerFile) -> Iterator[str]:
     """Blocks that programs of the controller hold, with placeholders."""
-    program = controller.program.model_dump(exclude={"passive", "carried_out", "relies_on_turns"})
+    program = controller.program.model_dump(exclude={"passive", "carried_out", "relies_on_turns", "smoothing_option",
+                                                     "without_smoothing"})
     rest = controller.model_dump(include={"codes", "subprograms", "subprogram_files", "arcs", "cycles", "rollover", "units",
                                           "levels"},
                                  exclude={"rollover": {"needs", "default", "rules"}, "subprograms": {"place", "file"},
-                                          "subprogram_files": {"place", "file"}, "cycles": {"rigid_only"}})
+                                          "subprogram_files": {"place", "file"}, "arcs": {"helical_option"},
+                                          "cycles": {"rigid_only", "rigid_option", "floating"}})
     modes = [mode for mode in (controller.modes.tcp, controller.modes.tilted) if mode is not None]
     texts = [*_texts(program), *_texts(rest), *(t for mode in modes for t in (*mode.start, *mode.enter, *mode.leave))]
     for text in texts:

@@ -54,7 +54,7 @@ from postproc.verification.planned_words import check_planned
 from postproc.verification.proof_text import with_statement
 from postproc.verification.read_back import read_back
 from postproc.verification.second_witness import second_witness
-from postproc.writing.unwritable import unwritable
+from postproc.writing.unwritable import floating_taps, unwritable
 from postproc.writing.writers import writer_for
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.units import DEG
@@ -138,7 +138,7 @@ def solved(made: PlacedStage, progress: Progress | None) -> tuple[PlacedStage | 
     job, shares = made.job, made.shares
     path, found = build_path(job.modes, job.kinematics, made.moves, job.space, job.home_rows(), job.operation,
                              shares["linearising"], shares["axis_linearising"] * DEG, made.toolpath.file, progress,
-                             made.drawing)
+                             made.drawing, made.setup.output.rapids_as_feed)
     found = with_system(found, job.work_system, job.placement, job.moves.axis)
     if path is None:
         return made, found
@@ -198,6 +198,8 @@ def compiled(made: PlannedStage, progress: Progress | None) -> tuple[CompiledSta
                                             None if compensation is None else compensation.apart)
     found += unwritable(made.controller, program, made.toolpath.cycles, made.toolpath.file,
                         job.control.length_on_z)
+    found += floating_taps(made.controller, program, made.toolpath.cycles, made.machine.options.absent("rigid_tapping"),
+                           made.toolpath.file)
     return handed_on(CompiledStage, made, program=program, feeds=feeds), found
 
 

@@ -181,7 +181,7 @@ class Source:
     @property
     def bounds(self) -> JointLimits:
         """Limits of the joints."""
-        return joint_limits(self.machine.limits)
+        return joint_limits(self.machine.cutting_limits)
 
     def bounds_of(self, one: PassGeometry) -> JointLimits:
         """Limits of the joints, and of the tool that cuts a pass."""

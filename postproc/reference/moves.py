@@ -79,9 +79,11 @@ class Moves:
     def without_pecks(self) -> Moves:
         """The rows but those of pecks: a hole is then one straight path to its bottom."""
         keep = self.phase != Phase.PECK
-        if bool(keep.all()):
-            return self
-        return rows_of(self, "M", keep)
+        return self if bool(keep.all()) else self.take(keep)
+
+    def take(self, rows: Ints | Bools) -> Moves:
+        """Some of the rows, or rows several times."""
+        return rows_of(self, "M", rows)
 
     def run_by(self, owner: Ints) -> Bools:
         """(E,) True for blocks that run a move of the CL file itself, by the move that each serves: not those of

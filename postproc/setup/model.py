@@ -121,6 +121,10 @@ class OutputSettings(UserModel):
     program_name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_]{1,24}$")] | None = None
     """of the program on controls that name them (BEGIN PGM NAME MM) and of its subprograms; default: that of
     the output file"""
+    rapids_as_feed: bool = False
+    """true: rapids that would leave their line, each axis running at its own speed (dog-leg), are written as G1 at the speed
+    of the slowest axis. Controls clamp or refuse such feeds, and the rapid override does not act on them. false: they
+    stay G0, split where that is safe, else they are refused"""
     stop_between_tools: bool = False
     """an optional stop (M1) before every tool change but the first, spindle and coolant off; where the CL
     file stops there itself, none besides"""
@@ -150,6 +154,11 @@ class Stock(UserModel):
     """its least x, y, z"""
     high: SetupVector
     """its greatest x, y, z"""
+
+    @property
+    def corners(self) -> Floats:
+        """(8, 3)"""
+        return np.asarray(np.array([self.low, self.high])[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)])
 
 
 class RewindSettings(UserModel):

@@ -17,6 +17,7 @@ from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.hooks import check_hooks
 from postproc.readback.comparison.length_margins import LengthMargin, length_margins, longer_run
+from postproc.readback.comparison.options import check_options
 from postproc.readback.comparison.slow_moves import planned_feeds
 from postproc.readback.comparison.starts import check_end, check_start
 from postproc.readback.comparison.states import check_lengths
@@ -112,7 +113,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, i
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(code, motion, job, comparison.owner, faults),
-               *check_index(motion, job, home, comparison.owner, faults),
+               *check_options(code, motion, job, faults), *check_index(motion, job, home, comparison.owner, faults),
                *check_hooks(data, code, motion, job, comparison.owner, faults),
                *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)

@@ -17,29 +17,34 @@ _CHUNK = 100_000
 _KINDS = ("XYZ", "UVW", "ABC")
 
 
-def seconds_of(e: ExecutedBlocks) -> Array:
-    """(E,) s of every block at the feed in force; meaningless for rapids.
+def seconds_of(e: ExecutedBlocks, length: Array, unit: Array) -> Array:
+    """(E,) s of every block at the feed in force, which refers to `length` (E,) in `unit` (E,); meaningless for rapids."""
+    share = np.where(np.isfinite(e.sweep), np.abs(e.sweep), 1.0) if e.by_angle else 1.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(60.0 * np.where(e.inverse, share, length / unit) / e.feed)
+
+
+def lengths_of(e: ExecutedBlocks) -> tuple[Array, Array]:
+    """(E,) mm or degrees of every block that its feed per minute refers to, (E,) the unit of the feed: 25.4 for inch.
 
     Per minute the feed is that of the tip where X, Y, Z are the tip; of machine coordinates by `rule`: "all" the
     root of the squares of all words, "geometry" X, Y, Z before all others, else X, Y, Z before U, V, W before
     A, B, C. In inverse time a block takes 1/F minutes, an arc its angle over F where the control has it so.
     """
-    length = np.empty(len(e))
+    length, unit = np.empty(len(e)), np.ones(len(e))
     for first in range(0, len(e), _CHUNK):
         rows = np.arange(first, min(first + _CHUNK, len(e)))
         step = e.steps(rows)
         linear = (np.abs(step[:, [name not in "ABC" for name in e.letters]]) > 0.0).any(axis=1)
-        unit = np.where(linear, e.unit[rows], 1.0)
+        unit[rows] = np.where(linear, e.unit[rows], 1.0)
         if e.degree_is_inch:
-            step = step * np.where([name in "ABC" for name in e.letters], unit[:, None], 1.0)
+            step = step * np.where([name in "ABC" for name in e.letters], unit[rows, None], 1.0)
         length[rows] = np.where(e.by_tip[rows], _first_of(np.where(np.abs(step) > _STILL, step, 0.0), e.letters, _KINDS),
-                                _by_rule(step, e.letters, e.rule)) / unit
+                                _by_rule(step, e.letters, e.rule))
     arcs = np.flatnonzero((e.code == 2) & np.isfinite(e.sweep))
     if len(arcs):
-        length[arcs] = _arc_lengths(e, arcs) / e.unit[arcs]
-    share = np.where(np.isfinite(e.sweep), np.abs(e.sweep), 1.0) if e.by_angle else 1.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(60.0 * np.where(e.inverse, share, length) / e.feed)
+        length[arcs], unit[arcs] = _arc_lengths(e, arcs), e.unit[arcs]
+    return length, unit
 
 
 def _by_rule(step: Array, letters: tuple[str, ...], rule: Literal["xyz-first", "geometry", "all"]) -> Array:

@@ -18,6 +18,11 @@ ROD = 1e-4
 """mm by which a rod may miss its length"""
 
 
+def largest_feed(table: dict[str, Any]) -> float:
+    """mm/min of the largest cutting feed; infinite where the machine file states none."""
+    return float((table.get("control") or {}).get("largest_feed") or math.inf)
+
+
 def merged(tables: list[dict[str, Any]]) -> dict[str, Any]:
     """A machine file over its base, over that one's base: tables merged, everything else replaced."""
     result: dict[str, Any] = {}
@@ -156,12 +161,12 @@ def kinematics_of(table: dict[str, Any]) -> Chain | Rods | None:
 
 
 def limits_of(table: dict[str, Any], letters: tuple[str, ...]) -> tuple[Array, Array]:
-    """(travel (J, 2), velocity (J,)) in mm, rad, s; infinite where unlimited."""
+    """(travel (J, 2), velocity at feed (J,)) in mm, rad, s; infinite where unlimited."""
     unit_of = np.array([math.pi / 180.0 if name in "ABC" else 1.0 for name in letters])
     travel, speed = [], []
     for name in letters:
         axis = table.get("axes", {}).get(name, {})
         found = axis.get("travel", "unlimited")
         travel.append((-math.inf, math.inf) if isinstance(found, str) else found)
-        speed.append(axis.get("velocity", math.inf))
+        speed.append(min(axis.get("velocity", math.inf), axis.get("cutting_velocity", math.inf)))
     return np.array(travel, np.float64) * unit_of[:, None], np.array(speed, np.float64) * unit_of

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from postproc.witness.block_times import seconds_of
+from postproc.witness.block_times import lengths_of, seconds_of
 from postproc.witness.commanded import RAPID
 from postproc.witness.evidence import Finding
 from postproc.witness.machine import Chain, limits_of
@@ -43,7 +43,9 @@ class Walked:
         """first block of the target that is no return of a hole"""
         self.gap = np.where(self.inside, targets.gap[m], False)
         self.away, self.tilt = np.zeros(len(owner)), np.zeros(len(owner))
-        self.seconds = seconds_of(poses.executed)
+        self.length, unit = lengths_of(poses.executed)
+        """(E,) mm or degrees that feeds refer to"""
+        self.seconds = seconds_of(poses.executed, self.length, unit)
         """(E,) of blocks at feed"""
 
     def _left_holes(self) -> tuple[Array, Array]:
@@ -97,10 +99,11 @@ class Walked:
 
 
 def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_angle: float, bent: bool,
-               table: dict[str, object]) -> list[Finding]:
+               table: dict[str, object], fed_rapids: bool) -> list[Finding]:
     """Blocks off their path that are no retract, approach or move clear of what is cut; rapids in cuts and the reverse.
 
-    Rapids that turn the tool axis by more than `link_angle` (degrees) have to be clear, or on such a line, themselves."""
+    Rapids that turn the tool axis by more than `link_angle` (degrees) have to be clear, or on such a line, themselves;
+    where they are dog-legs (`bent`) they may be fed if the set-up asks for that."""
     good = w.on_path()
     step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
     moved = np.sqrt((step * step).sum(axis=1))
@@ -109,7 +112,7 @@ def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_ang
     hurried = cutting & good & (w.code == 0) & (moved > STILL) & (w.kind != BOTTOM)
     found += _finding(w, np.flatnonzero(hurried), lines, "kind", "rapid motion on a cut of the CL file")
     after_hole = w.targets.kind[np.clip(w.owner - 1, 0, len(w.targets) - 1)] == BOTTOM
-    fed = (w.kind == RAPID) & ~after_hole & ~w.gap & good & (w.code > 0) & (moved > STILL) & (not bent)
+    fed = (w.kind == RAPID) & ~after_hole & ~w.gap & good & (w.code > 0) & (moved > STILL) & (not (bent and fed_rapids))
     found += _finding(w, np.flatnonzero(fed), lines, "kind", "feed motion on a rapid of the CL file")
     turned = _turned_in_rapid(w, math.radians(link_angle))
     good &= ~turned

@@ -12,7 +12,7 @@ from postproc.witness.clfile import commanded
 from postproc.witness.commanded import ARC, LINE, Commanded
 from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Case, ExecutedBlocks, Finding, Testimony
-from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, merged
+from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
 from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.states import (
@@ -97,9 +97,10 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     clearance = case.setup.get("clearance") or {}
     margin, link_angle = float(clearance.get("margin", 50.0)), float(clearance.get("link_angle", 5.0))
     if not len(lost):
-        found += check_path(w, c.line, cut, margin, link_angle, case.bent_rapids, table)
+        found += check_path(w, c.line, cut, margin, link_angle, case.bent_rapids, table,
+                            bool((case.setup.get("output") or {}).get("rapids_as_feed")))
         found += check_arcs(w, turns, c.line)
-    faults, holes = check_holes(w, c, case, match)
+    faults, holes = check_holes(w, c, case, match, largest_feed(table))
     found += faults
     faults, feeds = check_feeds(w, c, case, table, match)
     found += faults

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, WitnessCycle
 from postproc.witness.evidence import Case, Finding
-from postproc.witness.machine import limits_of
+from postproc.witness.machine import largest_feed, limits_of
 from postproc.witness.motion import CHUNK, Walked
 from postproc.witness.stretches import BOTTOM
 from postproc.witness.text import Array
@@ -54,8 +54,9 @@ def _loads(tool: Array) -> Array:
     return np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(tool)), 0))
 
 
-def feeds_of(c: Commanded, setup: dict[str, Any]) -> Array:
-    """(N,) mm/min that the CL file asks for at every position, holes by their cycle; NaN where it does not say."""
+def feeds_of(c: Commanded, setup: dict[str, Any], most: float) -> Array:
+    """(N,) mm/min that the CL file asks for at every position, holes by their cycle, but taps no more than `most`; NaN where
+    it does not say."""
     own = np.array([(x.feed, x.per_turn) for x in c.cycles] + [(math.nan, 0.0)], np.float64)
     hole = c.cycle >= 0
     feed = np.where(hole, own[c.cycle, 0], c.feed)
@@ -65,7 +66,8 @@ def feeds_of(c: Commanded, setup: dict[str, Any]) -> Array:
     if default:
         feed = np.where(np.isnan(feed) & ~c.inverse & ~tap, float(default), feed)
         per_turn = per_turn & ~(np.isnan(c.feed) & ~hole)
-    return np.asarray(np.where(per_turn, feed * c.rpm, np.where(c.inverse & ~hole, math.nan, feed)))
+    feed = np.where(per_turn, feed * c.rpm, np.where(c.inverse & ~hole, math.nan, feed))
+    return np.asarray(np.where(feed > np.where(tap, math.inf, most), most, feed))
 
 
 def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any],
@@ -81,9 +83,10 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any],
     rise = np.einsum("ni,ni->n", t.tip - t.start, t.normal)
     radius = np.sqrt(np.maximum((flat * flat).sum(axis=1) - np.einsum("ni,ni->n", flat, t.normal) ** 2, 0.0))
     length = np.where(round_, np.hypot(radius * np.abs(t.sweep), rise), length)
-    feed = feeds_of(c, case.setup)[t.row]
+    most = largest_feed(table)
+    feed = feeds_of(c, case.setup, most)[t.row]
     inverse = c.inverse[t.row] & (t.kind != BOTTOM)
-    asked = np.where(inverse, 60.0 / c.feed[t.row], 60.0 * length / feed)
+    asked = np.where(inverse, np.maximum(60.0 / c.feed[t.row], 60.0 * length / most), 60.0 * length / feed)
     shorter = 0.002 + 4.0 * case.tolerance + np.abs(t.sweep) * case.tolerance
     slack = shorter * np.where(inverse, asked / np.maximum(length, 1e-3), 60.0 / feed)
     check = ((t.kind == LINE) | (t.kind == ARC)) & ~t.gap & ~t.free & (match >= 0) & (seconds > 0.0) & np.isfinite(asked)
@@ -135,6 +138,7 @@ def _needed(w: Walked, rows: Array, slow: Array, pace: Array, table: dict[str, A
         _, speed = limits_of(table, w.poses.executed.letters)
         step = w.tip[here] - w.tip[np.maximum(here - 1, 0)]
         q, most = w.poses.before(here), np.sqrt((step * step).sum(axis=1)) * pace[w.owner[here]]
+        most = np.maximum(most, 60.0 * w.length[here] / largest_feed(table))
         for t in (0.25, 0.5, 0.75, 1.0):
             after = w.poses.joints(here, t)
             most = np.maximum(most, 4.0 * (np.abs(after - q) / speed).max(axis=1))
@@ -266,7 +270,7 @@ def tools_of(c: Commanded, setup: dict[str, Any]) -> Array:
     return np.asarray(np.where(own != UNKNOWN, own, np.where(sure & (c.tool > 0), c.tool, UNKNOWN)))
 
 
-def check_holes(w: Walked, c: Commanded, case: Case, match: Array) -> tuple[list[Finding], int]:
+def check_holes(w: Walked, c: Commanded, case: Case, match: Array, most: float) -> tuple[list[Finding], int]:
     """Depth, pecks, dwell and thread of every hole."""
     t, e = w.targets, w.poses.executed
     bad: dict[str, list[tuple[int, int]]] = {}
@@ -277,12 +281,19 @@ def check_holes(w: Walked, c: Commanded, case: Case, match: Array) -> tuple[list
         last = int(match[i])
         blocks = np.arange(first, last + 1)
         if len(blocks):
-            cycle = c.cycles[c.cycle[t.row[i]]]
-            for what in [*_hole_faults(w, i, blocks, cycle, float(c.rpm[t.row[i]]), case.tolerance),
+            rpm = float(c.rpm[t.row[i]])
+            cycle = _limited(c.cycles[c.cycle[t.row[i]]], rpm, most)
+            for what in [*_hole_faults(w, i, blocks, cycle, rpm, case.tolerance),
                          *_retract_fault(w, i, last, cycle, level, case.tolerance)]:
                 bad.setdefault(what, []).append((i, last))
     return [Finding("hole", what, int(c.line[t.row[at[0][0]]]), int(e.line[at[0][1]]), len(at))
             for what, at in bad.items()], len(holes)
+
+
+def _limited(cycle: WitnessCycle, rpm: float, most: float) -> WitnessCycle:
+    """The cycle at no more than the largest cutting feed, mm/min; taps keep their thread."""
+    feed = cycle.feed * rpm if cycle.per_turn else cycle.feed
+    return cycle if cycle.kind == "TAP" or not feed > most else replace(cycle, feed=most, per_turn=False)
 
 
 def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: float,

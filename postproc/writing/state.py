@@ -14,6 +14,7 @@ from postproc.compile.program import PER_MINUTE, Hole, Program, Section
 from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
 from postproc.controllers.texts import CYCLE_LENGTHS
 from postproc.job.smoothing import Smoothing
+from postproc.path.model import ARC
 from postproc.reference.coolant import CoolantCommand, switching
 from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Cycle
@@ -63,6 +64,19 @@ class WriterState:
     def named(self, number: int | str) -> dict[str, int | str]:
         """What the text of a frame or a subprogram may name."""
         return {"name": self.name, "number": number, "units": self.units}
+
+    def options(self, modes: list[Mode]) -> list[str]:
+        """What its modes need, and further options that the program needs, which the machine file does not confirm."""
+        needed = [text.replace("{work_offset}", self.offset_name) for mode in modes
+                  for text in (mode.option, *mode.relies_on) if text]
+        p, rules = self.program, self.controller
+        arcs = np.flatnonzero(p.code == ARC)
+        third = [p.letters.index("ZYX"[plane - 17]) for plane in p.plane[arcs].tolist()]
+        rising = p.words[arcs, third] != p.words[arcs - 1, third]
+        taps = any(hole.key.startswith("TAP") for hole in p.holes)
+        others = ((rules.program.smoothing_option, True), (rules.arcs.helical_option, bool(rising.any())),
+                  (rules.cycles.rigid_option, taps))
+        return needed + [text for text, used in others if text and used]
 
     def restate(self) -> None:
         """State motion code and feed with the next block."""

@@ -108,3 +108,14 @@ def _no_tool(controller: ControllerFile, program: Program, file: str) -> list[Di
     return [error("tool.missing", f"the control runs the tool tip with a length register ({code}), and the file has loaded "
                   "no tool", file=file, lines=lines[:6], count=len(lines),
                   hint="write LOADTL/1 before the first GOTO, or --output-mode axes")]
+
+
+def floating_taps(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], absent: bool,
+                  file: str) -> list[Diagnostic]:
+    """Taps where rigid tapping is `absent`, by the machine file, and the control has no cycle for a floating holder."""
+    lines = sorted({cycles[hole.cycle].line for hole in program.holes if hole.key.startswith("TAP")})
+    if not absent or controller.cycles.floating or not lines:
+        return []
+    return [error("cycle.rigid_tap", "a tap, and by the machine file the control has no rigid tapping (rigid_tapping = "
+                  "false): the tapping cycle of this controller is rigid", file=file, lines=lines[:6], count=len(lines),
+                  hint="take the tap out of the CL file, or state rigid_tapping = true under [control] where it is fitted")]

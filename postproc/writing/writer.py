@@ -117,11 +117,11 @@ class Writer(WriterState, ABC):
 
     def ending(self) -> list[str]:
         """The blocks that end every program, without those that switch off what is off already."""
-        codes = self.controller.codes
+        codes, program = self.controller.codes, self.controller.program
         off = {codes.spindle_stop} if self.turning is False else set()
         off |= {codes.coolant_off} if self.cooling is False else set()
         left = [code for code in self.coolant_off() if self.flowing and code != codes.coolant_off]
-        return left + [kept for block in self.controller.program.ending if (kept := _without(block, off))]
+        return left + [kept for block in (*program.path_tolerance_off, *program.ending) if (kept := _without(block, off))]
 
     def start(self) -> Iterator[str]:
         """Safe start: modes that the program uses off, then the preamble."""
@@ -143,7 +143,7 @@ class Writer(WriterState, ABC):
         """Settings of the control that the program needs, each once."""
         needed = [self.offset_needs] if self.offset_needs else []
         needed += self.controller.inch.relies_on if self.controller.format.units == "inch" else ()
-        needed += [text for mode in self.used_modes() for text in mode.relies_on]
+        needed += self.options(self.used_modes())
         letters, text = self.beyond_a_turn(), self.controller.program.relies_on_turns
         needed += [text.format(axes=" ".join(letters))] if letters and text else []
         for rule in ("shortest", "sign"):

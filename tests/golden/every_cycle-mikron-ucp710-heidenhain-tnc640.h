@@ -13,7 +13,7 @@
 12 ; tool T2 M6, diameter 6 mm, gauge length 95.5000 mm
 13 ; tool T3 EM10, diameter 10 mm, gauge length 110.0000 mm
 14 ; needs option 8 for PLANE: Advanced Function Set 1
-15 ; needs rotary values of 0 in the preset
+15 ; needs rotary values of 0 in datum number 1
 16 PLANE RESET STAY
 17 CYCL DEF 247 DATUM SETTING ~
 Q339=+1 ;DATUM NUMBER

@@ -12,7 +12,7 @@
 11 ; tool T1 EM10, diameter 10 mm, gauge length 120.0000 mm
 12 ; tool T2 BM6, diameter 6 mm, gauge length 95.5000 mm
 13 ; needs option 9 for FUNCTION TCPM: Advanced Function Set 2
-14 ; needs rotary values of 0 in the preset
+14 ; needs rotary values of 0 in datum number 1
 15 ; needs option 8 for PLANE: Advanced Function Set 1
 16 FUNCTION RESET TCPM
 17 PLANE RESET STAY

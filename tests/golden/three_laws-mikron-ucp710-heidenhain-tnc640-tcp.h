@@ -13,7 +13,7 @@
 12 ; tool T1 EM10, diameter 10 mm, gauge length 120.0000 mm
 13 ; tool T2 BM6, diameter 6 mm, gauge length 95.5000 mm
 14 ; needs option 9 for FUNCTION TCPM: Advanced Function Set 2
-15 ; needs rotary values of 0 in the preset
+15 ; needs rotary values of 0 in datum number 1
 16 FUNCTION RESET TCPM
 17 CYCL DEF 247 DATUM SETTING ~
 Q339=+1 ;DATUM NUMBER

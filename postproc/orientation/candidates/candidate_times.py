@@ -65,8 +65,8 @@ class Candidate:
 
     @cached_property
     def limits(self) -> JointLimits:
-        """of the machine's joints"""
-        return joint_limits(self.machine.limits)
+        """of the machine's joints at feed"""
+        return joint_limits(self.machine.cutting_limits)
 
     @cached_property
     def bound(self) -> float:
@@ -95,7 +95,8 @@ class Candidate:
         if self.refused:
             return np.inf
         rows = np.flatnonzero(self.one.rapid[1:])
-        return float(rest_seconds(self.q[rows], self.q[rows + 1], self.limits, PointToPointMode.STRAIGHT).sum())
+        limits = joint_limits(self.machine.limits)
+        return float(rest_seconds(self.q[rows], self.q[rows + 1], limits, PointToPointMode.STRAIGHT).sum())
 
     @cached_property
     def drilling(self) -> float:

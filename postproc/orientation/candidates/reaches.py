@@ -70,7 +70,7 @@ def least_under(made: Candidate, axes: Floats, near: Floats | None = None) -> Fl
     Args:
         near: (N, J) joints that say where a joint stands which the axis leaves free; default: home
     """
-    one, limits, stretch = made.one, made.machine.limits, made.one.longest
+    one, limits, stretch = made.one, made.machine.cutting_limits, made.one.longest
     direction, length = direction_of(stretch)
     if stretch is None or not length:
         return np.full(len(axes), np.nan)
@@ -130,7 +130,7 @@ def polytopes(made: Candidate) -> dict[MotionOrder, Polytope]:
     q = made.sites[which][middle:middle + 1]
     axis = stretch.axis[middle] if one.fixed else made.axis
     near = np.hstack((stretch.tip[middle] + one.shift(made.axis), axis))[None]
-    limits = made.machine.limits
+    limits = made.machine.cutting_limits
     shapes = {order: held_axis_polytope(one.kin, q, rate, near)
               for order, rate in zip(ORDERS, (limits.velocity, limits.acceleration, limits.jerk), strict=True)}
     return {order: shape for order, shape in shapes.items() if np.isfinite(shape.normals).all() and shape.normals.size}

@@ -19,6 +19,7 @@ from postproc.planning.geometry_sites import sites
 from postproc.planning.pass_geometry import chains, stops_of
 from postproc.reference.cutter import ball_radius
 from postproc.reference.events import tool_changes
+from postproc.reference.largest_feed import limited_feeds
 from postproc.reference.moves import Moves, build_moves
 from postproc.reference.tool_numbers import numbered
 from postproc.setup.model import Placement, SetupFile, part_placement
@@ -144,7 +145,7 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
     moves, more = build_moves(toolpath, setup, options.axis_tolerance * DEG)
     if has_errors([*found, *more]):
         return None, [*found, *more]
-    moves = moves.placed(placement)
+    moves = limited_feeds(moves, toolpath, machine.largest_feed)[0].placed(placement)
     normals = None if toolpath.normal is None else placement.directions(toolpath.normal)[moves.row]
     surface, faults = surface_of(setup, placement, options.tolerance, options.setup) if turning else (None, [])
     if has_errors(faults):

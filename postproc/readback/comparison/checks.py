@@ -36,8 +36,8 @@ def check_kinds(motion: Motion, moves: Moves, owner: Ints, tip: Floats, bent: bo
                 faults: Faults) -> list[Diagnostic]:
     """Rapids where the CL file cuts, cuts where it moves rapidly; pecks may return rapidly above what is drilled.
 
-    Where rapids are dog-legs (`bent`) a feed move may stand for one that must be straight; blocks (K,) that only take up
-    lost motion may be either: feed moves where a rapid has ended, rapids where a cut has.
+    Where rapids are dog-legs and feed moves asked for (`bent`) one may stand for a rapid that must be straight;
+    blocks (K,) that only take up lost motion may be either: feed moves where a rapid has ended, rapids where a cut has.
     """
     rows = np.flatnonzero(owner < len(moves))
     m = owner[rows]
@@ -206,14 +206,22 @@ def block_seconds(motion: Motion, control: Control, by_radius: bool = False) -> 
     the units of the feed (degrees where no linear axis moves). Inverse time
     counts whole blocks, in arcs 1/(minutes per radian) where the control has it so (`by_radius`).
     """
-    sweep, result = arc_sweeps(motion, control), np.empty(len(motion))
+    sweep, (length, unit) = arc_sweeps(motion, control), block_lengths(motion, control)
+    share = np.where(np.isfinite(sweep), sweep, 1.0) if by_radius else 1.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.where(motion.inverse, 60.0 * share / motion.feed, 60.0 * length / unit / motion.feed))
+
+
+def block_lengths(motion: Motion, control: Control) -> tuple[Floats, Floats]:
+    """(E,) mm or degrees of every block that a feed per minute refers to, (E,) the unit of the feed: 25.4 for inch."""
+    sweep, length, unit = arc_sweeps(motion, control), np.empty(len(motion)), np.empty(len(motion))
     for first in range(0, len(motion), CHUNK):
         rows = np.arange(first, min(first + CHUNK, len(motion)))
-        result[rows] = _seconds(motion, control, by_radius, rows, sweep[rows])
-    return result
+        length[rows], unit[rows] = _lengths(motion, control, rows, sweep[rows])
+    return length, unit
 
 
-def _seconds(motion: Motion, control: Control, by_radius: bool, rows: Ints, sweep: Floats) -> Floats:
+def _lengths(motion: Motion, control: Control, rows: Ints, sweep: Floats) -> tuple[Floats, Floats]:
     """Those of the blocks `rows` (K,), whose sweeps are `sweep` (K,)."""
     before, end = coordinates(motion, rows)
     step = end - before
@@ -229,10 +237,9 @@ def _seconds(motion: Motion, control: Control, by_radius: bool, rows: Ints, swee
             radius = np.linalg.norm(before[k][:, columns] - motion.center[rows[k]][:, (i, j)], axis=1)
             rise = step[k, int(control.xyz[3 - i - j])]
             length[k] = np.hypot(radius * sweep[k], rise) / unit[k]
-    share = np.where(np.isfinite(sweep), sweep, 1.0) if by_radius else 1.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        feed = motion.feed[rows]
-        return np.asarray(np.where(motion.inverse[rows], 60.0 * share / feed, 60.0 * length / feed))
+    linear = np.isfinite(sweep) | (step[:, control.slides] != 0.0).any(axis=1)
+    own = np.where(linear, unit, 1.0)
+    return length * own, own
 
 
 def check_links(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, space: SafeSpace, tolerance: float,

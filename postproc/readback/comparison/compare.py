@@ -109,8 +109,8 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
                                         "their deviation, they are only checked at places", int(moves.line[0]),
                                         int(motion.line[0]), hint="leave --require-proof out, where checked is enough"))
     diagnostics += check_spins(motion, executed, moves, owner, tip, axis, axis_tolerance, faults)
-    diagnostics += check_kinds(motion, moves, owner, tip, executed.control.rapids == "dog-leg",
-                               _taken_up(job, motion, tip), faults)
+    bent = job.setup.output.rapids_as_feed and executed.control.rapids == "dog-leg"
+    diagnostics += check_kinds(motion, moves, owner, tip, bent, _taken_up(job, motion, tip), faults)
     down = leads_down(motion, moves, owner, tip)
     diagnostics += check_states(motion, job, moves, owner, down, faults)
     diagnostics += check_compensated(motion, job, faults)

@@ -13,7 +13,7 @@ from postproc.base.header_words import feeds_place, read_head, with_feeds_mark
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.job.job import Job
-from postproc.readback.comparison.checks import CHUNK, STILL
+from postproc.readback.comparison.checks import CHUNK, STILL, block_lengths
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinates
@@ -181,7 +181,7 @@ def axis_seconds(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints
     control = executed.control
     arcs = np.flatnonzero(cutting & (motion.code == 2))
     if len(arcs) and (control.xyz >= 0).all():
-        least = control.machine.limits.velocity[control.xyz].min()
+        least = control.machine.cutting_limits.velocity[control.xyz].min()
         around = arc_sweeps(motion, control)[arcs]
         before, _ = coordinates(motion, arcs)
         for plane, (i, j) in PLANE_COLUMNS.items():
@@ -218,13 +218,20 @@ def check_fed_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Move
     rows = ours & ((owner == len(moves)) | (moves.kind[m] == Kind.RAPID) | moves.link[m])
     if not rows.any():
         return []
+    fed = np.flatnonzero(rows & ~down & (moves.link[m] | (owner == len(moves))))
+    if len(fed) and executed.control.rapids == "dog-leg" and not job.setup.output.rapids_as_feed:
+        k = int(fed[0])
+        return [faults.error("verify.kind", "a feed move on the path between operations", int(moves.line[m[k]]),
+                             int(motion.line[k]), len(fed), "rapid motion, or rapids_as_feed = true under [output] of the "
+                             "set-up")]
     needs = _least(motion, executed, rows)
     travel = np.concatenate([[np.inf], lengths(np.diff(tip, axis=0))])
     feed = np.where(down & (moves.feed[m] > 0.0), moves.feed[m], np.inf)
     grain = Slack.of(job, bool((motion.unit != 1.0).any())).length
     spot = np.where(down & (moves.seconds[m] > 0.0), moves.seconds[m], 0.0)
     allowed = np.fmax(np.fmax(needs, spot), travel / feed)
-    least = executed.control.machine.limits.velocity[executed.control.slides].min(initial=np.inf)
+    machine = executed.control.machine
+    least = machine.cutting_limits.velocity[executed.control.slides].min(initial=machine.largest_feed)
     slack = grain / np.minimum(feed, least) + 1e-4
     bad, fast = (np.flatnonzero(rows & wrong) for wrong in (
         seconds > 1.003 * allowed + slack, 1.02 * seconds + slack < np.where(np.isfinite(feed), travel / feed, needs)))
@@ -247,14 +254,18 @@ def _by_move(owner: Ints, which: Bools, values: Floats, moves: int) -> Floats:
 
 
 def _least(motion: Motion, executed: BlockPoses, cutting: Bools) -> Floats:
-    """(E,) s that the velocities of the axes ask of each cutting block, from joints at a few places of it."""
+    """(E,) s that the velocities of the axes, from joints at a few places, and the largest cutting feed ask of each
+    cutting block."""
     control: Control = executed.control
     every, result = np.flatnonzero(cutting), np.zeros(len(motion))
+    velocity, largest = control.machine.cutting_limits.velocity, control.machine.largest_feed
+    if np.isfinite(largest):
+        result = np.where(cutting, block_lengths(motion, control)[0] / largest, 0.0)
     for first in range(0, len(every), CHUNK):
         rows = every[first:first + CHUNK]
         q = executed.joints(motion, rows, 0.0)
         for t in (0.25, 0.5, 0.75, 1.0):
             after = executed.joints(motion, rows, t)
-            result[rows] = np.fmax(result[rows], 4.0 * (np.abs(after - q) / control.machine.limits.velocity).max(axis=1))
+            result[rows] = np.fmax(result[rows], 4.0 * (np.abs(after - q) / velocity).max(axis=1))
             q = after
     return result

@@ -17,7 +17,7 @@ from postproc.path.links import SafeSpace, stays_clear
 from postproc.path.travel import extremes
 from postproc.setup.model import load_setup
 from tests.postproc.control.test_output_modes import FOUR, indexed, turning
-from tests.postproc.kit import angle, codes, convert, goto, machine, tilted, tool_setup, toolpath
+from tests.postproc.kit import angle, codes, convert, goto, machine, setup_of, tilted, tool_setup, toolpath
 from tests.postproc.modes_kit import TCP, TILTED, first_mode, made, run, shop
 
 __all__ = ["first_mode"]
@@ -174,7 +174,8 @@ def test_a_dog_leg_is_each_axis_at_its_own_speed() -> None:
 def test_rapids_that_would_leave_their_line_are_fed(tmp_path: Path) -> None:
     lines = ["RAPID", "GOTO/0,0,50", "GOTO/0,0,5", "FEDRAT/MMPM,300", "GOTO/10,0,5", "RAPID", "GOTO/10,0,20", "RAPID",
              "GOTO/40,7,30"]
-    result = made(tmp_path, lines, "mill-3axis", more=DOG)
+    fed = setup_of("[tools.1]\ngauge_length = 120\n[output]\nrapids_as_feed = true\n")
+    result = convert(toolpath(*lines), "mill-3axis", shop(tmp_path, DOG), fed)
     p = result.program
     rows = np.flatnonzero((p.words[:, 1] == 7) & ~p.link)
     assert p.code[rows].tolist() == [1]

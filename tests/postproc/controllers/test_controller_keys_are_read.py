@@ -26,13 +26,15 @@ OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "units.others"
           "cutter_compensation.begins_on_arc", "cutter_compensation.ends_on_arc", "cutter_compensation.modal_register",
           "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload",
           "tools.length_automatic", "program.operation", "program.carried_out", "program.relies_on_turns", "program.stock",
+          "program.exact_path", "program.smoothing_option", "program.without_smoothing", "arcs.helical_option",
+          "cycles.rigid_option", "cycles.floating",
           "subprograms.call", "subprograms.begin", "subprograms.end",
           "subprograms.place", "subprograms.file", "subprogram_files.call", "subprogram_files.begin", "subprogram_files.end",
           "subprogram_files.place", "subprogram_files.file",
           *(f"rollover.{key}" for key in ("default", "rules", "shortest", "positive", "negative", "zero_negative", "on",
                                           "needs"))}
 """keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py,
-test_compensated_arcs.py, test_parts.py, test_rollover.py, test_inch_output.py, test_smoothing_levels.py,
+test_compensated_arcs.py, test_parts.py, test_rollover.py, test_inch_output.py, test_smoothing_levels.py, test_options.py,
 test_hooks_refused.py, test_output_quality.py and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief", "cycles.plane_at_start", "arcs.helix_by_angle"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states, and what rounding moves"""

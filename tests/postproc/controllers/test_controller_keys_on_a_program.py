@@ -76,8 +76,10 @@ def test_helices_by_angle_are_rounded_by_it(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("controller", "key", "value", "what"), KEYS, ids=lambda v: str(v)[:40])
 def test_each_key_counts(controller: str, key: str, value: str, what: str, tmp_path: Path) -> None:
-    shop = tmp_path / f"{controller}-shop.toml"
-    shop.write_text(f'base = "{controller}"\n{key} = {value}\n')
-    usual = made(controller, what)
+    shop, plain = (tmp_path / f"{controller}-{name}.toml" for name in ("shop", "plain"))
+    straight = 'kinematics.rapids = "straight"\n' if what in ("head", "nutating") else ""
+    plain.write_text(f'base = "{controller}"\n{straight}')
+    shop.write_text(f'base = "{controller}"\n{straight}{key} = {value}\n')
+    usual = made(plain if straight else controller, what)
     assert usual.ok, [str(d) for d in usual.diagnostics]
     assert outcome(made(shop, what)) != outcome(usual)

@@ -22,7 +22,7 @@ from toolpaths.arrays import Bools
 from toolpaths.toolpath import Kind
 
 SETUP = setup_of("[tools.1]\ngauge_length = 120.0\n[tools.2]\ngauge_length = 120.0\n"
-                 "[tools.3]\ngauge_length = 120.0\n")
+                 "[tools.3]\ngauge_length = 120.0\n[output]\nrapids_as_feed = true\n")
 BEFORE = """TOOL PATH/OP1,TOOL,EM10
 MSYS/0,0,0,1,0,0,0,1,0
 LOAD/TOOL,1
