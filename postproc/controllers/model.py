@@ -10,7 +10,6 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from machines.choices import Rapids, RolloverRule, Stop
-from machines.machine import ControlOptions
 from machines.user_file import UserModel, load_toml
 from postproc.base.length_text import INCH, MM, LengthText
 from postproc.controllers.spelling import (
@@ -316,20 +315,6 @@ class ControllerFile(UserModel):
     "G05 P10000" = 0.005"""
     links: LinkRules = LinkRules()
 
-    def fitted(self, options: ControlOptions) -> ControllerFile:
-        """The controller with what the machine file says of its options: modes, codes and comments of those that it has
-        not are left out, and comments of those that are confirmed."""
-        parts = {"modes": _fitted_modes(self.modes, options), "arcs": _fitted_arcs(self.arcs, options),
-                 "program": _fitted_program(self.program, options)}
-        if options.absent("rigid_tapping"):
-            parts["codes"] = self.codes.model_copy(update={"rigid_tap": ""})
-            parts["cycles"] = self.cycles.model_copy(update={"rigid_option": self.cycles.floating})
-        elif options.confirmed("rigid_tapping"):
-            parts["cycles"] = self.cycles.model_copy(update={"rigid_option": ""})
-        if options.power_on:
-            parts["start"] = Start(codes=tuple(dict.fromkeys((*self.start.codes, *options.power_on))))
-        return self.model_copy(update=parts)
-
     @property
     def keeps_length(self) -> bool:
         """True where a tool change puts the length of the tool in force for good: no code takes it back."""
@@ -395,34 +380,6 @@ class ControllerFile(UserModel):
     def divided(self, files: bool) -> ControllerFile:
         """The controller that writes operations into files of their own, where that is asked for."""
         return self.model_copy(update={"subprograms": self.subprogram_files}) if files else self
-
-
-def _fitted_modes(modes: Modes, options: ControlOptions) -> Modes:
-    """The modes that the control has; the frame of the tip as the machine file confirms it."""
-    tcp, tilted = modes.tcp, modes.tilted
-    if tcp is not None and options.tip_frame:
-        tcp = tcp.model_copy(update={"frame": options.tip_frame})
-    if tcp is not None and options.confirmed("tip_control"):
-        tcp = tcp.model_copy(update={"option": ""})
-    if tilted is not None and options.confirmed("tilted_planes"):
-        tilted = tilted.model_copy(update={"option": ""})
-    return modes.model_copy(update={"tcp": None if options.absent("tip_control") else tcp,
-                                    "tilted": None if options.absent("tilted_planes") else tilted})
-
-
-def _fitted_arcs(arcs: ArcRules, options: ControlOptions) -> ArcRules:
-    """Without helices where the control has none."""
-    if options.absent("helical"):
-        return arcs.model_copy(update={"helix_planes": (), "helical_option": ""})
-    return arcs.model_copy(update={"helical_option": ""}) if options.confirmed("helical") else arcs
-
-
-def _fitted_program(program: ProgramBlocks, options: ControlOptions) -> ProgramBlocks:
-    """Without the blocks of the smoothing where the control has it not."""
-    if options.absent("smoothing"):
-        return program.model_copy(update={"path_tolerance": program.exact_path, "path_tolerance_off": (),
-                                          "smoothing_option": program.without_smoothing})
-    return program.model_copy(update={"smoothing_option": ""}) if options.confirmed("smoothing") else program
 
 
 def builtin_files() -> dict[str, Path]:

@@ -16,7 +16,9 @@ from postproc.control.control import Control, InterpolationMode
 from postproc.control.modes import OutputModes, Refused, output_modes
 from postproc.control.rollover import rollovers
 from postproc.control.word_grid import WordGrid, word_grid
+from postproc.controllers.fitted import fitted
 from postproc.controllers.model import ControllerFile
+from postproc.job.length_words import words_depend_on_length
 from postproc.job.pivots import control_kinematics
 from postproc.job.rapids import safe_rapids
 from postproc.job.rounding import Rounding, helix_bound, rounding_bound
@@ -34,7 +36,7 @@ from postproc.reference.split_operations import cut_operations
 from postproc.reference.stated_feeds import without_feed
 from postproc.reference.tool_numbers import numbered
 from postproc.reference.unnumbered_tools import measured_length
-from postproc.setup.model import Placement, SetupFile, part_placement, stated_value, work_frame
+from postproc.setup.model import Placement, SetupFile, assumed_values, part_placement, work_frame
 from postproc.setup.system import standing
 from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
@@ -209,7 +211,7 @@ class Job:
 def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) -> ControllerFile:
     """The controller with its options, the codes of the shop's own blocks, the number of the program and its units."""
     passive = machine.hooks.under(setup.hooks).passive
-    shop = controller.fitted(machine.options).with_shop(passive, setup.output.program_number)
+    shop = fitted(controller, machine.options).with_shop(passive, setup.output.program_number)
     return shop.in_units(setup.output.units)
 
 
@@ -218,7 +220,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`:
     output modes that "auto" passes over."""
     toolpath, diagnostics = numbered(toolpath, setup, options.setup)
-    diagnostics += _assumed(setup, options)
+    diagnostics += assumed_values(setup, options.setup)
     toolpath, found = plain_records(toolpath, controller)
     diagnostics += found
     toolpath, stated = with_defaults(toolpath, setup)
@@ -262,24 +264,17 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     corrects = geometric is not None and geometric.corrected_by == "post"  # tables that are corrected do not stand at zero
     entry = "table" if corrects or controller.modes.tcp is None else controller.modes.tcp.frame
-    control = Control(machine, law, origin, largest, law, entry_frame=entry,
-                      rapids=machine.rapids or controller.kinematics.rapids,
+    control = Control(machine, law, origin, largest, law, entry_frame=entry, rapids=machine.rapids or controller.kinematics.rapids,
                       feed_rule=controller.feed.length, degree_is_inch=controller.degree_is_inch, own_kinematics=own,
                       helix_planes=controller.arcs.helix_planes,
                       rolls=rolls, measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
     diagnostics += _measured(control, controller, moves.axis, setup, options)
-    modes, found = output_modes(control, controller, setup, options, toolpath,
-                                word_grid(control, controller).places, refused)
+    places = word_grid(control, controller).places
+    modes, found = output_modes(control, controller, setup, options, toolpath, places, refused)
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
               modes, geometric, tuple(stated))
     return None if errors else _with_rapids(job), diagnostics + _tool_lengths(job) + _unused_tools(job)
-
-
-def _assumed(setup: SetupFile, options: Options) -> list[Diagnostic]:
-    """Values of the set-up that nobody has stated."""
-    return [warning("setup.assumed", f"{key} = {stated_value(setup, key)} is assumed: nobody has stated it",
-                    file=options.setup, hint="state yours, and take its name out of `assumed`") for key in setup.assumed]
 
 
 def _with_rapids(job: Job) -> Job:
@@ -398,15 +393,3 @@ def _unused_tools(job: Job) -> list[Diagnostic]:
     unused = [f"T{number}" for number in job.setup.tools if number not in used]
     return [info("setup.tool_unused", f"the CL file does not use {', '.join(unused)} of the set-up",
                  file=job.options.setup)] if unused else []
-
-
-def words_depend_on_length(control: Control, kin: Kinematics, axis: Floats) -> bool:
-    """True where a length offset on Z does not make program words free of the tool length (heads, parallel machines)."""
-    if control.tip_law:
-        return False
-    some = np.unique(axis[np.linspace(0, len(axis) - 1, min(len(axis), 200)).astype(int)], axis=0)
-    some = kin.nearest_axis(some)
-    tip = np.tile(kin.forward(control.machine.home[None, :])[0], (len(some), 1))
-    short, long = (control.words(tool.inverse(tip, some)[0], tool, length)
-                   for tool, length in ((kin, 0.0), (kin.with_tool(1.0), 1.0)))
-    return bool(np.nanmax(np.abs(long - short), initial=0.0) > 1e-9)

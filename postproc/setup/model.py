@@ -18,7 +18,7 @@ from postproc.setup.orientation import OrientationLimits
 from postproc.setup.place import PlacementLimits
 from postproc.setup.spindle import CoolantKind, SpindleSetup
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Frame, Toolpath
 
@@ -230,6 +230,12 @@ def stated_value(setup: SetupFile, key: str) -> Any:
         value = value.get(step) if isinstance(value, dict) else getattr(value, step, None) if isinstance(
             value, BaseModel) and step in type(value).model_fields else None
     return value
+
+
+def assumed_values(setup: SetupFile, file: str) -> list[Diagnostic]:
+    """Values of the set-up that nobody has stated."""
+    return [warning("setup.assumed", f"{key} = {stated_value(setup, key)} is assumed: nobody has stated it",
+                    file=file, hint="state yours, and take its name out of `assumed`") for key in setup.assumed]
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@
 13 ; tool T3 EM10, diameter 0.3937 inch, gauge length 4.33071 inch
 14 ; needs F, and feeds of cycles, counted in tenths of an inch per minute
 15 ; needs option 8 for PLANE: Advanced Function Set 1
-16 ; needs rotary values of 0 in the preset
+16 ; needs rotary values of 0 in datum number 1
 17 PLANE RESET STAY
 18 CYCL DEF 247 DATUM SETTING ~
 Q339=+1 ;DATUM NUMBER

@@ -158,7 +158,8 @@ def _checked_axis(b: ToolpathBuilder, rows: PointRows) -> Floats:
     bad = ~(np.abs(norm - 1.0) <= UNIT_ROUNDING)
     if bad.any():
         b.log.many(Severity.ERROR, "cl.axis", f"the tool axis has length {norm[bad][0]:.6g}, it must be 1 within "
-                   f"{UNIT_ROUNDING}", rows.line[bad])
+                   f"{UNIT_ROUNDING}", rows.line[bad],
+                   "write the six numbers of GOTO again: x, y, z, then i, j, k of length 1")
     return unit(rows.axis)
 
 

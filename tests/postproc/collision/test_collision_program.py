@@ -248,6 +248,7 @@ def test_dog_legs_are_followed(tmp_path: Path) -> None:
     """A rapid of 100 mm in x and 30 mm in y, all axes at their own speed: y is there first, next to the straight line."""
     path = toolpath("RAPID", "GOTO/0,0,50", "RAPID", "GOTO/100,30,50", "GOTO/100,30,49", head=HEAD)
     corner = setup_file(tmp_path, fixture((28, 37, 45), (32, 40, 60)))
+    corner.write_text(f"{corner.read_text()}\n[output]\nrapids_as_feed = true\n")
     result = converted(path, corner, "mill-3axis", "fanuc-30i")
     assert result.ok and "\nG1 X100. Y30." in result.text
     program = tmp_path / "p.nc"

@@ -13,6 +13,7 @@ import machines
 import postproc
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.controllers.fitted import fitted
 from postproc.pipeline.result import PostResult
 from postproc.verification.read_back import read_back
 from tests.postproc.kit import codes, setup_of, tilted, toolpath
@@ -177,5 +178,5 @@ def test_states_at_power_on_count_as_stated() -> None:
     result = converted("fanuc-30i", "", "axes")
     bare = result.text.replace("G17 G21 ", "G21 ").replace(" G17 G40", " G40")
     assert bare != result.text and verdict(bare, result)
-    job = replace(result.job, controller=result.controller.fitted(shop('power_on = ["G17"]').options))
+    job = replace(result.job, controller=fitted(result.controller, shop('power_on = ["G17"]').options))
     assert not verdict(bare, replace(result, job=job))

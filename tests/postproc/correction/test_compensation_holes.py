@@ -73,7 +73,9 @@ def drilled(folder: Path, machine: str, controller: str, cycle: str, tilted: boo
              "CYCLE/OFF", "RAPID", at[-1], "FINI", ""]
     path, found = toolpaths.read_bytes("\n".join(lines))
     options = Options(error_model=model or (str(both_directions_of_all(folder, machine, seed)) if seed else ""))
-    return postproc.convert(path, machine, controller, load_setup(None)[0], options, found)
+    setup = load_setup(None)[0]
+    setup = setup.model_copy(update={"output": setup.output.model_copy(update={"rapids_as_feed": True})})
+    return postproc.convert(path, machine, controller, setup, options, found)
 
 
 def checked(result: PostResult) -> PostResult:

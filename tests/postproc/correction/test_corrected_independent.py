@@ -126,7 +126,10 @@ def converted(case: Case, corrected: bool = True) -> Run:
     setup = "h4a" if machine.startswith("h4a") else "delta" if machine == "uranesx" else "tools"
     with TemporaryDirectory() as folder:
         file = Draw(Path(folder), own, seed).write()
-        options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"), output=mode,
+        shop = Path(folder) / "shop.toml"
+        usual = (SAMPLES / f"{setup}.setup.toml").read_text("utf-8")
+        shop.write_text(f"{usual}\n[output]\nrapids_as_feed = true\n", "utf-8")
+        options = Options(setup=str(shop), output=mode,
                           error_model=str(file) if corrected else "")
         result = postproc.convert(few_sides(sample), machine, controller, options=options)
         return run_of(result, own, Errors(file), controller)

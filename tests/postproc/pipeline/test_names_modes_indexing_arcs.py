@@ -137,7 +137,7 @@ def test_every_form_is_written_and_proved(controller: str, machine: str, output:
     axis = tilted(30.0, 40.0)
     tilt = [n for k in LEAN for n in leaning(["RAPID", "GOTO/0,0,50", *PIECES[k], "RAPID", "GOTO/0,0,50"], axis)]
     usual = tool_setup()
-    setup = usual.model_copy(update={"output": usual.output.model_copy(update=output)})
+    setup = usual.model_copy(update={"output": usual.output.model_copy(update={**output, "rapids_as_feed": True})})
     result = good(convert(toolpath(*lines, "LOADTL/2", "SPINDL/RPM,500,CCLW", *tilt), machine, controller, setup))
     assert result.comparison is not None and result.comparison.worst_tip < 0.01
     assert not [c for c in codes(result.diagnostics) if c.startswith(("verify.", "gcode.")) and c != "gcode.block_delete"]

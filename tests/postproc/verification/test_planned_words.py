@@ -40,8 +40,8 @@ def refused(result: PostResult) -> set[str]:
 def plant(monkeypatch: pytest.MonkeyPatch, change: Callable[[Floats], Floats]) -> None:
     """Feed words for other seconds than those of the plan."""
     def planted(*args: Any) -> Any:
-        *others, planned = args
-        return plan_feeds(*others, planned and PlannedTimes(change(planned.needed), planned.merge))
+        *others, planned, unit = args
+        return plan_feeds(*others, planned and PlannedTimes(change(planned.needed), planned.merge), unit)
 
     monkeypatch.setattr(postproc.compile.compile, "plan_feeds", planted)
 

@@ -86,9 +86,9 @@ def test_safe_start_ends_a_plane_only_in_programs_with_planes() -> None:
 def test_the_head_names_the_parameters_that_a_mode_needs() -> None:
     text = lines("fanuc-30i", program([step("rapid", X=0.0)], sections=(Section(0, "axes"), TILTED, TCP)))
     needed = [line for line in text if line.startswith("(NEEDS ")]
-    assert [key in line for key, line in zip(("G43.4", "5006#6", "19696#5", "ROTARY VALUES OF 0", "G68.2"), needed,
-                                        strict=True)] == [True] * 5
-    assert not any("NEEDS" in line for line in lines("fanuc-30i", program([step("rapid", X=0.0)])))
+    assert [key in line for key, line in zip(("G43.4", "5006#6", "19696#5", "ROTARY VALUES OF 0", "G68.2",
+                                                      "G05.1"), needed, strict=True)] == [True] * 6
+    assert [line for line in lines("fanuc-30i", program([step("rapid", X=0.0)])) if "NEEDS" in line] == needed[-1:]
 
 
 def test_smoothing_states_no_tolerance_and_is_taken_back() -> None:

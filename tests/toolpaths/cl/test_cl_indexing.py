@@ -37,7 +37,7 @@ def truth() -> np.ndarray:
     return np.array(found)
 
 
-def path_of(run_options: m.Manner, *changes: tuple[str, str]) -> ReadResult:
+def path_of(run_options: m.SpellingOptions, *changes: tuple[str, str]) -> ReadResult:
     text = m.text_of(run_options)
     for old, new in changes:
         assert old in text
@@ -49,7 +49,7 @@ def path_of(run_options: m.Manner, *changes: tuple[str, str]) -> ReadResult:
 @pytest.mark.parametrize("approach", ["before", "between", "after"])
 @pytest.mark.parametrize("multax", [False, True])
 def test_points_stand_where_the_part_has_them(multax: bool, approach: str, units: str) -> None:
-    result = path_of(m.Manner(multax, approach, units))
+    result = path_of(m.SpellingOptions(multax, approach, units))
     assert not errors(result)
     p = result.toolpath
     assert np.abs(p.tip - truth()).max() < 1e-3
@@ -68,11 +68,11 @@ def laws_hold(p: Toolpath) -> bool:
 
 
 def test_what_was_not_added_is_reported() -> None:
-    assert "cl.index-translation" in [d.code for d in path_of(m.Manner()).diagnostics]
+    assert "cl.index-translation" in [d.code for d in path_of(m.SpellingOptions()).diagnostics]
 
 
 def test_table_positions_are_no_systems_of_the_part() -> None:
-    assert [f.name for f in path_of(m.Manner()).toolpath.frames] == ["absolute"]
+    assert [f.name for f in path_of(m.SpellingOptions()).toolpath.frames] == ["absolute"]
 
 
 @pytest.mark.parametrize(("old", "new", "code"), [
@@ -83,7 +83,7 @@ def test_table_positions_are_no_systems_of_the_part() -> None:
     ("RAPID\nGOTO / 0.0000000000, 0.0000000000, 12", "RAPID\nGOTO / 0.0000000000, 0.0000000000, -12", "cl.rapid-below"),
 ])
 def test_files_that_contradict_themselves_are_refused(old: str, new: str, code: str) -> None:
-    result = path_of(m.Manner(), (old, new))
+    result = path_of(m.SpellingOptions(), (old, new))
     assert set(errors(result)) == {code}, [str(d) for d in result.diagnostics]
     found = next(d for d in result.diagnostics if d.code == code)
     assert found.lines and found.hint
@@ -91,7 +91,7 @@ def test_files_that_contradict_themselves_are_refused(old: str, new: str, code: 
 
 def test_axes_of_a_subroutine_that_are_radial_already_are_refused() -> None:
     old = "-4.0000000000, $\n 0.0000000000, 0.0000000000, 1.0000000000"
-    assert "cl.index-axis" in errors(path_of(m.Manner(multax=True), (
+    assert "cl.index-axis" in errors(path_of(m.SpellingOptions(multax=True), (
         old, "-4.0000000000, $\n 0.0000000000, -0.7071067812, 0.7071067812")))
 
 
