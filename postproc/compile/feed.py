@@ -92,12 +92,13 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
     cutting, arc = path.code != 0, path.code == ARC
     wanted = np.where(cutting, np.nan_to_num(path.seconds), np.nan)
     turned = np.abs(step)[:, control.rotary].sum(axis=1)
-    length = np.zeros(len(path))
+    length, own_unit = np.zeros(len(path)), np.ones(len(path))
     for law, k in path.by_control():
         length[k] = law.feed_units(step[k], unit)
+        own_unit[k] = np.where((step[k][:, law.slides] != 0.0).any(axis=1) | arc[k], unit, 1.0)
     asked = asked / unit
     length = np.where(arc & np.isfinite(asked), wanted * asked, length)
-    needed = _with_largest(needed, length, wanted, control.machine.largest_feed)
+    needed = _with_largest(needed, length * own_unit, wanted, control.machine.largest_feed)
     seconds = np.fmax(wanted, needed)
     slowed = cutting & (needed > wanted * (1.0 + 1e-9)) & (wanted > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -112,7 +113,7 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
         if law.tip_law:
             near = np.abs(length[k] - wanted[k] * asked[k]) <= _ROUNDING * length[k]
             same[k] |= cutting[k] & own[k] & near & (needed[k] <= (1.0 - _ROUNDING) * wanted[k]) & _moves_tip(step[k], law)
-    per_minute = np.minimum(np.where(same, 60.0 * asked, per_minute), 60.0 * control.machine.largest_feed)
+    per_minute = np.minimum(np.where(same, 60.0 * asked, per_minute), 60.0 * control.machine.largest_feed / own_unit)
     if rules.least_inverse_rate > 0.0:
         mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < rules.least_inverse_rate),
                         PER_MINUTE, mode)
