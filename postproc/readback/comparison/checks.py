@@ -237,7 +237,7 @@ def _lengths(motion: Motion, control: Control, rows: Ints, sweep: Floats) -> tup
             radius = np.linalg.norm(before[k][:, columns] - motion.center[rows[k]][:, (i, j)], axis=1)
             rise = step[k, int(control.xyz[3 - i - j])]
             length[k] = np.hypot(radius * sweep[k], rise) / unit[k]
-    linear = np.isfinite(sweep) | (step[:, control.slides] != 0.0).any(axis=1)
+    linear = np.isfinite(sweep) | (np.abs(step[:, control.slides]) > STILL).any(axis=1)
     own = np.where(linear, unit, 1.0)
     return length * own, own
 
