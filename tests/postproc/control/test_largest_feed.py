@@ -85,13 +85,15 @@ def test_no_feed_word_is_above_the_largest_feed(controller: str, output: str) ->
 @pytest.mark.parametrize("mode", ["auto", "per-minute"])
 @pytest.mark.parametrize("controller", CONTROLS)
 def test_in_inches_the_same_feed_is_the_largest(controller: str, mode: FeedModeChoice) -> None:
-    """F of all axes in inches too, where the words turn rotary axes."""
+    """The same motion, where words turn rotary axes too, whatever a degree counts in F."""
     inch = SETUP.model_copy(update={"output": SETUP.output.model_copy(update={"units": "inch"})})
     result = postproc.convert(cuts(), machine(), controller, inch, Options(output="axes", feed_mode=mode))
     assert result.ok, [str(d) for d in result.diagnostics]
     p = result.program
-    cutting = (p.code != 0) & (p.mode == 0) & (p.write[:, :3].any(axis=1))
+    cutting = (p.code != 0) & (p.mode == 0) & ~p.write[:, 3:].any(axis=1)
     assert p.feed[cutting].max() * result.controller.feed_unit == pytest.approx(400.0)
+    mm = postproc.convert(cuts(), machine(), controller, SETUP, Options(output="axes", feed_mode=mode))
+    assert np.nansum(result.feeds.seconds) == pytest.approx(np.nansum(mm.feeds.seconds), rel=2e-3)
 
 
 @pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc"])

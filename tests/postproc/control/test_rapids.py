@@ -162,8 +162,8 @@ def test_clearances_given_as_a_distance_are_kept() -> None:
 
 
 STEP = ["RAPID", "GOTO/0,0,60", "RAPID", "GOTO/0,0,22", "FEDRAT/MMPM,500", "GOTO/0,0,20", "GOTO/12,0,20", "RAPID",
-        "GOTO/12,0,60", "RAPID", "GOTO/30,0,60", "RAPID", "GOTO/30,0,5", "GOTO/30,0,2", "RAPID", "GOTO/30,0,5", "RAPID", "GOTO/60,17,5",
-        "GOTO/60,17,2", "RAPID", "GOTO/60,17,60"]
+        "GOTO/12,0,60", "RAPID", "GOTO/30,0,60", "RAPID", "GOTO/30,0,5", "GOTO/30,0,2", "RAPID", "GOTO/30,0,5", "RAPID",
+        "GOTO/60,17,5", "GOTO/60,17,2", "RAPID", "GOTO/60,17,60"]
 """a cut at 20, two at 2; from one of these to the other across at 5"""
 
 
