@@ -92,17 +92,18 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
     cutting, arc = path.code != 0, path.code == ARC
     wanted = np.where(cutting, np.nan_to_num(path.seconds), np.nan)
     turned = np.abs(step)[:, control.rotary].sum(axis=1)
-    length = np.zeros(len(path))
+    length, metric = np.zeros(len(path)), np.zeros(len(path))
     for law, k in path.by_control():
-        length[k] = law.feed_units(step[k], unit)
+        length[k], metric[k] = law.feed_units(step[k], unit), law.feed_length(step[k])
+    metric = np.where(arc & np.isfinite(asked), wanted * asked, metric)
     asked = asked / unit
     length = np.where(arc & np.isfinite(asked), wanted * asked, length)
-    needed = _with_largest(needed, length, wanted, control.machine.largest_feed)
+    needed = _with_largest(needed, metric, wanted, control.machine.largest_feed)
     seconds = np.fmax(wanted, needed)
     slowed = cutting & (needed > wanted * (1.0 + 1e-9)) & (wanted > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         per_minute = 60.0 * length / seconds
-        inverse = 60.0 / seconds
+        inverse, words_share = 60.0 / seconds, length / metric
         rate = np.nan_to_num(inverse * length)
         by_radius = inverse * length * unit / _radius(path) if arc.any() and rules.arc_inverse == "radius" else inverse
     own = (wanted > 0.0) | (needed <= 0.0)
@@ -112,7 +113,8 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
         if law.tip_law:
             near = np.abs(length[k] - wanted[k] * asked[k]) <= _ROUNDING * length[k]
             same[k] |= cutting[k] & own[k] & near & (needed[k] <= (1.0 - _ROUNDING) * wanted[k]) & _moves_tip(step[k], law)
-    per_minute = np.minimum(np.where(same, 60.0 * asked, per_minute), 60.0 * control.machine.largest_feed)
+    per_minute = np.minimum(np.where(same, 60.0 * asked, per_minute),
+                            60.0 * control.machine.largest_feed * np.where(metric > 0.0, words_share, 1.0))
     if rules.least_inverse_rate > 0.0:
         mode = np.where((mode == INVERSE) & (length > 0.0) & (rate < rules.least_inverse_rate),
                         PER_MINUTE, mode)
@@ -122,7 +124,8 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
 
 
 def _with_largest(needed: Floats, length: Floats, wanted: Floats, largest: float) -> Floats:
-    """(K,) s needed where no feed word is above the largest cutting feed, mm/s, `length` (K,) being what it refers to.
+    """(K,) s needed where no feed is above the largest cutting feed, mm/s; `length` (K,) is what it refers to in mm, in
+    programs in inches too: the same motion in either units.
 
     What the rounding of a block's words adds to its length is no reason to slow it.
     """

@@ -178,7 +178,7 @@ class Job:
     @cached_property
     def smoothing(self) -> SmoothingPlan:
         """The control's own smoothing by operation."""
-        return smoothing_plan(self.controller, self.setup, self.options, self.toolpath)[0]
+        return smoothing_plan(self.controller, self.setup, self.options, self.toolpath, self.machine)[0]
 
     @cached_property
     def grid(self) -> WordGrid:
@@ -233,7 +233,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     toolpath, found = own_registers(toolpath, controller)
     diagnostics += found
     diagnostics += [*_work_offset(controller, setup, options), *other_units(controller, options.setup),
-                    *smoothing_plan(controller, setup, options, toolpath)[1]]
+                    *smoothing_plan(controller, setup, options, toolpath, machine)[1]]
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += [*found, *_program_number(toolpath, controller, setup, options)]
     diagnostics += [*unfit_holes(toolpath, controller), *_refused(toolpath), *_no_inverse_time(controller, options)]

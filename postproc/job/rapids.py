@@ -123,10 +123,11 @@ def _levels(kin: Kinematics, machine: Machine, space: SafeSpace, rapids: tuple[F
 
 
 def _plane(space: SafeSpace, axis: Floats, share: float) -> Floats:
-    """(K,) height of the safe plane along axes (K, 3), with a share of its margin."""
+    """(K,) height of the safe plane along axes (K, 3), with a share of its margin; never below what is cut."""
+    top = (axis @ space.corners.T).max(axis=1)
     if space.distance is not None:
-        return np.asarray(axis @ space.centre + space.distance)
-    return np.asarray((axis @ space.corners.T).max(axis=1) + share * space.margin)
+        return np.asarray(np.maximum(axis @ space.centre + space.distance, top))
+    return np.asarray(top + share * space.margin)
 
 
 def _inside(q: Floats, machine: Machine) -> Bools:

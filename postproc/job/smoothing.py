@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile
 from postproc.controllers.spelling import SmoothingLevel
@@ -43,8 +44,12 @@ class SmoothingPlan:
         return np.array([one.mm for one in self.used] or [self.default.mm])
 
 
-def smoothing_plan(controller: ControllerFile, setup: SetupFile, options: Options,
-                   toolpath: Toolpath) -> tuple[SmoothingPlan, list[Diagnostic]]:
+NOT_FITTED = ("by the machine file the control has no smoothing (smoothing = false under [control])",
+              "take it out of the set-up, or state smoothing = true in the machine file where it is fitted")
+
+
+def smoothing_plan(controller: ControllerFile, setup: SetupFile, options: Options, toolpath: Toolpath,
+                   machine: Machine) -> tuple[SmoothingPlan, list[Diagnostic]]:
     """The smoothing that the set-up asks for ([output.smoothing]), and what the control or the file has not."""
     default = Smoothing(_usual(controller, options), controller.program.path_tolerance)
     named, found, names = dict[str, Smoothing](), list[Diagnostic](), {op.name for op in toolpath.operations}
@@ -53,6 +58,8 @@ def smoothing_plan(controller: ControllerFile, setup: SetupFile, options: Option
         if name not in names:
             has = ", ".join(sorted(n for n in names if n)) or "none"
             why = "which is not an operation of the CL file", f"it has: {has}"
+        if machine.options.absent("smoothing"):
+            one, why = default, NOT_FITTED
         if why is not None:
             found.append(error("setup.smoothing", f"[output.smoothing] {name!r} = {asked!r}: {why[0]}", file=options.setup,
                                hint=why[1]))

@@ -35,7 +35,7 @@ def lengths_of(e: ExecutedBlocks) -> tuple[Array, Array]:
     for first in range(0, len(e), _CHUNK):
         rows = np.arange(first, min(first + _CHUNK, len(e)))
         step = e.steps(rows)
-        linear = (np.abs(step[:, [name not in "ABC" for name in e.letters]]) > 0.0).any(axis=1)
+        linear = (np.abs(step[:, [name not in "ABC" for name in e.letters]]) > _STILL).any(axis=1)
         unit[rows] = np.where(linear, e.unit[rows], 1.0)
         if e.degree_is_inch:
             step = step * np.where([name in "ABC" for name in e.letters], unit[rows, None], 1.0)

@@ -237,7 +237,7 @@ def _lengths(motion: Motion, control: Control, rows: Ints, sweep: Floats) -> tup
             radius = np.linalg.norm(before[k][:, columns] - motion.center[rows[k]][:, (i, j)], axis=1)
             rise = step[k, int(control.xyz[3 - i - j])]
             length[k] = np.hypot(radius * sweep[k], rise) / unit[k]
-    linear = np.isfinite(sweep) | (step[:, control.slides] != 0.0).any(axis=1)
+    linear = np.isfinite(sweep) | (np.abs(step[:, control.slides]) > STILL).any(axis=1)
     own = np.where(linear, unit, 1.0)
     return length * own, own
 
@@ -266,6 +266,29 @@ def check_links(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints,
     line = int(moves.line[m[k]]) if m[k] < len(moves) else 0
     return [faults.error("verify.link", "a linking move comes too close to the part", line, int(motion.line[rows[k]]),
                          int(bad.sum()))]
+
+
+def check_low_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, owner: Ints,
+                     faults: Faults) -> list[Diagnostic]:
+    """Dog-legs that leave their line stay above all that is cut and the stock of the set-up, at whatever height they were
+    split; those from hole to hole are as the control's own cycles are."""
+    rows = np.flatnonzero(moves.run_by(owner) & (motion.code == 0))
+    m = owner[rows]
+    rows = rows[(moves.phase[m] == Phase.POSITION) & (moves.hole[m] < 0) & executed.bent(motion, rows)]
+    if not len(rows):
+        return []
+    stock = job.stock_corners
+    corners = job.space.corners if stock is None else np.concatenate([job.space.corners, stock])
+    bad, slack = np.zeros(len(rows), dtype=bool), job.options.tolerance
+    for t in executed.corners(motion, rows).T:
+        tip, axis = executed.poses(motion, rows, t)
+        off = moves.curves(owner[rows]).deviation(tip, axis, np.asarray(t), slack)[0]
+        bad |= (off > slack) & (np.einsum("ni,ni->n", tip, axis) < (axis @ corners.T).max(axis=1) - slack)
+    if not bad.any():
+        return []
+    k = int(rows[np.flatnonzero(bad)[0]])
+    return [faults.error("verify.link", "a rapid leaves its line, each axis running at its own speed, below what is cut",
+                         int(moves.line[owner[k]]), int(motion.line[k]), int(bad.sum()), "do not run this program")]
 
 
 def off_line(tip: Floats, end: Floats, axis: Floats) -> Floats:

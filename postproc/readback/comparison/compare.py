@@ -17,6 +17,7 @@ from postproc.readback.comparison.checks import (
     check_holes,
     check_kinds,
     check_links,
+    check_low_rapids,
     check_smoothing,
     check_speeds,
     check_travel,
@@ -122,6 +123,7 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
         diagnostics += check_slow(motion, executed, job, moves, owner, match, tip, seconds, faults)
     diagnostics += check_fed_rapids(motion, executed, job, moves, owner, tip, seconds, down, faults)
     diagnostics += check_links(motion, executed, moves, owner, job.space, tolerance, faults)
+    diagnostics += check_low_rapids(motion, executed, job, moves, owner, faults)
     diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance,
                                  grain[1] + _kept(job), faults)
     diagnostics += check_travel(motion, executed, moves, owner, faults)

@@ -13,7 +13,7 @@ import pytest
 import machines
 import postproc
 from machines.loader import load_checked
-from postproc.base.options import Options
+from postproc.base.options import FeedModeChoice, Options
 from postproc.cycle_time.source import from_gcode
 from postproc.pipeline.result import PostResult
 from postproc.verification import second_witness
@@ -80,6 +80,36 @@ def test_no_feed_word_is_above_the_largest_feed(controller: str, output: str) ->
     assert (step.max(axis=1)[fed] <= seconds[fed] * 1.001 + 1e-9).all()
     said = next(d for d in result.diagnostics if d.code == "feed.largest")
     assert said.severity is Severity.WARNING and "900 mm/min are limited to 400 mm/min" in said.message and said.count == 8
+
+
+@pytest.mark.parametrize("mode", ["auto", "per-minute"])
+@pytest.mark.parametrize("controller", CONTROLS)
+def test_in_inches_the_same_feed_is_the_largest(controller: str, mode: FeedModeChoice) -> None:
+    """The same motion, where words turn rotary axes too, whatever a degree counts in F."""
+    inch = SETUP.model_copy(update={"output": SETUP.output.model_copy(update={"units": "inch"})})
+    result = postproc.convert(cuts(), machine(), controller, inch, Options(output="axes", feed_mode=mode))
+    assert result.ok, [str(d) for d in result.diagnostics]
+    p = result.program
+    cutting = (p.code != 0) & (p.mode == 0) & ~p.write[:, 3:].any(axis=1)
+    assert p.feed[cutting].max() * result.controller.feed_unit == pytest.approx(400.0)
+    mm = postproc.convert(cuts(), machine(), controller, SETUP, Options(output="axes", feed_mode=mode))
+    assert np.nansum(result.feeds.seconds) == pytest.approx(np.nansum(mm.feeds.seconds), rel=2e-3)
+
+
+@pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc"])
+def test_rapids_that_are_fed_keep_the_largest_feed_in_inches(controller: str) -> None:
+    fed = SETUP.output.model_copy(update={"rapids_as_feed": True})
+    words = []
+    for units, of in (("mm", 1.0), ("inch", 25.4)):
+        setup = SETUP.model_copy(update={"output": fed.model_copy(update={"units": units})})
+        axis = tilted(20.0, 5.0)
+        path = toolpath("RAPID", point(45 * axis, axis), "FEDRAT/MMPM,300", point(30 * axis, axis), "RAPID",
+                        point(60 * axis, axis))
+        result = postproc.convert(path, machine("[control]\nlargest_feed = 600", "head-table"), controller, setup,
+                                  Options(output="axes"))
+        assert result.ok, [str(d) for d in result.diagnostics]
+        words.append(max(float(f) for f in re.findall(r" F([\d.]+)", result.text)) * of)
+    assert words == pytest.approx([600.0, 600.0], rel=1e-5)
 
 
 def test_without_the_keys_nothing_is_limited() -> None:

@@ -13,6 +13,7 @@ import pytest
 import machines
 import postproc
 from postproc.base.options import Options
+from postproc.job import rapids
 from postproc.pipeline.result import PostResult
 from postproc.verification import second_witness
 from postproc.verification.read_back import read_back
@@ -158,3 +159,27 @@ def test_clearances_given_as_a_distance_are_kept() -> None:
     made = postproc.convert(toolpath(*side(np.array([0.0, 0.0, 1.0]))), machines.load("mill-3axis"), "fanuc-30i", near)
     assert made.ok
     assert np.allclose(made.job.moves.tip[:, 2][made.job.moves.phase == 1], 5.0 + 90.0)
+
+
+STEP = ["RAPID", "GOTO/0,0,60", "RAPID", "GOTO/0,0,22", "FEDRAT/MMPM,500", "GOTO/0,0,20", "GOTO/12,0,20", "RAPID",
+        "GOTO/12,0,60", "RAPID", "GOTO/30,0,60", "RAPID", "GOTO/30,0,5", "GOTO/30,0,2", "RAPID", "GOTO/30,0,5", "RAPID",
+        "GOTO/60,17,5", "GOTO/60,17,2", "RAPID", "GOTO/60,17,60"]
+"""a cut at 20, two at 2; from one of these to the other across at 5"""
+
+
+@pytest.mark.parametrize("controller", BENT)
+def test_a_distance_below_what_is_cut_is_no_safe_plane(controller: str) -> None:
+    low = setup_of("[tools.1]\ngauge_length = 90\n[clearance]\ncentre = [0, 0, 0]\ndistance = 3\n")
+    made = postproc.convert(toolpath(*STEP), machines.load("mill-3axis"), controller, low)
+    assert made.ok and made.job is not None
+    assert made.job.moves.tip[:, 2][made.job.moves.phase == 1].min() >= 20.0
+
+
+@pytest.mark.parametrize("controller", BENT)
+def test_the_read_back_knows_what_is_cut_by_itself(controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted: rapids are split below what is cut; written and compared with the same moves they agree."""
+    plane = rapids._plane
+    monkeypatch.setattr(rapids, "_plane", lambda space, axis, share: plane(space, axis, share) - 100.0)
+    tools = setup_of("[tools.1]\ngauge_length = 90\n")
+    made = postproc.convert(toolpath(*STEP), machines.load("mill-3axis"), controller, tools)
+    assert not made.ok and any(d.code == "verify.link" and "below what is cut" in d.message for d in made.diagnostics)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import machines
+import postproc
 from postproc.pipeline.convert import verify
 from postproc.setup.model import SetupFile
 from tests.postproc.kit import codes, convert, good, machine, shop_file, toolpath
@@ -91,6 +93,21 @@ def test_what_the_control_or_the_file_has_not_is_refused_with_what_it_has(contro
     fault = next(d for d in made.diagnostics if d.code == "setup.smoothing")
     assert not made.ok and ("level" in fault.hint or any(str(v) in fault.hint for v in (*follow, *follow.values())))
     good(convert(part(), MACHINE, controller, setup(**follow)))
+
+
+@pytest.mark.parametrize("controller", LEVELS)
+@pytest.mark.parametrize("asked", ["finishing", 0.003])
+def test_no_level_on_a_control_without_smoothing(controller: str, asked: str | float, tmp_path: Path) -> None:
+    """smoothing = false of the machine file; both remedies of the hint are followed."""
+    file = tmp_path / "shop.toml"
+    file.write_text(f'base = "{MACHINE}"\n[control]\nsmoothing = false\n')
+    made = postproc.convert(part(), machines.load(file), controller, setup(FINE=asked))
+    found = [d for d in made.diagnostics if d.severity.name == "ERROR"]
+    assert [d.code for d in found] == ["setup.smoothing"] and "smoothing = false" in found[0].message
+    assert "smoothing = true" in found[0].hint
+    assert postproc.convert(part(), machines.load(file), controller, setup()).ok
+    file.write_text(file.read_text().replace("false", "true"))
+    assert postproc.convert(part(), machines.load(file), controller, setup(FINE=asked)).ok
 
 
 @pytest.mark.parametrize("word", ["G05.1 Q1 R5", "G05 P10000", "G61.1"])

@@ -13,7 +13,7 @@ import postproc
 import toolpaths
 from postproc.pipeline.convert import verify
 from postproc.pipeline.result import PostResult
-from postproc.readback.comparison.checks import block_seconds
+from postproc.readback.comparison.checks import block_lengths, block_seconds
 from postproc.setup.model import SetupFile
 from tests.postproc.kit import SAMPLES, codes, convert, good, machine, shop_file, tool_setup, toolpath
 
@@ -174,6 +174,19 @@ def test_feeds_of_all_axes_count_degrees_as_the_control_does() -> None:
         row = int(np.flatnonzero(np.isclose(motion.feed, program.feed[k], rtol=1e-3) & (motion.code == 1))[0])
         seconds = block_seconds(motion, job.control)[row]
         assert program.feed[k] * seconds / 60.0 / part == pytest.approx(length, rel=2e-3)
+
+
+def test_blocks_that_only_turn_under_tip_control_are_degrees_per_minute_for_both_readings() -> None:
+    """Near a singular direction the tip stands still in some blocks: 1e-15 of X, Y, Z that reckoning leaves is no motion."""
+    path, _ = toolpaths.read(SAMPLES / "tool_axis_tour.apt")
+    setup = tool_setup()
+    inch = setup.model_copy(update={"output": setup.output.model_copy(update={"units": "inch"})})
+    made = good(convert(path, "trunnion-bc", "haas-ngc", inch))
+    assert re.search(r"(?m)^B\S+ C\S+ F2\d{4}\.", made.text) and made.comparison is not None
+    motion, control = made.comparison.executed[1], made.job.control
+    length, unit = block_lengths(motion, control)
+    alone = (motion.code == 1) & (motion.feed > 20000.0)
+    assert alone.any() and (unit[alone] == 1.0).all() and (length[alone] < 2.0).all()
 
 
 def test_a_set_up_says_inches_in_its_file(tmp_path: Path) -> None:
