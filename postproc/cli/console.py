@@ -97,9 +97,17 @@ def progress_bar() -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import Progress as Bar
 
-    with Bar(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("")
-        yield lambda stage, at, total: bar.update(task, description=stage, completed=at, total=total)
+    bar = Bar(console=Console(stderr=True), transient=True)
+    task = bar.add_task("")
+
+    def shown(stage: str, at: int, total: int) -> None:
+        bar.start()  # not before: a bar that stands already wipes out what is asked on its line
+        bar.update(task, description=stage, completed=at, total=total)
+
+    try:
+        yield shown
+    finally:
+        bar.stop()
 
 
 def _say(stage: str, said: list[str]) -> None:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import re
+import select
 import shlex
+import subprocess
+import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -242,3 +247,28 @@ def test_answers_are_numbers_within_limits() -> None:
     assert parsed(speed, "inf")[0] is None and parsed(speed, "nan")[0] is None and parsed(feed, "0")[0] is None
     assert parsed(coolant, "") == ("off", "") and parsed(coolant, "Mist") == ("mist", "")
     assert parsed(coolant, "oil")[0] is None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo terminals are of Unix")
+def test_a_question_on_a_terminal_stays_on_its_line(tmp_path: Path) -> None:
+    """A progress bar that is redrawn ten times a second wiped it out."""
+    import pty
+
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    (file := tmp_path / "part.cls").write_text(practice_file(nx, CASES["no spindle"]))
+    code = "import sys; from postproc.cli.app import main; sys.exit(main())"
+    ours, theirs = pty.openpty()
+    words = ["setup", "new", str(file), "-m", "mill-3axis", "-o", str(tmp_path / "s.toml")]
+    command = subprocess.Popen([sys.executable, "-c", code, *words], stdin=theirs, stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    said = b""
+    while b"rev/min: " not in said:
+        said += os.read(ours, 4096)
+    assert b"\x1b" not in said
+    assert not select.select([ours], [], [], 0.5)[0], "nothing is written behind the question"
+    os.write(ours, b"3000\n")
+    with contextlib.suppress(OSError):  # as the end of a terminal is reported
+        while part := os.read(ours, 4096):
+            said += part
+    assert command.wait(60) == 0 and b"1 question" in said
+    os.close(ours)
