@@ -53,25 +53,35 @@ def sheet_text(head: SheetHead, facts: SheetFacts, answers: Mapping[str, Answer]
         lines += [*_tool(tool, facts, answers), ""]
     if facts.named:
         lines += ["[tool_numbers]    # by name of the tool in the CL file; the magazine must hold them so",
-                  *(_line(json.dumps(one.name, ensure_ascii=False), str(one.number), one.why) for one in facts.named), ""]
+                  *(_line(toml_text(one.name), str(one.number), one.why) for one in facts.named), ""]
     lines += [*_output(head, setup, facts, answers), *_operations(fit.result)]
     return "\n".join(lines).rstrip() + "\n"
 
 
+def toml_text(text: str) -> str:
+    """A text in quotes: as JSON has it, and without the one control character that JSON allows and TOML does not."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
+
+
+def remark_text(text: str) -> str:
+    """What may stand behind #: one line without control characters."""
+    return "".join(c if c >= " " and c != "\x7f" else "?" for c in " ".join(text.split()))
+
+
 def _line(key: str, value: str, remark: str) -> str:
     """`key = value`, with the reason in a column of its own."""
-    return f"{f'{key} = {value}':<{_COLUMN}}  # {' '.join(remark.split())}"
+    return f"{f'{key} = {value}':<{_COLUMN}}  # {remark_text(remark)}"
 
 
 def _top(head: SheetHead, setup: SetupFile, toolpath: Toolpath) -> Iterator[str]:
-    yield f"# Set-up of {head.file} on {head.machine}, {head.controller}: written by postproc setup new."
+    yield remark_text(f"# Set-up of {head.file} on {head.machine}, {head.controller}: written by postproc setup new.")
     yield f"# Proved with --tolerance {head.tolerance:g} (mm) and --axis-tolerance {head.axis_tolerance:g} (degrees)."
     yield f"# Units of the CL file: {head.units}, {head.units_from}"
-    yield _line("description", json.dumps(setup.description, ensure_ascii=False), "name of the part, or of the CL file")
+    yield _line("description", toml_text(setup.description), "name of the part, or of the CL file")
     yield _line("work_offset_code", json.dumps(setup.work_offset_code), "register of the control: the first; or as the shop "
                 "uses it")
     named = setup.work_offset or toolpath.frames[0].name
-    yield _line("work_offset", json.dumps(setup.work_offset or named, ensure_ascii=False),
+    yield _line("work_offset", toml_text(setup.work_offset or named),
                 "system of the CL file whose origin the work offset is: its first"
                 + (f" of {', '.join(f.name for f in toolpath.frames)}" if len(toolpath.frames) > 1 else ""))
     if setup.assumed:
@@ -97,7 +107,7 @@ def _clearance(setup: SetupFile) -> Iterator[str]:
 
 
 def _tool(tool: ToolFacts, facts: SheetFacts, answers: Mapping[str, Answer]) -> Iterator[str]:
-    yield f"[tools.{tool.number}]    # {tool.called}, first cut in line {tool.line} of the CL file"
+    yield f"[tools.{tool.number}]    # {remark_text(tool.called)}, first cut in line {tool.line} of the CL file"
     length = answers.get(f"tools.{tool.number}.gauge_length")
     if length is not None:
         yield _line("gauge_length", f"{length.value:g}", f"mm; {_from(length)}; "
@@ -111,7 +121,7 @@ def _tool(tool: ToolFacts, facts: SheetFacts, answers: Mapping[str, Answer]) -> 
                     f"rev/min; {_from(speed)}; the CL file states none for some cut")
     else:
         yield f"# spindle: {tool.speed}, of the CL file"
-    yield f"# coolant: {tool.coolant or 'none stated, see [output]'}{', of the CL file' * bool(tool.coolant)}"
+    yield remark_text(f"# coolant: {tool.coolant or 'none stated, see [output]'}{', of the CL file' * bool(tool.coolant)}")
 
 
 def _output(head: SheetHead, setup: SetupFile, facts: SheetFacts, answers: Mapping[str, Answer]) -> Iterator[str]:
@@ -135,7 +145,7 @@ def _operations(result: PostResult) -> Iterable[str]:
         return []
     modes = output_modes(result)
     lines = ["", "[output.operations]    # by name; \"auto\", or \"axes\", \"tcp\", \"tilted\" to ask for one"]
-    lines += [_line(json.dumps(name, ensure_ascii=False), '"auto"', f"written as {' and '.join(laws)}; tolerance "
+    lines += [_line(toml_text(name), '"auto"', f"written as {' and '.join(laws)}; tolerance "
                     f"{result.options.tolerance:g} mm") for name, laws in modes.items()
               if any(op.name == name for op in result.toolpath.operations) and name]
     return lines if len(lines) > 2 else []

@@ -272,3 +272,13 @@ def test_a_question_on_a_terminal_stays_on_its_line(tmp_path: Path) -> None:
             said += part
     assert command.wait(60) == 0 and b"1 question" in said
     os.close(ours)
+
+
+@pytest.mark.parametrize("name", ['EM"10\\n', "EM\x7f10", "EM\x0110", "Фреза\u2028Ø10\x85"])
+def test_odd_characters_of_names_stay_inside_their_quotes(name: str, tmp_path: Path) -> None:
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    text = practice_file(nx, CASES["no tool number"]).replace("EM10", name).replace("SLOT", "SL\x7fOT")
+    (file := tmp_path / "a\nb.cls").write_text(text, encoding="utf-8")
+    made = sheet(file, "mill-3axis", "haas-ngc")
+    assert "\x7f" not in made.text and tomllib.loads(made.text)["description"] == "a\nb.cls"
+    proved(file, made, "mill-3axis", "haas-ngc", tmp_path)
