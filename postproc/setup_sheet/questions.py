@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
@@ -20,6 +21,8 @@ ASSUMED_LENGTH = 150.0
 """mm, longer where CAM draws a longer cutter"""
 _ABOVE_CUTTER = 50.0
 """mm from the end of a cutter, as CAM draws it, to the gauge point, where that is assumed"""
+_THOUSANDS = re.compile(r"[1-9][0-9]{0,2},[0-9]{3}")
+"""numbers whose comma may part thousands or decimals"""
 _LARGEST: dict[QuestionKind, float] = {"gauge_length": 2000.0, "spindle": 200000.0, "feed": 200000.0}
 _UNITS: dict[QuestionKind, str] = {"gauge_length": "mm", "spindle": "rev/min", "feed": "mm/min", "coolant": ""}
 _OPTIONS: dict[QuestionKind, str] = {"gauge_length": "--gauge-length", "spindle": "--spindle", "feed": "--feed",
@@ -123,6 +126,8 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
     if question.kind == "coolant":
         known = get_args(CoolantKind)
         return (text.lower(), "") if text.lower() in known else (None, f"{text!r} is not one of {', '.join(known)}")
+    if _THOUSANDS.fullmatch(text):
+        return None, f"{text!r} may be {text.replace(',', '')} or {text.replace(',', '.')}: write it without the comma"
     try:
         value = float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
     except ValueError:

@@ -27,7 +27,7 @@ from postproc.controllers.model import load_controller
 from postproc.setup.model import load_setup, part_placement
 from postproc.setup_sheet.facts import facts_of
 from postproc.setup_sheet.make import SetupSheet, new_setup
-from postproc.setup_sheet.questions import ASSUMED_FEED, ASSUMED_SPEED, GivenAnswers, parsed, questions_of
+from postproc.setup_sheet.questions import ASSUMED_FEED, ASSUMED_SPEED, GivenAnswers, Question, parsed, questions_of
 from tests.postproc.kit import SAMPLES, machine
 from tests.practice_files import CASES, SHAPES, practice_file
 
@@ -282,3 +282,11 @@ def test_odd_characters_of_names_stay_inside_their_quotes(name: str, tmp_path: P
     made = sheet(file, "mill-3axis", "haas-ngc")
     assert "\x7f" not in made.text and tomllib.loads(made.text)["description"] == "a\nb.cls"
     proved(file, made, "mill-3axis", "haas-ngc", tmp_path)
+
+
+def test_a_comma_that_may_part_thousands_is_asked_again() -> None:
+    speed = Question("spindle", 1, "T1: spindle speed", None, 1000.0)
+    for text in ("12,000", "1,500"):  # 12000 rev/min was taken as 12
+        value, wrong = parsed(speed, text)
+        assert value is None and text.replace(",", "") in wrong and text.replace(",", ".") in wrong
+    assert [parsed(speed, text)[0] for text in ("150,5", "0,125", "12000", "12.5")] == [150.5, 0.125, 12000.0, 12.5]
