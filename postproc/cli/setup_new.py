@@ -56,6 +56,7 @@ def setup_new(file: ClFile, machine: MachineName,
     if output.exists() and not force:
         raise typer.BadParameter(f"{output} exists; --force replaces it", param_hint="-o")
     given = _given(gauge_length or [], spindle or [], feed, coolant)
+    _known_register(work_offset_code)
     options = Options(tolerance, axis_tolerance, units=units, dialect=dialect,
                       allow_unknown=tuple(w.upper() for w in allow_unknown or ()))
     values: dict[str, Any] = {}
@@ -123,15 +124,28 @@ class _Asking:
         return result
 
 
+def _known_register(code: str) -> None:
+    """Wrong use where no register of a control is called so; which of them a control has, the conversion says."""
+    from pydantic import ValidationError
+
+    from postproc.setup.model import SetupFile
+
+    try:
+        SetupFile(work_offset_code=code)
+    except ValidationError:
+        raise typer.BadParameter(f"{code!r} is no register of a work offset: G54, G54.1 P12, G154 P40, G520, preset 12",
+                                 param_hint="--work-offset-code") from None
+
+
 def _line() -> str:
     """One line of standard input.
 
     Raises:
-        EOFError: where it has ended.
+        EOFError: where it has ended, or is closed.
     """
     import sys
 
-    line = sys.stdin.readline()
+    line = sys.stdin.readline() if sys.stdin is not None else ""
     if not line:
         raise EOFError
     return line

@@ -23,6 +23,7 @@ import postproc
 import toolpaths
 from postproc.base.options import Options
 from postproc.cli.app import app
+from postproc.cli.setup_new import _line as LINE
 from postproc.controllers.model import load_controller
 from postproc.setup.model import load_setup, part_placement
 from postproc.setup_sheet.facts import facts_of
@@ -290,3 +291,19 @@ def test_a_comma_that_may_part_thousands_is_asked_again() -> None:
         value, wrong = parsed(speed, text)
         assert value is None and text.replace(",", "") in wrong and text.replace(",", ".") in wrong
     assert [parsed(speed, text)[0] for text in ("150,5", "0,125", "12000", "12.5")] == [150.5, 0.125, 12000.0, 12.5]
+
+
+def test_wrong_registers_and_a_closed_standard_input_are_no_faults_of_ours(tmp_path: Path,
+                                                                           monkeypatch: pytest.MonkeyPatch) -> None:
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    (file := tmp_path / "part.cls").write_text(practice_file(nx, CASES["no spindle"]))
+    words = ["setup", "new", file, "-m", "mill-3axis", "-o", tmp_path / "s.toml"]
+    assert "no register" in run(*words, "--yes", "--work-offset-code", 'G54"', code=2).output
+    monkeypatch.setattr("postproc.cli.setup_new._line", lambda: setup_new_line(monkeypatch))
+    assert "setup.unanswered" in run(*words, code=1).output
+
+
+def setup_new_line(monkeypatch: pytest.MonkeyPatch) -> str:
+    with monkeypatch.context() as closed:
+        closed.setattr(sys, "stdin", None)  # as `<&-` leaves it
+        return LINE()
