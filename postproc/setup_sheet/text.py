@@ -34,11 +34,12 @@ class SheetHead:
 
 def sheet_values(facts: SheetFacts, answers: Mapping[str, Answer], description: str, code: str) -> dict[str, Any]:
     """The values of the set-up, [part] still at its defaults."""
+    sides = {str(tool.number): tool.direction for tool in facts.tools}
     tools: dict[str, dict[str, Any]] = {}
     output: dict[str, Any] = {}
     for key, answer in answers.items():
         where, *rest = key.split(".")
-        value = {"rpm": answer.value, "direction": "clockwise"} if rest[-1] == "spindle" else answer.value
+        value = {"rpm": answer.value, "direction": sides[rest[0]]} if rest[-1] == "spindle" else answer.value
         (tools.setdefault(rest[0], {}) if where == "tools" else output)[rest[-1]] = value
     assumed = sorted(key for key, answer in answers.items() if answer.source == "assumed" and answer.value != "off")
     return {"description": description, "work_offset_code": code, "assumed": assumed, "tools": tools, "output": output,
@@ -117,7 +118,7 @@ def _tool(tool: ToolFacts, facts: SheetFacts, answers: Mapping[str, Answer]) -> 
                "to check travel with the tool")
     speed = answers.get(f"tools.{tool.number}.spindle")
     if speed is not None:
-        yield _line("spindle", f'{{ rpm = {speed.value:g}, direction = "clockwise" }}',
+        yield _line("spindle", f'{{ rpm = {speed.value:g}, direction = "{tool.direction}" }}',
                     f"rev/min; {_from(speed)}; the CL file states none for some cut")
     else:
         yield f"# spindle: {tool.speed}, of the CL file"

@@ -307,3 +307,20 @@ def setup_new_line(monkeypatch: pytest.MonkeyPatch) -> str:
     with monkeypatch.context() as closed:
         closed.setattr(sys, "stdin", None)  # as `<&-` leaves it
         return LINE()
+
+
+@pytest.mark.parametrize("record", ["SPINDL/CCLW", "SPINDL/ON,CCLW", "SPINDL/RPM,0,CCLW"])
+def test_a_direction_without_a_speed_is_that_of_the_file(record: str, tmp_path: Path) -> None:
+    """The set-up said clockwise, and the program started the spindle with M3 and M4 behind it."""
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    (file := tmp_path / "part.cls").write_text(practice_file(nx, CASES["complete"]).replace("SPINDL/RPM,3000,CLW", record))
+    made = sheet(file, "mill-3axis", "haas-ngc")
+    assert 'spindle = { rpm = 1000, direction = "anti-clockwise" }' in made.text
+    assert made.questions[0].text.endswith("spindle speed, anti-clockwise")
+    text = proved(file, made, "mill-3axis", "haas-ngc", tmp_path).text
+    assert re.search(r"\bM4\b", text) and not re.search(r"\bM3\b", text)
+    (tmp_path / "other.toml").write_text(made.text.replace("anti-clockwise", "clockwise"))
+    other, _ = load_setup(tmp_path / "other.toml")
+    path, found = toolpaths.read(file)
+    again = postproc.convert(path, machine("mill-3axis"), "haas-ngc", other, diagnostics=found)
+    assert again.ok and not re.search(r"\bM3\b", again.text)
