@@ -31,11 +31,12 @@ TRIAL = {"output": {"feed": 100.0, "spindle": {"rpm": 1000.0}}}
 
 @dataclass(frozen=True)
 class NumberedTool:
-    """A tool by its name in the file, the number that it gets, and why."""
+    """A tool by its name in the file, the number that it gets, and why; `assumed` where that is not the file's."""
 
     name: str
     number: int
     why: str
+    assumed: bool = True
 
 
 @dataclass(frozen=True)
@@ -140,7 +141,7 @@ def _of_one_number(toolpath: Toolpath) -> list[NumberedTool]:
                 other, tool):
             continue
         why = f"the CL file gives T{tool.number} to different tools, {other.name} and {tool.name}"
-        result.setdefault(other.name, NumberedTool(other.name, other.number, why))
+        result.setdefault(other.name, NumberedTool(other.name, other.number, why, assumed=False))
         if tool.name not in result:
             result[tool.name] = NumberedTool(tool.name, next(free), f"{why}: the next number that is free")
     return list(result.values())

@@ -13,7 +13,7 @@ from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import SheetFacts, facts_of
 from postproc.setup_sheet.place import Fit, Progress, fitted
 from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, questions_of
-from postproc.setup_sheet.text import SheetHead, sheet_text, sheet_values
+from postproc.setup_sheet.text import TOOL_NUMBERS, SheetHead, sheet_text, sheet_values
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, require, warning
 from toolpaths.toolpath import Toolpath
 
@@ -119,9 +119,14 @@ def _assumed(made: SetupSheet, fit: Fit) -> list[Diagnostic]:
     """What was assumed, as a warning each."""
     keys = {one.key: one for one in made.questions}
     values = dict(made.answers)
+    named = made.facts.named if made.facts is not None else ()
+    numbers = ", ".join(f"{one.name} = T{one.number}" for one in named if one.assumed)
     return [warning("setup.assumed", f"{key} = {values[key].value} {keys[key].unit} is assumed: nobody has stated it",
                     hint=f"state it by {keys[key].option}, or in the file, and take its name out of `assumed`")
-            for key in fit.setup.assumed]
+            for key in fit.setup.assumed if key != TOOL_NUMBERS] + ([
+                warning("setup.assumed", f"{TOOL_NUMBERS}: {numbers} is assumed: nobody has stated it", hint="see that the "
+                        "magazine holds them so, or put in its numbers, and take `tool_numbers` out of `assumed`")]
+                if numbers else [])
 
 
 def _not_fitted(fit: Fit) -> list[Diagnostic]:

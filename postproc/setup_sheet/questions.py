@@ -103,7 +103,8 @@ def questions_of(facts: SheetFacts) -> list[Question]:
             result.append(Question("gauge_length", tool.number, f"{tool.called}: gauge length, from the gauge point of the "
                                    "spindle to the tip", None, _length(tool)))
         if not tool.speed:
-            result.append(Question("spindle", tool.number, f"{tool.called}: spindle speed, {tool.direction}", None, ASSUMED_SPEED))
+            result.append(Question("spindle", tool.number, f"{tool.called}: spindle speed, {tool.direction}", None,
+                                   ASSUMED_SPEED))
     if facts.without_feed:
         result.append(Question("feed", 0, f"feed of {facts.without_feed} moves that cut without one", None, ASSUMED_FEED))
     if not any(tool.coolant for tool in facts.tools):

@@ -17,6 +17,8 @@ from toolpaths.toolpath import Toolpath
 
 _ASSUMED = "ASSUMED, nobody has stated it: put in yours, and take its name out of `assumed`"
 _COLUMN = 48
+TOOL_NUMBERS = "tool_numbers"
+"""key of numbers that no file states: the wrong tool is loaded where the magazine holds another under them"""
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ def sheet_values(facts: SheetFacts, answers: Mapping[str, Answer], description: 
         value = {"rpm": answer.value, "direction": sides[rest[0]]} if rest[-1] == "spindle" else answer.value
         (tools.setdefault(rest[0], {}) if where == "tools" else output)[rest[-1]] = value
     assumed = sorted(key for key, answer in answers.items() if answer.source == "assumed" and answer.value != "off")
+    assumed += [TOOL_NUMBERS] * any(one.assumed for one in facts.named)
     return {"description": description, "work_offset_code": code, "assumed": assumed, "tools": tools, "output": output,
             "tool_numbers": facts.numbers}
 
@@ -54,7 +57,8 @@ def sheet_text(head: SheetHead, facts: SheetFacts, answers: Mapping[str, Answer]
         lines += [*_tool(tool, facts, answers), ""]
     if facts.named:
         lines += ["[tool_numbers]    # by name of the tool in the CL file; the magazine must hold them so",
-                  *(_line(toml_text(one.name), str(one.number), one.why) for one in facts.named), ""]
+                  *(_line(toml_text(one.name), str(one.number), one.why + f"; {_ASSUMED}" * one.assumed)
+                    for one in facts.named), ""]
     lines += [*_output(head, setup, facts, answers), *_operations(fit.result)]
     return "\n".join(lines).rstrip() + "\n"
 

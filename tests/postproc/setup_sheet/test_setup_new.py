@@ -81,6 +81,7 @@ def test_what_is_written_converts(shape: str, case: str, name: str, controller: 
     result = proved(file, made, name, controller, tmp_path)
     setup = tomllib.loads(made.text)
     assumed = {key for key, answer in made.answers if answer.source == "assumed" and answer.value != "off"}
+    assumed |= {"tool_numbers"} if any(one.assumed for one in made.facts.named) else set()
     assert set(setup.get("assumed", [])) == assumed
     assert {d.message.split(" = ")[0] for d in result.diagnostics if d.code == "setup.assumed"} == assumed
     assert result.text.count("ASSUMED") == len(assumed)
@@ -152,7 +153,8 @@ def test_questions_are_asked_and_answered(tmp_path: Path) -> None:
     setup = tomllib.loads(out.read_text())
     assert setup["tools"]["1"]["spindle"] == {"rpm": 8000, "direction": "clockwise"}
     assert setup["output"] == {"default": "auto", "feed": 350, "coolant": "flood", "operations": {"SLOT": "auto"}}
-    assert "assumed" not in setup and "ASSUMED: the CL file states none" in out.read_text()  # the units
+    assert setup["assumed"] == ["tool_numbers"] and "tool_numbers: EM10 = T1 is assumed" in got.stderr
+    assert "ASSUMED: the CL file states none" in out.read_text()  # the units
     before = out.read_text()
     assert run(*words, "--yes", code=2).stderr and out.read_text() == before, "no file is replaced without --force"
     run(*words, "--yes", "--force", "--feed", "70")
