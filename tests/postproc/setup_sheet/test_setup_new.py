@@ -326,3 +326,19 @@ def test_a_direction_without_a_speed_is_that_of_the_file(record: str, tmp_path: 
     path, found = toolpaths.read(file)
     again = postproc.convert(path, machine("mill-3axis"), "haas-ngc", other, diagnostics=found)
     assert again.ok and not re.search(r"\bM3\b", again.text)
+
+
+def test_commands_that_are_offered_quote_names_with_spaces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    (file := tmp_path / "my part (1).cls").write_text(practice_file(nx, CASES["no spindle"]))
+    options = ("--units", "mm", "--dialect", "nx", "--allow-unknown", "SHOPWORD", "--tolerance", "0.02")
+    got = run("convert", file, "-m", "mill-3axis", "-c", "haas-ngc", "-o", "p.nc", *options, code=1)
+    offered = re.search(r"postproc (setup new .*) asks for all", got.stderr)
+    assert offered is not None
+    file.write_text(file.read_text().replace("COOLNT/FLOOD", "COOLNT/FLOOD\nSHOPWORD/7"))
+    got = run(*shlex.split(offered[1]), "--yes", *options)
+    following = re.search(r"next: postproc (.*)", got.stdout)
+    assert following is not None
+    run(*shlex.split(following[1]))
+    assert (tmp_path / "my part (1).nc").exists()
