@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from postproc.base.job_place import NAME
 from postproc.cli.says import SAYS
 
 if TYPE_CHECKING:
@@ -142,8 +143,10 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
     passed = not has_errors(diagnostics)
     if SAYS.strict:
         diagnostics = as_errors(diagnostics)
+    if SAYS.job_units:
+        diagnostics = _of_another_unit(diagnostics, SAYS.job_units)
     ok = not has_errors(diagnostics)
-    if passed and not ok:  # by --strict alone
+    if passed and not ok:  # by --strict or the job file's units alone
         unwritten = {"output": None} if "output" in values else {}
         values = values | unwritten | {"diagnostics": [d.as_dict() for d in diagnostics]}
         text, outputs = "", {}
@@ -189,6 +192,17 @@ def as_errors(diagnostics: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
     from toolpaths.diagnostics import Severity
 
     return tuple(replace(d, severity=Severity.ERROR) if d.severity is Severity.WARNING else d for d in diagnostics)
+
+
+def _of_another_unit(diagnostics: tuple[Diagnostic, ...], job: str) -> tuple[Diagnostic, ...]:
+    """The diagnostics with an error where the units of the job file, for files that state none, go against the file's."""
+    from dataclasses import replace
+
+    from toolpaths.diagnostics import Severity
+
+    hint = f"units of {job} are for files that state none: take them out there, or give --units on the command line"
+    return tuple(replace(d, severity=Severity.ERROR, hint=hint)
+                 if d.code == "cl.units" and d.severity is Severity.WARNING else d for d in diagnostics)
 
 
 def _headed(values: dict[str, Any], ok: bool) -> dict[str, Any]:
@@ -237,6 +251,9 @@ def refuse_overwriting(outputs: dict[str, str], inputs: dict[str, str]) -> None:
             raise typer.BadParameter("a program is written whole or not at all, so not to standard output; name a file",
                                      param_hint=option)
         target = place(name)
+        if target.name == NAME:
+            raise typer.BadParameter(f"{NAME} is the name of job files, which all commands below their folder read; take "
+                                     "another name", param_hint=option)
         try:
             same = next((what for other, what in known if other == target or (
                 other.exists() and target.exists() and other.samefile(target))), "")
