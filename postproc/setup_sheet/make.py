@@ -68,6 +68,7 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
         length = given.gauge_length.get(tool.number, given.gauge_length.get(0))
         if length is not None:
             answers[f"tools.{tool.number}.gauge_length"] = Answer(length, "answered")
+    known += _short(facts, answers, toolpath.file)
     if left:
         return SetupSheet("", (*known, _open(left, toolpath.file)), facts, tuple(questions), tuple(answers.items()))
     values = sheet_values(facts, answers, toolpath.name or Path(toolpath.file).name, code)
@@ -113,6 +114,16 @@ def _unused(given: GivenAnswers, facts: SheetFacts, toolpath: Toolpath) -> list[
         return []
     return [error("setup.no_such_tool", f"{', '.join(f'T{n}' for n in wrong)}: the CL file cuts with no such tool",
                   file=toolpath.file, hint=f"it cuts with {', '.join(f'T{n}' for n in sorted(used))}")]
+
+
+def _short(facts: SheetFacts, answers: dict[str, Answer], file: str) -> list[Diagnostic]:
+    """Gauge lengths below the length of the cutter as CAM draws it: a slip of the finger, inches, or another point."""
+    given = {tool.number: answers.get(f"tools.{tool.number}.gauge_length") for tool in facts.tools}
+    return [warning("setup.short_tool", f"{tool.called}: gauge length {length.value:g} mm, shorter than the cutter alone, "
+                    f"{tool.cutter:g} mm in the CL file", file=file, lines=[tool.line], hint="it is measured in mm from the "
+                    "gauge point of the spindle to the tip")
+            for tool in facts.tools if (length := given[tool.number]) is not None and tool.cutter is not None
+            and float(length.value) < tool.cutter]
 
 
 def _assumed(made: SetupSheet, fit: Fit) -> list[Diagnostic]:

@@ -342,3 +342,11 @@ def test_commands_that_are_offered_quote_names_with_spaces(tmp_path: Path, monke
     assert following is not None
     run(*shlex.split(following[1]))
     assert (tmp_path / "my part (1).nc").exists()
+
+
+def test_a_gauge_length_below_the_cutter_is_warned_of(tmp_path: Path) -> None:
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    (file := tmp_path / "part.cls").write_text(practice_file(nx, CASES["complete"]))
+    for length, count in ((5.0, 1), (75.0, 0)):  # the cutter of the file is 75 mm long
+        made = sheet(file, "head-table", "haas-ngc", GivenAnswers(gauge_length={0: length}))
+        assert made.text and [d.code for d in made.diagnostics].count("setup.short_tool") == count
