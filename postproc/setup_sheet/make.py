@@ -117,7 +117,7 @@ def _unused(given: GivenAnswers, facts: SheetFacts, toolpath: Toolpath) -> list[
 
 
 def _short(facts: SheetFacts, answers: dict[str, Answer], file: str) -> list[Diagnostic]:
-    """Gauge lengths below the length of the cutter as CAM draws it: a slip of the finger, inches, or another point."""
+    """Gauge lengths below the length of the cutter as CAM draws it: a wrong key, inches, or another point."""
     given = {tool.number: answers.get(f"tools.{tool.number}.gauge_length") for tool in facts.tools}
     return [warning("setup.short_tool", f"{tool.called}: gauge length {length.value:g} mm, shorter than the cutter alone, "
                     f"{tool.cutter:g} mm in the CL file", file=file, lines=[tool.line], hint="it is measured in mm from the "

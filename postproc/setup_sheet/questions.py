@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
@@ -21,8 +20,6 @@ ASSUMED_LENGTH = 150.0
 """mm, longer where CAM draws a longer cutter"""
 _ABOVE_CUTTER = 50.0
 """mm from the end of a cutter, as CAM draws it, to the gauge point, where that is assumed"""
-_THOUSANDS = re.compile(r"[1-9][0-9]{0,2},[0-9]{3}")
-"""numbers whose comma may part thousands or decimals"""
 _LARGEST: dict[QuestionKind, float] = {"gauge_length": 2000.0, "spindle": 200000.0, "feed": 200000.0}
 _UNITS: dict[QuestionKind, str] = {"gauge_length": "mm", "spindle": "rev/min", "feed": "mm/min", "coolant": ""}
 _OPTIONS: dict[QuestionKind, str] = {"gauge_length": "--gauge-length", "spindle": "--spindle", "feed": "--feed",
@@ -127,7 +124,7 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
     if question.kind == "coolant":
         known = get_args(CoolantKind)
         return (text.lower(), "") if text.lower() in known else (None, f"{text!r} is not one of {', '.join(known)}")
-    if _THOUSANDS.fullmatch(text):
+    if _thousands(text):
         return None, f"{text!r} may be {text.replace(',', '')} or {text.replace(',', '.')}: write it without the comma"
     try:
         value = float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
@@ -136,6 +133,12 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
     if not 0.0 < value <= _LARGEST[question.kind]:
         return None, f"{text} is not above 0 and at most {_LARGEST[question.kind]:g} {question.unit}"
     return value, ""
+
+
+def _thousands(text: str) -> bool:
+    """True for a number whose comma may part thousands or decimals: 12,000."""
+    whole, comma, rest = text.partition(",")
+    return bool(comma) and whole.isdigit() and rest.isdigit() and len(whole) <= 3 == len(rest) and whole[0] != "0"
 
 
 def answered(questions: list[Question], given: GivenAnswers, ask: Callable[[Question], float | str] | None,
