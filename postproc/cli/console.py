@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from postproc.base.job_place import NAME
 from postproc.cli.says import SAYS
 
 if TYPE_CHECKING:
@@ -97,9 +98,17 @@ def progress_bar() -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import Progress as Bar
 
-    with Bar(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("")
-        yield lambda stage, at, total: bar.update(task, description=stage, completed=at, total=total)
+    bar = Bar(console=Console(stderr=True), transient=True)
+    task = bar.add_task("")
+
+    def shown(stage: str, at: int, total: int) -> None:
+        bar.start()  # not before: a bar that stands already wipes out what is asked on its line
+        bar.update(task, description=stage, completed=at, total=total)
+
+    try:
+        yield shown
+    finally:
+        bar.stop()
 
 
 def _say(stage: str, said: list[str]) -> None:
@@ -134,8 +143,10 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
     passed = not has_errors(diagnostics)
     if SAYS.strict:
         diagnostics = as_errors(diagnostics)
+    if SAYS.job_units:
+        diagnostics = _of_another_unit(diagnostics, SAYS.job_units)
     ok = not has_errors(diagnostics)
-    if passed and not ok:  # by --strict alone
+    if passed and not ok:  # by --strict or the job file's units alone
         unwritten = {"output": None} if "output" in values else {}
         values = values | unwritten | {"diagnostics": [d.as_dict() for d in diagnostics]}
         text, outputs = "", {}
@@ -181,6 +192,17 @@ def as_errors(diagnostics: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
     from toolpaths.diagnostics import Severity
 
     return tuple(replace(d, severity=Severity.ERROR) if d.severity is Severity.WARNING else d for d in diagnostics)
+
+
+def _of_another_unit(diagnostics: tuple[Diagnostic, ...], job: str) -> tuple[Diagnostic, ...]:
+    """The diagnostics with an error where the units of the job file, for files that state none, go against the file's."""
+    from dataclasses import replace
+
+    from toolpaths.diagnostics import Severity
+
+    hint = f"units of {job} are for files that state none: take them out there, or give --units on the command line"
+    return tuple(replace(d, severity=Severity.ERROR, hint=hint)
+                 if d.code == "cl.units" and d.severity is Severity.WARNING else d for d in diagnostics)
 
 
 def _headed(values: dict[str, Any], ok: bool) -> dict[str, Any]:
@@ -229,6 +251,9 @@ def refuse_overwriting(outputs: dict[str, str], inputs: dict[str, str]) -> None:
             raise typer.BadParameter("a program is written whole or not at all, so not to standard output; name a file",
                                      param_hint=option)
         target = place(name)
+        if target.name == NAME:
+            raise typer.BadParameter(f"{NAME} is the name of job files, which all commands below their folder read; take "
+                                     "another name", param_hint=option)
         try:
             same = next((what for other, what in known if other == target or (
                 other.exists() and target.exists() and other.samefile(target))), "")

@@ -7,6 +7,8 @@ from typing import Any
 
 import typer
 
+from postproc.cli.says import SAYS
+
 ONLY_OF_CL = "dialect"
 """an option that only commands on CL files have: the others take machine and controller"""
 
@@ -16,6 +18,7 @@ def given_defaults(command: Any, arguments: list[str], context: typer.Context) -
 
     The file is looked for upwards from the folder of the CL file, for commands without one from the present folder.
     """
+    SAYS.job_units = ""
     names = {one.name for one in command.params}
     if "machine" not in names and ONLY_OF_CL not in names:
         return
@@ -28,6 +31,7 @@ def given_defaults(command: Any, arguments: list[str], context: typer.Context) -
     values, where = _values(folder, str(given.get("json") or ""))
     taken = {key: value for key, value in values.items()
              if key in names and key not in given and (of_cl or key in ("machine", "controller"))}
+    SAYS.job_units = str(where) if "units" in taken else ""
     if taken:
         context.default_map = {command.name: taken}
         if "quiet" not in given:

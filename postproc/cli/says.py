@@ -13,11 +13,13 @@ class Says:
         quiet: notes, figures and the job file's line are left out
         verbose: each stage is named as it begins
         strict: warnings are errors
+        job_units: the job file whose units the command takes, "" where it has its own or none
     """
 
     quiet: bool = False
     verbose: bool = False
     strict: bool = False
+    job_units: str = ""
 
 
 SAYS = Says()

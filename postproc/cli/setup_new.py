@@ -56,6 +56,7 @@ def setup_new(file: ClFile, machine: MachineName,
     if output.exists() and not force:
         raise typer.BadParameter(f"{output} exists; --force replaces it", param_hint="-o")
     given = _given(gauge_length or [], spindle or [], feed, coolant)
+    _known_register(work_offset_code)
     options = Options(tolerance, axis_tolerance, units=units, dialect=dialect,
                       allow_unknown=tuple(w.upper() for w in allow_unknown or ()))
     values: dict[str, Any] = {}
@@ -65,7 +66,7 @@ def setup_new(file: ClFile, machine: MachineName,
     outputs: dict[Path, str | bytes] = {}
     if sheet.text:
         outputs[output] = sheet.text
-        text = _text(sheet, output, file, machine, controller, units)
+        text = _text(sheet, output, file, machine, controller, options)
     values = _values(sheet, output)
     report(sheet.diagnostics, json, values, text, outputs)
 
@@ -123,15 +124,28 @@ class _Asking:
         return result
 
 
+def _known_register(code: str) -> None:
+    """Wrong use where no register of a control is called so; which of them a control has, the conversion says."""
+    from pydantic import ValidationError
+
+    from postproc.setup.model import SetupFile
+
+    try:
+        SetupFile(work_offset_code=code)
+    except ValidationError:
+        raise typer.BadParameter(f"{code!r} is no register of a work offset: G54, G54.1 P12, G154 P40, G520, preset 12",
+                                 param_hint="--work-offset-code") from None
+
+
 def _line() -> str:
     """One line of standard input.
 
     Raises:
-        EOFError: where it has ended.
+        EOFError: where it has ended, or is closed.
     """
     import sys
 
-    line = sys.stdin.readline()
+    line = sys.stdin.readline() if sys.stdin is not None else ""
     if not line:
         raise EOFError
     return line
@@ -176,15 +190,31 @@ def _values(sheet: SetupSheet, output: Path) -> dict[str, Any]:
             "diagnostics": [d.as_dict() for d in sheet.diagnostics]}
 
 
-def _text(sheet: SetupSheet, output: Path, file: Path, machine: str, controller: str, units: str) -> str:
+def _text(sheet: SetupSheet, output: Path, file: Path, machine: str, controller: str, options: Options) -> str:
     """What was written, and the command that uses it."""
+    import shlex
+
     assert sheet.fit is not None
     place, questions = sheet.fit.place, len(sheet.questions)
     assumed = f", {len(sheet.assumed)} assumed" if sheet.assumed else ""
-    given = f" --units {units}" if units else ""
+    target = file.with_suffix(".nc").name if str(file) != "-" else "part.nc"
+    words = [str(file), "-m", machine, "-c", controller, "--setup", str(output), *_reading(options), "-o", target]
     lines = [f"written: {output}, proved by a conversion", f"{questions} question{'s' * (questions != 1)}{assumed}"]
     if place is not None:
         lines.append(f"part: {place.why}")
-    lines.append(f"next: postproc convert {file} -m {machine} -c {controller} --setup {output}{given} -o "
-                 f"{file.with_suffix('.nc').name}")
+    lines.append(f"next: postproc convert {shlex.join(words)}")
     return "\n".join(lines)
+
+
+def _reading(options: Options) -> list[str]:
+    """The options with which the file was read and proved, where they are not those of every command."""
+    from postproc.base.options import Options as Default
+
+    usual = Default()
+    found = [word for name, value in (("--units", options.units), ("--dialect", options.dialect)) if value
+             for word in (name, value)]
+    found += [word for one in options.allow_unknown for word in ("--allow-unknown", one)]
+    for name, value, own in (("--tolerance", options.tolerance, usual.tolerance),
+                             ("--axis-tolerance", options.axis_tolerance, usual.axis_tolerance)):
+        found += [name, f"{value:g}"] if value != own else []
+    return found

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.reference.events import TOOL_WORDS, Spindle, cutting, numbers, speed_said, spindle_after, spindle_states, words
 from postproc.setup.model import SetupFile, ToolSetup
-from postproc.setup.spindle import CoolantKind, SpindleSetup
+from postproc.setup.spindle import CoolantKind, Direction, SpindleSetup
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Event, Toolpath
@@ -137,17 +137,18 @@ def stated_by_setup(toolpath: Toolpath, stated: Stated) -> list[Diagnostic]:
 def _spindle_of(here: tuple[Event, ...], first: int, before: Spindle, own: ToolSetup,
                 setup: SetupFile) -> SpindleSetup | None:
     """What the set-up gives a tool with the records `here`, the first cut of which is row `first`; None where
-    the file says enough."""
+    the file says enough. The direction is the file's, where it says one."""
     said = [e for e in here if e.word == "SPINDL" and e.index <= first]
     turns, speed = before.direction != 0, before.rpm
+    side: Direction | None = None
     for event in said:
+        side = "anti-clockwise" if "CCLW" in words(event) else "clockwise" if "CLW" in words(event) else side
         turns = not _OFF & set(words(event))
         speed = speed if speed_said(event) is None else float(speed_said(event) or 0.0)
     if said and (not turns or speed == speed):
         return None
-    if own.spindle is not None:
-        return own.spindle
-    return setup.output.spindle if not turns or speed != speed else None
+    wanted = own.spindle or (setup.output.spindle if not turns or speed != speed else None)
+    return wanted if wanted is None or side is None else wanted.model_copy(update={"direction": side})
 
 
 def _coolant_of(here: tuple[Event, ...], first: int, flowing: bool, own: ToolSetup,

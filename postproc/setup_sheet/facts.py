@@ -21,6 +21,7 @@ from postproc.reference.stated_feeds import without_feed
 from postproc.reference.tool_numbers import numbered
 from postproc.reference.unnumbered_tools import UNNAMED, with_tools
 from postproc.setup.model import SetupFile
+from postproc.setup.spindle import Direction
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.toolpath import Event, Kind, Role, Tool, Toolpath
 
@@ -30,11 +31,12 @@ TRIAL = {"output": {"feed": 100.0, "spindle": {"rpm": 1000.0}}}
 
 @dataclass(frozen=True)
 class NumberedTool:
-    """A tool by its name in the file, the number that it gets, and why."""
+    """A tool by its name in the file, the number that it gets, and why; `assumed` where that is not the file's."""
 
     name: str
     number: int
     why: str
+    assumed: bool = True
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,7 @@ class ToolFacts:
     Attributes:
         called: name and size for people
         speed: of the CL file in words, "" where it states none for some cut
+        direction: of the spindle in the cuts without a speed, where the CL file states it for all of them, else clockwise
         coolant: of the CL file, "" where it states none
         cutter: length of the cutter as CAM draws it, mm, or None
     """
@@ -54,6 +57,7 @@ class ToolFacts:
     coolant: str
     cutter: float | None
     line: int
+    direction: Direction = "clockwise"
 
 
 @dataclass(frozen=True)
@@ -137,7 +141,7 @@ def _of_one_number(toolpath: Toolpath) -> list[NumberedTool]:
                 other, tool):
             continue
         why = f"the CL file gives T{tool.number} to different tools, {other.name} and {tool.name}"
-        result.setdefault(other.name, NumberedTool(other.name, other.number, why))
+        result.setdefault(other.name, NumberedTool(other.name, other.number, why, assumed=False))
         if tool.name not in result:
             result[tool.name] = NumberedTool(tool.name, next(free), f"{why}: the next number that is free")
     return list(result.values())
@@ -158,7 +162,8 @@ def _tools(path: Toolpath) -> Iterator[ToolFacts]:
         speeds = sorted({f"{value:g}" for value in rpm[rows[~stands]].tolist()}, key=float)
         tool = path.tools[int(path.tool[rows[0]])] if path.tool[rows[0]] >= 0 else Tool(number)
         yield ToolFacts(number, _called(tool, number), "" if stands.any() else ", ".join(speeds) + " rev/min",
-                        _coolant(events), _height(tool), int(path.line[rows[0]]))
+                        _coolant(events), _height(tool), int(path.line[rows[0]]),
+                        "anti-clockwise" if stands.any() and (direction[rows[stands]] < 0).all() else "clockwise")
 
 
 def _coolant(events: list[Event]) -> str:

@@ -13,7 +13,7 @@ from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import SheetFacts, facts_of
 from postproc.setup_sheet.place import Fit, Progress, fitted
 from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, questions_of
-from postproc.setup_sheet.text import SheetHead, sheet_text, sheet_values
+from postproc.setup_sheet.text import TOOL_NUMBERS, SheetHead, sheet_text, sheet_values
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, require, warning
 from toolpaths.toolpath import Toolpath
 
@@ -68,6 +68,7 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
         length = given.gauge_length.get(tool.number, given.gauge_length.get(0))
         if length is not None:
             answers[f"tools.{tool.number}.gauge_length"] = Answer(length, "answered")
+    known += _short(facts, answers, toolpath.file)
     if left:
         return SetupSheet("", (*known, _open(left, toolpath.file)), facts, tuple(questions), tuple(answers.items()))
     values = sheet_values(facts, answers, toolpath.name or Path(toolpath.file).name, code)
@@ -115,13 +116,28 @@ def _unused(given: GivenAnswers, facts: SheetFacts, toolpath: Toolpath) -> list[
                   file=toolpath.file, hint=f"it cuts with {', '.join(f'T{n}' for n in sorted(used))}")]
 
 
+def _short(facts: SheetFacts, answers: dict[str, Answer], file: str) -> list[Diagnostic]:
+    """Gauge lengths below the length of the cutter as CAM draws it: a wrong key, inches, or another point."""
+    given = {tool.number: answers.get(f"tools.{tool.number}.gauge_length") for tool in facts.tools}
+    return [warning("setup.short_tool", f"{tool.called}: gauge length {length.value:g} mm, shorter than the cutter alone, "
+                    f"{tool.cutter:g} mm in the CL file", file=file, lines=[tool.line], hint="it is measured in mm from the "
+                    "gauge point of the spindle to the tip")
+            for tool in facts.tools if (length := given[tool.number]) is not None and tool.cutter is not None
+            and float(length.value) < tool.cutter]
+
+
 def _assumed(made: SetupSheet, fit: Fit) -> list[Diagnostic]:
     """What was assumed, as a warning each."""
     keys = {one.key: one for one in made.questions}
     values = dict(made.answers)
+    named = made.facts.named if made.facts is not None else ()
+    numbers = ", ".join(f"{one.name} = T{one.number}" for one in named if one.assumed)
     return [warning("setup.assumed", f"{key} = {values[key].value} {keys[key].unit} is assumed: nobody has stated it",
                     hint=f"state it by {keys[key].option}, or in the file, and take its name out of `assumed`")
-            for key in fit.setup.assumed]
+            for key in fit.setup.assumed if key != TOOL_NUMBERS] + ([
+                warning("setup.assumed", f"{TOOL_NUMBERS}: {numbers} is assumed: nobody has stated it", hint="see that the "
+                        "magazine holds them so, or put in its numbers, and take `tool_numbers` out of `assumed`")]
+                if numbers else [])
 
 
 def _not_fitted(fit: Fit) -> list[Diagnostic]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+
 from postproc.job.job import OF_SETUP
 from postproc.pipeline.result import PostResult
 from postproc.setup_sheet.place import found_place
@@ -20,8 +22,8 @@ def offers(result: PostResult, toolpath: Toolpath, machine: str, controller: str
     codes = {d.code for d in result.diagnostics if d.severity is Severity.ERROR}
     missing = sorted(codes & OF_SETUP)
     if missing:
-        file = toolpath.file or "part.cls"
+        words = shlex.join([toolpath.file or "part.cls", "-m", machine, "-c", controller])
         return [info("setup.offered", f"a set-up answers all of this: {', '.join(missing)}",
-                     hint=f"postproc setup new {file} -m {machine} -c {controller} -o part.setup.toml asks for all of "
+                     hint=f"postproc setup new {words} -o part.setup.toml asks for all of "
                      "them at once, and finds a place that fits")]
     return found_place(result, toolpath)

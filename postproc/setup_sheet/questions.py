@@ -100,7 +100,8 @@ def questions_of(facts: SheetFacts) -> list[Question]:
             result.append(Question("gauge_length", tool.number, f"{tool.called}: gauge length, from the gauge point of the "
                                    "spindle to the tip", None, _length(tool)))
         if not tool.speed:
-            result.append(Question("spindle", tool.number, f"{tool.called}: spindle speed", None, ASSUMED_SPEED))
+            result.append(Question("spindle", tool.number, f"{tool.called}: spindle speed, {tool.direction}", None,
+                                   ASSUMED_SPEED))
     if facts.without_feed:
         result.append(Question("feed", 0, f"feed of {facts.without_feed} moves that cut without one", None, ASSUMED_FEED))
     if not any(tool.coolant for tool in facts.tools):
@@ -123,6 +124,8 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
     if question.kind == "coolant":
         known = get_args(CoolantKind)
         return (text.lower(), "") if text.lower() in known else (None, f"{text!r} is not one of {', '.join(known)}")
+    if _thousands(text):
+        return None, f"{text!r} may be {text.replace(',', '')} or {text.replace(',', '.')}: write it without the comma"
     try:
         value = float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
     except ValueError:
@@ -130,6 +133,12 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
     if not 0.0 < value <= _LARGEST[question.kind]:
         return None, f"{text} is not above 0 and at most {_LARGEST[question.kind]:g} {question.unit}"
     return value, ""
+
+
+def _thousands(text: str) -> bool:
+    """True for a number whose comma may part thousands or decimals: 12,000."""
+    whole, comma, rest = text.partition(",")
+    return bool(comma) and whole.isdigit() and rest.isdigit() and len(whole) <= 3 == len(rest) and whole[0] != "0"
 
 
 def answered(questions: list[Question], given: GivenAnswers, ask: Callable[[Question], float | str] | None,

@@ -17,6 +17,8 @@ from toolpaths.toolpath import Toolpath
 
 _ASSUMED = "ASSUMED, nobody has stated it: put in yours, and take its name out of `assumed`"
 _COLUMN = 48
+TOOL_NUMBERS = "tool_numbers"
+"""key of numbers that no file states: the wrong tool is loaded where the magazine holds another under them"""
 
 
 @dataclass(frozen=True)
@@ -34,13 +36,15 @@ class SheetHead:
 
 def sheet_values(facts: SheetFacts, answers: Mapping[str, Answer], description: str, code: str) -> dict[str, Any]:
     """The values of the set-up, [part] still at its defaults."""
+    sides = {str(tool.number): tool.direction for tool in facts.tools}
     tools: dict[str, dict[str, Any]] = {}
     output: dict[str, Any] = {}
     for key, answer in answers.items():
         where, *rest = key.split(".")
-        value = {"rpm": answer.value, "direction": "clockwise"} if rest[-1] == "spindle" else answer.value
+        value = {"rpm": answer.value, "direction": sides[rest[0]]} if rest[-1] == "spindle" else answer.value
         (tools.setdefault(rest[0], {}) if where == "tools" else output)[rest[-1]] = value
     assumed = sorted(key for key, answer in answers.items() if answer.source == "assumed" and answer.value != "off")
+    assumed += [TOOL_NUMBERS] * any(one.assumed for one in facts.named)
     return {"description": description, "work_offset_code": code, "assumed": assumed, "tools": tools, "output": output,
             "tool_numbers": facts.numbers}
 
@@ -53,25 +57,36 @@ def sheet_text(head: SheetHead, facts: SheetFacts, answers: Mapping[str, Answer]
         lines += [*_tool(tool, facts, answers), ""]
     if facts.named:
         lines += ["[tool_numbers]    # by name of the tool in the CL file; the magazine must hold them so",
-                  *(_line(json.dumps(one.name, ensure_ascii=False), str(one.number), one.why) for one in facts.named), ""]
+                  *(_line(toml_text(one.name), str(one.number), one.why + f"; {_ASSUMED}" * one.assumed)
+                    for one in facts.named), ""]
     lines += [*_output(head, setup, facts, answers), *_operations(fit.result)]
     return "\n".join(lines).rstrip() + "\n"
 
 
+def toml_text(text: str) -> str:
+    """A text in quotes: as JSON has it, and without the one control character that JSON allows and TOML does not."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
+
+
+def remark_text(text: str) -> str:
+    """What may stand behind #: one line without control characters."""
+    return "".join(c if c >= " " and c != "\x7f" else "?" for c in " ".join(text.split()))
+
+
 def _line(key: str, value: str, remark: str) -> str:
     """`key = value`, with the reason in a column of its own."""
-    return f"{f'{key} = {value}':<{_COLUMN}}  # {' '.join(remark.split())}"
+    return f"{f'{key} = {value}':<{_COLUMN}}  # {remark_text(remark)}"
 
 
 def _top(head: SheetHead, setup: SetupFile, toolpath: Toolpath) -> Iterator[str]:
-    yield f"# Set-up of {head.file} on {head.machine}, {head.controller}: written by postproc setup new."
+    yield remark_text(f"# Set-up of {head.file} on {head.machine}, {head.controller}: written by postproc setup new.")
     yield f"# Proved with --tolerance {head.tolerance:g} (mm) and --axis-tolerance {head.axis_tolerance:g} (degrees)."
     yield f"# Units of the CL file: {head.units}, {head.units_from}"
-    yield _line("description", json.dumps(setup.description, ensure_ascii=False), "name of the part, or of the CL file")
+    yield _line("description", toml_text(setup.description), "name of the part, or of the CL file")
     yield _line("work_offset_code", json.dumps(setup.work_offset_code), "register of the control: the first; or as the shop "
                 "uses it")
     named = setup.work_offset or toolpath.frames[0].name
-    yield _line("work_offset", json.dumps(setup.work_offset or named, ensure_ascii=False),
+    yield _line("work_offset", toml_text(setup.work_offset or named),
                 "system of the CL file whose origin the work offset is: its first"
                 + (f" of {', '.join(f.name for f in toolpath.frames)}" if len(toolpath.frames) > 1 else ""))
     if setup.assumed:
@@ -97,7 +112,7 @@ def _clearance(setup: SetupFile) -> Iterator[str]:
 
 
 def _tool(tool: ToolFacts, facts: SheetFacts, answers: Mapping[str, Answer]) -> Iterator[str]:
-    yield f"[tools.{tool.number}]    # {tool.called}, first cut in line {tool.line} of the CL file"
+    yield f"[tools.{tool.number}]    # {remark_text(tool.called)}, first cut in line {tool.line} of the CL file"
     length = answers.get(f"tools.{tool.number}.gauge_length")
     if length is not None:
         yield _line("gauge_length", f"{length.value:g}", f"mm; {_from(length)}; "
@@ -107,11 +122,11 @@ def _tool(tool: ToolFacts, facts: SheetFacts, answers: Mapping[str, Answer]) -> 
                "to check travel with the tool")
     speed = answers.get(f"tools.{tool.number}.spindle")
     if speed is not None:
-        yield _line("spindle", f'{{ rpm = {speed.value:g}, direction = "clockwise" }}',
+        yield _line("spindle", f'{{ rpm = {speed.value:g}, direction = "{tool.direction}" }}',
                     f"rev/min; {_from(speed)}; the CL file states none for some cut")
     else:
         yield f"# spindle: {tool.speed}, of the CL file"
-    yield f"# coolant: {tool.coolant or 'none stated, see [output]'}{', of the CL file' * bool(tool.coolant)}"
+    yield remark_text(f"# coolant: {tool.coolant or 'none stated, see [output]'}{', of the CL file' * bool(tool.coolant)}")
 
 
 def _output(head: SheetHead, setup: SetupFile, facts: SheetFacts, answers: Mapping[str, Answer]) -> Iterator[str]:
@@ -135,7 +150,7 @@ def _operations(result: PostResult) -> Iterable[str]:
         return []
     modes = output_modes(result)
     lines = ["", "[output.operations]    # by name; \"auto\", or \"axes\", \"tcp\", \"tilted\" to ask for one"]
-    lines += [_line(json.dumps(name, ensure_ascii=False), '"auto"', f"written as {' and '.join(laws)}; tolerance "
+    lines += [_line(toml_text(name), '"auto"', f"written as {' and '.join(laws)}; tolerance "
                     f"{result.options.tolerance:g} mm") for name, laws in modes.items()
               if any(op.name == name for op in result.toolpath.operations) and name]
     return lines if len(lines) > 2 else []

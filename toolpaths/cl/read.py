@@ -146,6 +146,9 @@ def _units(program: StatementList, given: LengthUnit | None, log: DiagnosticLog)
         if said.words and given not in said.words:
             log.warning("cl.units", f"the file says {'/'.join(said.words)}, {given} was asked for and is taken",
                         next(iter(said.words.values())))
+        elif not said.words and len(said.feeds) == 1 and given not in said.feeds:
+            log.warning("cl.units", f"the file's feeds are in {'/'.join(said.feeds)}, {given} was asked for and is taken",
+                        next(iter(said.feeds.values())))
         return given
     if len(said.words) > 1:
         log.error("cl.units", "the file changes its units", max(said.words.values()),

@@ -109,3 +109,31 @@ def test_quiet_and_verbose(part: Path, tmp_path: Path) -> None:
     stages = run("convert", part, "-o", out, "-v").stderr.splitlines()
     assert {"blocks", "read back"} <= set(stages)
     assert "blocks" not in run("convert", part, "-o", out).stderr.splitlines(), "the option is for one command"
+
+
+@pytest.mark.parametrize("stated", ["UNITS/INCHES\n", "FEDRAT/10,IPM\n"])
+def test_its_units_never_go_against_those_of_a_file(part: Path, tmp_path: Path, stated: str) -> None:
+    """A part was cut 25.4 times too small, with a warning."""
+    job, out = part.parents[2] / "postproc.toml", tmp_path / "p.nc"
+    job.write_text(JOB + 'units = "mm"\n')
+    assert run("convert", part, "-o", out).exit_code == 0
+    out.unlink()
+    body = part.read_text().replace("UNITS/MM\n", "")
+    feed = re.search(r"FEDRAT/.*\n", body)
+    assert feed is not None
+    part.write_text(body.replace(feed[0], stated) if "FEDRAT" in stated else stated + body)
+    got = run("convert", part, "-o", out)
+    assert got.exit_code == 1 and not out.exists() and "error [cl.units]" in got.stderr
+    assert "for files that state none" in got.stderr
+    assert run("convert", part, "-o", out, "--units", "mm").exit_code == 0  # who says so on the command line knows the file
+    assert "warning [cl.units]" in run("inspect", part, "--units", "mm").stderr
+
+
+def test_no_output_takes_its_name(part: Path, tmp_path: Path) -> None:
+    """A program in its place stopped every command below the folder."""
+    job = part.parents[2] / "postproc.toml"
+    for words in (("convert", part, "-o", job), ("setup", "new", part, "-o", job, "--force", "--yes"),
+                  ("setup", "new", part, "-o", part.parent / "postproc.toml", "--yes"), ("inspect", part, "--json", job)):
+        got = run(*words)
+        assert got.exit_code == 2 and "job files" in got.stderr and job.read_text() == JOB
+    assert not (part.parent / "postproc.toml").exists()

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 import re
+import select
 import shlex
+import subprocess
+import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -18,11 +23,12 @@ import postproc
 import toolpaths
 from postproc.base.options import Options
 from postproc.cli.app import app
+from postproc.cli.setup_new import _line as LINE
 from postproc.controllers.model import load_controller
 from postproc.setup.model import load_setup, part_placement
 from postproc.setup_sheet.facts import facts_of
 from postproc.setup_sheet.make import SetupSheet, new_setup
-from postproc.setup_sheet.questions import ASSUMED_FEED, ASSUMED_SPEED, GivenAnswers, parsed, questions_of
+from postproc.setup_sheet.questions import ASSUMED_FEED, ASSUMED_SPEED, GivenAnswers, Question, parsed, questions_of
 from tests.postproc.kit import SAMPLES, machine
 from tests.practice_files import CASES, SHAPES, practice_file
 
@@ -75,6 +81,7 @@ def test_what_is_written_converts(shape: str, case: str, name: str, controller: 
     result = proved(file, made, name, controller, tmp_path)
     setup = tomllib.loads(made.text)
     assumed = {key for key, answer in made.answers if answer.source == "assumed" and answer.value != "off"}
+    assumed |= {"tool_numbers"} if any(one.assumed for one in made.facts.named) else set()
     assert set(setup.get("assumed", [])) == assumed
     assert {d.message.split(" = ")[0] for d in result.diagnostics if d.code == "setup.assumed"} == assumed
     assert result.text.count("ASSUMED") == len(assumed)
@@ -146,7 +153,8 @@ def test_questions_are_asked_and_answered(tmp_path: Path) -> None:
     setup = tomllib.loads(out.read_text())
     assert setup["tools"]["1"]["spindle"] == {"rpm": 8000, "direction": "clockwise"}
     assert setup["output"] == {"default": "auto", "feed": 350, "coolant": "flood", "operations": {"SLOT": "auto"}}
-    assert "assumed" not in setup and "ASSUMED: the CL file states none" in out.read_text()  # the units
+    assert setup["assumed"] == ["tool_numbers"] and "tool_numbers: EM10 = T1 is assumed" in got.stderr
+    assert "ASSUMED: the CL file states none" in out.read_text()  # the units
     before = out.read_text()
     assert run(*words, "--yes", code=2).stderr and out.read_text() == before, "no file is replaced without --force"
     run(*words, "--yes", "--force", "--feed", "70")
@@ -242,3 +250,103 @@ def test_answers_are_numbers_within_limits() -> None:
     assert parsed(speed, "inf")[0] is None and parsed(speed, "nan")[0] is None and parsed(feed, "0")[0] is None
     assert parsed(coolant, "") == ("off", "") and parsed(coolant, "Mist") == ("mist", "")
     assert parsed(coolant, "oil")[0] is None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo terminals are of Unix")
+def test_a_question_on_a_terminal_stays_on_its_line(tmp_path: Path) -> None:
+    """A progress bar that is redrawn ten times a second wiped it out."""
+    import pty
+
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    (file := tmp_path / "part.cls").write_text(practice_file(nx, CASES["no spindle"]))
+    code = "import sys; from postproc.cli.app import main; sys.exit(main())"
+    ours, theirs = pty.openpty()
+    words = ["setup", "new", str(file), "-m", "mill-3axis", "-o", str(tmp_path / "s.toml")]
+    command = subprocess.Popen([sys.executable, "-c", code, *words], stdin=theirs, stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    said = b""
+    while b"rev/min: " not in said:
+        said += os.read(ours, 4096)
+    assert b"\x1b" not in said
+    assert not select.select([ours], [], [], 0.5)[0], "nothing is written behind the question"
+    os.write(ours, b"3000\n")
+    with contextlib.suppress(OSError):  # as the end of a terminal is reported
+        while part := os.read(ours, 4096):
+            said += part
+    assert command.wait(60) == 0 and b"1 question" in said
+    os.close(ours)
+
+
+@pytest.mark.parametrize("name", ['EM"10\\n', "EM\x7f10", "EM\x0110", "Фреза\u2028Ø10\x85"])
+def test_odd_characters_of_names_stay_inside_their_quotes(name: str, tmp_path: Path) -> None:
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    text = practice_file(nx, CASES["no tool number"]).replace("EM10", name).replace("SLOT", "SL\x7fOT")
+    (file := tmp_path / "a\nb.cls").write_text(text, encoding="utf-8")
+    made = sheet(file, "mill-3axis", "haas-ngc")
+    assert "\x7f" not in made.text and tomllib.loads(made.text)["description"] == "a\nb.cls"
+    proved(file, made, "mill-3axis", "haas-ngc", tmp_path)
+
+
+def test_a_comma_that_may_part_thousands_is_asked_again() -> None:
+    speed = Question("spindle", 1, "T1: spindle speed", None, 1000.0)
+    for text in ("12,000", "1,500"):  # 12000 rev/min was taken as 12
+        value, wrong = parsed(speed, text)
+        assert value is None and text.replace(",", "") in wrong and text.replace(",", ".") in wrong
+    assert [parsed(speed, text)[0] for text in ("150,5", "0,125", "12000", "12.5")] == [150.5, 0.125, 12000.0, 12.5]
+
+
+def test_wrong_registers_and_a_closed_standard_input_are_no_faults_of_ours(tmp_path: Path,
+                                                                           monkeypatch: pytest.MonkeyPatch) -> None:
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    (file := tmp_path / "part.cls").write_text(practice_file(nx, CASES["no spindle"]))
+    words = ["setup", "new", file, "-m", "mill-3axis", "-o", tmp_path / "s.toml"]
+    assert "no register" in run(*words, "--yes", "--work-offset-code", 'G54"', code=2).output
+    monkeypatch.setattr("postproc.cli.setup_new._line", lambda: setup_new_line(monkeypatch))
+    assert "setup.unanswered" in run(*words, code=1).output
+
+
+def setup_new_line(monkeypatch: pytest.MonkeyPatch) -> str:
+    with monkeypatch.context() as closed:
+        closed.setattr(sys, "stdin", None)  # as `<&-` leaves it
+        return LINE()
+
+
+@pytest.mark.parametrize("record", ["SPINDL/CCLW", "SPINDL/ON,CCLW", "SPINDL/RPM,0,CCLW"])
+def test_a_direction_without_a_speed_is_that_of_the_file(record: str, tmp_path: Path) -> None:
+    """The set-up said clockwise, and the program started the spindle with M3 and M4 behind it."""
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    (file := tmp_path / "part.cls").write_text(practice_file(nx, CASES["complete"]).replace("SPINDL/RPM,3000,CLW", record))
+    made = sheet(file, "mill-3axis", "haas-ngc")
+    assert 'spindle = { rpm = 1000, direction = "anti-clockwise" }' in made.text
+    assert made.questions[0].text.endswith("spindle speed, anti-clockwise")
+    text = proved(file, made, "mill-3axis", "haas-ngc", tmp_path).text
+    assert re.search(r"\bM4\b", text) and not re.search(r"\bM3\b", text)
+    (tmp_path / "other.toml").write_text(made.text.replace("anti-clockwise", "clockwise"))
+    other, _ = load_setup(tmp_path / "other.toml")
+    path, found = toolpaths.read(file)
+    again = postproc.convert(path, machine("mill-3axis"), "haas-ngc", other, diagnostics=found)
+    assert again.ok and not re.search(r"\bM3\b", again.text)
+
+
+def test_commands_that_are_offered_quote_names_with_spaces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    (file := tmp_path / "my part (1).cls").write_text(practice_file(nx, CASES["no spindle"]))
+    options = ("--units", "mm", "--dialect", "nx", "--allow-unknown", "SHOPWORD", "--tolerance", "0.02")
+    got = run("convert", file, "-m", "mill-3axis", "-c", "haas-ngc", "-o", "p.nc", *options, code=1)
+    offered = re.search(r"postproc (setup new .*) asks for all", got.stderr)
+    assert offered is not None
+    file.write_text(file.read_text().replace("COOLNT/FLOOD", "COOLNT/FLOOD\nSHOPWORD/7"))
+    got = run(*shlex.split(offered[1]), "--yes", *options)
+    following = re.search(r"next: postproc (.*)", got.stdout)
+    assert following is not None
+    run(*shlex.split(following[1]))
+    assert (tmp_path / "my part (1).nc").exists()
+
+
+def test_a_gauge_length_below_the_cutter_is_warned_of(tmp_path: Path) -> None:
+    nx = next(shape for shape in SHAPES if shape.name == "nx")
+    (file := tmp_path / "part.cls").write_text(practice_file(nx, CASES["complete"]))
+    for length, count in ((5.0, 1), (75.0, 0)):  # the cutter of the file is 75 mm long
+        made = sheet(file, "head-table", "haas-ngc", GivenAnswers(gauge_length={0: length}))
+        assert made.text and [d.code for d in made.diagnostics].count("setup.short_tool") == count
