@@ -103,7 +103,8 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
     slowed = cutting & (needed > wanted * (1.0 + 1e-9)) & (wanted > 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         per_minute = 60.0 * length / seconds
-        inverse, words_share = 60.0 / seconds, length / metric
+        inverse = 60.0 / seconds
+        words_share = length / metric
         rate = np.nan_to_num(inverse * length)
         by_radius = inverse * length * unit / _radius(path) if arc.any() and rules.arc_inverse == "radius" else inverse
     own = (wanted > 0.0) | (needed <= 0.0)

@@ -264,9 +264,9 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     corrects = geometric is not None and geometric.corrected_by == "post"  # tables that are corrected do not stand at zero
     entry = "table" if corrects or controller.modes.tcp is None else controller.modes.tcp.frame
-    control = Control(machine, law, origin, largest, law, entry_frame=entry, rapids=machine.rapids or controller.kinematics.rapids,
-                      feed_rule=controller.feed.length, degree_is_inch=controller.degree_is_inch, own_kinematics=own,
-                      helix_planes=controller.arcs.helix_planes,
+    control = Control(machine, law, origin, largest, law, entry_frame=entry, own_kinematics=own,
+                      rapids=machine.rapids or controller.kinematics.rapids, feed_rule=controller.feed.length,
+                      degree_is_inch=controller.degree_is_inch, helix_planes=controller.arcs.helix_planes,
                       rolls=rolls, measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
     diagnostics += _measured(control, controller, moves.axis, setup, options)
     places = word_grid(control, controller).places
