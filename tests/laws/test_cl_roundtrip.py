@@ -84,6 +84,13 @@ def assert_whole(result: ReadResult) -> None:
         assert_writes_back(path)
 
 
+def test_a_tool_to_prepare_is_written_as_one() -> None:
+    """A number alone may be a work offset."""
+    path = read_bytes("GOTO/0,0,0\nSELECT/TOOL,5\nGOTO/1,0,0\n").toolpath
+    assert [e.values for e in path.events] == [(5.0,)]
+    assert_writes_back(path)
+
+
 @SLOW
 @given(heads, program, st.sampled_from(["\n", "\r\n", "\r"]))
 def test_written_text_reads_back(head: str, lines: list[str], end: str) -> None:

@@ -166,7 +166,8 @@ def _event(event: Event) -> list[str]:
         return [f"{event.word}/{event.values[0]}" if event.values else event.word]
     if not event.values:
         return [event.word]
-    return [_wrapped(f"{event.word}/{_joined(event.values)}")]
+    of = "TOOL," if event.word == "SELECT" else ""  # a number alone may be a work offset
+    return [_wrapped(f"{event.word}/{of}{_joined(event.values)}")]
 
 
 def _joined(values: tuple[str | float, ...]) -> str:
