@@ -19,6 +19,8 @@ from postproc.pipeline.next_modes import COARSER
 from postproc.pipeline.result import PostResult
 from postproc.readback.execution.frames import tool_frame
 from postproc.report.summary import output_modes
+from tests.postproc.correction.test_compensation_holes import HEIGHTS, PLACES
+from tests.postproc.correction.test_compensation_points import both_directions_of_all
 from toolpaths.diagnostics import Severity, error, has_errors
 from toolpaths.rotations import rotation
 
@@ -177,3 +179,23 @@ def test_auto_converts_all_samples_that_another_mode_converts(machine: str, cont
         for mode in MODES:
             asked = postproc.convert(path, loaded, controller, setup, Options(output=mode), found)
             assert not asked.ok, (file, mode, errors_of(auto))
+
+
+@pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc"])
+def test_a_program_in_the_next_mode_is_verified_in_it(controller: str, tmp_path: Path) -> None:
+    """Rapids that run as dog-legs are split by the mode; `verify` takes the modes that the program is in."""
+    y, z = np.array([0.0, 0.5 * np.sqrt(3.0), 0.5]), np.array([0.0, -0.5, 0.5 * np.sqrt(3.0)])
+    at = [",".join(f"{v:.6f}" for v in (*(x * np.eye(3)[0] + u * y + h * z), *z)) for x, u, h in (
+        (0, 0, 60), *zip(*zip(*PLACES, strict=True), HEIGHTS, strict=True))]
+    lines = ["UNITS/MM", "LOADTL/1", "SPINDL/1000,CLW", "MULTAX/ON", "RAPID", f"GOTO/{at[0]}", "RAPID",
+             "GOTO/30,20,90," + ",".join(f"{v:.6f}" for v in z), "RAPID", f"GOTO/{at[0]}",
+             "CYCLE/DRILL,DEPTH,3,CLEAR,2,RETURN,2,MMPM,250", *(f"GOTO/{p}" for p in at[1:]), "CYCLE/OFF", "RAPID",
+             f"GOTO/{at[0]}", "FINI", ""]
+    path, _ = toolpaths.read_bytes("\n".join(lines))
+    options = Options(error_model=str(both_directions_of_all(tmp_path, "mikron-ucp710", 2)))
+    result = postproc.convert(path, "mikron-ucp710", controller, options=options)
+    assert not errors_of(result) and "output.next_mode" in {d.code for d in result.diagnostics}
+    program = tmp_path / "p.nc"
+    program.write_text(result.text)
+    found = postproc.verify(program, path, "mikron-ucp710", controller, options=options).diagnostics
+    assert not has_errors(found), [str(d) for d in found]
