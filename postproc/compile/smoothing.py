@@ -12,9 +12,6 @@ from postproc.job.smoothing import SmoothingPlan
 from toolpaths.arrays import Bools
 from toolpaths.toolpath import Toolpath
 
-SMOOTHING = "SMOOTHING"
-"""(name of the operation,)"""
-
 
 def with_smoothing(program: Program, plan: SmoothingPlan, toolpath: Toolpath) -> Program:
     """The program with a command at each operation whose smoothing is another than that of the one before.

@@ -10,7 +10,7 @@ from postproc.controllers.spelling import ProgramBlocks
 def fitted(controller: ControllerFile, options: ControlOptions) -> ControllerFile:
     """The controller with what the machine file says of its options: modes, codes and comments of those that it has not are
     left out, and comments of those that are confirmed."""
-    codes, cycles, start, levels = controller.codes, controller.cycles, controller.start, controller.levels
+    codes, cycles, start = controller.codes, controller.cycles, controller.start
     if options.absent("rigid_tapping"):
         codes = codes.model_copy(update={"rigid_tap": ""})
         cycles = cycles.model_copy(update={"rigid_option": cycles.floating})
@@ -18,12 +18,9 @@ def fitted(controller: ControllerFile, options: ControlOptions) -> ControllerFil
         cycles = cycles.model_copy(update={"rigid_option": ""})
     if options.power_on:
         start = Start(codes=tuple(dict.fromkeys((*start.codes, *options.power_on))))
-    if options.absent("smoothing"):
-        levels = {}
     return controller.model_copy(update={
         "modes": _fitted_modes(controller.modes, options), "arcs": _fitted_arcs(controller.arcs, options),
-        "program": _fitted_program(controller.program, options), "codes": codes, "cycles": cycles, "start": start,
-        "levels": levels})
+        "program": _fitted_program(controller.program, options), "codes": codes, "cycles": cycles, "start": start})
 
 
 def _fitted_modes(modes: Modes, options: ControlOptions) -> Modes:

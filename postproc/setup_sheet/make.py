@@ -8,10 +8,11 @@ from pathlib import Path
 
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.base.progress import Progress
 from postproc.controllers.model import load_controller
 from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import SheetFacts, facts_of
-from postproc.setup_sheet.place import Fit, Progress, fitted
+from postproc.setup_sheet.place import Fit, fitted
 from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, questions_of
 from postproc.setup_sheet.text import TOOL_NUMBERS, SheetHead, sheet_text, sheet_values
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, require, warning

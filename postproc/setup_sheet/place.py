@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.base.progress import Progress
 from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.path.links import safe_space
 from postproc.pipeline.convert import convert
@@ -25,7 +26,6 @@ from toolpaths.diagnostics import Diagnostic, Severity, info
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
-Progress = Callable[[str, int, int], None]
 PLACES = frozenset({*BEYOND, "link.blocked", "path.jump", "reach.axis", "singular.distance", "verify.link", "verify.travel",
                     "collision.clear"})
 """codes of errors that another place or attitude may put right"""

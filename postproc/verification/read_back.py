@@ -11,6 +11,7 @@ import numpy as np
 from postproc.base.header_words import HEADER, NO_FILE, Head, read_head, same_name
 from postproc.base.memory import give_back
 from postproc.base.options import Options
+from postproc.base.progress import Progress
 from postproc.job.job import Job
 from postproc.readback.comparison.clamps import check_clamps, check_index
 from postproc.readback.comparison.compare import Comparison, compare
@@ -67,7 +68,7 @@ def other_setup(data: bytes, options: Options, off: bool, gcode: str) -> list[Di
                   hint=f"{hint}, or convert again" if stated else "verify without --setup")]
 
 
-def read_back(data: bytes | str, job: Job, file: str, progress: Callable[[str, int, int], None] | None = None,
+def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None = None,
               gcode: str = "", others: Mapping[str, bytes] | None = None,
               of_cl: Callable[[int], tuple[int, ...]] | None = None) -> tuple[Comparison | None, list[Diagnostic]]:
     """Execute a program on the job's machine and compare its motion with the job's CL file.

@@ -107,7 +107,7 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     found += check_velocities(w, c, table)
     faults, states, silent = check_states(w, c, case)
     found += faults
-    found += _rods(poses)
+    found += _misfits(poses)
     faults, turned = check_turning(case, executed)
     found += faults
     feeding = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
@@ -142,7 +142,7 @@ def _arriving(axis: Array) -> str:
     return "" if axis[2] == 1.0 else f" along ({axis[0]:.6f}, {axis[1]:.6f}, {axis[2]:.6f})"
 
 
-def _rods(poses: Poses) -> list[Finding]:
+def _misfits(poses: Poses) -> list[Finding]:
     """Rods that miss their length where the tool is said to be; a machine with errors that has it elsewhere."""
     worst = max(poses.misfits, default=(0.0, 0))
     if worst[0] <= ROD:

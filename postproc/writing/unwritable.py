@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from postproc.compile.program import Program
-from postproc.compile.smoothing import SMOOTHING
 from postproc.controllers.model import ControllerFile
 from postproc.writing.compensated import compensated_arcs
 from toolpaths.diagnostics import Diagnostic, error, warning
@@ -32,7 +31,7 @@ def _smoothed_in_modes(controller: ControllerFile, program: Program, file: str) 
             law = program.sections[int(command.args[0])].law
         elif command.name == "LEAVE_SECTION":
             law = "axes"
-        elif command.name == SMOOTHING and law != "axes":
+        elif command.name == "SMOOTHING" and law != "axes":
             lines.append(command.line or int(program.line[min(block, len(program) - 1)]))
             names.append(str(command.args[0]))
     if not lines:

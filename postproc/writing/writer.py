@@ -13,7 +13,6 @@ from machines.hooks import filled
 from postproc.compile.clamps import CLAMP, UNCLAMP
 from postproc.compile.hooks import HOOK
 from postproc.compile.program import PER_MINUTE, Command, Hole
-from postproc.compile.smoothing import SMOOTHING
 from postproc.control.rollover import HALF
 from postproc.controllers.model import Mode
 from postproc.controllers.texts import blocks_of
@@ -84,7 +83,7 @@ class Writer(WriterState, ABC):
 
     def sorted_blocks(self) -> tuple[Iterable[str], dict[int, list[str]]]:
         """Blocks of the main program up to its ending, and those of the subprograms by number, one for each operation."""
-        first = next((str(c.args[0]) for c in self.program.commands.get(0, ()) if c.name == SMOOTHING), "")
+        first = next((str(c.args[0]) for c in self.program.commands.get(0, ()) if c.name == "SMOOTHING"), "")
         start = chain(self.start(), self.smoothing_blocks(first))
         if not self.subprograms:
             return chain(start, (block for block in self.body() if block != MARK)), {}
@@ -273,7 +272,7 @@ class Writer(WriterState, ABC):
             yield self.hooked(command)
         elif command.name == "RESTATE":
             self.forget()
-        elif command.name == SMOOTHING:
+        elif command.name == "SMOOTHING":
             yield from self.other_smoothing(str(command.args[0]))
         elif command.name == "OPERATION_START":
             yield from self.operation(str(command.args[0]), len(command.args) > 1)

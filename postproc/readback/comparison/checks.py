@@ -279,10 +279,10 @@ def check_low_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Move
         return []
     stock = job.stock_corners
     corners = job.space.corners if stock is None else np.concatenate([job.space.corners, stock])
-    bad, slack = np.zeros(len(rows), dtype=bool), job.options.tolerance
+    bad, slack, curves = np.zeros(len(rows), dtype=bool), job.options.tolerance, moves.curves(owner[rows])
     for t in executed.corners(motion, rows).T:
         tip, axis = executed.poses(motion, rows, t)
-        off = moves.curves(owner[rows]).deviation(tip, axis, np.asarray(t), slack)[0]
+        off = curves.deviation(tip, axis, np.asarray(t), slack)[0]
         bad |= (off > slack) & (np.einsum("ni,ni->n", tip, axis) < (axis @ corners.T).max(axis=1) - slack)
     if not bad.any():
         return []

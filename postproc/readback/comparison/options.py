@@ -50,7 +50,7 @@ def _rise(motion: Motion, job: Job) -> Floats:
     xyz = job.control.xyz
     if (xyz < 0).any() or not (motion.code == 2).any():
         return np.zeros(len(motion))
-    before, end = coordinates(motion, np.arange(len(motion)))
-    third = xyz[np.clip(2 - (motion.plane - 17), 0, 2)]
     every = np.arange(len(motion))
+    before, end = coordinates(motion, every)
+    third = xyz[np.clip(2 - (motion.plane - 17), 0, 2)]
     return np.asarray((end - before)[every, third])

@@ -100,7 +100,7 @@ def test_what_is_written_converts(shape: str, case: str, name: str, controller: 
 @pytest.mark.parametrize(("sample", "name", "controller"), FITTING)
 def test_samples_convert_with_what_is_written(sample: str, name: str, controller: str, tmp_path: Path) -> None:
     made = sheet(SAMPLES / sample, name, controller)
-    proved(SAMPLES / sample, made, name, controller, tmp_path)
+    assert proved(SAMPLES / sample, made, name, controller, tmp_path).text
 
 
 @pytest.mark.parametrize(("case", "name"), [("from below", "mikron-ucp710"), ("from the side", "mill-3axis"),
