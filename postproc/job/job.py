@@ -55,7 +55,11 @@ OF_SETUP = frozenset({"tool.number", "tool.same_number", "tool.length", "feed.mi
 
 @dataclass(frozen=True)
 class Job:
-    """One CL file on one machine, ready to be solved or compared with; `moves` are in the table frame."""
+    """One CL file on one machine, ready to be solved or compared with.
+
+    `commanded` are the moves of the CL file in the table frame, `moves` those that the program is to have: with rapids split
+    where the control would not keep them on their line.
+    """
 
     toolpath: Toolpath
     machine: Machine
@@ -64,6 +68,7 @@ class Job:
     options: Options
     placement: Placement
     control: Control
+    commanded: Moves
     moves: Moves
     space: SafeSpace
     modes: OutputModes
@@ -272,8 +277,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     places = word_grid(control, controller).places
     modes, found = output_modes(control, controller, setup, options, toolpath, places, refused)
     diagnostics += found
-    job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
-              modes, geometric, tuple(stated))
+    job = Job(toolpath, machine, controller, setup, options, placement, control, moves, moves,
+              safe_space(moves, setup, placement), modes, geometric, tuple(stated))
     return None if errors else _with_rapids(job), diagnostics + _tool_lengths(job) + _unused_tools(job)
 
 
