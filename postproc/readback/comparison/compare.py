@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.job.job import Job
 from postproc.path.model import FEED, TRAVERSE
-from postproc.readback.comparison.align import BlockEnds, aligned, unreached
+from postproc.readback.alignment.align import BlockEnds, aligned, unreached
 from postproc.readback.comparison.approaches import leads_down
 from postproc.readback.comparison.bound_search import DeviationBound
 from postproc.readback.comparison.checks import (
@@ -30,7 +30,7 @@ from postproc.readback.comparison.length_margins import LengthMargin
 from postproc.readback.comparison.reach_bounds import check_reach_bounds
 from postproc.readback.comparison.rewinds import check_rewinds, rewinds
 from postproc.readback.comparison.slow_moves import check_fed_rapids, check_slow
-from postproc.readback.comparison.split_as_written import split_as_written
+from postproc.readback.alignment.split_as_written import split_as_written
 from postproc.readback.comparison.states import check_states
 from postproc.readback.comparison.taps import check_taps
 from postproc.readback.execution.execute import Motion

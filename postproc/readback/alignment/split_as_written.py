@@ -7,7 +7,7 @@ import numpy as np
 
 from postproc.job.job import Job
 from postproc.path.model import TRAVERSE
-from postproc.readback.comparison.align import BlockEnds, aligned
+from postproc.readback.alignment.align import BlockEnds, aligned
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses
 from postproc.reference.moves import Moves, Phase

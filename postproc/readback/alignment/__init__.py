@@ -1,0 +1,1 @@
+"""Motion against the CL file, bounds, checks."""
