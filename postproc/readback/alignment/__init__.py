@@ -1,1 +1,1 @@
-"""Motion against the CL file, bounds, checks."""
+"""Which blocks run each move of the CL file."""

@@ -20,7 +20,7 @@ _ROWS, _NUMBERS, _KINDS, _NUMBER = ("float64", 2), ("float64", 1), ("int8", 1), 
 
 @dataclass(frozen=True)
 @arrays(tip="E 3", axis="E 3", sweep="E")
-class BlockEnds:
+class EndPoses:
     """Poses at the ends of executed blocks; `sweep` in rad of those that are arcs, else NaN; `kept`: blocks of no rewind."""
 
     tip: Floats
@@ -29,7 +29,7 @@ class BlockEnds:
     kept: Ints | slice
 
 
-def aligned(ends: BlockEnds, moves: Moves, link: Bools, tolerance: float, axis_tolerance: float,
+def aligned(ends: EndPoses, moves: Moves, link: Bools, tolerance: float, axis_tolerance: float,
             grain: tuple[float, float]) -> tuple[Ints, Ints]:
     """`align` without the blocks of rewinds, which get no move (M + 1): but for them the tool only rests there."""
     kept, count = ends.kept, len(ends.tip)

@@ -7,7 +7,7 @@ import numpy as np
 
 from postproc.job.job import Job
 from postproc.path.model import TRAVERSE
-from postproc.readback.alignment.align import BlockEnds, aligned
+from postproc.readback.alignment.align import EndPoses, aligned
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses
 from postproc.reference.moves import Moves, Phase
@@ -19,7 +19,7 @@ NEAR = 0.02
 """mm off the tool axis within which a block goes along it, off a height within which it goes across"""
 
 
-def split_as_written(motion: Motion, executed: BlockPoses, job: Job, ends: BlockEnds,
+def split_as_written(motion: Motion, executed: BlockPoses, job: Job, ends: EndPoses,
                      grain: tuple[float, float]) -> Moves:
     """The moves of the CL file, with rapids split where the program goes along the tool axis, across and along it again."""
     moves = job.commanded.without_pecks()

@@ -8,7 +8,8 @@ import numpy as np
 
 from postproc.job.job import Job
 from postproc.path.model import FEED, TRAVERSE
-from postproc.readback.alignment.align import BlockEnds, aligned, unreached
+from postproc.readback.alignment.align import EndPoses, aligned, unreached
+from postproc.readback.alignment.split_as_written import split_as_written
 from postproc.readback.comparison.approaches import leads_down
 from postproc.readback.comparison.bound_search import DeviationBound
 from postproc.readback.comparison.checks import (
@@ -30,7 +31,6 @@ from postproc.readback.comparison.length_margins import LengthMargin
 from postproc.readback.comparison.reach_bounds import check_reach_bounds
 from postproc.readback.comparison.rewinds import check_rewinds, rewinds
 from postproc.readback.comparison.slow_moves import check_fed_rapids, check_slow
-from postproc.readback.alignment.split_as_written import split_as_written
 from postproc.readback.comparison.states import check_states
 from postproc.readback.comparison.taps import check_taps
 from postproc.readback.execution.execute import Motion
@@ -97,8 +97,8 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
     grain = max(1e-3, 1.5 * job.controller.grain), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
     number = rewinds(motion, tip, axis, job.commanded.without_pecks().tip, executed.control.rotary,
                      (2.0 * tolerance, 2.0 * axis_tolerance))
-    ends = BlockEnds(tip, axis, sweep, as_slice(np.flatnonzero(number < 0)))
-    job = replace(job, moves=split_as_written(motion, executed, job, ends, grain))
+    ends = EndPoses(tip, axis, sweep, as_slice(np.flatnonzero(number < 0)))
+    job = job.with_moves(split_as_written(motion, executed, job, ends, grain))
     moves = job.moves.without_pecks()
     match, owner = aligned(ends, moves, moves.link, tolerance, axis_tolerance, grain)
     lost = unreached(match)
