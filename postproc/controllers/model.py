@@ -124,6 +124,9 @@ class FeedRules(UserModel):
     alike, or the geometry axes before all others"""
     arc_inverse: Literal["length", "radius", "refuse"] = "length"
     """inverse time in arcs: speed by length, speed by radius, or not allowed"""
+    kept_by_units: bool = False
+    """F counts in the units that hold before its block, and a change of units leaves the feed as it is; else F counts in
+    the units of the block that moves"""
 
 
 class CutterCompensation(UserModel):
@@ -151,6 +154,8 @@ class InterpolationRules(UserModel):
     """share of the tolerance left to the controller's own smoothing"""
     smoothing_fixed: float | None = Field(default=None, ge=0.0)
     """mm that it takes instead of a share, where its tolerance is a parameter of the control"""
+    blends_unstated: bool = False
+    """where a program states no path mode, corners are blended without a limit"""
     smoothing_in_modes: bool = True
     """it may be changed while the tip's or a plane's mode is on"""
     axis_smoothing_share: float = Field(default=0.0, ge=0.0, le=0.8)
