@@ -144,7 +144,7 @@ class ControlModel(UserModel):
 
     tilted_planes: bool | None = None
     """the option of tilted work planes is fitted (Fanuc G68.2, Haas G254 DWO, Siemens CYCLE800, Heidenhain PLANE); false:
-    it is not. Default, here and below: not confirmed, it is used and the head of the program names it"""
+    it is not. Default, here and below: not confirmed, it is used and the header of the program names it"""
     tip_control: bool | None = None
     """the option of tool-centre-point control (G43.4, G234 TCPC, TRAORI, TCPM)"""
     smoothing: bool | None = None

@@ -1,4 +1,4 @@
-"""What the proof of a program covers and by what: a line for the summary, and one for the head of the program.
+"""What the proof of a program covers and by what: a line for the summary, and one for the header of the program.
 
 The head is part of the text that is read back. So it is written with a line in its place first (`PENDING`),
 and that line is replaced when the proof is complete; the control sees a comment before and after, which is checked.
@@ -17,9 +17,9 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
 PLACES = 4
-"""decimals of mm and degrees in the head"""
+"""decimals of mm and degrees in the header"""
 ELSEWHERE = "proof: not said here"
-"""in the head of a program whose blocks are too short for it; the summary and the file of the proof say it"""
+"""in the header of a program whose blocks are too short for it; the summary and the file of the proof say it"""
 _KINEMATICS = "kinematics "
 """begins what the second reading says of a machine file that it has not used"""
 
@@ -45,7 +45,7 @@ def _means(said: Testimony | None) -> str:
 
 
 def head_line(c: Comparison, said: Testimony | None, room: int, lengths: LengthText = MM) -> str:
-    """The same for the head of the program, in at most `room` characters, never cut short; bounds are rounded up.
+    """The same for the header of the program, in at most `room` characters, never cut short; bounds are rounded up.
 
     Without room for the names of what was not compared it says how many that are; without room for that, how
     near alone; and where not even that has room, that it is not said here. `lengths`: in units of the program.
@@ -74,7 +74,7 @@ def _up(degrees: float) -> str:
 
 def with_statement(text: str, controller: ControllerFile, comparison: Comparison, witness: Testimony | None,
                    file: str) -> tuple[str, list[Diagnostic]]:
-    """The text of a proved program with its proof in the head; an error where a comment of the controller cannot hold it.
+    """The text of a proved program with its proof in the header; an error where a comment of the controller cannot hold it.
 
     Args:
         file: the CL file, for messages
@@ -90,7 +90,7 @@ def with_statement(text: str, controller: ControllerFile, comparison: Comparison
 
 def _in_place_of(text: str, controller: ControllerFile, pending: str, line: str,
                  file: str) -> tuple[str, list[Diagnostic]]:
-    """The text with another comment in the head in the place of one that was read back."""
+    """The text with another comment in the header in the place of one that was read back."""
     style = controller.comment
     capitals = f"{style.open}{_cleaned(controller, pending, True)}{style.close}" in text[:HEADER]
     mark = f"{style.open}{_cleaned(controller, pending, capitals)}{style.close}"
@@ -100,7 +100,7 @@ def _in_place_of(text: str, controller: ControllerFile, pending: str, line: str,
     line = f"{style.open}{_cleaned(controller, line, capitals)}{style.close}"
     begin, end = text.rfind("\n", 0, at) + 1, at + len(mark)
     if plain(text[begin:end].encode()) != plain((text[begin:at] + line).encode()):
-        return text, [error("proof.comment", f"the proof cannot stand in a comment of the head: {line}",
+        return text, [error("proof.comment", f"the proof cannot stand in a comment of the header: {line}",
                             file=file, hint="comment.forbidden of the controller file must name all that "
                             "ends a comment")]
     return text[:at] + line + text[end:], []

@@ -75,7 +75,7 @@ def solidworks_feature(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def turn_type(b: ToolpathBuilder, s: Statement) -> None:
-    """SolidWorks CAM's `.apt` has TRNTYP at the head of each operation, before its CSYS, and names none of them."""
+    """SolidWorks CAM's `.apt` has TRNTYP where each operation begins, before its CSYS, and names none of them."""
     if b.dialect.trntyp_begins:
         begin_operation(b, f"OP {len(b.operations) + 1}")
 
