@@ -155,7 +155,7 @@ def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, star
     if isinstance(given, BarModel):
         figures["centre_mm"] = [c + fitted.setup[name] for c, name in zip(given.centre, SETUP["distance"], strict=False)]
     if not result.converged:
-        run.problem("calibrate.converged", "the fit does not come to an end",
+        run.problem("calibrate.converged", "the fit does not converge",
                     "check units and signs of the table")
     _undetermined(run, result.not_identifiable)
     if has_errors(run.found):

@@ -105,7 +105,8 @@ def rotary(run: CalibrationRun, given: RotaryMeasurementModel, table: CsvTable) 
                     "measure one more set-up, the indexer turned by one increment more")
         return CalibrationOutcome(None, figures)
     if fitted.lost:
-        run.note("calibrate.hidden", f"the mounting can pretend {', '.join(fitted.lost)} as well; they are 0 in the model")
+        run.note("calibrate.hidden",
+                 f"an error of the mounting has the same effect as {', '.join(fitted.lost)}; they are 0 in the model")
     model = error_model(fitted, given.axis, sense=sense, carries_part=_carries_part(run, given.axis))
     return done(run, model, figures, fitted.result.noise,
                 f"sigma_um = {given.sigma_um:g} or sigma_arcsec = {given.sigma_arcsec:g}",

@@ -238,7 +238,7 @@ class TcpMode(Mode):
 
 
 class TiltedMode(Mode):
-    """Tilted working plane: rotary axes stand still, X, Y, Z are the tip in a turned frame at the work offset's zero."""
+    """Tilted work plane: rotary axes stand still, X, Y, Z are the tip in a turned frame at the work offset's zero."""
 
     enter: tuple[Annotated[str, placeholders("first", "second", "third", "direction", "work_offset")], ...]
     """blocks that state the plane; {first}, {second}, {third} are the angles in the order of `angles`,
@@ -262,7 +262,7 @@ class Modes(UserModel):
     tcp: TcpMode | None = None
     """tool-centre-point mode"""
     tilted: TiltedMode | None = None
-    """tilted working plane"""
+    """tilted work plane"""
 
 
 class Stops(UserModel):
@@ -284,7 +284,7 @@ class LinkRules(UserModel):
 
 
 class ControllerFile(UserModel):
-    """A controller."""
+    """A controller: how its programs are spelt, and what it does with them."""
 
     description: str
     """one line for people"""

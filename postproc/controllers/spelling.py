@@ -74,7 +74,7 @@ class InchFormat(UserModel):
     degree: Literal["mm", "inch"] = "inch"
     """what a degree counts as where a feed per minute refers to all axes"""
     relies_on: tuple[str, ...] = ()
-    """settings of the control that a program in inches needs: comments at its head"""
+    """settings of the control that a program in inches needs: comments in its header"""
 
 
 class Comment(UserModel):

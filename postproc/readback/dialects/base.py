@@ -212,7 +212,7 @@ class Reader(ABC):
         return (text, structure), found
 
     def stems(self, call: str) -> tuple[str, ...]:
-        """Names that the file of a subprogram may bear, in capitals, without their ending."""
+        """Names that the file of a subprogram may have, in capitals, without their ending."""
         return (call,)
 
 
