@@ -32,7 +32,7 @@ FILES = {
     "postproc.writing.linuxcnc": "comments that LinuxCNC obeys", "postproc.writing.state": "decimals of words",
     "postproc.writing.writer": "labels of blocks"}
 """single files besides"""
-SENTENCES = {"message", "why", "refused", "touching", "hint", "text", "reason"}
+SENTENCES = {"message", "why", "refused", "touching", "hint", "text", "reason", "what", "where", "said", "meant"}
 """names under which sentences are held"""
 TAKEN_APART = {"startswith", "endswith", "removeprefix", "removesuffix", "partition", "rpartition", "split"}
 OF_OTHERS = {("machines.user_file", "partition"), ("machines.user_file", "removeprefix")}

@@ -20,8 +20,6 @@ PLACES = 4
 """decimals of mm and degrees in the header"""
 ELSEWHERE = "proof: not said here"
 """in the header of a program whose blocks are too short for it; the summary and the file of the proof say it"""
-_KINEMATICS = "kinematics "
-"""begins what the second reading says of a machine file that it has not used"""
 
 
 def statement(c: Comparison, said: Testimony | None) -> str:
@@ -33,15 +31,14 @@ def statement(c: Comparison, said: Testimony | None) -> str:
     else:
         text = (f"proved: tip within {c.tip_bound:.6f} mm, axis within {c.axis_bound / DEG:.6f} degrees of the CL file all "
                 f"along every block of {c.bounded_cuts} of {c.cuts} cuts ({seen} at the places looked at)")
-    left = [] if said is None else list(said.not_compared)
+    left = [] if said is None else [str(one) for one in said.not_compared]
     return f"{text}, by {_means(said)}" + (f"; not compared by the second reading: {'; '.join(left)}" if left else "")
 
 
 def _means(said: Testimony | None) -> str:
     if said is None or not said.compared:
         return "read-back alone"
-    machine = not any(what.startswith(_KINEMATICS) for what in said.not_compared)
-    return f"read-back and second reading of {'CL file and machine file' if machine else 'the CL file'}"
+    return f"read-back and second reading of {'CL file and machine file' if said.own_kinematics else 'the CL file'}"
 
 
 def head_line(c: Comparison, said: Testimony | None, room: int, lengths: LengthText = MM) -> str:
@@ -60,7 +57,7 @@ def head_line(c: Comparison, said: Testimony | None, room: int, lengths: LengthT
         cuts = f"all {c.cuts} cuts" if c.cuts == c.bounded_cuts else f"{c.bounded_cuts} of {c.cuts} cuts"
         near = f"{lengths.up(c.tip_bound)}, {_up(c.axis_bound / DEG)}"
         text = f"proved by {by}: {cuts} within {lengths.up(c.tip_bound)} {lengths.name}, {_up(c.axis_bound / DEG)} degrees"
-    left = [] if said is None else list(said.not_compared)
+    left = [] if said is None else [str(one) for one in said.not_compared]
     named = "; not in the second reading: " + "; ".join(left).replace("(", "- ").replace(")", "")
     count = f"; {len(left)} not read twice" if left else ""
     tight = f"{'not proved' if c.unbounded else 'proved'}: {near} {lengths.name}, degrees{count}"
