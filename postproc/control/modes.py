@@ -186,8 +186,8 @@ def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
         absent = OPTION_OF.get(law)
         if absent and modes.control.machine.options.absent(absent):
             where, line = modes.control.machine.options.stated[absent]
-            result.append(error("output.option", f"output mode {law} needs an option that the machine file says the control "
-                                f"has not: {absent} = false", file=where, lines=[line],
+            result.append(error("output.option", f"output mode {law} needs an option that the control does not have by the "
+                                f"machine file: {absent} = false", file=where, lines=[line],
                                 hint=f"take {absent} out of [control] or state true where it is fitted; without it this "
                                 f"controller and machine have: {can}"))
             continue

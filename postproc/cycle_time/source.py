@@ -96,7 +96,7 @@ def _executed(data: bytes, controller: ControllerFile, control: Control, lengths
 
 def _blocks(code: Canonical, motion: Motion, machine: Machine, control: Control, controller: ControllerFile,
             origin: BlockOrigin | None, override: float) -> MotionBlocks:
-    return blocks_of(code, motion, machine, control, origin, own_path=controller.writer == "linuxcnc",
+    return blocks_of(code, motion, machine, control, origin, blends_unstated=controller.kinematics.blends_unstated,
                      by_radius=controller.feed.arc_inverse == "radius", override=override)
 
 

@@ -10,7 +10,7 @@ from toolpaths.toolpath import Toolpath
 
 
 def work_offset(controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:
-    """A work offset that the control has not."""
+    """A work offset that the control does not have."""
     program = controller.program
     if program.offset_block(setup.work_offset_code) is not None:
         return []
@@ -25,5 +25,5 @@ def program_number(toolpath: Toolpath, controller: ControllerFile, setup: SetupF
     numbered = setup.output.divided and "{number}" in controller.subprograms.call
     if number is None or not numbered or not 1000 < number <= last:
         return []
-    return [error("setup.program_number", f"program_number = {number}: subprograms bear the numbers 1001 to {last}",
+    return [error("setup.program_number", f"program_number = {number}: subprograms have the numbers 1001 to {last}",
                   file=options.setup, hint=f"a number below 1001 or above {last}")]

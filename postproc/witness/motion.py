@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.witness.block_times import lengths_of, seconds_of
 from postproc.witness.commanded import RAPID
-from postproc.witness.evidence import Finding
+from postproc.witness.evidence import Finding, FindingCode
 from postproc.witness.machine import Chain, limits_of
 from postproc.witness.place import Cut, Poses
 from postproc.witness.stretches import BOTTOM, ENTER, Targets, is_cut, is_rapid, off
@@ -139,7 +139,7 @@ def _turned_in_rapid(w: Walked, angle: float) -> Array:
     return np.asarray(w.inside & ((t.kind == RAPID) & ~t.free & turns)[np.minimum(w.owner, len(t) - 1)])
 
 
-def _finding(w: Walked, rows: Array, lines: Array, code: str, message: str) -> list[Finding]:
+def _finding(w: Walked, rows: Array, lines: Array, code: FindingCode, message: str) -> list[Finding]:
     if not len(rows):
         return []
     k = int(rows[0])
