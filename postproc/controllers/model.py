@@ -136,6 +136,9 @@ class CutterCompensation(UserModel):
     modal_register: bool = False
     """D holds until another is stated, whatever tool is loaded: where CUTCOM names none, the number of the
     tool's length register is written"""
+    holds: str = "D{register}"
+    """what holds the radius or its wear, as the head of the program names it: {register} is that of CUTCOM, else the
+    number of the tool"""
 
 
 class InterpolationRules(UserModel):

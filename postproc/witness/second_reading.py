@@ -15,6 +15,7 @@ from postproc.witness.evidence import Case, ExecutedBlocks, Finding, Testimony
 from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
 from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
+from postproc.witness.sides import check_sides
 from postproc.witness.states import (
     check_feeds,
     check_holes,
@@ -107,6 +108,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     found += check_velocities(w, c, table)
     faults, states, silent = check_states(w, c, case)
     found += faults
+    faults, sides = check_sides(w, c, case)
+    found += faults
     found += _misfits(poses)
     faults, turned = check_turning(case, executed)
     found += faults
@@ -119,8 +122,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     good = w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM))
     worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
     counts = {"positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()),
-              "holes": holes, "feeds": feeds, **{_NAMES[k]: v for k, v in states.items()}, "work offset": zeros,
-              "turns of modulo axes": turned, "clamps": clamped}
+              "holes": holes, "feeds": feeds, **{_NAMES[k]: v for k, v in states.items()}, "cutter compensation": sides,
+              "work offset": zeros,              "turns of modulo axes": turned, "clamps": clamped}
     return found, worst, counts, silent
 
 
