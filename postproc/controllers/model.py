@@ -12,6 +12,7 @@ from pydantic import Field
 from machines.choices import Rapids, RolloverRule, Stop
 from machines.user_file import UserModel, load_toml
 from postproc.base.length_text import INCH, MM, LengthText
+from postproc.controllers.pivots import PivotNames
 from postproc.controllers.spelling import (
     Codes,
     Comment,
@@ -317,6 +318,7 @@ class ControllerFile(UserModel):
     """further words that set the control's smoothing, and the mm that each may take: "G61.1" = 0.005, or
     "G05 P10000" = 0.005"""
     links: LinkRules = LinkRules()
+    pivots: PivotNames = PivotNames()
 
     @property
     def keeps_length(self) -> bool:
