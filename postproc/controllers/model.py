@@ -17,6 +17,7 @@ from postproc.controllers.spelling import (
     Comment,
     Format,
     InchFormat,
+    PartAlignment,
     ProgramBlocks,
     SmoothingLevel,
     SubprogramFormat,
@@ -314,6 +315,7 @@ class ControllerFile(UserModel):
     """further words that set the control's smoothing, and the mm that each may take: "G61.1" = 0.005, or
     "G05 P10000" = 0.005"""
     links: LinkRules = LinkRules()
+    alignment: PartAlignment = PartAlignment()
 
     @property
     def keeps_length(self) -> bool:
