@@ -15,10 +15,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import get_args
 
-from postproc.witness.evidence import FindingCode
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from postproc.witness.evidence import FindingCode
 from tests.hints.case import example
 from tests.hints.cases import CASES
 

@@ -18,6 +18,7 @@ from postproc.controllers.spelling import (
     Comment,
     Format,
     InchFormat,
+    PartAlignment,
     ProgramBlocks,
     SmoothingLevel,
     SubprogramFormat,
@@ -324,6 +325,7 @@ class ControllerFile(UserModel):
     "G05 P10000" = 0.005"""
     links: LinkRules = LinkRules()
     pivots: PivotNames = PivotNames()
+    alignment: PartAlignment = PartAlignment()
 
     @property
     def keeps_length(self) -> bool:
