@@ -11,7 +11,8 @@ from textwrap import wrap
 import numpy as np
 
 from postproc.compile.program import PER_MINUTE, Hole, Program, Section
-from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
+from postproc.controllers.model import CannedCycle, ControllerFile
+from postproc.controllers.output_modes import LengthState, Mode
 from postproc.controllers.texts import CYCLE_LENGTHS
 from postproc.job.smoothing import Smoothing
 from postproc.path.model import ARC
