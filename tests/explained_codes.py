@@ -11,6 +11,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -50,6 +51,7 @@ def _said(path: Path, areas: frozenset[str]) -> Iterator[tuple[str, str, str]]:
             yield node.value, "", ""
 
 
+@cache
 def codes() -> dict[str, dict[str, list[str]]]:
     """Messages and remedies by code, in order."""
     areas = frozenset(tomllib.loads((DATA / "areas.toml").read_text("utf-8")))
