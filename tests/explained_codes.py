@@ -12,6 +12,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import get_args
 
@@ -124,6 +125,7 @@ SAYS = frozenset({"error", "warning", "info", "fault", "problem", "KeyProblem", 
 """names of calls that make a diagnostic"""
 
 
+@cache
 def _trees(*rooms: str) -> list[ast.Module]:
     return [ast.parse(path.read_text("utf-8")) for top in rooms or ("toolpaths", "machines", "postproc")
             for path in sorted((ROOT / top).rglob("*.py"))]
@@ -140,6 +142,7 @@ def said_codes() -> set[str]:
             for one in n.args[:3] if isinstance(one, ast.Constant) and isinstance(one.value, str) and CODE.match(one.value)}
 
 
+@cache
 def codes() -> dict[str, dict[str, list[str]]]:
     """Messages and remedies by code, in order."""
     areas = frozenset(tomllib.loads((DATA / "areas.toml").read_text("utf-8")))

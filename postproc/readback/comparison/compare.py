@@ -263,6 +263,7 @@ def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, 
         part = slice(at, at + CHUNK)
         here = rows[part]
         curve = moves.curves(owner[here])
+        executed.look_ahead(motion, here, SAMPLES)
         for t in SAMPLES:
             tip, axis = executed.poses(motion, here, t)
             guess = np.minimum(begin[part] + t * share[part], 1.0)
