@@ -232,7 +232,7 @@ def table_axes(control: Control) -> Ints:
     for j in control.rotary.tolist():
         q[1] = 0.0
         q[1, j] = 0.7
-        slides = kin.jacobian(q)[:, :3][:, :, control.xyz]
+        slides = kin.slide_directions(q, control.xyz)
         if not np.allclose(slides[0], slides[1], atol=1e-9):
             found.append(j)
     return np.array(found, dtype=np.int64)

@@ -111,6 +111,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         called = {name: others[name] for name, _ in code.files[1:]} if others else {}
         planned, changed = planned_feeds(as_bytes(data), called, gcode or job.toolpath.file)
         comparison = compare(motion, job, executed, gcode, planned)
+    job = job.with_moves(comparison.moves)
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(code, motion, job, comparison.owner, faults),

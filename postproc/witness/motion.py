@@ -173,7 +173,7 @@ def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, tur
         line = np.fmin(line, np.where(ends, np.inf, _above(tip, w.targets.tip[to], w.targets.axis[to])))
         line = np.fmin(line, np.where(ends | entry, np.inf, _above(tip, start, start_axis)))
         adjacent = ~(line <= near)
-        adjacent &= turned | ~_level(w, rows, to, ends | begins, tip, near, bent)
+        adjacent &= turned | ~_level(w, rows, to, ends | begins, tip, near, cut if bent else None)
         low |= adjacent & cuts
         if cut is not None:
             low |= adjacent & ~cut.clear(tip, axis, LEAST * margin)
@@ -192,16 +192,18 @@ def _above(tip: Array, end: Array, axis: Array) -> Array:
     return np.asarray(np.sqrt((rest * rest).sum(axis=1)))
 
 
-def _level(w: Walked, rows: Array, to: Array, away: Array, tip: Array, near: float, bent: bool) -> Array:
-    """(K,) True for rapids to a hole or from one that keep the height of where they come from: the start
-    plane of the hole before, or the position before; and for dog-legs."""
-    before = np.maximum(to - 1, 0)
+def _level(w: Walked, rows: Array, to: Array, away: Array, tip: Array, near: float, cut: Cut | None) -> Array:
+    """(K,) True for rapids to a hole or from one that keep the height of where they come from: the start plane of the hole
+    before, or the position before. Where rapids are dog-legs (`cut`), those that keep above what is cut and the stock, and
+    from hole to hole above the lower end."""
+    before, along = np.maximum(to - 1, 0), w.targets.axis[to]
     drilled = w.targets.kind[before] == BOTTOM
-    level = w.targets.tip[before - drilled]
-    rise, first = (np.einsum("ni,ni->n", p, w.targets.axis[to]) for p in (tip, level))
+    rise, first = (np.einsum("ni,ni->n", p, along) for p in (tip, w.targets.tip[before - drilled]))
+    last = np.einsum("ni,ni->n", w.targets.tip[to], along) if cut else first
     of_hole = drilled | (w.targets.kind[to] == ENTER)
-    last = np.einsum("ni,ni->n", w.targets.tip[to], w.targets.axis[to]) if bent else first
-    return np.asarray(~away & is_rapid(w.kind[rows]) & (of_hole | bent) & (rise >= np.minimum(first, last) - near))
+    keeps = of_hole & (rise >= np.minimum(first, last) - near)
+    keeps |= rise >= (cut.top(along) - near if cut else np.inf)
+    return np.asarray(~away & is_rapid(w.kind[rows]) & keeps)
 
 
 def _explained(w: Walked, rows: Array, margin: float, table: dict[str, object]) -> Array:
