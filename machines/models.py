@@ -209,7 +209,8 @@ class MachineModel(UserModel):
             try:
                 self.control_kinematics()
             except ValueError as fault:
-                yield KeyProblem("machine.control", ("control", "module"), str(fault))
+                yield KeyProblem("machine.control", ("control", "module"), str(fault),
+                                 "write one that is known, or take module out: joints are the program's axes then")
 
     def control_kinematics(self) -> ControlKinematics | None:
         """What the control runs; None where joints are the program's axes.
@@ -240,7 +241,8 @@ class MachineModel(UserModel):
                 yield problem
             elif not axis.range[0] <= axis.home <= axis.range[1]:
                 yield KeyProblem("machine.home", ("axes", name, "home"),
-                                 f"home {axis.home:g} of {name} lies outside its travel {list(axis.range)}")
+                                 f"home {axis.home:g} of {name} lies outside its travel {list(axis.range)}",
+                                 f"write home = {min(max(axis.home, axis.range[0]), axis.range[1]):g}, or correct travel")
 
 
 def register_beyond(rule: str) -> int:

@@ -42,6 +42,7 @@ BORDERS = {
     "postproc/cli/catalogue.py": FIGURES, "postproc/cli/setup_new.py": FIGURES,
     "postproc/cli/job_defaults.py": "defaults of options", "postproc/setup_sheet/text.py": TABLES,
     "postproc/verification/second_witness.py": TABLES, "postproc/witness/states.py": TABLES,
+    "postproc/witness/sides.py": TABLES,
     "postproc/witness/place.py": TABLES, "postproc/witness/errors.py": TABLES,
     "postproc/witness/machine.py": TABLES, "postproc/witness/evidence.py": TABLES,
     "postproc/witness/motion.py": TABLES, "postproc/witness/second_reading.py": TABLES, "postproc/setup/files.py": TABLES,

@@ -41,6 +41,7 @@ PLACES = {
     ("machines/geometric_error/tables/readings.py", "(?P<way>[+-]?)"): "group of a regular expression",
     ("machines/calibration/machine_run.py", "X way"): "that column",
     ("machines/calibration/run.py", "way"): "that column",
+    ("postproc/explain/codes.toml", "X way"): "that column", ("postproc/explain/codes.toml", "x way"): "that column",
     ("machines/geometric_error/tables/readings.py", "way"): "group of a regular expression",
     ("postproc/cycle_time/log.py", "position (S, A): axis positions, mm and degrees"): "columns of a log, no output mode",
     ("samples/calibration/make_measurements.py", "X way"): "that column",

@@ -12,6 +12,7 @@ from pydantic import Field
 from machines.choices import Rapids, RolloverRule, Stop
 from machines.user_file import UserModel, load_toml
 from postproc.base.length_text import INCH, MM, LengthText
+from postproc.controllers.pivots import PivotNames
 from postproc.controllers.spelling import (
     Codes,
     Comment,
@@ -139,6 +140,9 @@ class CutterCompensation(UserModel):
     modal_register: bool = False
     """D holds until another is stated, whatever tool is loaded: where CUTCOM names none, the number of the
     tool's length register is written"""
+    holds: str = "D{register}"
+    """what holds the radius or its wear, as the head of the program names it: {register} is that of CUTCOM, else the
+    number of the tool"""
 
 
 class InterpolationRules(UserModel):
@@ -319,6 +323,7 @@ class ControllerFile(UserModel):
     """further words that set the control's smoothing, and the mm that each may take: "G61.1" = 0.005, or
     "G05 P10000" = 0.005"""
     links: LinkRules = LinkRules()
+    pivots: PivotNames = PivotNames()
 
     @property
     def keeps_length(self) -> bool:

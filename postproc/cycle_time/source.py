@@ -74,7 +74,7 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
     blocks = _blocks(code, motion, machine, control, controller, None, override) if len(motion) else None
     if blocks is None or not len(blocks):
         return None, [*found, error("gcode.no_motion", "the program moves nothing", file=file,
-                                    hint="there is no time to estimate")]
+                                    hint="name a program that has moves: G0, G1 with axis words")]
     return blocks, found
 
 

@@ -22,22 +22,20 @@ from postproc.job.length_words import words_depend_on_length
 from postproc.job.pivots import control_kinematics
 from postproc.job.program_names import program_number, work_offset
 from postproc.job.rapids import safe_rapids
+from postproc.job.records import job_records
 from postproc.job.rounding import Rounding, helix_bound, rounding_bound
 from postproc.job.smoothing import SmoothingPlan, smoothing_plan
 from postproc.job.units import other_units
 from postproc.path.links import SafeSpace, safe_space
+from postproc.reference.cutcom_of_tools import CutcomOfTool
 from postproc.reference.events import register_changes, tool_changes
 from postproc.reference.hole_depths import unfit_holes
 from postproc.reference.largest_feed import limited_feeds
-from postproc.reference.length_registers import by_rule, own_registers
 from postproc.reference.moves import Moves, build_moves
-from postproc.reference.records import checked_records, plain_records
-from postproc.reference.spindle_defaults import standing_cuts, stated_by_setup, with_defaults
 from postproc.reference.split_operations import cut_operations
 from postproc.reference.stated_feeds import without_feed
-from postproc.reference.tool_numbers import numbered
 from postproc.reference.unnumbered_tools import measured_length
-from postproc.setup.model import Placement, SetupFile, assumed_values, part_placement, work_frame
+from postproc.setup.model import Placement, SetupFile, part_placement, work_frame
 from postproc.setup.system import standing
 from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
@@ -77,6 +75,8 @@ class Job:
     """geometric errors of the machine"""
     stated: tuple[tuple[int, str], ...] = ()
     """(tool number, what the set-up states of its spindle and coolant), where the CL file states none"""
+    cutcom: tuple[CutcomOfTool, ...] = ()
+    """the tools of the CL file that cut under CUTCOM"""
 
     @property
     def hooks(self) -> HooksModel:
@@ -229,19 +229,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
             options: Options, refused: Refused = frozenset()) -> tuple[Job | None, list[Diagnostic]]:
     """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`:
     output modes that "auto" passes over."""
-    toolpath, diagnostics = numbered(toolpath, setup, options.setup)
-    diagnostics += assumed_values(setup, options.setup)
-    toolpath, found = plain_records(toolpath, controller)
-    diagnostics += found
-    toolpath, stated = with_defaults(toolpath, setup)
-    diagnostics += stated_by_setup(toolpath, stated)
-    toolpath, found = checked_records(toolpath, controller)
-    diagnostics += found
-    if not any(d.severity is Severity.ERROR and d.code.split(".")[0] in ("spindle", "insert") for d in diagnostics):
-        diagnostics += standing_cuts(toolpath)
-    toolpath = by_rule(toolpath, controller, machine.length_register, machine.radius_register)
-    toolpath, found = own_registers(toolpath, controller)
-    diagnostics += found
+    records, diagnostics = job_records(toolpath, machine, controller, setup, options.setup)
+    toolpath = records.toolpath
     diagnostics += [*work_offset(controller, setup, options), *other_units(controller, options.setup),
                     *smoothing_plan(controller, setup, options, toolpath, machine)[1]]
     toolpath, found = cut_operations(toolpath, setup.output.longest)
@@ -283,7 +272,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     modes, found = output_modes(control, controller, setup, options, toolpath, places, refused)
     diagnostics += found
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, moves,
-              safe_space(moves, setup, placement), modes, geometric, tuple(stated))
+              safe_space(moves, setup, placement), modes, geometric, tuple(records.stated), records.cutcom)
     return None if errors else _with_rapids(job), diagnostics + _tool_lengths(job) + _unused_tools(job)
 
 

@@ -61,6 +61,7 @@ class ExecutedBlocks:
         steps: words (K, J) of blocks less those where they begin, mm and degrees; by_tip (E,): X, Y, Z are the tip
         rule: what a feed per minute refers to ("xyz-first", "geometry", "all"); degree_is_inch: with all axes in
             inches, degrees count as such, else as mm; by_angle: inverse time of arcs counts rad
+        side (E,): cutter compensation, 40 off, 41 left, 42 right
         tool, spindle, rpm, coolant, dwell, pitch, hole (E,): as in force; pitch NaN outside taps, hole True in cycles
         register (E,): length register in force, -1 for none; lengthless (E,): True where none may be, since
             the joints hold the tool's length already
@@ -84,6 +85,7 @@ class ExecutedBlocks:
     rule: Literal["xyz-first", "geometry", "all"]
     degree_is_inch: bool
     by_angle: bool
+    side: Array
     tool: Array
     spindle: Array
     rpm: Array
@@ -103,10 +105,10 @@ class ExecutedBlocks:
 
 
 FindingCode = Literal["position", "path", "kind", "clearance", "arc", "hole", "feed", "velocity", "tool", "length",
-                      "spindle", "coolant", "offset", "turning", "clamp", "errors", "rods"]
+                      "spindle", "coolant", "compensation", "offset", "turning", "clamp", "errors", "rods"]
 """what is found to differ; `witness.` with it is the code of the error"""
 Aspect = Literal["positions", "arcs", "holes", "feeds", "length registers", "tools", "spindle states", "coolant states",
-                 "work offset", "turns of modulo axes", "clamps"]
+                 "cutter compensation", "work offset", "turns of modulo axes", "clamps"]
 
 
 @dataclass(frozen=True)

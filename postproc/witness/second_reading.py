@@ -16,6 +16,7 @@ from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Fi
 from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
 from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
+from postproc.witness.sides import check_sides
 from postproc.witness.states import (
     check_feeds,
     check_holes,
@@ -105,6 +106,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     found += check_velocities(w, c, table)
     faults, states, silent = check_states(w, c, case)
     found += faults
+    faults, sides = check_sides(w, c, case)
+    found += faults
     found += _misfits(poses)
     faults, turned = check_turning(case, executed)
     found += faults
@@ -118,7 +121,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
     counts: dict[Aspect, int] = {
         "positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()),
-        "holes": holes, "feeds": feeds, **states, "work offset": zeros, "turns of modulo axes": turned, "clamps": clamped}
+        "holes": holes, "feeds": feeds, **states, "cutter compensation": sides, "work offset": zeros,
+        "turns of modulo axes": turned, "clamps": clamped}
     return found, worst, counts, silent
 
 

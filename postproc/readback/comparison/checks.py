@@ -54,7 +54,7 @@ def check_kinds(motion: Motion, moves: Moves, owner: Ints, tip: Floats, bent: bo
     bad = rows[motion.missing_feed[rows]]
     if len(bad):
         diagnostics.append(faults.error("verify.feed_missing", "no feed in force", int(moves.line[owner[bad[0]]]),
-                                        int(motion.line[bad[0]]), len(bad)))
+                                        int(motion.line[bad[0]]), len(bad), hint="state F in this block or before it"))
     return diagnostics
 
 
