@@ -30,7 +30,7 @@ FLOORS = (
     ("postproc.feedrate.kernels", "compiled loops of the planner"),
     ("postproc.feedrate", "the planner: arrays and limits in, motion out"),
     ("postproc.controllers", "controller files: what a control is, no text"),
-    ("postproc.reference", "records spelt out: events, moves, holes, tools, coolant"),
+    ("postproc.reference", "records expanded: events, moves, holes, tools, coolant"),
     ("postproc.control", "what words mean: interpolation modes, planes, arcs"),
     ("postproc.joints", "branches, windings, rewinds, singular directions"),
     ("postproc.path", "blocks in joints: links, points between, travel, reach"),
