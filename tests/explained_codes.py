@@ -21,7 +21,8 @@ NONE = frozenset({"postproc.controllers", "postproc.cycle_time", "postproc.kinem
 """texts of that form that are no codes: modules, files, keys of the set-up"""
 MADE = {"verify.tip", "verify.axis", "setup.work_offset", "coolant.off", "coolant.flood", "coolant.mist", "coolant.through",
         "coolant.air", "proof.program", "proof.cl_file", "proof.setup", "proof.machine", "proof.controller",
-        "proof.error_model", "proof.options", "proof.postproc", "witness.arc", "witness.clamp", "witness.feed",
+        "proof.error_model", "proof.options", "proof.postproc", "witness.arc", "witness.clamp", "witness.compensation",
+        "witness.feed",
         "witness.hole", "witness.offset", "witness.position", "witness.rods", "witness.turning", "witness.velocity"}
 """codes that are put together from an area and what is found"""
 
