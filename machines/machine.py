@@ -172,6 +172,11 @@ class Machine:
         return replace(self.limits, velocity=np.minimum(self.limits.velocity, self.cutting_velocity))
 
     @property
+    def home_axis(self) -> Floats:
+        """(3,) tool axis in the table frame with all joints at home."""
+        return np.asarray(self.kinematics.forward(self.home[None, :])[1][0])
+
+    @property
     def clamp_codes(self) -> dict[str, ClampCodes]:
         """The codes of the axes that the program clamps, by letter."""
         return {name: codes for name, codes in zip(self.axis_names, self.clamps, strict=True) if codes.clamp}
