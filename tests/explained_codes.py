@@ -6,12 +6,16 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import json
 import re
 import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
+
+from postproc.witness.evidence import FindingCode
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "postproc" / "explain"
@@ -21,9 +25,14 @@ NONE = frozenset({"postproc.controllers", "postproc.cycle_time", "postproc.kinem
 """texts of that form that are no codes: modules, files, keys of the set-up"""
 MADE = {"verify.tip", "verify.axis", "setup.work_offset", "coolant.off", "coolant.flood", "coolant.mist", "coolant.through",
         "coolant.air", "proof.program", "proof.cl_file", "proof.setup", "proof.machine", "proof.controller",
-        "proof.error_model", "proof.options", "proof.postproc", "witness.arc", "witness.clamp", "witness.feed",
-        "witness.hole", "witness.offset", "witness.position", "witness.rods", "witness.turning", "witness.velocity"}
+        "proof.error_model", "proof.options", "proof.postproc", *(f"witness.{found}" for found in get_args(FindingCode))}
 """codes that are put together from an area and what is found"""
+
+
+FOUND = {found: found for found in get_args(FindingCode)} | {"speed": "spindle"}
+"""words of findings in the code, and the codes that they are"""
+LEAST = 20
+"""characters of a message; shorter texts are names"""
 
 
 def _words(node: ast.AST | None) -> str:
@@ -48,6 +57,17 @@ def _said(path: Path, areas: frozenset[str]) -> Iterator[tuple[str, str, str]]:
                 yield one.value, _words(node.args[k + 1]) if k + 1 < len(node.args) else "", hint
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.match(node.value):
             yield node.value, "", ""
+        if path.parent.name == "witness":
+            yield from _found(node)
+
+
+def _found(node: ast.AST) -> Iterator[tuple[str, str, str]]:
+    """What the second witness finds, where it says so: a code without its area, and a message behind it."""
+    given = node.args if isinstance(node, ast.Call) else node.elts if isinstance(node, ast.Tuple) else []
+    for one, then in itertools.pairwise(given):
+        said = re.sub("{[0-9]}", "...", _words(then))
+        if isinstance(one, ast.Constant) and one.value in FOUND and len(said) > LEAST:
+            yield f"witness.{FOUND[one.value]}", f"second witness: {said}", "do not run this program"
 
 
 def codes() -> dict[str, dict[str, list[str]]]:

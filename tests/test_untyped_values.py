@@ -63,7 +63,7 @@ ANYTHING = {
     "postproc/correction/backlash_steps_loop.py": LOOP, "postproc/cycle_time/linuxcnc_kernels.py": LOOP,
     "postproc/feedrate/kernels/coefficients.py": LOOP, "postproc/feedrate/kernels/interior.py": LOOP,
     "postproc/feedrate/kernels/second_order.py": LOOP, "postproc/feedrate/kernels/splines.py": LOOP,
-    "postproc/feedrate/kernels/tightening.py": LOOP, "postproc/readback/comparison/align.py": LOOP,
+    "postproc/feedrate/kernels/tightening.py": LOOP, "postproc/readback/alignment/align.py": LOOP,
     "postproc/witness/assign_blocks.py": LOOP, "postproc/report/residual_figure.py": DRAWN,
     "machines/calibration/figures.py": DRAWN, "machines/geometric_error/exchange/figures.py": DRAWN,
     "machines/geometric_error/__init__.py": LAZY, "postproc/__init__.py": LAZY,

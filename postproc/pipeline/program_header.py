@@ -1,4 +1,4 @@
-"""Comment lines at the head of a program: what made it, what the work offset must hold, which tool axes were chosen."""
+"""Comment lines in the header of a program: what made it, what the work offset must hold, which tool axes were chosen."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from postproc.setup.model import stated_value
 
 
 def header_lines(made: CompiledStage) -> list[str]:
-    """The head of the program of a conversion that is compiled."""
+    """The header of the program of a conversion that is compiled."""
     job, machine = made.job, made.machine
     letters, said = zip(machine.axis_names, job.control.work_offset, machine.rotary, strict=True), made.controller.lengths
     offset = " ".join(f"{k}{v:.4f}" if turns else f"{k}{said.plain(v)}" for k, v, turns in letters)

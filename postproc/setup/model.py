@@ -187,6 +187,7 @@ class SetupFile(UserModel):
     """A set-up. Everything has a default: part frame on the table frame, first system of the file as work offset."""
 
     description: str = ""
+    """one line"""
     assumed: list[str] = Field(default_factory=list)
     """keys whose values nobody has stated, e.g. assumed = ["tools.1.spindle", "output.feed"]: convert warns of each"""
     work_offset: str = ""

@@ -14,7 +14,7 @@ MUCH = 50.0
 
 
 ELSEWHERE = "lengths: not said here"
-"""in the head of a program whose blocks are too short for it"""
+"""in the header of a program whose blocks are too short for it"""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class LengthMargin:
     """bodies of the set-up are not looked at"""
 
     def line(self, said: LengthText = MM) -> str:
-        """For the head of the program, in its units, and the summary; margins are rounded down."""
+        """For the header of the program, in its units, and the summary; margins are rounded down."""
         ends = (end_text(sign, mm, what, said)
                 for sign, mm, what in (("-", self.shorter, self.ends_shorter), ("+", self.longer, self.ends_longer)))
         return f"T{self.number}: length may differ by {'; by '.join(ends)}{'; bodies apart' if self.bodies else ''}"
@@ -52,7 +52,7 @@ def taken_up_line(margins: tuple[LengthMargin, ...], said: LengthText = MM) -> s
 
 
 def margin_lines(margins: tuple[LengthMargin, ...], job: Job, said: LengthText = MM, room: int = 1000) -> list[str]:
-    """For the head and the summary: a line for each tool whose length is in the program, else one for all.
+    """For the header and the summary: a line for each tool whose length is in the program, else one for all.
 
     Where a line has no `room` for what fails, the numbers alone: never a part of it.
     """
@@ -75,7 +75,7 @@ def _fitting(line: str, short: str, room: int) -> str:
 
 
 def pending_lines(numbers: list[int], job: Job) -> list[str]:
-    """What stands in their place in the head while the program is written; `numbers`: of the tools that move."""
+    """What stands in their place in the header while the program is written; `numbers`: of the tools that move."""
     if not (job.setup.output.tool_call and numbers):
         return []
     return [f"T{number}: {LENGTHS_PENDING}" for number in numbers] if length_matters(job) else [LENGTHS_PENDING]
