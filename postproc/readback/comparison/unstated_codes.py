@@ -64,7 +64,7 @@ def _known(reader: Reader) -> set[str]:
     """The groups whose state the controller file says."""
     said = reader.controller.start.codes if reader.controller is not None else ()
     numbers = [float(m[1]) for text in said if (m := re.fullmatch(r"G(\d+\.?\d*)", text))]
-    return {name for name, group in reader.groups.items() if among(numbers, group).any()}
+    return {name for name, group in reader.groups.items() if not set(group).isdisjoint(numbers)}
 
 
 def _moves(words: Words, axes: tuple[str, ...]) -> Ints:
