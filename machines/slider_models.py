@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator
 
+from machines.kinematics.chain import LINEAR
 from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
@@ -55,8 +56,11 @@ class WorkspaceModel(UserModel):
     """`[kinematics.workspace]`: box of the platform's reference point in the machine frame, mm; tilt in degrees."""
 
     x: Interval
+    """lower, upper"""
     y: Interval
+    """lower, upper"""
     z: Interval
+    """lower, upper"""
     tilt: tuple[float, float] = (0.0, 0.0)
     """range of the platform's tilt about x"""
 
@@ -70,10 +74,13 @@ class ClearanceModel(UserModel):
     """`[kinematics.clearance]`: what may touch, mm and degrees; a key left out is not checked."""
 
     rod_radius: Positive | None = None
+    """of every rod"""
     spindle_radius: Positive | None = None
+    """of the spindle round the tool axis"""
     spindle: Interval = (0.0, 1.0)
     """lower and upper end of the spindle above the gauge point along the tool axis"""
     rail_radius: NotNegative | None = None
+    """of the fixed part of every slide, as a round bar"""
     carriage_angle: Positive | None = None
     """largest swing of a rod at its carriage from its direction in the middle of the workspace"""
     platform_angle: Positive | None = None
@@ -137,7 +144,7 @@ class SliderModel(KinematicsModel):
             if abs(length - 1.0) > UNIT:
                 yield KeyProblem("machine.geometry", ("legs", name, "direction"),
                                  f"{list(leg.direction)} has length {length:.6g}, not 1", "write a unit vector")
-            if len(name) != 1 or name not in "XYZUVWPQR":
+            if len(name) != 1 or name not in LINEAR:
                 yield KeyProblem("machine.axis-letter", ("legs", name), f"{name!r} is not a letter of a linear axis",
                                  "choose from X Y Z U V W P Q R")
             if len(leg.rods) > 2:

@@ -6,49 +6,140 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import json
 import re
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
+from typing import get_args
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from postproc.witness.evidence import FindingCode
+from tests.hints.case import example
+from tests.hints.cases import CASES
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "postproc" / "explain"
-CODE = re.compile(r"^[a-z_]+\.[a-z][a-z0-9_-]*$")
+CODE = re.compile(r"^[a-z_-]+\.[a-z][a-z0-9_-]*$")
 NONE = frozenset({"postproc.controllers", "postproc.cycle_time", "postproc.kinematics", "postproc.toml", "bodies.part",
                   "bodies.table", "output.coolant", "output.feed"})
 """texts of that form that are no codes: modules, files, keys of the set-up"""
 MADE = {"verify.tip", "verify.axis", "setup.work_offset", "coolant.off", "coolant.flood", "coolant.mist", "coolant.through",
         "coolant.air", "proof.program", "proof.cl_file", "proof.setup", "proof.machine", "proof.controller",
-        "proof.error_model", "proof.options", "proof.postproc", "witness.arc", "witness.clamp", "witness.feed",
-        "witness.hole", "witness.offset", "witness.position", "witness.rods", "witness.turning", "witness.velocity"}
+        "proof.error_model", "proof.options", "proof.postproc", *(f"witness.{found}" for found in get_args(FindingCode))}
 """codes that are put together from an area and what is found"""
 
 
-def _words(node: ast.AST | None) -> str:
-    """A text with ... for what is filled in."""
+FOUND = {found: found for found in get_args(FindingCode)} | {"speed": "spindle"}
+"""words of findings in the code, and the codes that they are"""
+LEAST = 20
+"""characters of a message; shorter texts are names"""
+Signature = tuple[str, ...]
+"""names of the parameters of a function, self left out"""
+
+
+def _words(node: ast.AST | None, known: dict[str, str]) -> str:
+    """A text with ... for what is filled in; `known` are texts of the module by name."""
     if isinstance(node, ast.Constant):
         return node.value if isinstance(node.value, str) else ""
     if isinstance(node, ast.JoinedStr):
-        return "".join(v.value if isinstance(v, ast.Constant) and isinstance(v.value, str) else "..." for v in node.values)
-    if isinstance(node, ast.BinOp):
-        return _words(node.left) + _words(node.right)
-    return "..."
+        return "".join(v.value if isinstance(v, ast.Constant) and isinstance(v.value, str) else _words(
+            v.value, known) if isinstance(v, ast.FormattedValue) else "..." for v in node.values)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        return _words(node.left, known) + _words(node.right, known)
+    return known.get(node.id, "...") if isinstance(node, ast.Name) else "..."
 
 
-def _said(path: Path, areas: frozenset[str]) -> Iterator[tuple[str, str, str]]:
+def _choices(node: ast.AST | None) -> list[ast.AST | None]:
+    """Both texts of `a if b else c`."""
+    return [*_choices(node.body), *_choices(node.orelse)] if isinstance(node, ast.IfExp) else [node]
+
+
+def _texts_of(tree: ast.Module) -> dict[str, str]:
+    """Texts of a module by name."""
+    return {target.id: node.value.value for node in tree.body if isinstance(node, ast.Assign) for target in node.targets
+            if isinstance(target, ast.Name) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)}
+
+
+def _signatures(trees: Iterable[ast.Module]) -> dict[str, set[Signature]]:
+    """Parameters of all functions with a hint, and fields of classes with one, by name."""
+    found: dict[str, set[Signature]] = {}
+    for node in (n for tree in trees for n in ast.walk(tree)):
+        names: list[str] = []
+        if isinstance(node, ast.FunctionDef):
+            names = [a.arg for a in (*node.args.posonlyargs, *node.args.args) if a.arg != "self"]
+        elif isinstance(node, ast.ClassDef):
+            names = [n.target.id for n in node.body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)]
+        if "hint" in names:
+            found.setdefault(node.name, set()).add(tuple(names))
+    return found
+
+
+def _is_text(node: ast.AST) -> bool:
+    return isinstance(node, (ast.JoinedStr, ast.BinOp, ast.IfExp)) or (
+        isinstance(node, ast.Constant) and isinstance(node.value, str))
+
+
+def _given(node: ast.Call, name: str, at: int, signatures: set[Signature]) -> ast.AST | None:
+    """The argument of a call that is its message or hint: by keyword, else where a signature with the code at `at` is."""
+    keyword = next((w.value for w in node.keywords if w.arg == name), None)
+    if keyword is not None:
+        return keyword
+    for one in sorted(signatures):
+        if len(one) > at and one[at] == "code" and name in one and one.index(name) < len(node.args):
+            text = one.index("message") if "message" in one else at
+            if text >= len(node.args) or text == at or _is_text(node.args[text]):
+                return node.args[one.index(name)]
+    return None
+
+
+def _said(tree: ast.Module, signatures: dict[str, set[Signature]]) -> Iterator[tuple[str, str, str]]:
     """(code, message, hint) of a file; texts "" where a code stands by itself."""
-    tree = ast.parse(path.read_text("utf-8"))
+    known = _texts_of(tree)
     for node in ast.walk(tree):
         for k, one in enumerate(node.args[:3]) if isinstance(node, ast.Call) else ():
             if isinstance(one, ast.Constant) and isinstance(one.value, str) and CODE.match(one.value):
                 assert isinstance(node, ast.Call)
-                hint = next((_words(w.value) for w in node.keywords if w.arg == "hint"), "")
-                yield one.value, _words(node.args[k + 1]) if k + 1 < len(node.args) else "", hint
+                own = signatures.get(_called(node), set())
+                message = _given(node, "message", k, own) or next(iter(node.args[k + 1:]), None)
+                for hint in _choices(_given(node, "hint", k, own)):
+                    yield one.value, _words(message, known), _words(hint, known)
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.match(node.value):
             yield node.value, "", ""
+
+
+def _found(node: ast.AST) -> Iterator[tuple[str, str, str]]:
+    """What the second witness finds, where it says so: a code without its area, and a message behind it."""
+    given = node.args if isinstance(node, ast.Call) else node.elts if isinstance(node, ast.Tuple) else []
+    for one, then in itertools.pairwise(given):
+        said = re.sub("{[0-9]}", "...", _words(then, {}))
+        if isinstance(one, ast.Constant) and one.value in FOUND and len(said) > LEAST:
+            yield f"witness.{FOUND[one.value]}", f"second witness: {said}", "do not run this program"
+
+
+SAYS = frozenset({"error", "warning", "info", "fault", "problem", "KeyProblem", "Diagnostic", "note", "warn", "many", "add"})
+"""names of calls that make a diagnostic"""
+
+
+@cache
+def _trees(*rooms: str) -> list[ast.Module]:
+    return [ast.parse(path.read_text("utf-8")) for top in rooms or ("toolpaths", "machines", "postproc")
+            for path in sorted((ROOT / top).rglob("*.py"))]
+
+
+def _called(node: ast.Call) -> str:
+    return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+
+
+def said_codes() -> set[str]:
+    """Codes that stand in the calls that make diagnostics, whatever their area."""
+    calls = [n for tree in _trees() for n in ast.walk(tree) if isinstance(n, ast.Call)]
+    return {one.value for n in calls if _called(n) in SAYS
+            for one in n.args[:3] if isinstance(one, ast.Constant) and isinstance(one.value, str) and CODE.match(one.value)}
 
 
 @cache
@@ -56,16 +147,22 @@ def codes() -> dict[str, dict[str, list[str]]]:
     """Messages and remedies by code, in order."""
     areas = frozenset(tomllib.loads((DATA / "areas.toml").read_text("utf-8")))
     found: dict[str, dict[str, list[str]]] = {code: {"messages": [], "remedies": []} for code in MADE}
-    for top in ("toolpaths", "machines", "postproc"):
-        for path in sorted((ROOT / top).rglob("*.py")):
-            for code, message, hint in _said(path, areas):
-                if code in NONE or code.split(".")[0] not in areas:
-                    continue
-                one = found.setdefault(code, {"messages": [], "remedies": []})
-                for text, kept in ((message, one["messages"]), (hint, one["remedies"])):
-                    text = " ".join(text.split())
-                    if text.strip(". ") and text not in kept:
-                        kept.append(text)
+    trees = _trees()
+    signatures = _signatures(trees)
+    found_by_witness = (said for tree in _trees("postproc/witness") for node in ast.walk(tree) for said in _found(node))
+    for code, message, hint in itertools.chain((said for tree in trees for said in _said(tree, signatures)),
+                                               found_by_witness):
+        if code in NONE or code.split(".")[0] not in areas:
+            continue
+        one = found.setdefault(code, {"messages": [], "remedies": []})
+        for text, kept in ((message, one["messages"]), (hint, one["remedies"])):
+            text = " ".join(text.split())
+            if text.strip(". ") and text not in kept:
+                kept.append(text)
+    for case in CASES:
+        text = example(case)
+        if text and case.code in found:
+            found[case.code].setdefault("example", [text])
     for file in sorted((ROOT / "tests" / "bad").glob("*.*")):
         first, _, rest = file.read_bytes().decode("latin-1").partition("\n")
         said = re.search(r"expect: \w+ (\S+)", first)

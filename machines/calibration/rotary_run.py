@@ -27,6 +27,7 @@ from machines.geometric_error.actual.serial_errors import Component, SerialError
 from machines.geometric_error.tables.csv_table import UNITS, CsvTable
 from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Floats
 
 ARCSEC = UNITS["arcsec"]
@@ -58,7 +59,7 @@ def reversal(run: CalibrationRun, given: ReversalModel, table: CsvTable) -> Cali
     x = 2.0 * np.pi * np.arange(given.steps) / given.steps
     model = ErrorModel(SerialErrors((Component(name, TableCurve(x, sense * fitted.axis, "spline", period=2.0 * np.pi)),)),
                        covariance=fitted.covariance[: given.steps, : given.steps])
-    return done(run, model, figures, fitted.result.noise, f"sigma_arcsec = {given.sigma_arcsec:g}",
+    return done(run, model, figures, fitted.result.noise, {"sigma_arcsec": given.sigma_arcsec},
                 lambda: reversal_table_fault(readings, sigma, given, table.unit["reading"]))
 
 
@@ -105,10 +106,11 @@ def rotary(run: CalibrationRun, given: RotaryMeasurementModel, table: CsvTable) 
                     "measure one more set-up, the indexer turned by one increment more")
         return CalibrationOutcome(None, figures)
     if fitted.lost:
-        run.note("calibrate.hidden", f"the mounting can pretend {', '.join(fitted.lost)} as well; they are 0 in the model")
+        run.note("calibrate.hidden",
+                 f"an error of the mounting has the same effect as {', '.join(fitted.lost)}; they are 0 in the model")
     model = error_model(fitted, given.axis, sense=sense, carries_part=_carries_part(run, given.axis))
     return done(run, model, figures, fitted.result.noise,
-                f"sigma_um = {given.sigma_um:g} or sigma_arcsec = {given.sigma_arcsec:g}",
+                {"sigma_um": given.sigma_um, "sigma_arcsec": given.sigma_arcsec},
                 lambda: rotary_table_fault(bench, readings, sigma, given.harmonics, [table.unit[p] for p in PARTS]))
 
 
@@ -129,7 +131,7 @@ def _sense(run: CalibrationRun, letter: str) -> int:
         run.problem("calibrate.axis", f"{machine.name} has no axis {letter}", "it has " + ", ".join(machine.axis_names),
                     "axis")
         return 0
-    along = kinematics.axis_line(letter)[0]["ABC".index(letter)]
+    along = kinematics.axis_line(letter)[0][ROTARY.index(letter)]
     if abs(along) < 1.0 - ALONG:
         run.problem("calibrate.axis", f"{letter} of {machine.name} is inclined: E{letter}{letter} is not its "
                     "positioning error", "measure poses, and name its parameters", "axis")

@@ -31,7 +31,7 @@ PLACES = 200
 InterpolationMode = Literal["axes", "tcp", "tilted"]
 MODE_NAMES: dict[InterpolationMode, str] = {"axes": "machine coordinates without RTCP", "tcp": "tool-centre-point control",
                                             "tilted": "tilted work planes"}
-"""as heads of programs, warnings and documents name them"""
+"""as headers of programs, warnings and documents name them"""
 FeedLength = Literal["xyz-first", "all", "geometry"]
 
 

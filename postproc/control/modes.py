@@ -13,7 +13,8 @@ from machines.kinematics.base import Kinematics
 from postproc.base.options import Options, OutputMode
 from postproc.control.control import Control, InterpolationMode, tool_frames
 from postproc.control.planes import Plane, stated
-from postproc.controllers.model import ControllerFile, Mode
+from postproc.controllers.model import ControllerFile
+from postproc.controllers.output_modes import Mode
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Array, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -186,8 +187,8 @@ def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
         absent = OPTION_OF.get(law)
         if absent and modes.control.machine.options.absent(absent):
             where, line = modes.control.machine.options.stated[absent]
-            result.append(error("output.option", f"output mode {law} needs an option that the machine file says the control "
-                                f"has not: {absent} = false", file=where, lines=[line],
+            result.append(error("output.option", f"output mode {law} needs an option that the control does not have by the "
+                                f"machine file: {absent} = false", file=where, lines=[line],
                                 hint=f"take {absent} out of [control] or state true where it is fitted; without it this "
                                 f"controller and machine have: {can}"))
             continue

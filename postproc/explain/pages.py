@@ -28,7 +28,9 @@ class CodePage:
             lines += ["", "What to do:", *(f"  {one}" for one in self.remedies)]
         lines += ["", "First of all:" if self.remedies else "What to do:", f"  {self.first}"]
         if self.example:
-            lines += ["", "A CL file that has it:", *(f"  {one}" for one in self.example.splitlines())]
+            obeyed = any(line.startswith("+") for line in self.example.splitlines())
+            title = "An example (- as found, + put right):" if obeyed else "A CL file that has it:"
+            lines += ["", title, *(f"  {one}" for one in self.example.splitlines())]
         return "\n".join(lines)
 
 

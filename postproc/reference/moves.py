@@ -13,7 +13,7 @@ from machines.kinematics.frames import spin_about, tool_x
 from postproc.reference.events import tool_changes
 from postproc.reference.holes import HoleLeg, hole_legs
 from postproc.reference.holes import Phase as Phase
-from postproc.reference.stated_feeds import feeds_of
+from postproc.reference.stated_feeds import feeds_of, follows_speed
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, error
@@ -272,6 +272,7 @@ def _arcs_behind_holes(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
 def _missing_feeds(toolpath: Toolpath, moves: Moves) -> list[Diagnostic]:
     cutting = moves.kind != Kind.RAPID
     bad = np.flatnonzero(cutting & ~(moves.feed > 0.0) & ~(moves.seconds > 0.0))
+    bad = bad[~follows_speed(toolpath)[moves.row[bad]]] if len(bad) else bad
     if not len(bad):
         return []
     return [error("feed.missing", "cutting motion before any feed is stated, or at feed 0", file=toolpath.file,

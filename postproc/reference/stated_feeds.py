@@ -59,6 +59,12 @@ def _unstated(toolpath: Toolpath, feed: Floats, mode: Array) -> Bools:
     return np.asarray(unstated & ~(holes & tap[np.where(holes, toolpath.cycle, -1)]))
 
 
+def follows_speed(toolpath: Toolpath) -> Bools:
+    """(N,) rows with a feed per revolution: what they lack is a spindle speed, never a feed."""
+    feed, mode = _stated_feeds(toolpath)
+    return np.asarray((mode == FeedMode.PER_REVOLUTION) & (feed > 0.0))
+
+
 def without_feed(toolpath: Toolpath) -> Bools:
     """(N,) rows that cut while the file has stated no feed: they run at the set-up's `[output] feed`."""
     return _unstated(toolpath, *_stated_feeds(toolpath))

@@ -14,7 +14,7 @@ from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import SheetFacts, facts_of
 from postproc.setup_sheet.place import Fit, fitted
 from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, questions_of
-from postproc.setup_sheet.text import TOOL_NUMBERS, SheetHead, sheet_text, sheet_values
+from postproc.setup_sheet.text import TOOL_NUMBERS, SheetHeader, sheet_text, sheet_values
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, require, warning
 from toolpaths.toolpath import Toolpath
 
@@ -78,9 +78,9 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     made = SetupSheet("", tuple(known), facts, tuple(questions), tuple(answers.items()), fit)
     if not fit.result.ok:
         return _with(made, _not_fitted(fit), text="")
-    head = SheetHead(Path(toolpath.file).name, machine.name, fit.result.controller_name, toolpath.units,
+    header = SheetHeader(Path(toolpath.file).name, machine.name, fit.result.controller_name, toolpath.units,
                      _units(found, options), options.tolerance, options.axis_tolerance)
-    return _with(made, _assumed(made, fit), text=sheet_text(head, facts, answers, fit, toolpath))
+    return _with(made, _assumed(made, fit), text=sheet_text(header, facts, answers, fit, toolpath))
 
 
 def _units(found: list[Diagnostic], options: Options) -> str:

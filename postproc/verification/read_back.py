@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.base.header_words import HEADER, NO_FILE, Head, read_head, same_name
+from postproc.base.header_words import HEADER, NO_FILE, ProgramHeader, read_header, same_name
 from postproc.base.memory import give_back
 from postproc.base.options import Options
 from postproc.base.progress import Progress
@@ -17,7 +17,7 @@ from postproc.readback.comparison.clamps import check_clamps, check_index
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.hooks import check_hooks
-from postproc.readback.comparison.length_margins import LengthMargin, length_margins, longer_run
+from postproc.readback.comparison.length_margins import LengthMargin
 from postproc.readback.comparison.options import check_options
 from postproc.readback.comparison.slow_moves import planned_feeds
 from postproc.readback.comparison.starts import check_end, check_start
@@ -29,8 +29,10 @@ from postproc.readback.dialects.base import UNITS_UNSTATED, as_bytes
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
-from postproc.readback.execution.poses import BlockPoses, poses_before
+from postproc.readback.execution.poses import BlockPoses
 from postproc.readback.text.canonical import placed
+from postproc.verification.executed import executed_poses
+from postproc.verification.length_limits import LengthTrial, length_margins
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -41,12 +43,12 @@ CAUSES = frozenset({"verify.start", "verify.tool", "verify.tool_change", "verify
 
 def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
     """An error where the header of a program names other chosen tool axes than the options; nothing without our header."""
-    head, chosen = read_head(data), options.orient != "keep"
+    header, chosen = read_header(data), options.orient != "keep"
     given = f"--orient {options.orient} --max-tilt {options.max_tilt:g}" if chosen else "no --orient"
-    if head.axes is None:
+    if header.axes is None:
         return [error("verify.orient", f"the header names no chosen tool axes, {given} is given", file=gcode,
-                      hint="verify without --orient")] if chosen and head.ours else []
-    plan, tilt = head.axes
+                      hint="verify without --orient")] if chosen and header.ours else []
+    plan, tilt = header.axes
     if chosen and (plan, tilt) == (options.orient, f"{options.max_tilt:g}"):
         return []
     return [error("verify.orient", f"the header says orient {plan}, max tilt {tilt} degrees, {given} is given", file=gcode,
@@ -55,9 +57,9 @@ def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
 
 def other_setup(data: bytes, options: Options, off: bool, gcode: str) -> list[Diagnostic]:
     """What the header of a program says of its set-up where that is not the one given; `off`: the program fails."""
-    head = read_head(data)
-    stated, then = head.setup, head.setup.mark if head.setup else ""
-    if then == options.setup_mark or (stated and not then) or not head.ours:
+    header = read_header(data)
+    stated, then = header.setup, header.setup.mark if header.setup else ""
+    if then == options.setup_mark or (stated and not then) or not header.ours:
         return []
     given = f"{Path(options.setup).name or NO_FILE} (fingerprint {options.setup_mark})" if options.setup_mark else "none"
     named = stated.name if stated else ""
@@ -84,9 +86,9 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls,
                         machine.clamp_codes)
     code, diagnostics = reader.read(data, gcode, others)
-    head = read_head(as_bytes(data[:HEADER]))
+    header = read_header(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]
-    if gcode and not job.corrects and head.corrected is not None:
+    if gcode and not job.corrects and header.corrected is not None:
         return None, [_twice(job, gcode), *diagnostics]
     if code is not None:
         diagnostics += placed([_located(d, job.toolpath.file, of_cl) for d in check_stated(code, reader, gcode)], code.files)
@@ -97,7 +99,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     motion, found = run(code, machine.axis_names, offsets, gcode)
     give_back()
     faults = Faults(job.toolpath.file, gcode)
-    unseen, longer = check_start(code, job, faults), longer_run(code, offsets, job)
+    unseen, trial = check_start(code, job, faults), LengthTrial(code, offsets, job)
     code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))
     diagnostics += [_located(d, job.toolpath.file, of_cl) for d in found]
     if has_errors(diagnostics):
@@ -106,11 +108,12 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         return None, [*diagnostics, error("verify.no_motion", "the program moves nothing", file=gcode)]
     if progress:
         progress("read back", 0, len(motion))
-    executed = _executed(job, motion, offsets.lengths)
+    executed = executed_poses(job, motion, offsets.lengths)
     with np.errstate(invalid="ignore"):
         called = {name: others[name] for name, _ in code.files[1:]} if others else {}
         planned, changed = planned_feeds(as_bytes(data), called, gcode or job.toolpath.file)
         comparison = compare(motion, job, executed, gcode, planned)
+    job = job.with_moves(comparison.moves)
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(code, motion, job, comparison.owner, faults),
@@ -119,21 +122,16 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
                *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     if gcode and job.corrects:
-        noted = [*(_of_model(head, job, gcode, has_errors(noted)) if head.corrected is not None else
-                   _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
+        noted = [*(_of_model(header, job, gcode, has_errors(noted)) if header.corrected is not None else
+                   _uncorrected(header, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
     return replace(comparison, executed=(code, motion), poses=executed, planned=planned,
-                   lengths=_margins(motion, executed, longer, job, comparison)), [*diagnostics, *noted]
+                   lengths=_margins(motion, executed, trial, comparison)), [*diagnostics, *noted]
 
 
-def _margins(motion: Motion, executed: BlockPoses, longer: tuple[Motion, Job, dict[int, float]] | None, job: Job,
-             c: Comparison) -> tuple[LengthMargin, ...]:
-    """How much tools may differ from their gauge lengths; () where registers take that up, or where the program fails."""
-    if longer is None or has_errors([*c.diagnostics]):
-        return ()
-    again, other, held = longer
-    left = job.options.tolerance - c.tip_bound, job.axis_tolerance - c.axis_bound
-    return length_margins(motion, executed, again, _executed(other, again, held), job, c.owner, left)
+def _margins(motion: Motion, executed: BlockPoses, trial: LengthTrial, c: Comparison) -> tuple[LengthMargin, ...]:
+    """How much tools may differ from their gauge lengths; () where the program fails."""
+    return () if has_errors([*c.diagnostics]) else length_margins(trial, motion, executed, c)
 
 
 def _unmeasured(motion: Motion, executed: BlockPoses, job: Job, faults: Faults) -> list[Diagnostic]:
@@ -153,28 +151,28 @@ def _twice(job: Job, gcode: str) -> Diagnostic:
                  "into it and take its errors out of the control")
 
 
-def _uncorrected(head: Head, job: Job, motion: Motion, executed: BlockPoses, comparison: Comparison,
+def _uncorrected(header: ProgramHeader, job: Job, motion: Motion, executed: BlockPoses, comparison: Comparison,
                  gcode: str) -> list[Diagnostic]:
     """Why a program is off on the machine with errors: its header names none that it corrects.
 
     A program of another post may correct them all the same, so that no amounts are known.
     """
-    if not (head.by_control or head.ours):
+    if not (header.by_control or header.ours):
         return [warning("verify.error_model", "the header of the program names no error model, it is verified on the "
                         "machine with errors", file=gcode, hint="verify without --error-model, if it corrects none")]
-    why = "by its header the control does" if head.by_control else "its header names no error model"
+    why = "by its header the control does" if header.by_control else "its header names no error model"
     return [error("verify.error_model", f"the program corrects no geometric errors ({why}): verified on the machine with "
                   "errors" + _amounts(job, motion, executed, comparison), file=gcode,
                   hint="verify without --error-model, or convert with it")]
 
 
-def _of_model(head: Head, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
+def _of_model(header: ProgramHeader, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
     """What its header says of the model that a program corrects, its name and fingerprint, where that is not
     the one that it is verified with; `off`: the program fails. Programs without a fingerprint have only the name."""
     from machines.geometric_error.files.fingerprint import fingerprint
 
     assert job.errors is not None
-    name, then, now = head.corrected, head.model, fingerprint(job.errors)
+    name, then, now = header.corrected, header.model, fingerprint(job.errors)
     same = not name or same_name(name, job.errors.name)
     if then == now or (not then and (same or not off)):
         return []
@@ -223,13 +221,3 @@ def _located(d: Diagnostic, file: str, of_cl: Callable[[int], tuple[int, ...]] |
         return d
     message = f"{d.message} (line {d.lines[0]} of the program)"
     return replace(d, file=file, lines=of_cl(d.lines[0]) if of_cl else (), message=message)
-
-
-def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> BlockPoses:
-    """Poses of the machine as it is: with its errors where the program corrects them."""
-    before = poses_before(motion, job.control)
-    if job.errors is None or not job.corrects:
-        return BlockPoses(job.control, job.kinematics_of, lengths, before)
-    from postproc.readback.execution.actual import ActualBlockPoses
-
-    return ActualBlockPoses(job.control, job.kinematics_of, lengths, before, model=job.errors, motion=motion)

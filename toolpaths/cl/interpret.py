@@ -76,6 +76,18 @@ def defsub(b: ToolpathBuilder, s: Statement) -> None:
     b.index = end
 
 
+def _uncallable(b: ToolpathBuilder, name: str, found: tuple[int, int] | None) -> tuple[str, str]:
+    """Why a subprogram is not carried out, and what to do."""
+    known = [shown(one) for one in _subprograms(b).named if one != ""][:6]
+    if found is None:
+        own = f"put DEFSUB/{name} and ENDSUB round its records"
+        return "is not defined", f"the file defines {', '.join(known)}; else {own}" if known else own
+    if found in b.calls or len(b.calls) >= _DEEPEST:
+        return ("calls itself" if found in b.calls else f"is called from {_DEEPEST} others, each inside the next"), (
+            f"take CALSUB/{name} out of the records between DEFSUB and ENDSUB")
+    return "makes too many points", "divide the file: one for each part of the calls"
+
+
 def calsub(b: ToolpathBuilder, s: Statement) -> None:
     """Carry out the statements and points of a subprogram here, under the frame that holds here."""
     known, name = _subprograms(b), called(s)
@@ -85,8 +97,7 @@ def calsub(b: ToolpathBuilder, s: Statement) -> None:
                       "moves of a program that the machine keeps are not checked", key="named")
         return
     if found is None or len(b.calls) >= _DEEPEST or found in b.calls or b.row > _MOST_ROWS:
-        why = "is not defined" if found is None else "calls itself" if found in b.calls else "makes too many points"
-        hint = f"the file defines {', '.join(known.names[:6])}" if found is None and known.names else ""
+        why, hint = _uncallable(b, s.body, found)
         b.log.error("cl.subprogram", f"CALSUB/{s.body}: the subprogram {why}", b.line, hint)
         return
     start, end = found

@@ -137,7 +137,7 @@ def loadtl(b: ToolpathBuilder, s: Statement) -> None:
     length = s.after("LENGTH")
     if length is not None:
         b.log.info("cl.tool-length", f"LOADTL/{s.body}: the length is not used, it may be that of the cutter or of the "
-                   "whole tool", b.line, f"state the gauge length of tool {numbers[0]:g} in the set-up")
+                   f"whole tool; [tools.{numbers[0]:g}] gauge_length of the set-up is", b.line)
     if s.has("TURN"):
         b.turns()
     change(b, numbers[0], register)

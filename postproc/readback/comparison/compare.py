@@ -8,7 +8,8 @@ import numpy as np
 
 from postproc.job.job import Job
 from postproc.path.model import FEED, TRAVERSE
-from postproc.readback.comparison.align import align, unreached
+from postproc.readback.alignment.align import EndPoses, aligned, unreached
+from postproc.readback.alignment.split_as_written import split_as_written
 from postproc.readback.comparison.approaches import leads_down
 from postproc.readback.comparison.bound_search import DeviationBound
 from postproc.readback.comparison.checks import (
@@ -51,6 +52,7 @@ class Comparison:
     """Worst deviations (mm, rad) with the CL line and program line of each, and the poses and matching they rest on.
 
     Attributes:
+        moves: those of the CL file, rapids split as the program splits them; `match` and `owner` count them without pecks
         worst_tip, worst_axis: the worst of the places that were looked at
         tip_bound, axis_bound: what no block exceeds anywhere, see `deviation_bound`; blocks without a bound
             count by the places that were looked at
@@ -59,6 +61,7 @@ class Comparison:
         executed: what was compared, the words of the program and their motion, so that nothing reads it again
     """
 
+    moves: Moves
     worst_tip: float
     worst_axis: float
     worst_tip_line: tuple[int, int]
@@ -88,21 +91,23 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
     Faults point into the CL file, or into the program where `gcode` names it. `planned`: its feeds were.
     """
     tolerance, axis_tolerance = job.options.tolerance, job.axis_tolerance
-    moves, faults = job.moves.without_pecks(), Faults(job.toolpath.file, gcode)
     tip, axis = _ends(motion, executed)
+    sweep, faults = arc_sweeps(motion, executed.control), Faults(job.toolpath.file, gcode)
     words = job.controller.format
     grain = max(1e-3, 1.5 * job.controller.grain), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
-    number = rewinds(motion, tip, axis, moves.tip, executed.control.rotary,
+    number = rewinds(motion, tip, axis, job.commanded.without_pecks().tip, executed.control.rotary,
                      (2.0 * tolerance, 2.0 * axis_tolerance))
-    match, owner = _aligned(as_slice(np.flatnonzero(number < 0)), tip, axis, arc_sweeps(motion, executed.control), moves,
-                            tolerance, axis_tolerance, grain)
+    ends = EndPoses(tip, axis, sweep, as_slice(np.flatnonzero(number < 0)))
+    job = job.with_moves(split_as_written(motion, executed, job, ends, grain))
+    moves = job.moves.without_pecks()
+    match, owner = aligned(ends, moves, moves.link, tolerance, axis_tolerance, grain)
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
     (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match,
                                                                owner, tolerance)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
-    bound = _bound(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects)
+    bound = bound_of_blocks(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects)
     if not has_errors(diagnostics):
         diagnostics += _unproved(bound, (tolerance, axis_tolerance), moves, motion, owner, faults)
     if bound.unbounded and job.options.require_proof:
@@ -129,7 +134,7 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_reach_bounds(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
-    return Comparison(worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics),
+    return Comparison(job.moves, worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics),
                       max(bound.tip, worst_tip), max(bound.axis, worst_axis), bound.unbounded, *_cuts(moves, owner, bound))
 
 
@@ -180,16 +185,6 @@ def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
     return np.asarray((travel <= still) | ((begins | ends) & ~far))
 
 
-def _aligned(kept: Ints | slice, tip: Floats, axis: Floats, sweep: Floats, moves: Moves, tolerance: float,
-             axis_tolerance: float, grain: tuple[float, float]) -> tuple[Ints, Ints]:
-    """`align` without the blocks of rewinds, which get no move (M + 1): but for them the tool only rests there."""
-    match, short = align(tip[kept], axis[kept], sweep[kept], moves.curves(), moves.link, tolerance,
-                         axis_tolerance, grain)
-    owner = np.full(len(tip), len(moves) + 1)
-    owner[kept] = short
-    return np.where(match >= 0, np.arange(len(tip))[kept][match], match), owner
-
-
 WorstPlace = tuple[float, tuple[int, int]]
 """a deviation and where it is: CL line, program line"""
 
@@ -215,21 +210,21 @@ def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: F
                         "the program is not made from this CL file with this machine, set-up and tools")
 
 
-def _bound(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allowed: tuple[float, float],
-           corrects: bool) -> DeviationBound:
+def bound_of_blocks(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allowed: tuple[float, float],
+                    corrects: bool, judge: bool = False) -> DeviationBound:
     """Bounds of every block of the moves that are no links. From hole to hole dog-legs are looked at in
     height alone; so are all paths where geometric errors are corrected: a control that drills the holes takes
     up lost motion on its path."""
     rows = np.flatnonzero(moves.run_by(owner))
-    begin, share = _place(motion, executed, rows, owner, moves)
+    begin, share = place_on_moves(motion, executed, rows, owner, moves)
     free = executed.bent(motion, rows) | corrects
     level = (moves.phase[owner[rows]] == Phase.POSITION) & (motion.code[rows] == 0) & free
     some = as_slice(np.flatnonzero(~level))
     found = deviation_bound(motion, executed, moves, rows[some], owner[rows[some]], begin[some],
-                            share[some], allowed)
+                            share[some], allowed, judge)
     for corner in (0.0, 0.5, *executed.corners(motion, rows[level]).T) if level.any() else ():
         tip, _ = executed.poses(motion, rows[level], corner)
-        height = float(_off_level(moves.curves(owner[rows[level]]), tip).max())
+        height = float(off_level(moves.curves(owner[rows[level]]), tip).max())
         found = replace(found, tip=max(found.tip, height))
     return found
 
@@ -247,7 +242,7 @@ def _unproved(bound: DeviationBound, allowed: tuple[float, float], moves: Moves,
     return found
 
 
-def _off_level(curve: Curves, tip: Floats) -> Floats:
+def off_level(curve: Curves, tip: Floats) -> Floats:
     """How far (K,) mm tips are above or below the stretch between the ends of curves, along the tool's axis."""
     height, first, last = ((p * curve.axis1).sum(axis=1) for p in (tip, curve.start, curve.end))
     return np.asarray(np.maximum(np.maximum(np.minimum(first, last) - height, height - np.maximum(first, last)), 0.0))
@@ -262,7 +257,7 @@ def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, 
     tip_off, axis_off = np.zeros(len(rows)), np.zeros(len(rows))
     if not len(rows):
         return tip_off, axis_off
-    begin, share = _place(motion, executed, rows, owner, moves)
+    begin, share = place_on_moves(motion, executed, rows, owner, moves)
     level = (moves.phase[owner[rows]] == Phase.POSITION) & executed.bent(motion, rows)
     for at in range(0, len(rows), CHUNK):
         part = slice(at, at + CHUNK)
@@ -273,20 +268,20 @@ def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, 
             tip, axis = executed.poses(motion, here, t)
             guess = np.minimum(begin[part] + t * share[part], 1.0)
             d, e, _ = curve.deviation(tip, axis, guess, within)
-            d = np.where(level[part], _off_level(curve, tip), d)
+            d = np.where(level[part], off_level(curve, tip), d)
             tip_off[part] = np.fmax(tip_off[part], np.nan_to_num(d, nan=np.inf))
             axis_off[part] = np.fmax(axis_off[part], np.nan_to_num(e, nan=np.inf))
         for k, places in executed.looks(motion, here):
             tip, axis = executed.poses(motion, here[k], places)
             some = moves.curves(owner[here[k]])
             d, e, _ = some.deviation(tip, axis, np.minimum(begin[part][k] + places * share[part][k], 1.0), within)
-            d = np.where(level[part][k], _off_level(some, tip), d)
+            d = np.where(level[part][k], off_level(some, tip), d)
             np.fmax.at(tip_off, at + k, np.nan_to_num(d, nan=np.inf))
             np.fmax.at(axis_off, at + k, np.nan_to_num(e, nan=np.inf))
     return tip_off, axis_off
 
 
-def _place(motion: Motion, executed: BlockPoses, rows: Ints, owner: Ints,
+def place_on_moves(motion: Motion, executed: BlockPoses, rows: Ints, owner: Ints,
            moves: Moves) -> tuple[Floats, Floats]:
     """Where on its move each block (K,) begins, and what part of it it is: by length along arcs, else by count."""
     length = np.ones(len(rows))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.header_words import feeds_place, read_head, with_feeds_mark
+from postproc.base.header_words import feeds_place, read_header, with_feeds_mark
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.job.job import Job
@@ -17,13 +17,13 @@ from postproc.readback.comparison.checks import CHUNK, STILL, block_lengths
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinates
-from postproc.readback.execution.rows import INCH
 from postproc.readback.text.words import plain
 from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import lengths
 from toolpaths.toolpath import Kind
+from toolpaths.units import MM_PER_INCH
 
 _FEED = re.compile(rb"(?i)(?<![A-Z])F *(\d[\d.]*|\.\d+)")
 
@@ -36,13 +36,13 @@ def planned_feeds(data: bytes, others: Mapping[str, bytes], gcode: str) -> tuple
     Feeds that were planned keep acceleration and jerk, which the program does not show: they count as
     explained only as they were written.
     """
-    head = read_head(data)
-    if not head.planned:
+    header = read_header(data)
+    if not header.planned:
         return False, []
     now = feed_fingerprint(data, others)
-    if head.feeds == now:
+    if header.feeds == now:
         return True, []
-    found = f"its header names {head.feeds}, the F words are {now}" if head.feeds else \
+    found = f"its header names {header.feeds}, the F words are {now}" if header.feeds else \
         "its header names no fingerprint of them"
     return True, [error("verify.slow", f"the planned feeds were changed after the program was written: {found}", file=gcode,
                         hint="convert again; where feeds were lowered by hand, no plan explains them")]
@@ -122,7 +122,7 @@ class Slack:
     @classmethod
     def of(cls, job: Job, inch: bool = False) -> Slack:
         """Of a job; programs that correct geometric errors take up lost motion on the path."""
-        unit = INCH if inch else 1.0
+        unit = MM_PER_INCH if inch else 1.0
         if job.corrects:
             return cls(0.25, 0.002, 10.0 * unit * 10.0**-job.controller.format.linear_decimals)
         return cls(0.003, 1e-5, 2.0 * unit * 10.0**-job.controller.format.linear_decimals)

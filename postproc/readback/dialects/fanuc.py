@@ -215,13 +215,14 @@ class FanucReader(IsoReader):
         """The laws, code by code in running order."""
         register = number_of(words, "H")
         state: FanucState = "axes"
-        begun, length = -1, -1.0
+        begun, length, lost = -1, -1.0, False
         for b, c in zip(*codes(words, "G", self.laws), strict=True):
             here, code = int(b), f"G{c:g}"
-            wrong = self.wrong(float(c), state, length)
+            wrong, remedy = self.wrong(float(c), state, length)
             if wrong:
-                found.append(error("gcode.mode", f"{code} {wrong}", file=file, lines=[int(line[here])],
-                                   hint="cancel the mode that is on first"))
+                if not (lost and c == 53.1):  # follows from a G68.2 that was refused
+                    found.append(error("gcode.mode", f"{code} {wrong}", file=file, lines=[int(line[here])], hint=remedy))
+                lost = c == 68.2
                 continue
             if c in (43, self.tcp_code):
                 length = float(np.nan_to_num(register[here], nan=-1.0))
@@ -241,17 +242,16 @@ class FanucReader(IsoReader):
                 state = self.hold(new, here, plane, "tilted")
                 self.unmoved(words, begun, here, line, file, found)
 
-    def wrong(self, code: float, state: FanucState, length: float) -> str:
-        """Why a law's code cannot stand here, "" where it can."""
+    def wrong(self, code: float, state: FanucState, length: float) -> tuple[str, str]:
+        """Why a law's code cannot stand here ("" where it can), and what to do."""
         if code == 53.1:
-            return "" if state == "pending" else "without G68.2 before it"
-        if code == 68.2 and length >= 0.0:
-            return "while a length offset is in force"
+            return ("", "") if state == "pending" else (
+                "without G68.2 before it", "write G68.2 X Y Z I J K in the block before")
+        if length >= 0.0 and (code == 68.2 or (code == 69 and state == "tilted")):
+            return "while a length offset is in force", "write G49 before it"
         if code in (68.2, 254, self.tcp_code) and state != "axes":
-            return "while another mode is on"
-        if code == 69 and state == "tilted" and length >= 0.0:
-            return "while a length offset is in force"
-        return "between G68.2 and G53.1" if state == "pending" and code != 69 else ""
+            return "while another mode is on", f"cancel that: write {'G49' if state == 'tcp' else 'G69 or G255'} before it"
+        return ("between G68.2 and G53.1", "write G53.1 first") if state == "pending" and code != 69 else ("", "")
 
     def hold(self, new: New, b: int, law: WordMeaning, state: InterpolationMode) -> InterpolationMode:
         """The law in force from block b on."""

@@ -91,7 +91,7 @@ class IsoReader(Reader):
         lost = change[~(tool[change] >= 0)]
         if len(lost):
             found.append(error("gcode.tool", "M6 without a tool number", file=file, lines=line[lost][:6].tolist(),
-                               count=len(lost)))
+                               count=len(lost), hint="state T with its number in the block, or before it"))
         blocks, code = codes(words, "G", (43, 49))
         put = np.where(code == 43, np.nan_to_num(register[blocks], nan=-1.0), -1.0)
         new += [(b, REGISTER, h) for b, h in zip(blocks.tolist(), put.tolist(), strict=True)]

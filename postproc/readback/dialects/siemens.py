@@ -189,7 +189,7 @@ class SiemensReader(Reader):
                 loaded = float(np.nan_to_num(tool[b], nan=-1.0))
                 new.append((b, LOADED, loaded))
                 if loaded < 0.0:
-                    run.fault("gcode.tool", b, "M6 without a tool number", "")
+                    run.fault("gcode.tool", b, "M6 without a tool number", "state T with its number before it")
             if d not in (0.0, 1.0):
                 run.fault("gcode.tool", b, f"D{d:g}: the length of another cutting edge than the first is not known",
                           "D1 or D0")

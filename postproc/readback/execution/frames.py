@@ -139,7 +139,7 @@ def frame_of(law: WordMeaning, control: Control | None, length: float, position:
         return AXES
     kin = control.kinematics if control is not None else None
     if control is None or kin is None or not kin.straight_slides or (control.xyz < 0).any():
-        found.append(error("gcode.mode", f"{law.code}: the control does not own the kinematics of this machine", file=file,
+        found.append(error("gcode.mode", f"{law.code}: the control does not have the kinematics of this machine", file=file,
                            lines=[line], hint="machine coordinates are all that it can run"))
         return AXES
     kin = kin.with_tool(length)

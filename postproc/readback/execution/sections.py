@@ -161,7 +161,7 @@ def _with_arcs(rows: MotionRows, state: SectionState, line: Ints, where: Ints, f
                           section.extra[n, 1] * scale[:, 0], state.offsets.arc_slack)
     for k, message in bad.items():
         found.append(error("gcode.arc", message, file=file, lines=[int(where[rows.block[arcs[k]]])],
-                           hint="the control stops at such an arc"))
+                           hint="correct its centre or radius, or the point before it: the control stops there"))
     all_centres = rows.center.copy()
     all_centres[arcs] = center
     rows = replace(rows, center=all_centres)

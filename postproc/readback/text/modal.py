@@ -160,7 +160,7 @@ def check_end(words: Words, file: str, called: tuple[tuple[int, int], ...] = ())
     ends = words.line[outside & (words.letter == ord("M")) & among(words.value, (2, 30))]
     if not len(ends):
         return [error("gcode.no_end", "the program has no end (M2 or M30)", file=file, lines=[words.lines],
-                      hint="it may have been cut off")]
+                      hint="write M30 in its last line where it is whole; it may have been cut off")]
     after = np.unique(words.line[outside & (words.line > ends.min())])
     if not len(after):
         return []

@@ -6,7 +6,7 @@ import json
 import re
 
 from postproc.explain.pages import pages
-from tests.explained_codes import MADE, ROOT, codes
+from tests.explained_codes import MADE, NONE, ROOT, codes, said_codes
 from tests.postproc.cli.test_cli import run
 
 HOW = "run python tests/explained_codes.py"
@@ -16,6 +16,11 @@ def test_every_code_has_a_page_and_every_page_a_code() -> None:
     found, known = set(codes()), set(pages())
     assert found - known == set(), HOW
     assert known - found == set(), HOW
+
+
+def test_no_area_is_left_out() -> None:
+    """Codes by the calls that make them: one with an area that no page knows is a code without a page."""
+    assert said_codes() - NONE - set(pages()) == set(), "add its area to postproc/explain/areas.toml"
 
 
 def test_messages_and_remedies_are_those_of_the_source() -> None:

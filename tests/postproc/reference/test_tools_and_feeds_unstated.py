@@ -238,7 +238,7 @@ def test_a_cycle_that_cannot_be_written_names_the_reason(text: str, controller: 
 def test_a_length_next_to_the_tool_is_no_register() -> None:
     result = converted(HEAD.replace("LOADTL/1", "LOADTL/1,LENGTH,120") + CUT)
     assert not errors(result) and "G43 H1" in result.text.splitlines()
-    assert "gauge length of tool 1 in the set-up" in said(result, "cl.tool-length").hint
+    assert "[tools.1] gauge_length of the set-up is" in said(result, "cl.tool-length").message
     both = converted(HEAD.replace("LOADTL/1", "LOADTL/1,LENGTH,120,OFFSET,7") + CUT)
     assert "G43 H7" in both.text.splitlines()
     assert "G43 H5" in converted(HEAD.replace("LOADTL/1", "LOADTL/1,1,120,5") + CUT).text.splitlines()

@@ -250,8 +250,8 @@ def test_subprograms_bear_numbers_or_names() -> None:
     p = read(head + "CALSUB/HOLE-7\nDEFSUB/hole-7\nGOTO/2,0,0\nCALSUB/LATER\nENDSUB\nCALSUB / hole-7\n"
              "DEFSUB/LATER\nGOTO/3,0,0\nENDSUB\nCALSUB/7\n")
     assert p.tip[:, 0].tolist() == [1, 2, 3, 7]
-    for call, said in (("HOLE", "HOLE: the subprogram is not defined; the file defines HOLE-7"), ("", "is not defined"),
-                       ("8", "8: the subprogram is not defined")):
+    for call, said in (("HOLE", "HOLE: the subprogram is not defined; the file defines 7, HOLE-7; else"),
+                       ("", "is not defined"), ("8", "8: the subprogram is not defined")):
         found = read_bytes(f"{head}CALSUB/{call}\n").diagnostics
         assert sum(said in str(d) for d in found if d.code == "cl.subprogram") == 1
     assert any("no CALSUB runs subroutine HOLE-7" in str(d) for d in read_bytes(head).diagnostics)

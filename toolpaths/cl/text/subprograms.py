@@ -21,8 +21,6 @@ class Subprograms:
 
     ends: dict[int, int]
     named: dict[Called, list[tuple[int, int]]]
-    names: tuple[str, ...]
-    """those that are no numbers"""
 
     def elsewhere(self, name: Called) -> bool:
         """True where a call means a program that the machine keeps: by name in a file without subprograms.
@@ -50,7 +48,7 @@ def subprograms_of(statements: Sequence[Statement]) -> Subprograms:
     named: dict[Called, list[tuple[int, int]]] = {}
     for start in sorted(ends):
         named.setdefault(called(statements[start]), []).append((start, ends[start]))
-    return Subprograms(ends, named, tuple(name for name in named if isinstance(name, str) and name))
+    return Subprograms(ends, named)
 
 
 def called(s: Statement) -> Called:

@@ -1,0 +1,14 @@
+"""All cases of the law of hints."""
+
+from __future__ import annotations
+
+from tests.hints.cl_cases import CL
+from tests.hints.cl_word_cases import CL_WORDS
+from tests.hints.convert_cases import CONVERT
+from tests.hints.error_cases import ERRORS
+from tests.hints.file_cases import FILE
+from tests.hints.gcode_cases import GCODE
+from tests.hints.machine_cases import MACHINE
+from tests.hints.tool_cases import TOOLS
+
+CASES = [*CL, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE]

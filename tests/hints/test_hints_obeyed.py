@@ -1,0 +1,40 @@
+"""The law of hints: what a message says is done, word by word, and its fault is gone."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.explained_codes import codes
+from tests.hints.case import HintCase, called
+from tests.hints.cases import CASES
+from tests.hints.open_codes import OPEN
+
+
+@pytest.mark.parametrize("case", CASES, ids=[f"{c.code}-{k}" for k, c in enumerate(CASES)])
+def test_a_hint_obeyed_is_the_end_of_its_fault(case: HintCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    case.begin(tmp_path)
+    _, before = called(case.command, tmp_path)
+    said = [d for d in before if d["code"] == case.code and re.search(case.says, d["hint"])]
+    assert said, [f"{d['code']} {d['message']}; {d['hint']}" for d in before]
+    again = case.obey(tmp_path, said[0]["hint"])
+    code, after = called(again, tmp_path)
+    left = [f"{d['code']} {d['message']}; {d['hint']}" for d in after if (
+        d["message"] == said[0]["message"] if case.code_left else d["code"] == case.code)]
+    assert left == []
+    errors = {d["code"] for d in after if d["severity"] == "error"}
+    assert errors <= set(case.stops), [f"{d['code']} {d['message']}; {d['hint']}" for d in after if d["code"] in errors]
+    assert code == (1 if errors else 0)
+
+
+def test_every_code_with_a_remedy_is_under_the_law_or_named() -> None:
+    """A new remedy comes with its case; the table of those without one only shrinks."""
+    known = {code for code, one in codes().items() if one["remedies"]}
+    proved = {case.code for case in CASES}
+    assert proved & set(OPEN) == set(), "take it out of the table"
+    assert known - proved - set(OPEN) == set(), "write a case"
+    assert set(OPEN) <= known, "no such remedy"
+    assert len(OPEN) <= 132 and all(len(why) > 10 for why in OPEN.values())
