@@ -55,6 +55,7 @@ FLOORS = (
     ("postproc.proof", "the proof as a file, what has changed since"),
     ("postproc.cycle_time", "how long a program takes, with a band"),
     ("postproc.placement", "where the part stands on the table"),
+    ("postproc.alignment", "a part that is not where it was meant, measured"),
     ("postproc.report", "summary, trace, residual field"),
     ("postproc.setup_sheet", "a new set-up: facts, questions, a place that fits"),
     ("postproc.explain", "a page for each code of a message"),

@@ -12,7 +12,8 @@ import numpy as np
 
 from machines.kinematics.chain import ROTARY
 from postproc.compile.program import PER_MINUTE, Hole, Program, Section
-from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
+from postproc.controllers.model import CannedCycle, ControllerFile
+from postproc.controllers.output_modes import LengthState, Mode
 from postproc.controllers.texts import CYCLE_LENGTHS
 from postproc.job.smoothing import Smoothing
 from postproc.path.model import ARC

@@ -15,7 +15,7 @@ from postproc.compile.clamps import CLAMP, UNCLAMP
 from postproc.compile.hooks import HOOK
 from postproc.compile.program import PER_MINUTE, Command, Hole
 from postproc.control.rollover import HALF
-from postproc.controllers.model import Mode
+from postproc.controllers.output_modes import Mode
 from postproc.controllers.texts import blocks_of
 from postproc.reference.coolant import COMMANDS
 from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name
