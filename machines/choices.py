@@ -9,7 +9,7 @@ Stop = Literal["spindle and coolant", "spindle", "nothing"]
 RolloverRule = Literal["shortest", "sign", "none"]
 """which path the control takes to a word of a modulo axis"""
 Park = Literal["turn", "home"]
-"""where an axis that turns on and on is parked"""
+"""where an axis without end stops is parked"""
 BoughtOption = Literal["tilted_planes", "tip_control", "smoothing", "rigid_tapping", "helical", "splines"]
 """option of a control that a shop has bought or not"""
 Rapids = Literal["straight", "dog-leg"]

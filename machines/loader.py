@@ -18,7 +18,7 @@ from machines.kind_check import build_faults, contract_faults
 from machines.kinematics.base import Kinematics
 from machines.machine import ClampCodes, ControlOptions, Limits, Machine, Timing, Turns
 from machines.models import ControlModel, KeyProblem, KinematicsModel, MachineModel, register_beyond
-from machines.user_file import UserFile, nearest, read_toml, schema, validate
+from machines.user_file import UserFile, nearest_word, read_toml, schema, validate
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.units import DEG, PER_MINUTE
 
@@ -114,8 +114,8 @@ def _kinematics_model(file: UserFile) -> tuple[type[KinematicsModel] | None, lis
 
 
 def _hint(kind: str) -> str:
-    meant = nearest(kind, kinds.known())
-    return f"{meant} {kinds.HOW}" if meant.endswith("?") else kinds.HOW
+    meant = nearest_word(kind, kinds.known())
+    return f"did you mean {meant!r}? {kinds.HOW}" if meant else kinds.HOW
 
 
 @cache

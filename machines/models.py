@@ -81,7 +81,7 @@ class AxisModel(UserModel):
     """One `[axes.LETTER]` table."""
 
     travel: Travel
-    """[lower, upper] in machine coordinates, mm or degrees; "unlimited" for a rotary axis that turns on and on"""
+    """[lower, upper] in machine coordinates, mm or degrees; "unlimited" for a rotary axis without end stops"""
     velocity: Positive
     """mm/s or deg/s"""
     acceleration: Positive
@@ -92,7 +92,7 @@ class AxisModel(UserModel):
     """mm/s or deg/s that the axis is moved with at feed at most, where that is less than its velocity, which is
     that of rapids. Fanuc: parameter 1430, under look-ahead 1432; default: the velocity"""
     home: float
-    """position for tool change and programme start, mm or degrees"""
+    """position for tool change and program start, mm or degrees"""
     modulo: bool = False
     """the control counts this rotary axis modulo 360 degrees (roll-over): its words stay inside one turn.
     Fanuc: parameter 1008#0 ROA = 1 and 1260 = 360; Siemens: MD30310 $MA_ROT_IS_MODULO; LinuxCNC: WRAPPED_ROTARY = 1"""
@@ -103,7 +103,7 @@ class AxisModel(UserModel):
     Heidenhain M126), that of the word's sign (Fanuc RAB = 1, LinuxCNC), or none: it counts the turns after
     all. Default: that of the controller"""
     park: Park = "turn"
-    """where an axis that turns on and on is parked: at the whole turn that is nearest to home, or at home
+    """where an axis without end stops is parked: at the whole turn that is nearest to home, or at home
     itself, all turns unwound; a modulo axis that rolls over has no turns to unwind"""
     clamp: MCode = ""
     """M code that clamps this rotary axis, e.g. "M10", where the program has to say it; the builder's manual
@@ -144,7 +144,7 @@ class ControlModel(UserModel):
 
     tilted_planes: bool | None = None
     """the option of tilted work planes is fitted (Fanuc G68.2, Haas G254 DWO, Siemens CYCLE800, Heidenhain PLANE); false:
-    it is not. Default, here and below: not confirmed, it is used and the head of the program names it"""
+    it is not. Default, here and below: not confirmed, it is used and the header of the program names it"""
     tip_control: bool | None = None
     """the option of tool-centre-point control (G43.4, G234 TCPC, TRAORI, TCPM)"""
     smoothing: bool | None = None
@@ -187,6 +187,7 @@ class MachineModel(UserModel):
     """linear axis that lifts the tool off the part at home"""
     timing: TimingModel
     control: ControlModel | None = None
+    """what the control of this machine does of its own, and which options it has"""
     hooks: HooksModel = HooksModel()
     """blocks of the shop round tool calls, indexing moves, operations and stops"""
 
@@ -257,7 +258,7 @@ def _modulo_problem(name: str, axis: AxisModel, rotary: bool) -> KeyProblem | No
         return KeyProblem("machine.modulo", path, f"linear axis {name} cannot be modulo", "take modulo out")
     if used and axis.travel != "unlimited" and (axis.modulo or "park" in used):
         return KeyProblem("machine.modulo", path, f"axis {name} has {used[0]}, and its travel ends at {list(axis.range)}",
-                       'write travel = "unlimited" for an axis that turns on and on, else take it out')
+                       'write travel = "unlimited" for an axis without end stops, else take it out')
     stray = [key for key in used if key in ("modulo_range", "rollover")]
     if stray and not axis.modulo:
         return KeyProblem("machine.modulo", ("axes", name, stray[0]), f"axis {name} has {stray[0]}, and is not modulo",

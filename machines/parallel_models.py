@@ -79,6 +79,7 @@ class RotaryModel(UserModel):
     """`[kinematics.rotary]`: the fifth axis of an H4 machine."""
 
     letter: Literal["A", "B", "C"]
+    """name of the axis"""
     carries: Literal["part", "spindle"]
     """part: a table about z through the machine origin; spindle: about the platform's y, between it and the spindle"""
     positive: Literal[1, -1] = 1

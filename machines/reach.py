@@ -30,18 +30,20 @@ MarginColumn = tuple[str, bool, Callable[[ClearanceGeometry], Floats]]
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(angular="M", values="N M")
+@arrays(angular="M", of_box="M", values="N M")
 class Margins:
     """Signed margins: negative where a bound is passed, NaN where the joints have no pose.
 
     Attributes:
         names: what each column is, e.g. "rod X1 - rod Y1"
         angular: (M,) True for rad, False for mm
+        of_box: (M,) True for faces of the box that the machine is declared to work in
         values: (N, M)
     """
 
     names: tuple[str, ...]
     angular: Bools
+    of_box: Bools
     values: Floats
 
     def passed(self) -> list[tuple[str, bool, int, int, float]]:
@@ -69,7 +71,7 @@ def reach(kinematics: Kinematics, q: Floats, near: Floats | None = None) -> Marg
         hint = near[part] if near is not None and near.ndim == 2 else near
         blocks.append(checks.values(kinematics.rig(q[part], hint)))
     values = np.concatenate(blocks) if blocks else np.empty((0, len(checks.names)))
-    return Margins(checks.names, checks.angular, values)
+    return Margins(checks.names, checks.angular, checks.of_box, values)
 
 
 def reach_between(kinematics: Kinematics, q: Floats, depth: int = 6) -> Margins:
@@ -83,7 +85,7 @@ def reach_between(kinematics: Kinematics, q: Floats, depth: int = 6) -> Margins:
     ends = reach(kinematics, q).values
     least = np.minimum(ends[:-1], ends[1:])
     _halve(kinematics, checks, q[:-1], q[1:], ends[:-1], ends[1:], least, np.arange(len(q) - 1), depth)
-    return Margins(checks.names, checks.angular, least)
+    return Margins(checks.names, checks.angular, checks.of_box, least)
 
 
 def _halve(kinematics: Kinematics, checks: _Checks, q0: Floats, q1: Floats, m0: Floats, m1: Floats, least: Floats,
@@ -106,21 +108,24 @@ class _Checks:
     def __init__(self, kinematics: Kinematics) -> None:
         assert kinematics.workspace is not None  # see `is_checked`
         self.space, self.letters = kinematics.workspace, kinematics.axis_names
-        self.columns: list[MarginColumn] = list(self._workspace())
+        self.columns: list[MarginColumn] = [*self._box(), *self._tilts()]
         platform = kinematics.on_rods
         if platform is not None and platform.clearance is not None:
             self.middle, self.legs, self.clearance = platform.middle_rig(), platform.legs, platform.clearance
             self.columns += [*self._stops(), *self._bars()]
         self.names = tuple(name for name, _, _ in self.columns)
         self.angular = np.array([angular for _, angular, _ in self.columns], dtype=np.bool_)
+        self.of_box = np.arange(len(self.columns)) < len("xyz")
 
     def values(self, rig: ClearanceGeometry) -> Floats:
         """(N, M)"""
         return np.stack([column(rig) for _, _, column in self.columns], axis=1)
 
-    def _workspace(self) -> Iterator[MarginColumn]:
+    def _box(self) -> Iterator[MarginColumn]:
         for i, letter in enumerate("xyz"):
             yield f"workspace {letter}", False, partial(self._face, i)
+
+    def _tilts(self) -> Iterator[MarginColumn]:
         if self.space.tilt[0] < self.space.tilt[1]:
             yield "tilt", True, self._tilt
 

@@ -55,8 +55,11 @@ class WorkspaceModel(UserModel):
     """`[kinematics.workspace]`: box of the platform's reference point in the machine frame, mm; tilt in degrees."""
 
     x: Interval
+    """lower, upper"""
     y: Interval
+    """lower, upper"""
     z: Interval
+    """lower, upper"""
     tilt: tuple[float, float] = (0.0, 0.0)
     """range of the platform's tilt about x"""
 
@@ -70,10 +73,13 @@ class ClearanceModel(UserModel):
     """`[kinematics.clearance]`: what may touch, mm and degrees; a key left out is not checked."""
 
     rod_radius: Positive | None = None
+    """of every rod"""
     spindle_radius: Positive | None = None
+    """of the spindle round the tool axis"""
     spindle: Interval = (0.0, 1.0)
     """lower and upper end of the spindle above the gauge point along the tool axis"""
     rail_radius: NotNegative | None = None
+    """of the fixed part of every slide, as a round bar"""
     carriage_angle: Positive | None = None
     """largest swing of a rod at its carriage from its direction in the middle of the workspace"""
     platform_angle: Positive | None = None

@@ -136,13 +136,14 @@ def schema(*models: type[BaseModel]) -> Values:
 
 def nearest(word: str, known: Sequence[str]) -> str:
     """A hint: the known word nearest to `word`, else the list of all."""
-    match = _nearest(word, known)
+    match = nearest_word(word, known)
     if match is not None:
         return f"did you mean {match!r}?"
     return "known: " + ", ".join(sorted(known)) if known else ""
 
 
-def _nearest(word: str, known: Sequence[str]) -> str | None:
+def nearest_word(word: str, known: Sequence[str]) -> str | None:
+    """The known word that is most like `word`; None where none is."""
     close = difflib.get_close_matches(word.lower(), [k.lower() for k in known], n=1, cutoff=0.6)
     return next((k for k in known if close and k.lower() == close[0]), None)
 
@@ -302,7 +303,7 @@ def _in_file(values: Values, detail: ErrorDetails) -> KeyPath:
 
 
 def _nearest_key(path: KeyPath, model: type[BaseModel]) -> str | None:
-    return _nearest(str(path[-1]), _known_keys(model, path[:-1]))
+    return nearest_word(str(path[-1]), _known_keys(model, path[:-1]))
 
 
 def _diagnostic(file: UserFile, model: type[BaseModel], fault: _Fault) -> Diagnostic:

@@ -50,7 +50,14 @@ def chosen(cases: Sequence[Case], together: int = 1, count: int = 0, of: Sequenc
 
 
 def _case(item: pytest.Item) -> Case:
-    """Values of a case by parameter; where one cannot be compared, its number among the values of that parameter."""
-    spec = item.callspec
-    return {name: value if isinstance(value, Hashable) and not callable(value) else ("case", spec.indices[name])
-            for name, value in spec.params.items()}
+    """Values of a case by parameter."""
+    return {name: _known(value) for name, value in item.callspec.params.items()}
+
+
+def _known(value: object) -> Hashable:
+    """A value; one that cannot be looked up is known by its place in memory, the same in all cases that share it."""
+    try:
+        hash(value)
+    except TypeError:
+        return "at", id(value)
+    return value

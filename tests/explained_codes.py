@@ -6,12 +6,16 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import json
 import re
 import sys
 import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import get_args
+
+from postproc.witness.evidence import FindingCode
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -26,11 +30,14 @@ NONE = frozenset({"postproc.controllers", "postproc.cycle_time", "postproc.kinem
 """texts of that form that are no codes: modules, files, keys of the set-up"""
 MADE = {"verify.tip", "verify.axis", "setup.work_offset", "coolant.off", "coolant.flood", "coolant.mist", "coolant.through",
         "coolant.air", "proof.program", "proof.cl_file", "proof.setup", "proof.machine", "proof.controller",
-        "proof.error_model", "proof.options", "proof.postproc", "witness.arc", "witness.clamp", "witness.feed",
-        "witness.hole", "witness.offset", "witness.position", "witness.rods", "witness.turning", "witness.velocity"}
+        "proof.error_model", "proof.options", "proof.postproc", *(f"witness.{found}" for found in get_args(FindingCode))}
 """codes that are put together from an area and what is found"""
 
 
+FOUND = {found: found for found in get_args(FindingCode)} | {"speed": "spindle"}
+"""words of findings in the code, and the codes that they are"""
+LEAST = 20
+"""characters of a message; shorter texts are names"""
 Signature = tuple[str, ...]
 """names of the parameters of a function, self left out"""
 
@@ -105,12 +112,21 @@ def _said(tree: ast.Module, signatures: dict[str, set[Signature]]) -> Iterator[t
             yield node.value, "", ""
 
 
+def _found(node: ast.AST) -> Iterator[tuple[str, str, str]]:
+    """What the second witness finds, where it says so: a code without its area, and a message behind it."""
+    given = node.args if isinstance(node, ast.Call) else node.elts if isinstance(node, ast.Tuple) else []
+    for one, then in itertools.pairwise(given):
+        said = re.sub("{[0-9]}", "...", _words(then, {}))
+        if isinstance(one, ast.Constant) and one.value in FOUND and len(said) > LEAST:
+            yield f"witness.{FOUND[one.value]}", f"second witness: {said}", "do not run this program"
+
+
 SAYS = frozenset({"error", "warning", "info", "fault", "problem", "KeyProblem", "Diagnostic", "note", "warn", "many", "add"})
 """names of calls that make a diagnostic"""
 
 
-def _trees() -> list[ast.Module]:
-    return [ast.parse(path.read_text("utf-8")) for top in ("toolpaths", "machines", "postproc")
+def _trees(*rooms: str) -> list[ast.Module]:
+    return [ast.parse(path.read_text("utf-8")) for top in rooms or ("toolpaths", "machines", "postproc")
             for path in sorted((ROOT / top).rglob("*.py"))]
 
 
@@ -131,7 +147,9 @@ def codes() -> dict[str, dict[str, list[str]]]:
     found: dict[str, dict[str, list[str]]] = {code: {"messages": [], "remedies": []} for code in MADE}
     trees = _trees()
     signatures = _signatures(trees)
-    for code, message, hint in (said for tree in trees for said in _said(tree, signatures)):
+    found_by_witness = (said for tree in _trees("postproc/witness") for node in ast.walk(tree) for said in _found(node))
+    for code, message, hint in itertools.chain((said for tree in trees for said in _said(tree, signatures)),
+                                               found_by_witness):
         if code in NONE or code.split(".")[0] not in areas:
             continue
         one = found.setdefault(code, {"messages": [], "remedies": []})

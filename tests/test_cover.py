@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from itertools import combinations, product
 from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from tests.cover import Case, chosen, mark_slow
@@ -44,7 +46,7 @@ class Item:
     def __init__(self, nodeid: str, marker: pytest.MarkDecorator | None, **params: object) -> None:
         self.nodeid, self.marker, self.added = nodeid, marker, list[str]()
         if params:
-            self.callspec = SimpleNamespace(params=params, indices=dict.fromkeys(params, 0))
+            self.callspec = SimpleNamespace(params=params)
 
     def get_closest_marker(self, name: str) -> pytest.Mark | None:
         return self.marker.mark if self.marker and name == "covering" else None
@@ -61,3 +63,20 @@ def test_the_marker_leaves_the_others_to_the_slow_tests() -> None:
     mark_slow([*one, *two, *plain])
     assert [item.added for item in one] == [[], ["slow"], ["slow"], []]
     assert not any(item.added for item in (*two, *plain))
+
+
+def test_options_in_dictionaries_and_arrays_are_values_as_others() -> None:
+    """Of a real product: pytest numbers such values anew in each case."""
+    options: list[Any] = [{}, {"smooth": True}, ["a"], np.zeros(3), ({}, 1)]
+    items = [Item(f"a.py::one[{c}-{k}]", pytest.mark.covering, control=c, option=one)
+             for c in "abc" for k, one in enumerate(options)]
+    mark_slow(items)
+    assert len([item for item in items if not item.added]) == len(options)
+
+
+@pytest.mark.covering
+@pytest.mark.parametrize("option", [{}, {"smooth": True}], ids=["plain", "smooth"])
+@pytest.mark.parametrize("control", range(6))
+def test_pytest_gives_one_object_to_all_cases(control: int, option: dict[str, bool], request: pytest.FixtureRequest) -> None:
+    own = [item for item in request.session.items if item.nodeid.partition("[")[0] == request.node.nodeid.partition("[")[0]]
+    assert sum(item.get_closest_marker("slow") is None for item in own) <= 6

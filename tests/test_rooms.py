@@ -42,6 +42,7 @@ FLOORS = (
     ("postproc.readback.text", "characters to canonical words, modal state"),
     ("postproc.readback.dialects", "the reader of each control"),
     ("postproc.readback.execution", "canonical words to motion and poses"),
+    ("postproc.readback.alignment", "which blocks run each move of the CL file"),
     ("postproc.readback.comparison", "motion against the CL file, bounds, checks"),
     ("postproc.collision", "tools against part, table and fixtures"),
     ("postproc.verification", "reading a program back, second witness, errors that are left"),

@@ -23,7 +23,7 @@ FILES = {
     "machines.geometric_error.exchange.imports": "tables of others",
     "postproc.pipeline.hooks": "blocks of controller files",
     "postproc.reference.records": "blocks of INSERT records",
-    "postproc.base.header_words": "heads of programs: written and read in one place",
+    "postproc.base.header_words": "headers of programs: written and read in one place",
     "postproc.cycle_time.source": "whether a file is a CL file or a program",
     "postproc.readback.comparison.hooks": "blocks of the shop in programs",
     "postproc.readback.comparison.slow_moves": "F words of programs",
@@ -32,7 +32,7 @@ FILES = {
     "postproc.writing.linuxcnc": "comments that LinuxCNC obeys", "postproc.writing.state": "decimals of words",
     "postproc.writing.writer": "labels of blocks"}
 """single files besides"""
-SENTENCES = {"message", "why", "refused", "touching", "hint", "text", "reason"}
+SENTENCES = {"message", "why", "refused", "touching", "hint", "text", "reason", "what", "where", "said", "meant"}
 """names under which sentences are held"""
 TAKEN_APART = {"startswith", "endswith", "removeprefix", "removesuffix", "partition", "rpartition", "split"}
 OF_OTHERS = {("machines.user_file", "partition"), ("machines.user_file", "removeprefix")}

@@ -29,6 +29,9 @@ INSTEAD = {
     "arcs resolved": "arcs split into lines", "no control is below": "lower bound",
     "goes to:": "time by activity:", "held by the feed": "limited by programmed feed", "lost by": "rejected:",
     "sense of the arcs": "arc direction", "axis positions": "machine coordinates", "best alone": "fastest for this pass",
+    "head of the program": "header of the program (a head carries the spindle)", "head of a program": "header of a program",
+    "head of programs": "header of programs", "heads of programs": "headers of programs", "at the head": "in the header",
+    "on and on": "without end stops", "pretend": "have the same effect as",
 }
 WORDS = re.compile(r"(?<![\w.-])(" + "|".join(sorted(INSTEAD, key=len, reverse=True)) + r")(?![\w-])",
                    re.IGNORECASE)

@@ -60,8 +60,7 @@ def reached(machine: Machine, tip: Floats, axis: Floats) -> Bools:
 
 def _clear(machine: Machine, q: Floats) -> Bools:
     margins = reach(machine.kinematics, q)
-    bounds = [not name.startswith("workspace") for name in margins.names]
-    result: Bools = np.all(margins.values[:, bounds] >= 0.0, axis=1)
+    result: Bools = np.all(margins.values[:, ~margins.of_box] >= 0.0, axis=1)
     return result
 
 

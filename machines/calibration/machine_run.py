@@ -155,7 +155,7 @@ def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, star
     if isinstance(given, BarModel):
         figures["centre_mm"] = [c + fitted.setup[name] for c, name in zip(given.centre, SETUP["distance"], strict=False)]
     if not result.converged:
-        run.problem("calibrate.converged", "the fit does not come to an end",
+        run.problem("calibrate.converged", "the fit does not converge",
                     "check units and signs of the table")
     _undetermined(run, result.not_identifiable)
     if has_errors(run.found):
@@ -164,7 +164,7 @@ def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, star
     travel = run.machine.limits.lower, run.machine.limits.upper
     columns = [c.name for c in COLUMNS[run.kind]]
     units, joints = ([table.unit[name] for name in names] for names in (columns, run.machine.axis_names))
-    return done(run, fitted.model, figures, result.noise, f"sigma_um = {given.sigma_um:g}",
+    return done(run, fitted.model, figures, result.noise, {"sigma_um": given.sigma_um},
                 lambda: machine_table_fault(start, kinematics, measured, wanted, travel, units, joints, columns), start,
                 wanted)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from machines.calibration.noise import CHANCE, Noise
@@ -44,14 +44,14 @@ class CalibrationOutcome:
                 f"readings, {self.figures['spare']} degrees of freedom")
 
 
-def done(run: CalibrationRun, model: ErrorModel, figures: CalibrationFigures, noise: Noise | None, sigma: str,
-         fault: Callable[[], TableFault | None], start: ErrorModel | None = None,
+def done(run: CalibrationRun, model: ErrorModel, figures: CalibrationFigures, noise: Noise | None,
+         sigma: Mapping[str, float], fault: Callable[[], TableFault | None], start: ErrorModel | None = None,
          wanted: Sequence[str] = ()) -> CalibrationOutcome:
     """The calibration, its parameters in the figures.
 
     Args:
         noise: what is left of the readings
-        sigma: how the file states their noise
+        sigma: their noise by the keys with which the file states it
         fault: looks for a wrong unit, sign or order in the table that would explain the readings, None where there is none
         start, wanted: model that was begun from, and beginnings of names that were asked for
     """
@@ -84,7 +84,7 @@ def uncertain(run: CalibrationRun, code: str, message: str, hint: str, key: str 
         run.problem(code, message, hint, key)
 
 
-def _residual(run: CalibrationRun, figures: CalibrationFigures, noise: Noise | None, sigma: str,
+def _residual(run: CalibrationRun, figures: CalibrationFigures, noise: Noise | None, sigma: Mapping[str, float],
               fault: Callable[[], TableFault | None]) -> None:
     """What is left of the readings against what the file says of their noise."""
     if noise is None:
@@ -133,7 +133,6 @@ def _loud(run: CalibrationRun, figures: CalibrationFigures, noise: Noise, messag
                 f"look for wrong signs, units, outliers (robust = true); {stated}; {ACCEPT}")
 
 
-def _stated(sigma: str, left: float) -> str:
-    """The keys that state the noise, as they would be for what is left: `sigma` "sigma_um = 0.3 or sigma_arcsec = 0.05"."""
-    keys = [key.split(" = ") for key in sigma.split(" or ")]
-    return " or ".join(f"{name} = {left * float(value):.3g}" for name, value in keys)
+def _stated(sigma: Mapping[str, float], left: float) -> str:
+    """The keys that state the noise, as they would be for what is left."""
+    return " or ".join(f"{name} = {left * value:.3g}" for name, value in sigma.items())

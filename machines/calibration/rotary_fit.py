@@ -2,7 +2,7 @@
 
 Each error is a Fourier series of the axis's position (C annex A.1, which offers polynomials; a turn is
 periodic), the indexer's are free at every increment, the mounting's eighteen are free in each set-up. The
-readings are linear in all of them (transport matrices, C 1.25). What mounting and indexer can pretend as well
+readings are linear in all of them (transport matrices, C 1.25). What mounting and indexer cause as well
 is found by rank and left out: it is listed, never divided by.
 """
 
@@ -37,7 +37,7 @@ class RotaryFit:
     Attributes:
         amplitudes, sigma: (6, 2, H); where they are not determined amplitude 0 and sigma inf
         covariance: (12 H, 12 H) of the flattened amplitudes
-        lost: names of the amplitudes that mounting or indexer can pretend as well
+        lost: names of the amplitudes that mounting or indexer cause as well
         result: of the fit; the smallest one where the readings leave it open
         residuals: (m, n, 6)
         noted, condition_number: how many amplitudes the readings determine, and how far apart (2-norm,
@@ -117,7 +117,7 @@ def _design(bench: Bench, m: int, harmonics: int) -> tuple[Floats, tuple[str, ..
 
 
 def hidden(bench: Bench, sigma: Floats, harmonics: int) -> tuple[str, ...]:
-    """Names of the amplitudes that the mounting can pretend however many set-ups are measured."""
+    """Names of the amplitudes that the mounting causes as well, however many set-ups are measured."""
     design, names = _design(bench, min(bench.steps, ENOUGH), harmonics)
     lost, _ = _noted(_left(design / np.tile(sigma, len(design) // 6)[:, None], 12 * harmonics))
     return tuple(np.array(names[:12 * harmonics])[lost].tolist())

@@ -58,7 +58,7 @@ def reversal(run: CalibrationRun, given: ReversalModel, table: CsvTable) -> Cali
     x = 2.0 * np.pi * np.arange(given.steps) / given.steps
     model = ErrorModel(SerialErrors((Component(name, TableCurve(x, sense * fitted.axis, "spline", period=2.0 * np.pi)),)),
                        covariance=fitted.covariance[: given.steps, : given.steps])
-    return done(run, model, figures, fitted.result.noise, f"sigma_arcsec = {given.sigma_arcsec:g}",
+    return done(run, model, figures, fitted.result.noise, {"sigma_arcsec": given.sigma_arcsec},
                 lambda: reversal_table_fault(readings, sigma, given, table.unit["reading"]))
 
 
@@ -105,10 +105,11 @@ def rotary(run: CalibrationRun, given: RotaryMeasurementModel, table: CsvTable) 
                     "measure one more set-up, the indexer turned by one increment more")
         return CalibrationOutcome(None, figures)
     if fitted.lost:
-        run.note("calibrate.hidden", f"the mounting can pretend {', '.join(fitted.lost)} as well; they are 0 in the model")
+        run.note("calibrate.hidden",
+                 f"an error of the mounting has the same effect as {', '.join(fitted.lost)}; they are 0 in the model")
     model = error_model(fitted, given.axis, sense=sense, carries_part=_carries_part(run, given.axis))
     return done(run, model, figures, fitted.result.noise,
-                f"sigma_um = {given.sigma_um:g} or sigma_arcsec = {given.sigma_arcsec:g}",
+                {"sigma_um": given.sigma_um, "sigma_arcsec": given.sigma_arcsec},
                 lambda: rotary_table_fault(bench, readings, sigma, given.harmonics, [table.unit[p] for p in PARTS]))
 
 

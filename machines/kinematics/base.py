@@ -135,7 +135,7 @@ class Kinematics(ABC):
         result = q.copy()
         result[:, solved] = 0.0
         at_zero, _ = self.forward(result)
-        columns = self.jacobian(result)[:, :3, :][:, :, solved]
+        columns = self.slide_directions(result, solved)
         result[:, solved] = np.linalg.solve(columns, (tip - at_zero)[..., None])[..., 0]
         return result
 
@@ -154,6 +154,10 @@ class Kinematics(ABC):
     def jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
         """d(tip, axis)/dq as (N, 6, J)."""
         return by_samples.rates(lambda some: self.forward(some, near), q, self.rotary)
+
+    def slide_directions(self, q: Floats, slides: Ints) -> Floats:
+        """d(tip)/dq (N, 3, K) of the K joints `slides`: where slides are straight, how they run in the table frame."""
+        return self.jacobian(q)[:, :3, :][:, :, slides]
 
     def twist_jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
         """(v, omega) of the tool relative to the part per joint rate, (N, 6, J), v at the tip, in the table frame.

@@ -1,14 +1,14 @@
 """Serial machines: three linear and up to two rotary axes in any order, on the part's or the tool's side.
 
-The machine is one chain from the workpiece to the tool in the order of its ISO 10791-6 code. Every axis moves
-what is on its tool side relative to what is on its workpiece side in the positive sense of ISO 841, so that
-primed axes (which carry the part) and unprimed ones obey one formula. With the motion M_i of axis i (a shift
-along its direction, or a turn about the line through its point, both as they stand at q = 0)
+The machine is one chain from the workpiece to the tool in the order of its ISO 10791-6 code. Every axis moves what is on its
+tool side relative to what is on its workpiece side in the positive sense of ISO 841, so that primed axes (which carry the
+part) and unprimed ones obey one formula. With the motion M_i of axis i (a shift along its direction, or a turn about the
+line through its point, both as they stand at q = 0)
 
     tip = M_1(q_1) M_2(q_2) ... M_J(q_J) tip_0,      axis = R_1 R_2 a_0 (turns only),
 
-the product of exponentials (Brockett 1984; Murray, Li, Sastry, A Mathematical Introduction to Robotic
-Manipulation, 1994, equation 3.4), seen from the part. The gauge point is at the machine origin at q = 0.
+the product of exponentials (Brockett 1984; Murray, Li, Sastry, A Mathematical Introduction to Robotic Manipulation, 1994,
+equation 3.4), seen from the part. The gauge point is at the machine origin at q = 0.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x, spin_about
 from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between, cross, lengths, wrap
 from toolpaths.shapes import arrays
 
@@ -52,8 +52,8 @@ class Serial(Kinematics):
         tool_axis: (3,) from the tip to the spindle at q = 0
 
     Branches: two for two rotary axes, first the one whose rotary axis nearest the tool stands at the greater angle from
-    where it brings the tool nearest to the other rotary axis (a trunnion A or B: first positive, then negative). One
-    for fewer: a single angle takes the tool to a given direction, and the slides follow by a linear system.
+    where it brings the tool nearest to the other rotary axis (a trunnion A or B: first positive, then negative). One for
+    fewer: a single angle takes the tool to a given direction, and the slides follow by a linear system.
     """
 
     chain: tuple[Joint, ...] = field()
@@ -124,8 +124,8 @@ class Serial(Kinematics):
         """The tip and the vectors `carried` (each (3,)) by the tool, moved by every axis in turn, each (N, 3)."""
         result = [np.empty((len(q), 3)) for _ in range(1 + len(carried))]
         for part in columns.blocks(len(q)):
-            moved = self._sweep(self.chain, q[part], self._turning(q[part]),
-                                [self._tip_at_zero(), *map(columns.of_one, carried)])
+            starts = [self._tip_at_zero(), *map(columns.of_one, carried)]
+            moved = self._sweep(self.chain, q[part], self._turning(q[part]), starts)
             for rows, vector in zip(result, moved, strict=True):
                 rows[part] = columns.to_rows(vector, len(q[part]))
         return result
@@ -165,6 +165,14 @@ class Serial(Kinematics):
         """d(tip, axis)/dq as (N, 6, J): a rotary axis w moves the tip by w x (tip - point), the axis by w x axis."""
         return self._rates(as_points(q, self.joints, "q"), twist=False)
 
+    def slide_directions(self, q: Floats, slides: Ints) -> Floats:
+        """See the base class."""
+        chosen = [next(joint for joint in self.chain if joint.name == self.axis_names[j]) for j in slides.tolist()]
+        if any(joint.rotary for joint in chosen):
+            return super().slide_directions(q, slides)
+        turning = self._turning(q)
+        return np.stack([columns.to_rows(self._turned(joint, turning), len(q)) for joint in chosen], axis=2)
+
     def twist_jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
         """(v at the tip, omega) of the tool relative to the part per joint rate, (N, 6, J), in the table frame."""
         return self._rates(as_points(q, self.joints, "q"), twist=True)
@@ -175,8 +183,7 @@ class Serial(Kinematics):
         rates = np.zeros((3, self.joints, 2, n))
         done: list[int] = []
         for joint in reversed(self.chain):
-            index = self.axis_names.index(joint.name)
-            w = columns.of_one(joint.direction)
+            index, w = self.axis_names.index(joint.name), columns.of_one(joint.direction)
             if not joint.rotary:
                 tip = columns.plus(tip, columns.times(q[:, index], w))
                 rates[:, index, 0] = joint.direction[:, None]
@@ -187,9 +194,8 @@ class Serial(Kinematics):
                 axis = columns.turn(joint.direction, cos, sin, axis)
                 for i, column in enumerate(columns.turn(joint.direction, cos, sin, rates[:, done])):
                     rates[i, done] = column
-                for i, (v, turned) in enumerate(zip(columns.cross(w, tip), w if twist else columns.cross(w, axis),
-                                                    strict=True)):
-                    rates[i, index, 0], rates[i, index, 1] = v, turned
+                for i, both in enumerate(zip(columns.cross(w, tip), w if twist else columns.cross(w, axis), strict=True)):
+                    rates[i, index, 0], rates[i, index, 1] = both
                 tip = columns.plus(tip, place)
             done.append(index)
         return np.ascontiguousarray(rates.transpose(3, 2, 0, 1)).reshape(n, 6, self.joints)

@@ -1,4 +1,4 @@
-"""The lines of a program's head that `verify` decides by: one place writes them, one reads them back (`read_head`).
+"""The lines of a program's header that `verify` decides by: one place writes them, one reads them back (`read_header`).
 
 Controls change comments: capitals, accents, brackets. What is read is looked for without regard to case.
 """
@@ -30,8 +30,8 @@ _FIRST = re.compile(rb"(?im)^[ \tN\d]*[(;][ \t]*postproc \d")
 _COMMENT = re.compile(rb"(?i)[ \t]*(?:N?\d+[ \t]*)?(?:\([^()\n]*\)|;[^\n]*)?[ \t]*(?:\n|\Z)")
 
 
-def head_of(data: bytes) -> bytes:
-    """The comments at the head of a program, from the one that names postproc to the first block; comments of
+def header_of(data: bytes) -> bytes:
+    """The comments in the header of a program, from the one that names postproc to the first block; comments of
     the CL file stand behind that. Where nothing names postproc, the first characters as they are."""
     text = data[:HEADER].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     first = _FIRST.search(text)
@@ -79,22 +79,22 @@ def feeds_line() -> str:
 
 
 class SetupNamed(NamedTuple):
-    """The set-up that a head names; "" for a mark that it does not state."""
+    """The set-up that a header names; "" for a mark that it does not state."""
 
     name: str
     mark: str
 
 
 class AxesNamed(NamedTuple):
-    """The plan of tool axes that a head names, in small letters."""
+    """The plan of tool axes that a header names, in small letters."""
 
     plan: str
     max_tilt: str
 
 
 @dataclass(frozen=True)
-class Head:
-    """What the head of a program says.
+class ProgramHeader:
+    """What the header of a program says.
 
     Attributes:
         ours: True where postproc wrote it
@@ -128,16 +128,16 @@ _FEEDS = re.compile(rb"(?im)^[^\n]*" + FEEDS.encode("ascii") + rb" ([0-9a-f]{8})
 _PLACE = re.compile(f"(?i){FEEDS} {UNKNOWN}")
 
 
-def read_head(data: bytes) -> Head:
-    """The head of a program as values; data may be the whole program."""
-    head = head_of(data)
-    named, axes, setup = _CORRECTED.search(head), _AXES.search(head), _SETUP.search(head)
-    marks = [found[1].decode("ascii").lower() if (found := mark.search(head)) else "" for mark in (_MODEL, _FEEDS)]
-    return Head(
-        ours=_OURS.search(head) is not None, by_control=_BY_CONTROL.search(head) is not None,
+def read_header(data: bytes) -> ProgramHeader:
+    """The header of a program as values; data may be the whole program."""
+    header = header_of(data)
+    named, axes, setup = _CORRECTED.search(header), _AXES.search(header), _SETUP.search(header)
+    marks = [found[1].decode("ascii").lower() if (found := mark.search(header)) else "" for mark in (_MODEL, _FEEDS)]
+    return ProgramHeader(
+        ours=_OURS.search(header) is not None, by_control=_BY_CONTROL.search(header) is not None,
         corrected=named[1].decode("utf-8", "replace") if named else None, model=marks[0],
         axes=AxesNamed(*(text.decode("ascii", "replace").lower() for text in axes.groups())) if axes else None,
-        setup=_named(setup) if setup else None, planned=_PLANNED.search(head) is not None, feeds=marks[1])
+        setup=_named(setup) if setup else None, planned=_PLANNED.search(header) is not None, feeds=marks[1])
 
 
 def _named(setup: re.Match[bytes]) -> SetupNamed:
@@ -148,13 +148,13 @@ def _named(setup: re.Match[bytes]) -> SetupNamed:
 
 
 def with_feeds_mark(text: str, mark: str) -> str:
-    """The text of a program with the fingerprint of its F words in the place that the head has left for it."""
+    """The text of a program with the fingerprint of its F words in the place that the header has left for it."""
     place = _PLACE.search(text, 0, HEADER)
     return text if place is None else text[:place.end() - len(UNKNOWN)] + mark + text[place.end():]
 
 
 def feeds_place(text: str) -> bool:
-    """Whether the head of a program has left a place for the fingerprint of its F words."""
+    """Whether the header of a program has left a place for the fingerprint of its F words."""
     return _PLACE.search(text, 0, HEADER) is not None
 
 

@@ -1,4 +1,4 @@
-"""Lengths at the head of a program, in the units of the program."""
+"""Lengths in the header of a program, in the units of the program."""
 
 from __future__ import annotations
 

@@ -139,8 +139,8 @@ def map_figures(model: ErrorModel, made: MadeMap) -> tuple[dict[str, Any], list[
     assert lattice is not None
     figures: dict[str, Any] = {"nodes": {x: len(n) for x, n in zip(lattice.letters, lattice.nodes, strict=True)}}
     noted = [f"{lattice.table.size // 6} nodes: " + ", ".join(f"{x} {n}" for x, n in figures["nodes"].items())]
-    for where, loss in (("inside the lattice", made.inside), ("over the work volume", made.volume)):
-        key = where.split()[-1]
+    for key, where, loss in (("lattice", "inside the lattice", made.inside),
+                             ("volume", "over the work volume", made.volume)):
         figures[key] = None if loss is None else {
             "tip_worst_um": loss.tip_worst / um, "tip_rms_um": loss.tip_rms / um,
             "axis_worst_arcsec": loss.axis_worst / arcsec, "axis_rms_arcsec": loss.axis_rms / arcsec}

@@ -54,7 +54,7 @@ MapDirectionsOption = Annotated[MapDirections, word_option("--directions", MapDi
 @errors_app.command("check", epilog="Example: postproc errors check errors.toml -m mikron-ucp710 --tool-length 120")
 def check(file: ModelFile, machine: MachineName, tool_length: ToolLength = 100.0, figure: FigureOption = None,
           json: Json = "") -> None:
-    """Check an error model: what it holds, how far it reaches, worst tip and axis over the work volume, uncertainty."""
+    """Check an error model: its errors, range, worst tip and axis over the work volume, uncertainty."""
     refuse_overwriting({"--figure": str(figure or ""), "--json": json},
                        {"the error model": str(file), **own_files(machine)})
     ending = figure_ending(figure)

@@ -52,12 +52,21 @@ class Argument(TyperArgument):
 
 
 class Option(TyperOption):
-    """An option whose range is written as `1 to 300`."""
+    """An option whose default and range are written as `60` and `1 to 300`."""
+
+    def _get_default_string(self, **given: Any) -> str:
+        value = given["default_value"]
+        return _short(value) if isinstance(value, float) else super()._get_default_string(**given)
 
     def _get_number_range_help_str(self) -> str | None:
         if self.min is None or self.max is None:
-            return None if self.min is None else f"at least {self.min:g}"
-        return f"{self.min:g} to {self.max:g}"
+            return None if self.min is None else f"at least {_short(self.min)}"
+        return f"{_short(self.min)} to {_short(self.max)}"
+
+
+def _short(value: float) -> str:
+    """A number as people write it: 60, 0.001, 1e9."""
+    return f"{value:g}".replace("e+0", "e").replace("e-0", "e-")
 
 
 class Group(TyperGroup):

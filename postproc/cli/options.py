@@ -10,9 +10,13 @@ import typer
 from postproc.base.options import Orientation
 from toolpaths.choices import FigureEnding, GivenDialect, GivenUnit
 
+_LONGEST = 72
+"""characters of an option with its choices that stand on one line of 80 columns"""
+
 
 def word_option(option: str, words: Any, said: str) -> Any:
-    """An option that takes one of the values of a Literal; another is wrong use, and help shows the values."""
+    """An option that takes one of the values of a Literal; another is wrong use, and help shows the values: as choices,
+    or in its text where a narrow terminal would break them."""
     known = {str(word): word for word in get_args(words)}
     shown = [word for word in known if word]
 
@@ -22,7 +26,10 @@ def word_option(option: str, words: Any, said: str) -> Any:
                                      param_hint=option)
         return known[str(value)]
 
-    return typer.Option(option, parser=taken, metavar=f"{{{','.join(shown)}}}", help=said)
+    choices = f"{{{','.join(shown)}}}"
+    if len(option) + len(choices) > _LONGEST:
+        return typer.Option(option, parser=taken, metavar=option.strip("-").upper(), help=f"{said}: {', '.join(shown)}")
+    return typer.Option(option, parser=taken, metavar=choices, help=said)
 
 
 ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]

@@ -38,11 +38,10 @@ if TYPE_CHECKING:
     from postproc.orientation.plans.choice import OrientationChoice
     from toolpaths.diagnostics import Diagnostic
 
-EXAMPLES = """Examples:
-
+EXAMPLES = """\b
+Examples:
 postproc orient part.cls -m mikron-ucp710 --max-tilt 45
-
-postproc orient part.cls -m mikron-ucp710 --figure part.svg --pass 3 --json part.json
+postproc orient part.cls -m mikron-ucp710 --figure part.svg --pass 3
 
 Then the program: postproc convert part.cls -m mikron-ucp710 -c linuxcnc --orient auto -o part.ngc"""
 MOST = 6

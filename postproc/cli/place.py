@@ -32,14 +32,11 @@ if TYPE_CHECKING:
 
 EXAMPLES = """Example: postproc place part.cls -m mill-3axis --setup shop.toml -o placed.toml
 
+\b
 shop.toml says where the part may stand:
-
 [placement]
-
 x = [-100, 100]
-
 y = [-100, 100]
-
 turns = [0, 90, 180, 270]"""
 
 

@@ -14,6 +14,7 @@ from postproc.compile.spindle_coolant_state import SpindleCoolantState
 from postproc.controllers.model import ControllerFile
 from postproc.path.model import JointPath
 from postproc.reference.coolant import written
+from postproc.reference.cutcom_of_tools import CutcomOfTool
 from postproc.reference.events import (
     Spindle,
     ToolChange,
@@ -38,11 +39,12 @@ _STOPS = frozenset({"STOP", "OPSTOP"})
 
 
 def commands_of(toolpath: Toolpath, moves: Moves, path: JointPath, controller: ControllerFile, native: Bools,
-                restart: bool = False, tool_call: bool = True, stops: bool = False) -> tuple[Commands, list[Diagnostic]]:
+                restart: bool = False, tool_call: bool = True, stops: bool = False,
+                cutcom: tuple[CutcomOfTool, ...] = ()) -> tuple[Commands, list[Diagnostic]]:
     """Commands by block, and what could not be carried out; with `restart` every operation restates its tool;
     without `tool_call` no length register may be left in force by what ran before; with `stops` the program
     stops optionally between tools."""
-    writing = _Writing(toolpath, moves, path, controller, restart, stops)
+    writing = _Writing(toolpath, moves, path, controller, restart, stops, cutcom)
     for at, event in enumerate(toolpath.events):
         writing.operations(event)
         writing.event(at, event)
@@ -66,7 +68,7 @@ class _Writing:
     """Goes through the records of a path and puts commands at their blocks."""
 
     def __init__(self, toolpath: Toolpath, moves: Moves, path: JointPath, controller: ControllerFile, restart: bool,
-                 stops: bool) -> None:
+                 stops: bool, cutcom: tuple[CutcomOfTool, ...]) -> None:
         self.stops = {(c.index, c.line) for c in stops_between(toolpath)} if stops else set[tuple[int, int]]()
         self.toolpath, self.moves, self.path, self.controller, self.restart = toolpath, moves, path, controller, restart
         self.result: dict[int, list[Command]] = {}
@@ -81,7 +83,7 @@ class _Writing:
         self.loaded: ToolChange | None = None
         self.spindle, self.state = Spindle(), SpindleCoolantState()
         self.compensation = RadiusCompensation(moves, path, self.result, controller,
-                                               loaded_registers(toolpath))
+                                               loaded_registers(toolpath), cutcom)
         self.starts = operation_starts(toolpath, moves)
         self.lost: dict[str, list[int]] = {}
         self.skipping = False

@@ -42,7 +42,7 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                        toolpath.pass_[moves.row[path.move]], native, job.options.feed_mode, controller.feed,
                        planned, controller.feed_unit)
     commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.apart,
-                                        job.setup.output.tool_call, job.setup.output.stop_between_tools)
+                                        job.setup.output.tool_call, job.setup.output.stop_between_tools, job.cutcom)
     end = np.where(path.home[:, None], job.grid.trimmed(path.q * control.unit), words.end)
     write = without_standing(words.write, end, control.rolls)
     keep = write.any(axis=1) | (path.code == ARC)

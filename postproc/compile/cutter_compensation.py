@@ -9,6 +9,7 @@ import numpy as np
 from postproc.compile.program import Command, CommandName
 from postproc.controllers.model import ControllerFile
 from postproc.path.model import TRAVERSE, JointPath
+from postproc.reference.cutcom_of_tools import CutcomOfTool
 from postproc.reference.events import CompensationSide, compensation_side, numbers
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
@@ -33,12 +34,14 @@ class RadiusCompensation:
     that plane must be square
     to the tool all the while: a tilted plane, or the tool along Z and no rotary axis turning. Where D is modal and CUTCOM
     names none, that of the tool's length register is written: `registers` (N,) by row of the Toolpath, -1 for none.
+    What the registers hold is said of `tools` by the set-up, else warned of.
     """
 
     def __init__(self, moves: Moves, path: JointPath, commands: dict[int, list[Command]], controller: ControllerFile,
-                 registers: Ints) -> None:
+                 registers: Ints, tools: tuple[CutcomOfTool, ...] = ()) -> None:
         self.moves, self.path, self.out = moves, path, commands
         self.modal, self.registers = controller.cutter_compensation.modal_register, registers
+        self.stated = {line for tool in tools if tool.stated for line in tool.lines}
         self.without_tool: list[int] = []
         self.chosen: dict[int, list[int]] = {}
         """lines by register that is written though CUTCOM names none"""
@@ -118,14 +121,14 @@ class RadiusCompensation:
     def diagnostics(self, file: str) -> list[Diagnostic]:
         """What the operator has to know, and records that could not be carried out."""
         result = []
-        if self.written:
-            result.append(warning("cutcom.register", "cutter compensation is written and proved as the programmed contour: "
-                                  "the control adds what its register holds" + self._chosen(), file=file,
-                                  lines=self.written[:6],
-                                  count=len(self.written), hint="points of the tool centre: the register holds the wear "
-                                  "only; points of the contour: the radius" + (
-                                      "; where lengths and radii share one table, name another register in CUTCOM"
-                                      if self.chosen else "")))
+        if unsaid := [line for line in self.written if line not in self.stated]:
+            result.append(warning("cutcom.register", "cutter compensation is written and proved as programmed, for CL "
+                                  "points of the tool's centre: the control adds what its register holds, which is "
+                                  "the wear only" + self._chosen(), file=file, lines=unsaid[:6], count=len(unsaid),
+                                  hint='say so in the set-up: [tools.N] compensation = "wear" (or "none": CUTCOM is not '
+                                  "written), or contour = true where the CAM system writes the contour and the register "
+                                  "holds the radius" + ("; where lengths and radii share one table, name another register "
+                                                        "in CUTCOM" if self.chosen else "")))
         if self.without_tool:
             result.append(error("tool.missing", "CUTCOM names no register, and the file has loaded no tool of a number "
                                 "above 0 whose register could be taken: D holds until another is stated", file=file,
@@ -145,7 +148,8 @@ class RadiusCompensation:
                 result.append(error(code, f"{what}: the control would shift the path in the plane of the axis words, not "
                                     "square to the tool", file=file, lines=lines[:6], count=len(lines),
                                     hint="write the operation in a tilted plane (--output-mode tilted, where the controller "
-                                    "has it), or take CUTCOM out and let the CAM system offset the path"))
+                                    "has it), or [tools.N] compensation = \"none\" in the set-up: the path of the "
+                                    "tool's centre is written uncompensated"))
         return result
 
     def _chosen(self) -> str:

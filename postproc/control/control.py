@@ -31,7 +31,7 @@ PLACES = 200
 InterpolationMode = Literal["axes", "tcp", "tilted"]
 MODE_NAMES: dict[InterpolationMode, str] = {"axes": "machine coordinates without RTCP", "tcp": "tool-centre-point control",
                                             "tilted": "tilted work planes"}
-"""as heads of programs, warnings and documents name them"""
+"""as headers of programs, warnings and documents name them"""
 FeedLength = Literal["xyz-first", "all", "geometry"]
 
 
@@ -131,7 +131,7 @@ class Control:
             return False
         q = np.zeros((8, kin.joints))
         q[:, self.rotary] = np.linspace(-1.0, 1.3, 8 * len(self.rotary)).reshape(8, -1)
-        along = np.swapaxes(tool_frames(kin, q), 1, 2) @ kin.jacobian(q)[:, :3][:, :, self.xyz]
+        along = np.swapaxes(tool_frames(kin, q), 1, 2) @ kin.slide_directions(q, self.xyz)
         return bool(np.allclose(along, np.eye(3), atol=1e-9))
 
     @cached_property
@@ -252,7 +252,7 @@ class Control:
     def tip_to_words(self, kin: Kinematics, q: Floats) -> Floats:
         """(N, 3, 3): change of the words X, Y, Z per change of the tip at joints q (N, J), rotary joints fixed."""
         if self.law == "axes":
-            return np.asarray(np.linalg.inv(kin.jacobian(q)[:, :3, :][:, :, self.xyz]))
+            return np.asarray(np.linalg.inv(kin.slide_directions(q, self.xyz)))
         return np.tile(np.eye(3) if self.plane is None else self.plane.rotation.T, (len(q), 1, 1))
 
     def between(self, q0: Floats, q1: Floats, t: Floats, kin: Kinematics,

@@ -186,8 +186,8 @@ def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
         absent = OPTION_OF.get(law)
         if absent and modes.control.machine.options.absent(absent):
             where, line = modes.control.machine.options.stated[absent]
-            result.append(error("output.option", f"output mode {law} needs an option that the machine file says the control "
-                                f"has not: {absent} = false", file=where, lines=[line],
+            result.append(error("output.option", f"output mode {law} needs an option that the control does not have by the "
+                                f"machine file: {absent} = false", file=where, lines=[line],
                                 hint=f"take {absent} out of [control] or state true where it is fitted; without it this "
                                 f"controller and machine have: {can}"))
             continue
@@ -232,7 +232,7 @@ def table_axes(control: Control) -> Ints:
     for j in control.rotary.tolist():
         q[1] = 0.0
         q[1, j] = 0.7
-        slides = kin.jacobian(q)[:, :3][:, :, control.xyz]
+        slides = kin.slide_directions(q, control.xyz)
         if not np.allclose(slides[0], slides[1], atol=1e-9):
             found.append(j)
     return np.array(found, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Tilted working planes: their frame, and the angles by which a controller names it.
+"""Tilted work planes: their frame, and the angles by which a controller names it.
 
 A convention names the letters of three turns about the axes of the moving frame, one after another
 (intrinsic), so that R = R_1(angle 1) R_2(angle 2) R_3(angle 3). "ZXZ" are Euler angles (Fanuc B-64484EN,

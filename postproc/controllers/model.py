@@ -12,6 +12,7 @@ from pydantic import Field
 from machines.choices import Rapids, RolloverRule, Stop
 from machines.user_file import UserModel, load_toml
 from postproc.base.length_text import INCH, MM, LengthText
+from postproc.controllers.pivots import PivotNames
 from postproc.controllers.spelling import (
     Codes,
     Comment,
@@ -53,7 +54,7 @@ class ArcRules(UserModel):
     start: tuple[str, ...] = ()
     """blocks of the safe start in programs that hold arcs in G18 or G19"""
     helical_option: str = ""
-    """the option that arcs which rise need: a comment at the head of programs with such, where the machine file does
+    """the option that arcs which rise need: a comment in the header of programs with such, where the machine file does
     not confirm it"""
 
 
@@ -92,10 +93,10 @@ class Cycles(UserModel):
     rigid_only: tuple[str, ...] = ("TAP",)
     """kinds that must not become single moves, next to those that never do"""
     rigid_option: str = ""
-    """the option that rigid tapping needs: a comment at the head of programs that tap, where the machine file does not
+    """the option that rigid tapping needs: a comment in the header of programs that tap, where the machine file does not
     confirm it"""
     floating: str = ""
-    """what taps need where rigid tapping is not fitted, and `codes.rigid_tap` is left out: a comment at the head; empty:
+    """what taps need where rigid tapping is not fitted, and `codes.rigid_tap` is left out: a comment in the header; empty:
     the control's cycles are rigid alone, taps are then refused"""
     dwell_milliseconds: bool = False
     """the dwell of a cycle is a whole number of ms, else s"""
@@ -124,6 +125,9 @@ class FeedRules(UserModel):
     alike, or the geometry axes before all others"""
     arc_inverse: Literal["length", "radius", "refuse"] = "length"
     """inverse time in arcs: speed by length, speed by radius, or not allowed"""
+    kept_by_units: bool = False
+    """F counts in the units that hold before its block, and a change of units leaves the feed as it is; else F counts in
+    the units of the block that moves"""
 
 
 class CutterCompensation(UserModel):
@@ -136,6 +140,9 @@ class CutterCompensation(UserModel):
     modal_register: bool = False
     """D holds until another is stated, whatever tool is loaded: where CUTCOM names none, the number of the
     tool's length register is written"""
+    holds: str = "D{register}"
+    """what holds the radius or its wear, as the head of the program names it: {register} is that of CUTCOM, else the
+    number of the tool"""
 
 
 class InterpolationRules(UserModel):
@@ -151,6 +158,8 @@ class InterpolationRules(UserModel):
     """share of the tolerance left to the controller's own smoothing"""
     smoothing_fixed: float | None = Field(default=None, ge=0.0)
     """mm that it takes instead of a share, where its tolerance is a parameter of the control"""
+    blends_unstated: bool = False
+    """where a program states no path mode, corners are blended without a limit"""
     smoothing_in_modes: bool = True
     """it may be changed while the tip's or a plane's mode is on"""
     axis_smoothing_share: float = Field(default=0.0, ge=0.0, le=0.8)
@@ -176,7 +185,7 @@ class RolloverRules(UserModel):
     on: tuple[str, ...] = ()
     """blocks of the safe start that put the shorter path in force, in programs for machines with modulo axes"""
     needs: dict[Literal["shortest", "sign"], Annotated[str, placeholders("axes")]] = Field(default_factory=dict)
-    """settings that each rule needs: a comment at the head of programs for machines with modulo axes; {axes}
+    """settings that each rule needs: a comment in the header of programs for machines with modulo axes; {axes}
     are their letters"""
 
 
@@ -200,7 +209,7 @@ class Mode(UserModel):
     option: str = ""
     """the option of the control that the mode is: a comment likewise, where the machine file does not confirm it"""
     relies_on: tuple[Annotated[str, placeholders("work_offset")], ...] = ()
-    """settings of the control that the mode needs: comments at the head of programs that use it; {work_offset}
+    """settings of the control that the mode needs: comments in the header of programs that use it; {work_offset}
     is the name of the work offset"""
     length: LengthState = "any"
     """how the length register must stand where the mode is entered, and where its `leave` blocks begin"""
@@ -233,7 +242,7 @@ class TcpMode(Mode):
 
 
 class TiltedMode(Mode):
-    """Tilted working plane: rotary axes stand still, X, Y, Z are the tip in a turned frame at the work offset's zero."""
+    """Tilted work plane: rotary axes stand still, X, Y, Z are the tip in a turned frame at the work offset's zero."""
 
     enter: tuple[Annotated[str, placeholders("first", "second", "third", "direction", "work_offset")], ...]
     """blocks that state the plane; {first}, {second}, {third} are the angles in the order of `angles`,
@@ -257,7 +266,7 @@ class Modes(UserModel):
     tcp: TcpMode | None = None
     """tool-centre-point mode"""
     tilted: TiltedMode | None = None
-    """tilted working plane"""
+    """tilted work plane"""
 
 
 class Stops(UserModel):
@@ -279,7 +288,7 @@ class LinkRules(UserModel):
 
 
 class ControllerFile(UserModel):
-    """A controller."""
+    """A controller: how its programs are spelt, and what it does with them."""
 
     description: str
     """one line for people"""
@@ -314,6 +323,7 @@ class ControllerFile(UserModel):
     """further words that set the control's smoothing, and the mm that each may take: "G61.1" = 0.005, or
     "G05 P10000" = 0.005"""
     links: LinkRules = LinkRules()
+    pivots: PivotNames = PivotNames()
 
     @property
     def keeps_length(self) -> bool:
@@ -354,7 +364,7 @@ class ControllerFile(UserModel):
 
     @property
     def lengths(self) -> LengthText:
-        """How the head of a program says lengths."""
+        """How the header of a program says lengths."""
         return INCH if self.format.units == "inch" else MM
 
     @property

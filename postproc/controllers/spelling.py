@@ -74,7 +74,7 @@ class InchFormat(UserModel):
     degree: Literal["mm", "inch"] = "inch"
     """what a degree counts as where a feed per minute refers to all axes"""
     relies_on: tuple[str, ...] = ()
-    """settings of the control that a program in inches needs: comments at its head"""
+    """settings of the control that a program in inches needs: comments in its header"""
 
 
 class Comment(UserModel):
@@ -98,7 +98,7 @@ class FurtherOffsets(UserModel):
     last: int = Field(ge=1)
     """the greatest"""
     needs: Annotated[str, placeholders("name")] = ""
-    """what the control must have for it: a comment at the head of programs with one; {name} is its name"""
+    """what the control must have for it: a comment in the header of programs with one; {name} is its name"""
 
 
 CarriedOutName = Annotated[str, Field(pattern=r"^[GM][0-9]+(\.[0-9]+)?-[GM][0-9]+(\.[0-9]+)?$|^[A-Z]$|" + PASSIVE)]
@@ -138,11 +138,11 @@ class ProgramBlocks(UserModel):
     exact_path: tuple[str, ...] = ()
     """blocks that stand in the place of `path_tolerance` where the machine file says that the control has no smoothing"""
     smoothing_option: str = ""
-    """the option that `path_tolerance` needs: a comment at the head, where the machine file does not confirm it"""
+    """the option that `path_tolerance` needs: a comment in the header, where the machine file does not confirm it"""
     without_smoothing: str = ""
-    """what programs rely on without it: a comment at the head"""
+    """what programs rely on without it: a comment in the header"""
     relies_on_turns: Annotated[str, placeholders("axes")] = ""
-    """setting of the control that rotary words of 360 degrees and more need: a comment at the head of
+    """setting of the control that rotary words of 360 degrees and more need: a comment in the header of
     programs with such; {axes} are their letters"""
     ending: tuple[str, ...] = ("M30",)
     """blocks that end every program"""

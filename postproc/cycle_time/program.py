@@ -52,14 +52,13 @@ class BlockOrigin:
 
 
 def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Control, origin: BlockOrigin | None = None,
-              own_path: bool = True, by_radius: bool = False, override: float = 1.0) -> MotionBlocks:
+              blends_unstated: bool = False, by_radius: bool = False, override: float = 1.0) -> MotionBlocks:
     """The blocks that move, with their pauses.
 
     Args:
         code: what the reader makes of the text; motion: what executing it gave
         origin: operations and CL lines; by tool where it is left out
-        own_path: True where a program without a path mode blends without a limit, and a feed keeps the units
-            that held when it was stated (LinuxCNC), else both are the control's
+        blends_unstated: a program without a path mode blends without a limit, else as the control's smoothing says
         by_radius: inverse time of arcs counts radians
         override: the operator's feed override, 1 for 100 %: of feeds alone, not of rapids and taps
     """
@@ -70,16 +69,15 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     start, end = points[:-1], points[1:]
     arc = motion.code == 2
     normal, sweep, center = _arcs(motion, control, arc, start)
-    path, tolerance, chain = _path_modes(words, own_path)
+    path, tolerance, chain = _path_modes(words, blends_unstated)
     path = np.where(motion.hole, CornerMode.EXACT, path[block])
     pauses = _pauses(words, block, code.line, motion, machine)
     blocks = MotionBlocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc, center, normal, sweep,
                           np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names,
                           pauses,
                           origin.cl_line, origin.move, _tip_lengths(motion, control))
-    per = np.where(_feed_inch(words, block, own_path), INCH / code.feed_parts, 1.0)
     turned = np.where(np.isnan(motion.pitch), override, 1.0)
-    blocks = replace(blocks, speed=_clamped(_speeds(per, motion, blocks, by_radius) * turned, blocks, machine))
+    blocks = replace(blocks, speed=_clamped(_speeds(motion, blocks, by_radius) * turned, blocks, machine))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
     blocks = _unrolled(blocks, motion, control, unit) if (motion.frame > 0).any() else blocks.take(moving)
     return replace(blocks, pauses=_with_indexing(blocks, machine))
@@ -158,7 +156,7 @@ def _pieces(blocks: MotionBlocks, motion: Motion, control: Control, unit: Floats
     return count
 
 
-def _path_modes(words: Words, own_path: bool) -> tuple[Array, Floats, Floats]:
+def _path_modes(words: Words, blends_unstated: bool) -> tuple[Array, Floats, Floats]:
     """(B + 1,) Path, tolerance and chain in force at each block: G61, G61.1, G64 P Q (LinuxCNC G-code
     reference), else what the reader says of the control's smoothing."""
     at, codes = words.pick("G")
@@ -171,7 +169,7 @@ def _path_modes(words: Words, own_path: bool) -> tuple[Array, Floats, Floats]:
     tolerance = np.where(p > 0.0, p, np.inf)
     chain = np.where(blend, np.where(np.isfinite(q), q, np.where(np.isfinite(p), p, 0.0)), 0.0)
     smooth = fill_values(*words.pick(SMOOTH), words.lines)
-    stated = np.where(smooth == 0.0, np.nan, smooth) if not own_path else np.full(words.lines + 1, np.inf)
+    stated = np.where(smooth == 0.0, np.nan, smooth) if not blends_unstated else np.full(words.lines + 1, np.inf)
     stated[at[0] if len(at) else words.lines + 1:] = np.nan
     own = _carried(at, tolerance, words.lines)
     return (np.nan_to_num(_carried(at, path.astype(np.float64), words.lines), nan=float(CornerMode.BLEND)).astype(np.int8),
@@ -183,22 +181,9 @@ def _carried(at: Ints, values: Floats, count: int) -> Floats:
     return fill_values(at, values, count)
 
 
-def _feed_inch(words: Words, block: Ints, kept: bool) -> Bools:
-    """(E,) True where the feed counts inches; `kept`: by the units in force before the block that states it.
-
-    LinuxCNC carries out F before G20 and G21 of a block, and a change of units leaves the feed alone (measured; order of
-    execution: NIST RS274/NGC table 8).
-    """
-    inch = modal_state(words).inch
-    if not kept:
-        return np.asarray(inch[block])
-    at = np.unique(words.pick("F")[0])
-    return np.asarray(fill_values(at, inch[at - 1].astype(np.float64), words.lines)[block] == 1.0)
-
-
-def _speeds(unit: Floats, motion: Motion, blocks: MotionBlocks, by_radius: bool) -> Floats:
-    """(E,) mm/s or rad/s that the feed word asks for; `unit` (E,): mm that 1 of it stands for."""
-    form = shape(blocks)
+def _speeds(motion: Motion, blocks: MotionBlocks, by_radius: bool) -> Floats:
+    """(E,) mm/s or rad/s that the feed word asks for."""
+    form, unit = shape(blocks), motion.unit
     linear = (form.first != 0.0).any(axis=1) | blocks.arc
     per_minute = motion.feed * np.where(linear, unit, DEG)
     least = LEAST_RATE * np.where(linear, unit, DEG)

@@ -34,11 +34,11 @@ def from_conversion(result: PostResult, override: float = 1.0) -> MotionBlocks:
     assert result.job is not None and result.comparison is not None and result.comparison.executed is not None and result.ok
     job = result.job
     code, motion = result.comparison.executed
-    moves, path = job.moves.without_pecks(), job.toolpath
+    moves, path = result.comparison.moves.without_pecks(), job.toolpath
     owner = np.clip(result.comparison.owner, 0, len(moves) - 1)
     names = tuple(op.name or f"operation {k + 1}" for k, op in enumerate(path.operations))
     inside = (result.comparison.owner >= 0) & (result.comparison.owner < len(moves))
-    kept = np.flatnonzero(job.moves.phase != Phase.PECK)
+    kept = np.flatnonzero(result.comparison.moves.phase != Phase.PECK)
     origin = BlockOrigin(path.operation[moves.row[owner]].astype(np.int64), names,
                          np.where(inside, moves.line[owner], -1).astype(np.int64), np.where(inside, kept[owner], -1))
     return _blocks(code, motion, result.machine, job.control, result.controller, origin, override)
@@ -96,7 +96,7 @@ def _executed(data: bytes, controller: ControllerFile, control: Control, lengths
 
 def _blocks(code: Canonical, motion: Motion, machine: Machine, control: Control, controller: ControllerFile,
             origin: BlockOrigin | None, override: float) -> MotionBlocks:
-    return blocks_of(code, motion, machine, control, origin, own_path=controller.writer == "linuxcnc",
+    return blocks_of(code, motion, machine, control, origin, blends_unstated=controller.kinematics.blends_unstated,
                      by_radius=controller.feed.arc_inverse == "radius", override=override)
 
 

@@ -20,23 +20,22 @@ from postproc.controllers.fitted import fitted
 from postproc.controllers.model import ControllerFile
 from postproc.job.length_words import words_depend_on_length
 from postproc.job.pivots import control_kinematics
+from postproc.job.program_names import program_number, work_offset
 from postproc.job.rapids import safe_rapids
+from postproc.job.records import job_records
 from postproc.job.rounding import Rounding, helix_bound, rounding_bound
 from postproc.job.smoothing import SmoothingPlan, smoothing_plan
 from postproc.job.units import other_units
 from postproc.path.links import SafeSpace, safe_space
+from postproc.reference.cutcom_of_tools import CutcomOfTool
 from postproc.reference.events import register_changes, tool_changes
 from postproc.reference.hole_depths import unfit_holes
 from postproc.reference.largest_feed import limited_feeds
-from postproc.reference.length_registers import by_rule, own_registers
 from postproc.reference.moves import Moves, build_moves
-from postproc.reference.records import checked_records, plain_records
-from postproc.reference.spindle_defaults import standing_cuts, stated_by_setup, with_defaults
 from postproc.reference.split_operations import cut_operations
 from postproc.reference.stated_feeds import without_feed
-from postproc.reference.tool_numbers import numbered
 from postproc.reference.unnumbered_tools import measured_length
-from postproc.setup.model import Placement, SetupFile, assumed_values, other_machine, part_placement, work_frame
+from postproc.setup.model import Placement, SetupFile, part_placement, work_frame
 from postproc.setup.system import standing, upside_down
 from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
@@ -55,7 +54,11 @@ OF_SETUP = frozenset({"tool.number", "tool.same_number", "tool.length", "feed.mi
 
 @dataclass(frozen=True)
 class Job:
-    """One CL file on one machine, ready to be solved or compared with; `moves` are in the table frame."""
+    """One CL file on one machine, ready to be solved or compared with.
+
+    `commanded` are the moves of the CL file in the table frame, `moves` those that the program is to have: with rapids split
+    where the control would not keep them on their line.
+    """
 
     toolpath: Toolpath
     machine: Machine
@@ -64,6 +67,7 @@ class Job:
     options: Options
     placement: Placement
     control: Control
+    commanded: Moves
     moves: Moves
     space: SafeSpace
     modes: OutputModes
@@ -71,6 +75,8 @@ class Job:
     """geometric errors of the machine"""
     stated: tuple[tuple[int, str], ...] = ()
     """(tool number, what the set-up states of its spindle and coolant), where the CL file states none"""
+    cutcom: tuple[CutcomOfTool, ...] = ()
+    """the tools of the CL file that cut under CUTCOM"""
 
     @property
     def hooks(self) -> HooksModel:
@@ -202,6 +208,10 @@ class Job:
         """(M,) operation of each move."""
         return shared(taken(self.toolpath.operation, self.moves.row).astype(np.int64))
 
+    def with_moves(self, moves: Moves) -> Job:
+        """The job with these moves of the program; itself where they are its own, with all that it knows of them."""
+        return self if moves is self.moves else replace(self, moves=moves)
+
     def operation_starts(self) -> list[int]:
         """The linked moves that operations begin with."""
         begins = np.concatenate([[True], np.diff(self.operation) != 0])
@@ -219,23 +229,12 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
             options: Options, refused: Refused = frozenset()) -> tuple[Job | None, list[Diagnostic]]:
     """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`:
     output modes that "auto" passes over."""
-    toolpath, diagnostics = numbered(toolpath, setup, options.setup)
-    diagnostics += [*other_machine(setup, machine.name, options.setup), *assumed_values(setup, options.setup)]
-    toolpath, found = plain_records(toolpath, controller)
-    diagnostics += found
-    toolpath, stated = with_defaults(toolpath, setup)
-    diagnostics += stated_by_setup(toolpath, stated)
-    toolpath, found = checked_records(toolpath, controller)
-    diagnostics += found
-    if not any(d.severity is Severity.ERROR and d.code.split(".")[0] in ("spindle", "insert") for d in diagnostics):
-        diagnostics += standing_cuts(toolpath)
-    toolpath = by_rule(toolpath, controller, machine.length_register, machine.radius_register)
-    toolpath, found = own_registers(toolpath, controller)
-    diagnostics += found
-    diagnostics += [*_work_offset(controller, setup, options), *other_units(controller, options.setup),
+    records, diagnostics = job_records(toolpath, machine, controller, setup, options.setup)
+    toolpath = records.toolpath
+    diagnostics += [*work_offset(controller, setup, options), *other_units(controller, options.setup),
                     *smoothing_plan(controller, setup, options, toolpath, machine)[1]]
     toolpath, found = cut_operations(toolpath, setup.output.longest)
-    diagnostics += [*found, *_program_number(toolpath, controller, setup, options)]
+    diagnostics += [*found, *program_number(toolpath, controller, setup, options)]
     diagnostics += [*unfit_holes(toolpath, controller), *_refused(toolpath), *_no_inverse_time(controller, options)]
     setup, found = standing(setup, toolpath, options.setup)
     diagnostics += found
@@ -272,8 +271,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     places = word_grid(control, controller).places
     modes, found = output_modes(control, controller, setup, options, toolpath, places, refused)
     diagnostics += found
-    job = Job(toolpath, machine, controller, setup, options, placement, control, moves, safe_space(moves, setup, placement),
-              modes, geometric, tuple(stated))
+    job = Job(toolpath, machine, controller, setup, options, placement, control, moves, moves,
+              safe_space(moves, setup, placement), modes, geometric, tuple(records.stated), records.cutcom)
     return None if errors else _with_rapids(job), diagnostics + _tool_lengths(job) + _unused_tools(job)
 
 
@@ -283,26 +282,6 @@ def _with_rapids(job: Job) -> Job:
         return job
     return replace(job, moves=safe_rapids(job.moves, job.modes, job.kinematics, job.operation, job.space, job.stock_corners,
                                           (job.options.tolerance, job.axis_tolerance)))
-
-
-def _work_offset(controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:
-    """A work offset that the control has not."""
-    program = controller.program
-    if program.offset_block(setup.work_offset_code) is not None:
-        return []
-    return [error("setup.work_offset_code", f"work_offset_code = {setup.work_offset_code!r}: this control has no such work "
-                  "offset", file=options.setup, hint=f"allowed are {program.offsets_named}")]
-
-
-def _program_number(toolpath: Toolpath, controller: ControllerFile, setup: SetupFile,
-                    options: Options) -> list[Diagnostic]:
-    """A number of the program that one of its subprograms bears."""
-    last, number = 1000 + len(toolpath.operations), setup.output.program_number
-    numbered = setup.output.divided and "{number}" in controller.subprograms.call
-    if number is None or not numbered or not 1000 < number <= last:
-        return []
-    return [error("setup.program_number", f"program_number = {number}: subprograms bear the numbers 1001 to {last}",
-                  file=options.setup, hint=f"a number below 1001 or above {last}")]
 
 
 def _measured(control: Control, controller: ControllerFile, axis: Floats, setup: SetupFile,
@@ -343,9 +322,11 @@ def _refused(toolpath: Toolpath) -> list[Diagnostic]:
     result = []
     turning = [op for op in toolpath.operations if op.turning]
     if turning:
-        result.append(error("convert.turning", "turning operations cannot be converted", file=toolpath.file,
+        named = ", ".join(op.name or f"the operation in line {op.line}" for op in turning[:3])
+        whole = "this is a turning file" if len(turning) == len(toolpath.operations) else "turning stands between milling"
+        result.append(error("convert.turning", f"{whole} ({named}): milling alone is converted", file=toolpath.file,
                             lines=[op.line for op in turning][:6], count=len(turning),
-                            hint="take them out of the CL file; inspect reads them"))
+                            hint="take turning operations out of the CL file; inspect reads them"))
     if not bool((toolpath.role != Role.START).any()):
         result.append(error("convert.no_motion", "the file commands no motion", file=toolpath.file,
                             hint="it needs GOTO records"))

@@ -19,18 +19,15 @@ from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.modes import CONSTANT, OutputModes
 from postproc.joints.joint_path import TRAVEL_SLACK, nearest_solution
-from postproc.path.blocks import LEG, rapid_codes
+from postproc.path.blocks import rapid_codes
 from postproc.path.links import MARGINS, SafeSpace
-from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
+from postproc.reference.split_rapids import CORNER, along, splittable, with_corners
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
-from toolpaths.toolpath import Kind
 
 STILL = 1e-6
-"""mm of a rise that is none"""
-SAME = 1e-9
-"""rad between axes that are one"""
+"""mm below a safe plane that are none"""
 
 
 def safe_rapids(moves: Moves, modes: OutputModes, kinematics: Callable[[int], Kinematics], operation: Ints, space: SafeSpace,
@@ -54,7 +51,9 @@ def safe_rapids(moves: Moves, modes: OutputModes, kinematics: Callable[[int], Ki
         return moves
     rows, level = (np.concatenate(some) for some in zip(*parts, strict=True))
     order = np.argsort(rows)
-    return _with_corners(moves, rows[order], level[order])
+    rows, level = rows[order], level[order]
+    rise, fall = (level - along(moves.tip[k], moves.axis[rows]) for k in (rows - 1, rows))
+    return with_corners(moves, rows, level, rise > CORNER, fall > CORNER)
 
 
 def _with_box(space: SafeSpace, corners: Floats) -> SafeSpace:
@@ -65,14 +64,10 @@ def _with_box(space: SafeSpace, corners: Floats) -> SafeSpace:
 
 
 def _bendable(moves: Moves, modes: OutputModes, operation: Ints, axis_tolerance: float) -> Ints:
-    """Rapids across the tool axis, which stands still, in words under which axes run each for itself."""
-    rows = np.flatnonzero((moves.kind == Kind.RAPID) & ~moves.link & (moves.hole < 0))
-    rows = rows[rows > 0]
-    axis, step = moves.axis[rows], moves.tip[rows] - moves.tip[rows - 1]
-    across = step - np.einsum("ni,ni->n", step, axis)[:, None] * axis
-    rows = rows[(np.linalg.norm(across, axis=1) > LEG[0]) & (angle_between(moves.axis[rows - 1], axis) <= SAME)]
+    """The splittable rapids in words under which axes run each for itself."""
+    rows = splittable(moves)
     if not len(rows):
-        return np.zeros(0, dtype=np.int64)
+        return rows
     starts = np.flatnonzero(moves.link)
     run = np.maximum(np.searchsorted(starts, rows, side="right") - 1, 0)
     off = angle_between(moves.axis, moves.axis[starts[np.maximum(np.cumsum(moves.link) - 1, 0)]])
@@ -107,7 +102,7 @@ def _levels(kin: Kinematics, machine: Machine, space: SafeSpace, rapids: tuple[F
     """(K,) height along the axis at which rapids (begin, end, axis (K, 3), joints (K, J)) may go across: their own higher
     end where that is above all that is cut, else the safe plane, as far above as travel allows; NaN where it allows none."""
     begin, end, axis, q = rapids
-    low, high = (np.einsum("ni,ni->n", p, axis) for p in (begin, end))
+    low, high = (along(p, axis) for p in (begin, end))
     top, result = np.maximum(low, high), np.full(len(axis), np.nan)
     planes = [_plane(space, axis, share) for share in MARGINS]
     own = top >= planes[-1] - STILL
@@ -137,20 +132,3 @@ def _inside(q: Floats, machine: Machine) -> Bools:
         turned = q + turn * np.array(machine.rotary)
         result |= (turned >= limits.lower - TRAVEL_SLACK) & (turned <= limits.upper + TRAVEL_SLACK)
     return np.asarray(result.all(axis=-1))
-
-
-def _with_corners(moves: Moves, rows: Ints, level: Floats) -> Moves:
-    """The moves with rapids `rows` (K,) going along their axis to their level (K,), across, and along it to their end."""
-    axis, begin, end = moves.axis[rows], moves.tip[rows - 1], moves.tip[rows]
-    rise, fall = (level - np.einsum("ni,ni->n", p, axis) for p in (begin, end))
-    rises, falls = rise > STILL, fall > STILL
-    counts = np.ones(len(moves), dtype=np.int64)
-    counts[rows] += rises.astype(np.int64) + falls
-    wide = moves.take(np.repeat(np.arange(len(moves)), counts))
-    first = np.cumsum(counts)[rows] - counts[rows]
-    tip, phase = np.array(wide.tip), np.array(wide.phase)
-    tip[first[rises]] = (begin + rise[:, None] * axis)[rises]
-    across = first + rises
-    tip[across[falls]] = (end + fall[:, None] * axis)[falls]
-    phase[across] = Phase.POSITION
-    return replace(wide, tip=tip, phase=phase)

@@ -54,4 +54,4 @@ def _at_samples(path: JointPath, control: Control, start: Floats) -> clearances.
     for t in _SAMPLES:
         _, _, q = control.between(start[:-1], path.q, np.full(len(path), t), kinematics)
         values = np.fmin(values, clearances.reach(kinematics, q).values)
-    return clearances.Margins(margins.names, margins.angular, values)
+    return replace(margins, values=values)

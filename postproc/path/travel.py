@@ -32,7 +32,7 @@ def _arc_extremes(path: JointPath, law: Control, k: Ints, at_start: Floats, low:
     """
     kin, slides = law.machine.kinematics, law.slides
     q0 = at_start[:, slides]
-    slides_of = np.linalg.inv(kin.jacobian(at_start)[:, :3][:, :, slides]) @ np.linalg.inv(law.tip_to_words(kin, at_start))
+    slides_of = np.linalg.inv(kin.slide_directions(at_start, slides)) @ np.linalg.inv(law.tip_to_words(kin, at_start))
     step = np.linalg.solve(slides_of, (path.q[k][:, slides] - q0)[..., None])[..., 0]
     for plane, (i, j) in PLANE_COLUMNS.items():
         rows = np.flatnonzero(path.plane[k] == plane)

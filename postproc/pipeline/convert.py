@@ -13,7 +13,7 @@ from postproc.base.progress import Progress
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.job.job import prepare, with_shop
 from postproc.pipeline.hooks import refused_hooks
-from postproc.pipeline.next_modes import modes_not_in, with_next_modes
+from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
 from postproc.pipeline.stages import staged
@@ -152,11 +152,6 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
             return replace(begun, diagnostics=tuple(found))
         job = replace(job, setup=with_measured(job.setup, measured))
     comparison, more = read_back(data, job, path.file, progress, str(gcode), NeighbourFiles(gcode))
-    if has_errors(more) and (refused := modes_not_in(comparison, job)):
-        again, _ = prepare(path, machine, spec, start.setup, options, refused)
-        if again is not None:
-            job = replace(again, setup=job.setup)
-            comparison, more = read_back(data, job, path.file, progress, str(gcode), NeighbourFiles(gcode))
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more]
     said = None
     if comparison is not None and not has_errors(found):

@@ -11,7 +11,6 @@ from postproc.control.control import MODE_NAMES, InterpolationMode
 from postproc.control.modes import ASKED, OutputModes, Refused
 from postproc.job.job import Job
 from postproc.pipeline.result import PostResult
-from postproc.readback.comparison.compare import Comparison
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, warning
 
@@ -53,18 +52,6 @@ def with_next_modes(result: PostResult, staged: StagedAgain) -> PostResult:
         if made.ok:
             return _said(first, made, why)
     return with_remedies(first)
-
-
-def modes_not_in(comparison: Comparison | None, job: Job) -> Refused:
-    """The modes that a program is not written in, where it is in others than "auto" takes: another one could not be proved
-    when it was written. Where rapids run as dog-legs its path depends on the mode. Empty where all are as expected."""
-    if comparison is None or comparison.executed is None or job.control.rapids != "dog-leg" or not _auto(job.modes):
-        return Refused()
-    motion, count = comparison.executed[1], len(job.modes.asked)
-    used = {motion.frames[k].law for k in np.unique(motion.frame[motion.code > 0]).tolist()}
-    if {job.modes.law(k, True) for k in range(count)} <= used:
-        return Refused()
-    return Refused((k, law) for k in range(count) for law in _LAWS if law not in used)
 
 
 def _depends(made: PostResult) -> bool:

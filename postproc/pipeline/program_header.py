@@ -1,4 +1,4 @@
-"""Comment lines at the head of a program: what made it, what the work offset must hold, which tool axes were chosen."""
+"""Comment lines in the header of a program: what made it, what the work offset must hold, which tool axes were chosen."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from postproc.compile.program import Program
 from postproc.control.control import MODE_NAMES
 from postproc.control.modes import table_axes
 from postproc.job.job import Job
+from postproc.pipeline.cutcom_header import cutcom_lines
+from postproc.pipeline.pivot_header import pivot_lines
 from postproc.pipeline.stage_values import CompiledStage
 from postproc.readback.comparison.length_margins import length_matters
 from postproc.setup.model import stated_value
 
 
 def header_lines(made: CompiledStage) -> list[str]:
-    """The head of the program of a conversion that is compiled."""
+    """The header of the program of a conversion that is compiled."""
     job, machine = made.job, made.machine
     letters, said = zip(machine.axis_names, job.control.work_offset, machine.rotary, strict=True), made.controller.lengths
     offset = " ".join(f"{k}{v:.4f}" if turns else f"{k}{said.plain(v)}" for k, v, turns in letters)
@@ -38,7 +40,8 @@ def header_lines(made: CompiledStage) -> list[str]:
     if made.motion is not None:
         header.append(feeds_line())
     header += [f"T{number}: {what}, of the set-up" for number, what in job.stated]
-    header += [*_tip_frame(made), *_corrections(made), *_orientations(made), *_tools(job)]
+    header += [*_tip_frame(made), *_corrections(made), *_orientations(made), *pivot_lines(job, made.program),
+               *_tools(job), *cutcom_lines(job, made.program)]
     if made.toolpath.name:
         header.insert(1, f"part {made.toolpath.name}")
     return header

@@ -139,7 +139,7 @@ def _touched(work: PassContext, program: PostResult) -> _Blame:
 
     job, comparison = program.job, program.comparison
     assert job is not None and comparison is not None and comparison.executed is not None
-    motion, moves = comparison.executed[1], job.moves.without_pecks()
+    motion, moves = comparison.executed[1], comparison.moves.without_pecks()
     executed = BlockPoses(job.control, job.kinematics_of, job.register_lengths(),
                           poses_before(motion, job.control))
     serves = np.minimum(comparison.owner, len(moves) - 1)

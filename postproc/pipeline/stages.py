@@ -257,7 +257,7 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
 
 
 def stated(made: VerifiedStage, progress: Progress | None) -> tuple[VerifiedStage, DiagnosticList]:
-    """What is proved, in the head of the program: another comment in the place of the one that was read back."""
+    """What is proved, in the header of the program: another comment in the place of the one that was read back."""
     if made.comparison is None:
         return made, []
     text, found = with_statement(made.text, made.controller, made.comparison, made.witness,
@@ -276,6 +276,6 @@ STAGES = (
     Stage("compile", "canonical words, feeds, commands, cycles", compiled),
     Stage("write", "text in the control's dialect", written),
     Stage("verify", "read back, compared with the CL file, second witness", verified),
-    Stage("state", "what is proved, in the head of the program", stated),
+    Stage("state", "what is proved, in the header of the program", stated),
 )
 """in order; each is given what the one before hands on"""

@@ -89,7 +89,7 @@ def _program(result: VerifyResult, kept: ProofFile, folder: Path) -> str:
 
 
 def _differs(then: list[HashedFile], now: Hashes) -> str:
-    """What is other than then, "" where all is the same; files may bear other names."""
+    """What is other than then, "" where all is the same; files may have other names."""
     if [one.sha256 for one in then] == [one.sha256 for one in now]:
         return ""
     if not then or not now:

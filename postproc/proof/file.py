@@ -152,7 +152,8 @@ def _second(result: PostResult) -> dict[str, Any]:
     if said is None:
         return {"compared": [], "not_compared": ["all"], "positions": 0, "worst": {"tip_mm": 0.0, "axis_deg": 0.0}}
     worst = [value if math.isfinite(value) else 0.0 for value in (said.worst_tip, said.worst_axis / DEG)]
-    return {"compared": list(said.compared), "not_compared": list(said.not_compared), "positions": said.points,
+    return {"compared": [str(one) for one in said.compared], "positions": said.points,
+            "not_compared": [str(one) for one in said.not_compared],
             "worst": {"tip_mm": worst[0], "axis_deg": worst[1]}}
 
 

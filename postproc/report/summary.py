@@ -120,15 +120,17 @@ def _orientation(result: PostResult) -> dict[str, Any] | None:
 
 def witness_dict(said: Testimony | None) -> dict[str, Any] | None:
     """What the second witness compared; None where it was not asked, because the read-back had found errors."""
-    return None if said is None else {"agrees": not said.findings, "compared": list(said.compared),
-                                      "not_compared": list(said.not_compared), "points": said.points,
+    return None if said is None else {"agrees": not said.findings, "compared": [str(one) for one in said.compared],
+                                      "not_compared": [str(one) for one in said.not_compared], "points": said.points,
                                       "worst_tip_mm": _number(said.worst_tip),
                                       "worst_axis_deg": _number(said.worst_axis / DEG), "seconds": said.seconds}
 
 
 def witness_lines(said: Testimony | None) -> list[str]:
     """What the second witness has compared, for people."""
-    return [f"second witness agrees: {', '.join(said.compared)}"] if said and said.compared and not said.findings else []
+    if said is None or not said.compared or said.findings:
+        return []
+    return [f"second witness agrees: {', '.join(map(str, said.compared))}"]
 
 
 def _number(value: float) -> float | None:

@@ -11,7 +11,7 @@ from toolpaths.rotations import TWO_PI, whole_turns
 
 
 def unwinding(result: PostResult) -> dict[str, dict[str, Any]]:
-    """By letter of each axis that turns on and on and counts its turns: seconds that linking moves of the
+    """By letter of each axis without end stops that counts its turns: seconds that linking moves of the
     program unwind it, turns from home at which it ends, seconds that the next start unwinds those."""
     path, job = result.path, result.job
     if path is None or job is None or not len(path):

@@ -18,7 +18,7 @@ _LATER: tuple[tuple[str, ...], ...] = (
     ("hooks",), ("output", "stop_between_tools"), ("output", "program_number"), ("output", "program_name"),
     ("clearance", "index"), ("output", "units"), ("output", "smoothing"), ("output", "rapids_as_feed"))
 """keys that set-ups have not always had: at their defaults they are left out, so that programs keep their fingerprint"""
-_LATER_OF_TOOLS = ("tip_acceleration", "tip_jerk", "axis_rate")
+_LATER_OF_TOOLS = ("tip_acceleration", "tip_jerk", "axis_rate", "compensation", "contour")
 """likewise, of each tool"""
 
 
@@ -34,7 +34,7 @@ def fingerprint(setup: SetupFile, file: str) -> str:
             del value_at(values, path[:-1])[path[-1]]
     for tool in values["tools"].values():
         for name in _LATER_OF_TOOLS:
-            if tool[name] is None:
+            if not tool[name]:
                 del tool[name]
     for key in file_keys(values):
         try:

@@ -22,6 +22,7 @@ from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Frame, Toolpath
 
+Compensation = Literal["wear", "radius", "none"]
 SetupVector = Annotated[tuple[float, float, float], Field(description="x, y, z")]
 
 
@@ -65,6 +66,12 @@ class ToolSetup(ToolBody):
     """where the CL file states no SPINDL for this tool, e.g. spindle = { rpm = 8000, direction = "clockwise" }"""
     coolant: CoolantKind | None = None
     """where the CL file states no COOLNT for this tool"""
+    compensation: Compensation | None = None
+    """what CUTCOM is for this tool. wear: its register holds by how much the radius is greater than the CAM system's, 0
+    for the tool as drawn (CL points of the tool's centre); radius: it holds the radius (contour = true); none: CUTCOM is
+    not written, the words are the path of the tool's centre. Default: wear, radius where contour = true"""
+    contour: bool = False
+    """true: under CUTCOM the CL file holds the contour, not the path of the tool's centre"""
     tip_acceleration: float | None = Field(default=None, gt=0.0)
     """largest acceleration of the tip along its path on the part, mm/s2; kept by --feed planned; default: no limit"""
     tip_jerk: float | None = Field(default=None, gt=0.0)
@@ -187,6 +194,7 @@ class SetupFile(UserModel):
     """A set-up. Everything has a default: part frame on the table frame, first system of the file as work offset."""
 
     description: str = ""
+    """one line"""
     assumed: list[str] = Field(default_factory=list)
     """keys whose values nobody has stated, e.g. assumed = ["tools.1.spindle", "output.feed"]: convert warns of each"""
     machine: str = ""

@@ -16,7 +16,7 @@ from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import NumberedTool, SheetFacts, facts_of, named_tools, taken_numbers
 from postproc.setup_sheet.place import Fit, fitted
 from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, number_questions, questions_of
-from postproc.setup_sheet.text import TOOL_NUMBERS, SheetHead, sheet_text, sheet_values
+from postproc.setup_sheet.text import TOOL_NUMBERS, SheetHeader, sheet_text, sheet_values
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, require, warning
 from toolpaths.toolpath import Toolpath
 
@@ -84,9 +84,9 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     made = SetupSheet("", tuple(known), facts, tuple(questions), tuple(answers.items()), fit)
     if not fit.result.ok:
         return _with(made, _not_fitted(fit), text="")
-    head = SheetHead(Path(toolpath.file).name, machine.name, fit.result.controller_name, toolpath.units,
+    header = SheetHeader(Path(toolpath.file).name, machine.name, fit.result.controller_name, toolpath.units,
                      _units(found, options), options.tolerance, options.axis_tolerance)
-    return _with(made, _assumed(made, fit), text=sheet_text(head, facts, answers, fit, toolpath))
+    return _with(made, _assumed(made, fit), text=sheet_text(header, facts, answers, fit, toolpath))
 
 
 def _numbers(toolpath: Toolpath, given: GivenAnswers, ask: Callable[[Question], float | str] | None,

@@ -22,7 +22,7 @@ TOOL_NUMBERS = "tool_numbers"
 
 
 @dataclass(frozen=True)
-class SheetHead:
+class SheetHeader:
     """What the first lines of the file say."""
 
     file: str
@@ -50,17 +50,17 @@ def sheet_values(facts: SheetFacts, answers: Mapping[str, Answer], description: 
             "output": output, "tool_numbers": facts.numbers}
 
 
-def sheet_text(head: SheetHead, facts: SheetFacts, answers: Mapping[str, Answer], fit: Fit, toolpath: Toolpath) -> str:
+def sheet_text(header: SheetHeader, facts: SheetFacts, answers: Mapping[str, Answer], fit: Fit, toolpath: Toolpath) -> str:
     """The file."""
     setup = fit.setup
-    lines = [*_top(head, setup, toolpath), "", *_part(fit), "", *_clearance(setup), ""]
+    lines = [*_top(header, setup, toolpath), "", *_part(fit), "", *_clearance(setup), ""]
     for tool in facts.tools:
         lines += [*_tool(tool, facts, answers), ""]
     if facts.named:
         lines += ["[tool_numbers]    # by name of the tool in the CL file; the magazine must hold them so",
                   *(_line(toml_text(one.name), str(one.number), one.why + f"; {_ASSUMED}" * one.assumed)
                     for one in facts.named), ""]
-    lines += [*_output(head, setup, facts, answers), *_operations(fit.result)]
+    lines += [*_output(header, setup, facts, answers), *_operations(fit.result)]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -79,10 +79,10 @@ def _line(key: str, value: str, remark: str) -> str:
     return f"{f'{key} = {value}':<{_COLUMN}}  # {remark_text(remark)}"
 
 
-def _top(head: SheetHead, setup: SetupFile, toolpath: Toolpath) -> Iterator[str]:
-    yield remark_text(f"# Set-up of {head.file} on {head.machine}, {head.controller}: written by postproc setup new.")
-    yield f"# Proved with --tolerance {head.tolerance:g} (mm) and --axis-tolerance {head.axis_tolerance:g} (degrees)."
-    yield f"# Units of the CL file: {head.units}, {head.units_from}"
+def _top(header: SheetHeader, setup: SetupFile, toolpath: Toolpath) -> Iterator[str]:
+    yield remark_text(f"# Set-up of {header.file} on {header.machine}, {header.controller}: written by postproc setup new.")
+    yield f"# Proved with --tolerance {header.tolerance:g} (mm) and --axis-tolerance {header.axis_tolerance:g} (degrees)."
+    yield f"# Units of the CL file: {header.units}, {header.units_from}"
     yield _line("description", toml_text(setup.description), "name of the part, or of the CL file")
     if setup.machine:
         yield _line("machine", toml_text(setup.machine), "as -m has it: on another machine convert warns")
@@ -132,7 +132,7 @@ def _tool(tool: ToolFacts, facts: SheetFacts, answers: Mapping[str, Answer]) -> 
     yield remark_text(f"# coolant: {tool.coolant or 'none stated, see [output]'}{', of the CL file' * bool(tool.coolant)}")
 
 
-def _output(head: SheetHead, setup: SetupFile, facts: SheetFacts, answers: Mapping[str, Answer]) -> Iterator[str]:
+def _output(header: SheetHeader, setup: SetupFile, facts: SheetFacts, answers: Mapping[str, Answer]) -> Iterator[str]:
     yield "[output]"
     yield _line("default", json.dumps(setup.output.default), "output mode: the best that control and machine can, see below")
     feed, coolant = answers.get("output.feed"), answers.get("output.coolant")

@@ -47,7 +47,7 @@ def check_planned(path: JointPath, moves: Moves, needed: Floats, merge: float, c
     """
     if comparison.executed is None or comparison.poses is None:
         return []
-    motion, reference = comparison.executed[1], job.moves.without_pecks()
+    motion, reference = comparison.executed[1], comparison.moves.without_pecks()
     written, faults = WrittenBlocks.of(path, moves, needed), Faults(job.toolpath.file, gcode)
     count = len(reference)
     cutting = (motion.code > 0) & reference.run_by(comparison.owner) & ~motion.hole

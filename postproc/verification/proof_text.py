@@ -1,4 +1,4 @@
-"""What the proof of a program covers and by what: a line for the summary, and one for the head of the program.
+"""What the proof of a program covers and by what: a line for the summary, and one for the header of the program.
 
 The head is part of the text that is read back. So it is written with a line in its place first (`PENDING`),
 and that line is replaced when the proof is complete; the control sees a comment before and after, which is checked.
@@ -17,11 +17,9 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
 PLACES = 4
-"""decimals of mm and degrees in the head"""
+"""decimals of mm and degrees in the header"""
 ELSEWHERE = "proof: not said here"
-"""in the head of a program whose blocks are too short for it; the summary and the file of the proof say it"""
-_KINEMATICS = "kinematics "
-"""begins what the second reading says of a machine file that it has not used"""
+"""in the header of a program whose blocks are too short for it; the summary and the file of the proof say it"""
 
 
 def statement(c: Comparison, said: Testimony | None) -> str:
@@ -33,19 +31,18 @@ def statement(c: Comparison, said: Testimony | None) -> str:
     else:
         text = (f"proved: tip within {c.tip_bound:.6f} mm, axis within {c.axis_bound / DEG:.6f} degrees of the CL file all "
                 f"along every block of {c.bounded_cuts} of {c.cuts} cuts ({seen} at the places looked at)")
-    left = [] if said is None else list(said.not_compared)
+    left = [] if said is None else [str(one) for one in said.not_compared]
     return f"{text}, by {_means(said)}" + (f"; not compared by the second reading: {'; '.join(left)}" if left else "")
 
 
 def _means(said: Testimony | None) -> str:
     if said is None or not said.compared:
         return "read-back alone"
-    machine = not any(what.startswith(_KINEMATICS) for what in said.not_compared)
-    return f"read-back and second reading of {'CL file and machine file' if machine else 'the CL file'}"
+    return f"read-back and second reading of {'CL file and machine file' if said.own_kinematics else 'the CL file'}"
 
 
 def head_line(c: Comparison, said: Testimony | None, room: int, lengths: LengthText = MM) -> str:
-    """The same for the head of the program, in at most `room` characters, never cut short; bounds are rounded up.
+    """The same for the header of the program, in at most `room` characters, never cut short; bounds are rounded up.
 
     Without room for the names of what was not compared it says how many that are; without room for that, how
     near alone; and where not even that has room, that it is not said here. `lengths`: in units of the program.
@@ -60,7 +57,7 @@ def head_line(c: Comparison, said: Testimony | None, room: int, lengths: LengthT
         cuts = f"all {c.cuts} cuts" if c.cuts == c.bounded_cuts else f"{c.bounded_cuts} of {c.cuts} cuts"
         near = f"{lengths.up(c.tip_bound)}, {_up(c.axis_bound / DEG)}"
         text = f"proved by {by}: {cuts} within {lengths.up(c.tip_bound)} {lengths.name}, {_up(c.axis_bound / DEG)} degrees"
-    left = [] if said is None else list(said.not_compared)
+    left = [] if said is None else [str(one) for one in said.not_compared]
     named = "; not in the second reading: " + "; ".join(left).replace("(", "- ").replace(")", "")
     count = f"; {len(left)} not read twice" if left else ""
     tight = f"{'not proved' if c.unbounded else 'proved'}: {near} {lengths.name}, degrees{count}"
@@ -74,7 +71,7 @@ def _up(degrees: float) -> str:
 
 def with_statement(text: str, controller: ControllerFile, comparison: Comparison, witness: Testimony | None,
                    file: str) -> tuple[str, list[Diagnostic]]:
-    """The text of a proved program with its proof in the head; an error where a comment of the controller cannot hold it.
+    """The text of a proved program with its proof in the header; an error where a comment of the controller cannot hold it.
 
     Args:
         file: the CL file, for messages
@@ -90,7 +87,7 @@ def with_statement(text: str, controller: ControllerFile, comparison: Comparison
 
 def _in_place_of(text: str, controller: ControllerFile, pending: str, line: str,
                  file: str) -> tuple[str, list[Diagnostic]]:
-    """The text with another comment in the head in the place of one that was read back."""
+    """The text with another comment in the header in the place of one that was read back."""
     style = controller.comment
     capitals = f"{style.open}{_cleaned(controller, pending, True)}{style.close}" in text[:HEADER]
     mark = f"{style.open}{_cleaned(controller, pending, capitals)}{style.close}"
@@ -100,7 +97,7 @@ def _in_place_of(text: str, controller: ControllerFile, pending: str, line: str,
     line = f"{style.open}{_cleaned(controller, line, capitals)}{style.close}"
     begin, end = text.rfind("\n", 0, at) + 1, at + len(mark)
     if plain(text[begin:end].encode()) != plain((text[begin:at] + line).encode()):
-        return text, [error("proof.comment", f"the proof cannot stand in a comment of the head: {line}",
+        return text, [error("proof.comment", f"the proof cannot stand in a comment of the header: {line}",
                             file=file, hint="comment.forbidden of the controller file must name all that "
                             "ends a comment")]
     return text[:at] + line + text[end:], []

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.base.header_words import HEADER, NO_FILE, Head, read_head, same_name
+from postproc.base.header_words import HEADER, NO_FILE, ProgramHeader, read_header, same_name
 from postproc.base.memory import give_back
 from postproc.base.options import Options
 from postproc.base.progress import Progress
@@ -41,12 +41,12 @@ CAUSES = frozenset({"verify.start", "verify.tool", "verify.tool_change", "verify
 
 def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
     """An error where the header of a program names other chosen tool axes than the options; nothing without our header."""
-    head, chosen = read_head(data), options.orient != "keep"
+    header, chosen = read_header(data), options.orient != "keep"
     given = f"--orient {options.orient} --max-tilt {options.max_tilt:g}" if chosen else "no --orient"
-    if head.axes is None:
+    if header.axes is None:
         return [error("verify.orient", f"the header names no chosen tool axes, {given} is given", file=gcode,
-                      hint="verify without --orient")] if chosen and head.ours else []
-    plan, tilt = head.axes
+                      hint="verify without --orient")] if chosen and header.ours else []
+    plan, tilt = header.axes
     if chosen and (plan, tilt) == (options.orient, f"{options.max_tilt:g}"):
         return []
     return [error("verify.orient", f"the header says orient {plan}, max tilt {tilt} degrees, {given} is given", file=gcode,
@@ -55,9 +55,9 @@ def other_axes(data: bytes, options: Options, gcode: str) -> list[Diagnostic]:
 
 def other_setup(data: bytes, options: Options, off: bool, gcode: str) -> list[Diagnostic]:
     """What the header of a program says of its set-up where that is not the one given; `off`: the program fails."""
-    head = read_head(data)
-    stated, then = head.setup, head.setup.mark if head.setup else ""
-    if then == options.setup_mark or (stated and not then) or not head.ours:
+    header = read_header(data)
+    stated, then = header.setup, header.setup.mark if header.setup else ""
+    if then == options.setup_mark or (stated and not then) or not header.ours:
         return []
     given = f"{Path(options.setup).name or NO_FILE} (fingerprint {options.setup_mark})" if options.setup_mark else "none"
     named = stated.name if stated else ""
@@ -84,9 +84,9 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls,
                         machine.clamp_codes)
     code, diagnostics = reader.read(data, gcode, others)
-    head = read_head(as_bytes(data[:HEADER]))
+    header = read_header(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]
-    if gcode and not job.corrects and head.corrected is not None:
+    if gcode and not job.corrects and header.corrected is not None:
         return None, [_twice(job, gcode), *diagnostics]
     if code is not None:
         diagnostics += placed([_located(d, job.toolpath.file, of_cl) for d in check_stated(code, reader, gcode)], code.files)
@@ -111,6 +111,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         called = {name: others[name] for name, _ in code.files[1:]} if others else {}
         planned, changed = planned_feeds(as_bytes(data), called, gcode or job.toolpath.file)
         comparison = compare(motion, job, executed, gcode, planned)
+    job = job.with_moves(comparison.moves)
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(code, motion, job, comparison.owner, faults),
@@ -119,8 +120,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
                *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     if gcode and job.corrects:
-        noted = [*(_of_model(head, job, gcode, has_errors(noted)) if head.corrected is not None else
-                   _uncorrected(head, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
+        noted = [*(_of_model(header, job, gcode, has_errors(noted)) if header.corrected is not None else
+                   _uncorrected(header, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
     return replace(comparison, executed=(code, motion), poses=executed, planned=planned,
                    lengths=_margins(motion, executed, longer, job, comparison)), [*diagnostics, *noted]
@@ -153,28 +154,28 @@ def _twice(job: Job, gcode: str) -> Diagnostic:
                  "into it and take its errors out of the control")
 
 
-def _uncorrected(head: Head, job: Job, motion: Motion, executed: BlockPoses, comparison: Comparison,
+def _uncorrected(header: ProgramHeader, job: Job, motion: Motion, executed: BlockPoses, comparison: Comparison,
                  gcode: str) -> list[Diagnostic]:
     """Why a program is off on the machine with errors: its header names none that it corrects.
 
     A program of another post may correct them all the same, so that no amounts are known.
     """
-    if not (head.by_control or head.ours):
+    if not (header.by_control or header.ours):
         return [warning("verify.error_model", "the header of the program names no error model, it is verified on the "
                         "machine with errors", file=gcode, hint="verify without --error-model, if it corrects none")]
-    why = "by its header the control does" if head.by_control else "its header names no error model"
+    why = "by its header the control does" if header.by_control else "its header names no error model"
     return [error("verify.error_model", f"the program corrects no geometric errors ({why}): verified on the machine with "
                   "errors" + _amounts(job, motion, executed, comparison), file=gcode,
                   hint="verify without --error-model, or convert with it")]
 
 
-def _of_model(head: Head, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
+def _of_model(header: ProgramHeader, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
     """What its header says of the model that a program corrects, its name and fingerprint, where that is not
     the one that it is verified with; `off`: the program fails. Programs without a fingerprint have only the name."""
     from machines.geometric_error.files.fingerprint import fingerprint
 
     assert job.errors is not None
-    name, then, now = head.corrected, head.model, fingerprint(job.errors)
+    name, then, now = header.corrected, header.model, fingerprint(job.errors)
     same = not name or same_name(name, job.errors.name)
     if then == now or (not then and (same or not off)):
         return []

@@ -21,7 +21,7 @@ from postproc.readback.execution.poses import BlockPoses as Poses
 from postproc.readback.execution.poses import arc_sweeps, begins, coordinates
 from postproc.reference.coolant import COMMANDS, switching
 from postproc.setup.model import SetupFile
-from postproc.witness.evidence import Case, ExecutedBlocks, Testimony
+from postproc.witness.evidence import Case, ExecutedBlocks, NotCompared, Testimony
 from postproc.witness.machine import merged
 from postproc.witness.second_reading import testify
 from toolpaths.arrays import Floats, Ints
@@ -85,10 +85,9 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
     return ExecutedBlocks(job.machine.axis_names, joints, start, motion.line, motion.code, np.asarray(straight),
                           arc_sweeps(motion, control), motion.feed, motion.inverse, motion.unit, by_tip, control.feed_rule,
                           control.degree_is_inch,
-                          job.controller.feed.arc_inverse == "radius", motion.tool, motion.spindle, motion.rpm,
-                          motion.coolant,
-                          motion.dwell, motion.pitch, motion.hole, motion.register, lengthless, steps, joints_at, poses_at,
-                          approach_at if job.corrects else None)
+                          job.controller.feed.arc_inverse == "radius", motion.compensation, motion.tool,
+                          motion.spindle, motion.rpm, motion.coolant, motion.dwell, motion.pitch, motion.hole,
+                          motion.register, lengthless, steps, joints_at, poses_at, approach_at if job.corrects else None)
 
 
 def error_tables(file: str | Path) -> tuple[dict[str, Any], dict[str, bytes]]:
@@ -128,7 +127,7 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
     """
     if options.orient != "keep" or source is None or comparison.executed is None or comparison.poses is None:
         why = "the tool axes were chosen" if options.orient != "keep" else "the path is not as it was read from a file"
-        return Testimony((), (f"all ({why})",)), []
+        return Testimony((), (NotCompared("all", why),)), []
     control, codes = job.control, job.controller.codes
     errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})
     case = Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
@@ -147,7 +146,7 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
         why = f"the second witness failed: {type(fault).__name__}: {fault}"
         hint = "leave --require-proof out, where the read-back alone is enough"
         found = [error("witness.failed", f"{why}; the program is not proved", file=job.toolpath.file, hint=hint)]
-        return Testimony((), (f"all ({why})",)), found if options.require_proof else []
+        return Testimony((), (NotCompared("all", why),)), found if options.require_proof else []
     return said, [error(f"witness.{f.code}", f"second witness: {f.message} (line {f.block} of the program)",
                         file=job.toolpath.file, lines=[f.line] if f.line else [], count=f.count,
                         hint="do not run this program") for f in said.findings]

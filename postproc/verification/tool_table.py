@@ -281,7 +281,7 @@ def _separated(lines: list[str], rows: _Rows) -> None:
     for n, line in list(_numbered(lines))[1:]:
         cells = line.split(mark)
         if len(cells) != len(columns):
-            rows.fault("cells", f"{len(cells)} cells, the head line has {len(columns)}", n,
+            rows.fault("cells", f"{len(cells)} cells, the header line has {len(columns)}", n,
                        f"separate the cells by {mark!r} throughout; numbers have a decimal point")
             continue
         values = {name: rows.number(cell, n) for name, cell in zip(columns, cells, strict=True) if cell.strip()}

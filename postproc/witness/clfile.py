@@ -10,7 +10,7 @@ import numpy as np
 
 import postproc.witness.arcs as arcs
 import postproc.witness.cycles as cycles
-from postproc.witness.commanded import KINDS, OWN, UNFOLLOWED, Commanded, unit
+from postproc.witness.commanded import KINDS, OFF, OWN, SIDES, UNFOLLOWED, Commanded, unit
 from postproc.witness.dialect import ALL, dialect_of, scale_of
 from postproc.witness.execution import Execution, Z
 from postproc.witness.rows import assembled
@@ -25,7 +25,7 @@ _NO_MOTION = frozenset((
     "END", "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATSTART", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH",
     "DISPLY", "AUTOPS", "PSIS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST",
     "PLOT", "CSI_SET_EXTENSION_LENGTH", "CSI_SET_FLUTE_LENGTH", "MCHTOL", "CUTTER", "TLDATA", "TOOLNO", "TRNTYP",
-    "SELECT", "CUTCOM", "DELAY", "DWELL", "STOP", "OPSTOP", "OPSKIP", "SEQNO", "MODE", "REWIND", "CLAMP", "BREAK",
+    "SELECT", "DELAY", "DWELL", "STOP", "OPSTOP", "OPSKIP", "SEQNO", "MODE", "REWIND", "CLAMP", "BREAK",
     "CHECK", "LEADER", "HEAD", "POD", "AIR", "SLOWDN", "UNLOAD", "SELCTL", "OFSTNO", "CLEARP", "CLRSRF", "RETRCT",
     "END-OF-PATH", "START_OP", "END_OP", "TOOLPATH_TYPE", "ISN", "ARCSLP", "MCS2", "START", "OPERATION", "BEGIN",
     "MATERL", "TCP", "CSI_PATH_TOLERANCE", "CSI_SET_PATH_PARAM", "SET", "ORIGIN", "SAFPOS", "COMMENT", "RTCP", "DELETE",
@@ -268,6 +268,7 @@ def _load(e: Execution, r: Record, line: int) -> None:
     if named or number != e.tool.now:
         e.register.set(e.row, named)
     e.tool.set(e.row, int(number))
+    e.side.set(e.row, OFF)
 
 
 def _register(r: Record) -> int:
@@ -278,6 +279,12 @@ def _register(r: Record) -> int:
         placed = list(takewhile(lambda w: isinstance(w, float), r.words))
         named = placed[3] if len(placed) > 3 else placed[1] if len(placed) > 1 else None
     return int(named) if isinstance(named, float) and named > 0.0 else OWN
+
+
+def _cutcom(e: Execution, r: Record, line: int) -> None:
+    side = next((SIDES[w] for w in r.words if isinstance(w, str) and w in SIDES), None)
+    if side is not None:
+        e.side.set(e.row, side)
 
 
 def _named(e: Execution, name: str) -> None:
@@ -357,5 +364,5 @@ HANDLERS: dict[str, Callable[[Execution, Record, int], None]] = {
     "RAPID": _rapid, "FEDRAT": _fedrat, "LOAD": _load, "LOADTL": _load, "TURRET": _load, "TOOL PATH": _tool_path,
     "TPRINT": _tprint, "SPINDL": _spindl, "COOLNT": _coolnt, "AUXFUN": _by_code, "PREFUN": _by_code,
     "INSERT": _by_code,
-    "CYCLE": _cycle,
+    "CYCLE": _cycle, "CUTCOM": _cutcom,
 }

@@ -19,6 +19,8 @@ KINDS = {"OFF": 0, "THRU": 12, "AIR": 13, "MIST": 11}
 """coolant by the word that says it, in this order; 1 is flood, 2 whatever flows"""
 BITS = {1: 1, 11: 2, 12: 4, 13: 8}
 """what flows then, as the reader counts it"""
+OFF, SIDES = 40, {"LEFT": 41, "RIGHT": 42, "OFF": 40}
+"""of cutter compensation, and by the words of CUTCOM"""
 OWN = 0
 """of a length register: that of the tool's number"""
 
@@ -49,6 +51,7 @@ class Commanded:
         feed (N,): mm/min, or mm per turn where `per_turn` (N,), or 1/min where `inverse` (N,); NaN: none
         arc (N,): index into centre, normal (K, 3), sweep (K,) rad; -1
         cycle (N,): index into cycles, -1; tool, spindle, coolant (N,): number; -1, 0, 1; "" to words; UNKNOWN
+        side (N,): 40, 41 or 42 as CUTCOM says it: off, left, right of the path
         register (N,): length register, OWN where no record names one
         rpm (N,): NaN where not stated; turned, flowed (N,): row of the last SPINDL and COOLNT record; name (N,): into names
         systems: rotation and origin of every system of the file by its name, in order; first: name of the one
@@ -72,6 +75,7 @@ class Commanded:
     cycle: Array
     cycles: tuple[WitnessCycle, ...]
     tool: Array
+    side: Array
     register: Array
     name: Array
     names: tuple[str, ...]

@@ -37,7 +37,6 @@ class Case:
     """what the length register of a tool is more than its number where the file names none"""
     coolants: int = 15
     """bits of the kinds of coolant that the control has codes for: it gives the nearest of them for others"""
-    oriented: bool = False
     program: bytes = b""
     """the text of the program, where it is one file"""
     modulo: dict[str, Literal["shortest", "sign"]] = field(default_factory=dict)
@@ -62,6 +61,7 @@ class ExecutedBlocks:
         steps: words (K, J) of blocks less those where they begin, mm and degrees; by_tip (E,): X, Y, Z are the tip
         rule: what a feed per minute refers to ("xyz-first", "geometry", "all"); degree_is_inch: with all axes in
             inches, degrees count as such, else as mm; by_angle: inverse time of arcs counts rad
+        side (E,): cutter compensation, 40 off, 41 left, 42 right
         tool, spindle, rpm, coolant, dwell, pitch, hole (E,): as in force; pitch NaN outside taps, hole True in cycles
         register (E,): length register in force, -1 for none; lengthless (E,): True where none may be, since
             the joints hold the tool's length already
@@ -85,6 +85,7 @@ class ExecutedBlocks:
     rule: Literal["xyz-first", "geometry", "all"]
     degree_is_inch: bool
     by_angle: bool
+    side: Array
     tool: Array
     spindle: Array
     rpm: Array
@@ -103,11 +104,18 @@ class ExecutedBlocks:
         return len(self.line)
 
 
+FindingCode = Literal["position", "path", "kind", "clearance", "arc", "hole", "feed", "velocity", "tool", "length",
+                      "spindle", "coolant", "compensation", "offset", "turning", "clamp", "errors", "rods"]
+"""what is found to differ; `witness.` with it is the code of the error"""
+Aspect = Literal["positions", "arcs", "holes", "feeds", "length registers", "tools", "spindle states", "coolant states",
+                 "cutter compensation", "work offset", "turns of modulo axes", "clamps"]
+
+
 @dataclass(frozen=True)
 class Finding:
     """A place where program and CL file differ: CL line and program line (0: none), `count` of such places."""
 
-    code: str
+    code: FindingCode
     message: str
     line: int
     block: int
@@ -115,13 +123,44 @@ class Finding:
 
 
 @dataclass(frozen=True)
+class Compared:
+    """How many places were compared in one respect."""
+
+    what: Aspect
+    count: int
+
+    def __str__(self) -> str:
+        return f"{self.count} {self.what}"
+
+
+@dataclass(frozen=True)
+class NotCompared:
+    """What was not compared, and why: everything, the machine's kinematics (poses are then those of the read-back), the
+    spindle, or a record of the CL file by its text. `line` of the CL file, 0 for none."""
+
+    what: Literal["all", "kinematics", "spindle", "record"]
+    why: str
+    line: int = 0
+
+    def __str__(self) -> str:
+        if self.what == "record":
+            return f"{self.why} (line {self.line})"
+        return f"{self.what} ({self.why}{f', line {self.line}' if self.line else ''})"
+
+
+@dataclass(frozen=True)
 class Testimony:
     """What was compared, what not and why, what was found; the worst tip (mm) and axis (rad) that was seen."""
 
-    compared: tuple[str, ...]
-    not_compared: tuple[str, ...]
+    compared: tuple[Compared, ...]
+    not_compared: tuple[NotCompared, ...]
     findings: tuple[Finding, ...] = ()
     points: int = 0
     worst_tip: float = 0.0
     worst_axis: float = 0.0
     seconds: float = 0.0
+
+    @property
+    def own_kinematics(self) -> bool:
+        """True where positions are compared by the witness's own reading of the machine file."""
+        return bool(self.compared) and all(one.what != "kinematics" for one in self.not_compared)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import postproc.witness.arcs as arcs
-from postproc.witness.commanded import OWN, UNKNOWN, WitnessCycle
+from postproc.witness.commanded import OFF, OWN, UNKNOWN, WitnessCycle
 from postproc.witness.dialect import WitnessDialect
 from postproc.witness.text import Array, ClText
 
@@ -57,7 +57,7 @@ class Execution:
         self.known, self.gap = HeldValues(True), set[int]()
         self.feed: HeldValues = HeldValues((math.nan, False, False))
         self.tool, self.name, self.names = HeldValues(UNKNOWN), HeldValues(-1), list[str]()
-        self.register = HeldValues(OWN)
+        self.register, self.side = HeldValues(OWN), HeldValues(OFF)
         self.spindle: HeldValues = HeldValues((UNKNOWN, math.nan))
         self.last_direction = 1
         self.coolant, self.cycle, self.cycles = HeldValues(UNKNOWN), HeldValues(-1), list[WitnessCycle]()

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.witness.block_times import lengths_of, seconds_of
 from postproc.witness.commanded import RAPID
-from postproc.witness.evidence import Finding
+from postproc.witness.evidence import Finding, FindingCode
 from postproc.witness.machine import Chain, limits_of
 from postproc.witness.place import Cut, Poses
 from postproc.witness.stretches import BOTTOM, ENTER, Targets, is_cut, is_rapid, off
@@ -139,7 +139,7 @@ def _turned_in_rapid(w: Walked, angle: float) -> Array:
     return np.asarray(w.inside & ((t.kind == RAPID) & ~t.free & turns)[np.minimum(w.owner, len(t) - 1)])
 
 
-def _finding(w: Walked, rows: Array, lines: Array, code: str, message: str) -> list[Finding]:
+def _finding(w: Walked, rows: Array, lines: Array, code: FindingCode, message: str) -> list[Finding]:
     if not len(rows):
         return []
     k = int(rows[0])
@@ -173,7 +173,7 @@ def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, tur
         line = np.fmin(line, np.where(ends, np.inf, _above(tip, w.targets.tip[to], w.targets.axis[to])))
         line = np.fmin(line, np.where(ends | entry, np.inf, _above(tip, start, start_axis)))
         adjacent = ~(line <= near)
-        adjacent &= turned | ~_level(w, rows, to, ends | begins, tip, near, bent)
+        adjacent &= turned | ~_level(w, rows, to, ends | begins, tip, near, cut if bent else None)
         low |= adjacent & cuts
         if cut is not None:
             low |= adjacent & ~cut.clear(tip, axis, LEAST * margin)
@@ -192,16 +192,18 @@ def _above(tip: Array, end: Array, axis: Array) -> Array:
     return np.asarray(np.sqrt((rest * rest).sum(axis=1)))
 
 
-def _level(w: Walked, rows: Array, to: Array, away: Array, tip: Array, near: float, bent: bool) -> Array:
-    """(K,) True for rapids to a hole or from one that keep the height of where they come from: the start
-    plane of the hole before, or the position before; and for dog-legs."""
-    before = np.maximum(to - 1, 0)
+def _level(w: Walked, rows: Array, to: Array, away: Array, tip: Array, near: float, cut: Cut | None) -> Array:
+    """(K,) True for rapids to a hole or from one that keep the height of where they come from: the start plane of the hole
+    before, or the position before. Where rapids are dog-legs (`cut`), those that keep above what is cut and the stock, and
+    from hole to hole above the lower end."""
+    before, along = np.maximum(to - 1, 0), w.targets.axis[to]
     drilled = w.targets.kind[before] == BOTTOM
-    level = w.targets.tip[before - drilled]
-    rise, first = (np.einsum("ni,ni->n", p, w.targets.axis[to]) for p in (tip, level))
+    rise, first = (np.einsum("ni,ni->n", p, along) for p in (tip, w.targets.tip[before - drilled]))
+    last = np.einsum("ni,ni->n", w.targets.tip[to], along) if cut else first
     of_hole = drilled | (w.targets.kind[to] == ENTER)
-    last = np.einsum("ni,ni->n", w.targets.tip[to], w.targets.axis[to]) if bent else first
-    return np.asarray(~away & is_rapid(w.kind[rows]) & (of_hole | bent) & (rise >= np.minimum(first, last) - near))
+    keeps = of_hole & (rise >= np.minimum(first, last) - near)
+    keeps |= rise >= (cut.top(along) - near if cut else np.inf)
+    return np.asarray(~away & is_rapid(w.kind[rows]) & keeps)
 
 
 def _explained(w: Walked, rows: Array, margin: float, table: dict[str, object]) -> Array:

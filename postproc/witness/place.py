@@ -137,11 +137,16 @@ class Poses:
 
 @dataclass(frozen=True)
 class Cut:
-    """The box (8, 3) and the sphere of what is cut."""
+    """The box (8, 3) and the sphere of what is cut; `whole` (K, 3): corners of that box and of the set-up's stock."""
 
     corners: Array
     centre: Array
     radius: float
+    whole: Array
+
+    def top(self, axis: Array) -> Array:
+        """(N,) mm along axes (N, 3) of the highest of what is cut and of the stock."""
+        return np.asarray((axis @ self.whole.T).max(axis=1))
 
     def clear(self, tip: Array, axis: Array, margin: float) -> Array:
         """(N,) True where the half line from a tip along its axis keeps `margin` mm from the box seen along
@@ -172,11 +177,16 @@ def cut_of(case: Case, c: Commanded, tip: Array, axis: Array, centre: Array, nor
     every = every[np.isfinite(every).all(axis=1)]
     if not len(every):
         return None
-    low, high = every.min(axis=0), every.max(axis=0)
-    given = case.setup.get("clearance", {}).get("centre")
-    middle = 0.5 * (low + high) if given is None else place[0] @ np.array(given, np.float64) + place[1]
-    corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(8, 3)
-    return Cut(corners, middle, float(np.sqrt(((every - middle) ** 2).sum(axis=1).max())))
+    corners = _box(every.min(axis=0), every.max(axis=0))
+    given, stock = case.setup.get("clearance", {}).get("centre"), (case.setup.get("rewind") or {}).get("stock")
+    middle = 0.5 * (corners[0] + corners[-1]) if given is None else place[0] @ np.array(given, np.float64) + place[1]
+    whole = [corners, _box(stock["low"], stock["high"]) @ place[0].T + place[1]] if stock else [corners]
+    return Cut(corners, middle, float(np.sqrt(((every - middle) ** 2).sum(axis=1).max())), np.concatenate(whole))
+
+
+def _box(low: Array, high: Array) -> Array:
+    """(8, 3) corners of the box between two points."""
+    return np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(8, 3)
 
 
 def on_arc(start: Array, end: Array, centre: Array, normal: Array, sweep: Array,

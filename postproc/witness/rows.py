@@ -57,7 +57,8 @@ def assembled(e: Execution) -> Commanded:
     gap = np.zeros(n, bool)
     gap[[row for row in e.gap if row < n] + uncertain] = True
     return Commanded(tip, axis, kind, line, known, gap, feed[:, 0], feed[:, 1] > 0, feed[:, 2] > 0, arc, centre, normal,
-                     sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.register.column(n, np.int64),
+                     sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.side.column(n, np.int64),
+                     e.register.column(n, np.int64),
                      e.name.column(n, np.int64), tuple(e.names),
                      spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64),
                      np.array(e.coolant.rows, np.int64)[_index(e.coolant, n)], e.systems, _first_system(e, place), e.unread)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from time import process_time
 
 import numpy as np
@@ -11,10 +12,11 @@ from postproc.witness.clamps import check_clamps
 from postproc.witness.clfile import commanded
 from postproc.witness.commanded import ARC, LINE, Commanded
 from postproc.witness.errors import ErrorChain, error_chain
-from postproc.witness.evidence import Case, ExecutedBlocks, Finding, Testimony
+from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Finding, NotCompared, Testimony
 from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
 from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
+from postproc.witness.sides import check_sides
 from postproc.witness.states import (
     check_feeds,
     check_holes,
@@ -27,7 +29,6 @@ from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
 from postproc.witness.text import Array
 from postproc.witness.turning import check_turning
 
-_NAMES = {"tool": "tools", "length": "length registers", "spindle": "spindle states", "coolant": "coolant states"}
 ZERO = 1e-6
 """mm that reckoning may move the zero of the work offset"""
 
@@ -35,27 +36,25 @@ ZERO = 1e-6
 def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
     """What this witness says of an executed program; it never raises for what it does not understand."""
     began = process_time()
-    if case.oriented:
-        return _nothing("all (the tool axes were chosen, the CL file has others)", began)
     try:
         c = with_spindle(commanded(case.cl, case.units, case.dialect), case.setup)
         place = placement(case.setup, c)
     except Unplaced as fault:
-        return _nothing(f"all (system {fault} was not found)", began)
-    missing = [f"{what} (line {line})" for what, line in c.unread.items()]
+        return _nothing(f"system {fault} was not found", began)
+    missing = [NotCompared("record", what, line) for what, line in c.unread.items()]
     if not len(c) or not c.known.any():
-        return _nothing("all: " + (", ".join(missing) or "no position was understood"), began)
+        return _nothing("no position was understood", began, missing)
     table = merged(case.machine)
     machine = _machine(case, table)
     if machine is None:
-        missing.append("kinematics (parallel machine with geometric errors: poses of the read-back)" if case.errors
-                       else "kinematics (no machine file of a known kind: poses of the read-back)")
+        missing.append(NotCompared("kinematics", "parallel machine with geometric errors: poses of the read-back"
+                                   if case.errors else "no machine file of a known kind: poses of the read-back"))
     poses = Poses(case, executed, machine, [],
                   max(int(tools_of(c, case.setup).max(initial=0)), 0))
     with np.errstate(all="ignore"):
         found, worst, counts, silent = _compare(case, executed, c, place, poses, table)
-    compared = [f"{n} {what}" for what, n in counts.items() if n]
-    return Testimony(tuple(compared), (*missing, *silent), tuple(found), int(c.known.sum()), *worst,
+    compared = tuple(Compared(what, n) for what, n in counts.items() if n)
+    return Testimony(compared, (*missing, *silent), tuple(found), int(c.known.sum()), *worst,
                      process_time() - began)
 
 
@@ -66,12 +65,12 @@ def _machine(case: Case, table: dict[str, object]) -> Chain | ErrorChain | Rods 
     return error_chain(table, case.error_model, case.error_tables) if case.error_model else None
 
 
-def _nothing(why: str, began: float) -> Testimony:
-    return Testimony((), (why,), seconds=process_time() - began)
+def _nothing(why: str, began: float, missing: Sequence[NotCompared] = ()) -> Testimony:
+    return Testimony((), (NotCompared("all", why), *missing), seconds=process_time() - began)
 
 
 def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Array, Array], poses: Poses,
-             table: dict[str, object]) -> tuple[list[Finding], tuple[float, float], dict[str, int], list[str]]:
+             table: dict[str, object]) -> tuple[list[Finding], tuple[float, float], dict[Aspect, int], list[NotCompared]]:
     rotation, origin = place
     same = bool((rotation == np.eye(3)).all())
     tip = c.tip if same and not origin.any() else c.tip @ rotation.T + origin
@@ -107,6 +106,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     found += check_velocities(w, c, table)
     faults, states, silent = check_states(w, c, case)
     found += faults
+    faults, sides = check_sides(w, c, case)
+    found += faults
     found += _misfits(poses)
     faults, turned = check_turning(case, executed)
     found += faults
@@ -118,9 +119,10 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     found += faults
     good = w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM))
     worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
-    counts = {"positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()),
-              "holes": holes, "feeds": feeds, **{_NAMES[k]: v for k, v in states.items()}, "work offset": zeros,
-              "turns of modulo axes": turned, "clamps": clamped}
+    counts: dict[Aspect, int] = {
+        "positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()),
+        "holes": holes, "feeds": feeds, **states, "cutter compensation": sides, "work offset": zeros,
+        "turns of modulo axes": turned, "clamps": clamped}
     return found, worst, counts, silent
 
 

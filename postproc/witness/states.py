@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, WitnessCycle
-from postproc.witness.evidence import Case, Finding
+from postproc.witness.evidence import Aspect, Case, Finding, FindingCode, NotCompared
 from postproc.witness.machine import largest_feed, limits_of
 from postproc.witness.motion import CHUNK, Walked
 from postproc.witness.stretches import BOTTOM
@@ -21,6 +21,10 @@ VELOCITY = 1.02
 """share of the velocity of an axis that rounded words may ask for"""
 _RETRACT = 12
 """blocks behind the bottom of a hole in which the tool comes to its retract plane"""
+_State = Literal["length", "tool", "spindle", "speed", "coolant"]
+_STATES: dict[_State, tuple[FindingCode, Aspect]] = {
+    "length": ("length", "length registers"), "tool": ("tool", "tools"), "spindle": ("spindle", "spindle states"),
+    "speed": ("spindle", "spindle states"), "coolant": ("coolant", "coolant states")}
 _PECKED = ("DEEP", "BRKCHP")
 _FEED_OUT = ("BORE", "REAM", "TAP")
 
@@ -172,7 +176,7 @@ def _feed_finding(w: Walked, c: Commanded, at: Array, ratio: Array, match: Array
                     int(w.poses.executed.line[match[k]]), len(at))]
 
 
-def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], dict[str, int], list[str]]:
+def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], dict[Aspect, int], list[NotCompared]]:
     """Tool, spindle, speed and coolant while cutting; how many blocks each was compared in; what could not be.
 
     Blocks that leave a hole at feed count with the hole; feed moves off the path are linking moves and belong to no cut."""
@@ -197,7 +201,8 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     wet = np.where(coolant == UNKNOWN, some | (flow == 0), np.where(coolant == 0, flow == 0, flow > 0))
     for kind, bit in BITS.items():
         wet &= (coolant != kind) | ((flow & bit) > 0) | (not case.coolants & bit)
-    checks = (("length", "the length register is {0}, by the CL file it is {1}", tool != UNKNOWN, e.register[rows],
+    checks: tuple[tuple[_State, str, Array, Array, Array, Array], ...] = (
+              ("length", "the length register is {0}, by the CL file it is {1}", tool != UNKNOWN, e.register[rows],
                register, e.register[rows] == register),
               ("tool", "the program cuts with {0}, the CL file with {1}", tool != UNKNOWN, e.tool[rows], tool,
                e.tool[rows] == tool),
@@ -207,17 +212,17 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
                np.abs(e.rpm[rows] - rpm) <= 0.5 + 1e-3 * np.abs(rpm)),
               ("coolant", "the coolant is {0}, the CL file says {1}",
                (coolant != UNFOLLOWED) & ((coolant != UNKNOWN) | (not some)), flow, coolant, wet))
-    found, counts = [], dict[str, int]()
-    for code, text, compared, is_, wanted, good in checks:
+    found, counts = [], dict[Aspect, int]()
+    for state, text, compared, is_, wanted, good in checks:
         bad = np.flatnonzero(compared & ~good)
-        code_of = "spindle" if code == "speed" else code
-        counts[code_of] = counts.get(code_of, 0) + int(compared.sum())
+        code, aspect = _STATES[state]
+        counts[aspect] = counts.get(aspect, 0) + int(compared.sum())
         if len(bad):
             k = int(bad[0])
-            found.append(Finding(code_of, text.format(_said(code, is_[k]), _said(code, wanted[k])), int(c.line[row[k]]),
+            found.append(Finding(code, text.format(_said(state, is_[k]), _said(state, wanted[k])), int(c.line[row[k]]),
                                  int(e.line[rows[k]]), len(bad)))
     silent = np.flatnonzero((direction == UNKNOWN) & ~tap)
-    return found, counts, [f"spindle (stated by no record, line {c.line[row[silent[0]]]})"] if len(silent) else []
+    return found, counts, [NotCompared("spindle", "stated by no record", int(c.line[row[silent[0]]]))] if len(silent) else []
 
 
 def _coolants(c: Commanded, setup: dict[str, Any]) -> Array:
@@ -239,16 +244,16 @@ _SPINDLE = {1: "turning clockwise (M3)", -1: "turning anti-clockwise (M4)", 0: "
 _COOLANT = {0: "off", 1: "flood", 2: "on", 11: "mist", 12: "through the tool", 13: "air"}
 
 
-def _said(code: str, value: float) -> str:
+def _said(state: _State, value: float) -> str:
     """A state in words; UNKNOWN of the file as nothing that is stated."""
     if value == UNKNOWN:
         return "nothing"
-    if code == "length":
+    if state == "length":
         return f"{value:g}" if value >= 0 else "none"
-    if code == "tool":
+    if state == "tool":
         return f"T{value:g}" if value >= 0 else "the tool in the spindle"
-    names = _SPINDLE if code == "spindle" else _COOLANT if code == "coolant" else {}
-    return names.get(int(value), f"{value:g}") if code != "coolant" or value in names else "on"
+    names = _SPINDLE if state == "spindle" else _COOLANT if state == "coolant" else {}
+    return names.get(int(value), f"{value:g}") if state != "coolant" or value in names else "on"
 
 
 def _stated_coolant(setup: dict[str, Any]) -> tuple[dict[int, str], str | None]:

@@ -12,12 +12,12 @@ def program_files(output: Path, text: str, files: dict[str, str]) -> tuple[dict[
     """Texts by path, the subprograms before the program that calls them; says which of another program will be replaced.
 
     Raises:
-        DiagnosticError: where a subprogram would bear the program's own name.
+        DiagnosticError: where a subprogram would have the program's own name.
     """
     from postproc.writing.writer import OF_PROGRAM
 
     if output.name.lower() in {name.lower() for name in files}:
-        raise DiagnosticError([error("file.own_name", "the program and one of its subprograms would bear the same name",
+        raise DiagnosticError([error("file.own_name", "the program and one of its subprograms would have the same name",
                                      file=str(output), hint=f"give -o another name than {', '.join(list(files)[:6])}")])
     called = {output.parent / name: text for name, text in files.items()}
     return {**called, output: text}, replaced(called, OF_PROGRAM)
@@ -34,7 +34,7 @@ def replaced(files: dict[Path, str], mark: str) -> list[Diagnostic]:
     names = ", ".join(path.name for path in found[:6]) + (", ..." if len(found) > 6 else "")
     return [warning("file.replaced", f"{names} of another program stood there and {'are' if len(found) > 1 else 'is'} "
                     "replaced: that program now calls the new text", file=str(found[0]), count=len(found),
-                    hint="write programs whose subprograms bear the same names into folders of their own")]
+                    hint="write programs whose subprograms have the same names into folders of their own")]
 
 
 def _same_program(path: Path, text: str, mark: str) -> bool:

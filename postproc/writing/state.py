@@ -29,7 +29,7 @@ class WriterState:
     negative: anti-clockwise, 0 unknown), `rounded` its ratio to what was asked. `files` are the subprograms in files of
     their own, by name, once the program is written. `turning` and `cooling` say whether spindle and coolant
     run, None where nobody knows, `flowing` the kinds of coolant that may run (`postproc.reference.coolant`);
-    `taken` are block numbers that subprograms bear; `stock` (2, 3) least and greatest X, Y, Z of the stock;
+    `taken` are block numbers that subprograms have; `stock` (2, 3) least and greatest X, Y, Z of the stock;
     `levels`
     smoothing of operations by name, `level` the blocks of the one in force; `ahead` the axis words of a stretch of
     blocks, and the first of them.

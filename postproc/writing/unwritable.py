@@ -36,8 +36,8 @@ def _smoothed_in_modes(controller: ControllerFile, program: Program, file: str) 
             names.append(str(command.args[0]))
     if not lines:
         return []
-    return [error("output.smoothing_mode", f"the smoothing of {', '.join(names[:6])} would change in a mode of the tip or "
-                  "of a plane is on", file=file, lines=lines[:6], count=len(lines),
+    return [error("output.smoothing_mode", f"the smoothing of {', '.join(names[:6])} would change while a mode of the tip "
+                  "or of a plane is on", file=file, lines=lines[:6], count=len(lines),
                   hint="[output] restart = true of the set-up: every operation begins at home, outside of modes")]
 
 

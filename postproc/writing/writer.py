@@ -111,7 +111,7 @@ class Writer(WriterState, ABC):
         self.number = 0
 
     def framed(self, block: str) -> str:
-        """A block of the frame, or a comment at the head, as the file holds it."""
+        """A block of the frame, or a comment in the header, as the file holds it."""
         return block
 
     def ending(self) -> list[str]:

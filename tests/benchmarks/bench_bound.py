@@ -1,4 +1,4 @@
-"""The printed bound next to a denser sampling of every block: python tests/benchmarks/bench_bound.py [TIMES]
+"""The printed bound next to a denser sampling of every block: python -m tests.benchmarks.bench_bound [TIMES]
 
 TIMES as many places in each block as the conversion looks at (1000 times unless given), on programs of every
 kind: straight joints, straight tips, tilted planes, arcs, rods, machines with errors. The bound is never

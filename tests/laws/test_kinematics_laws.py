@@ -73,6 +73,15 @@ def test_jacobian_equals_central_differences(name):
         assert (np.abs(difference - jacobian[:, :, j])[real] / scale).max() < 1e-6
 
 
+def test_slides_run_as_the_jacobian_has_them(name):
+    """To the last bit, so that no program depends on which of them was asked; in any order, some of them, all joints."""
+    m = law.machine(name)
+    q, _, _ = law.poses(m, 20, seed=8, calm=False)
+    slides = np.flatnonzero(~np.array(m.rotary))
+    for some in (slides, slides[::-1], slides[1:2], np.arange(m.kinematics.joints)):
+        np.testing.assert_array_equal(m.kinematics.slide_directions(q, some), m.kinematics.jacobian(q)[:, :3][:, :, some])
+
+
 def test_twist_agrees_with_the_jacobian(name):
     m = law.machine(name)
     _, tip, axis = law.poses(m, 600, seed=6)

@@ -37,7 +37,7 @@ def test_an_unknown_kind_lists_what_is_registered(tmp_path, monkeypatch) -> None
     monkeypatch.setenv(kinds.FILES, str(SAMPLE))  # what the hint says
     assert machines.load(tmp_path / "m.toml").structure == "scissors"
     misspelt = only(tmp_path, GOOD.replace('"scissors"', '"scisors"'))
-    assert "h4-linear, scissors" in misspelt.message and "did you mean 'scissors'?" in misspelt.hint
+    assert f"{', '.join(kinds.BUILT_IN)}, scissors" in misspelt.message and "did you mean 'scissors'?" in misspelt.hint
 
 
 def test_the_schema_has_the_registered_kinds(monkeypatch) -> None:

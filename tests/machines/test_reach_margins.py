@@ -128,7 +128,7 @@ def test_between_ends_reports_joints_that_lose_the_platform() -> None:
 
 
 def test_passed_lists_the_worst_first() -> None:
-    margins = Margins(("a", "b", "c"), np.array([False, False, True]),
+    margins = Margins(("a", "b", "c"), np.array([False, False, True]), np.zeros(3, dtype=bool),
                       np.array([[-1.0, -2, 1], [-3.0, 5, -0.1]]))
     assert margins.passed() == [("a", False, 2, 1, -3.0), ("b", False, 1, 0, -2.0), ("c", True, 1, 1, -0.1)]
 

@@ -91,11 +91,11 @@ def _arm(b: ToolpathBuilder, v: CycleValues) -> None:
                     "write the number behind it")
     for word in v.strange:
         b.log.warning("cl.cycle-option", f"CYCLE/{v.kind}: {word} is not used", b.line, key=word)
-    if v.placed and b.dialect.name == "catia":
+    if v.placed and b.dialect.cycles_by_table:
         b.log.warning("cl.cycle-place", f"CYCLE/{v.kind}: numbers without words, read as depth {v.depth:g}"
                       + ("" if v.feed is None else f", feed {v.feed[0]:g} {v.feed[1] or 'per minute'}")
                       + ("" if math.isnan(v.clearance) else f", start plane {v.clearance:g}"), b.line,
-                      "their order is that of the user's table in CATIA")
+                      f"their order is that of the user's table in {b.dialect.title}")
     b.cycle.set(b.row, len(b.cycles))
     b.cycles.append(_made(b, v))
 
@@ -103,7 +103,7 @@ def _arm(b: ToolpathBuilder, v: CycleValues) -> None:
 def _approached(b: ToolpathBuilder, v: CycleValues) -> CycleValues:
     """CATIA's cycle of two numbers, depth and another: the start plane where the tool stands so far above the hole."""
     last, hole = b.last_point(), b.next_point()
-    if b.dialect.name != "catia" or len(v.free) != 2 or last is None or hole is None:
+    if not b.dialect.cycles_by_table or len(v.free) != 2 or last is None or hole is None:
         return v
     if abs(math.dist(last, hole) - v.free[1]) > _APPROACH:
         return v

@@ -199,7 +199,6 @@ _SAME_FRAME = 1e-9
 _NO_ANGLE = 1e-9
 """rad"""
 _AXES = {"AAXIS": 0, "BAXIS": 1, "CAXIS": 2, "A": 0, "B": 1, "C": 2, "XAXIS": 0, "YAXIS": 1, "ZAXIS": 2}
-_TURNED = frozenset({"creo", "solidworks-clt"})
 
 
 def rotate(b: ToolpathBuilder, s: Statement) -> None:
@@ -211,7 +210,7 @@ def rotate(b: ToolpathBuilder, s: Statement) -> None:
     angle = s.after("ATANGL", "INCR")
     if angle is None:
         angle = next((w for w in s.words if isinstance(w, float)), None)
-    if angle is None or b.dialect.name not in _TURNED:
+    if angle is None or not (b.dialect.table_frames or b.dialect.frame_turns):
         if angle is None or angle:
             b.log.warning("cl.table", f"{s.major}/{s.body}: the points after it are taken as if it were not there",
                           b.line, "points must be in the part's frame")

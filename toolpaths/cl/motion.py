@@ -13,10 +13,9 @@ from toolpaths.toolpath import Role
 _NAN = math.nan
 _CLOCKWISE = {"CLOCKWISE": -1, "CLW": -1, "COUNTERCLOCKWISE": 1, "CCLW": 1}
 _NX_COUNT = 11
+"""numbers of a CIRCLE of NX"""
 _HALF_TURN = 1e-3
 """degrees"""
-_NO_LONG_CIRCLES = ("generic", "solidworks")
-"""Systems that write fewer numbers themselves: 11 are those of NX, which others (CAMplete's APT) have taken over."""
 
 
 def _triple(numbers: list[float], at: int) -> Triple:
@@ -157,7 +156,7 @@ def _axis_and_sense(b: ToolpathBuilder, s: Statement,
     for word in s.tail:
         if isinstance(word, str) and word in _CLOCKWISE:
             return (0.0, 0.0, 1.0), _CLOCKWISE[word]
-    if b.dialect.name in _NO_LONG_CIRCLES and len(s.numbers) >= _NX_COUNT:
+    if b.dialect.eleven_clockwise and len(s.numbers) >= _NX_COUNT:
         return numbers[3:6], -1
     return numbers[3:6], b.dialect.arc_sense or 1
 

@@ -75,8 +75,8 @@ def solidworks_feature(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def turn_type(b: ToolpathBuilder, s: Statement) -> None:
-    """SolidWorks CAM's `.apt` has TRNTYP at the head of each operation, before its CSYS, and names none of them."""
-    if b.dialect.name == "solidworks":
+    """SolidWorks CAM's `.apt` has TRNTYP where each operation begins, before its CSYS, and names none of them."""
+    if b.dialect.trntyp_begins:
         begin_operation(b, f"OP {len(b.operations) + 1}")
 
 
@@ -94,7 +94,7 @@ def partno(b: ToolpathBuilder, s: Statement) -> None:
 def comment(b: ToolpathBuilder, s: Statement) -> None:
     """CATIA names its axis system and its operations in comments."""
     frames.comment(b, s)
-    found = _CATIA_OPERATION.match(s.body) if b.dialect.name == "catia" else None
+    found = _CATIA_OPERATION.match(s.body) if b.dialect.operations_in_comments else None
     if found:
         begin_operation(b, found[1].strip())
 
@@ -149,7 +149,7 @@ def nothing(b: ToolpathBuilder, s: Statement) -> None:
 def multax(b: ToolpathBuilder, s: Statement) -> None:
     """MULTAX/ON, OFF: the points say by themselves; after OFF those of three numbers keep the last axis
     (CATIA: APT formats, MULTAX influence on output), which others may not mean."""
-    if s.has("OFF") and b.dialect.name != "catia":
+    if s.has("OFF") and not b.dialect.multax_off_keeps:
         b.multax_off.append((b.row, b.line))
 
 

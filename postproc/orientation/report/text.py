@@ -27,7 +27,7 @@ REJECTED: dict[RejectionKind, int] = {"slower": 8, "bound": 3, "touches": 4, "tr
 _WHYS = 3
 """reasons of the paper's choice missing"""
 RUNS = 20
-"""lines of the head of a program"""
+"""lines of the header of a program"""
 _HEADS = ("pass", "line", "orientation", "time s", "CL axis s", "gain %", "limited by", "fastest s", "runner-up s",
           "rejected")
 
@@ -46,7 +46,7 @@ def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Seque
 
 
 def header(choice: OrientationChoice, plan: Orientation) -> list[str]:
-    """Lines for the head of a program: the plan, and what tool axes follow one another."""
+    """Lines for the header of a program: the plan, and what tool axes follow one another."""
     picked = choice.plans[plan].picked
     first = [k for k in range(len(picked)) if k == 0 or turns(picked[k - 1], picked[k])]
     lines = [_against(choice, plan), f"planned {seconds(choice.plans[plan].seconds)} s, with the axes of the CL file "

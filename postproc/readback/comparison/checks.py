@@ -270,20 +270,23 @@ def check_links(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints,
 
 def check_low_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, owner: Ints,
                      faults: Faults) -> list[Diagnostic]:
-    """Dog-legs that leave their line stay above all that is cut and the stock of the set-up, at whatever height they were
-    split; those from hole to hole are as the control's own cycles are."""
+    """Dog-legs that leave their line, and rapids that the program splits, go across above all that is cut and the stock of
+    the set-up; those from hole to hole are as the control's own cycles are."""
     rows = np.flatnonzero(moves.run_by(owner) & (motion.code == 0))
     m = owner[rows]
-    rows = rows[(moves.phase[m] == Phase.POSITION) & (moves.hole[m] < 0) & executed.bent(motion, rows)]
+    split = np.diff(moves.row, prepend=-1, append=-1) == 0
+    split = split[1:] | split[:-1]
+    rows = rows[(moves.phase[m] == Phase.POSITION) & (moves.hole[m] < 0) & (split[m] | executed.bent(motion, rows))]
     if not len(rows):
         return []
     stock = job.stock_corners
     corners = job.space.corners if stock is None else np.concatenate([job.space.corners, stock])
     bad, slack, curves = np.zeros(len(rows), dtype=bool), job.options.tolerance, moves.curves(owner[rows])
+    corner = split[owner[rows]]
     for t in executed.corners(motion, rows).T:
         tip, axis = executed.poses(motion, rows, t)
         off = curves.deviation(tip, axis, np.asarray(t), slack)[0]
-        bad |= (off > slack) & (np.einsum("ni,ni->n", tip, axis) < (axis @ corners.T).max(axis=1) - slack)
+        bad |= (corner | (off > slack)) & (np.einsum("ni,ni->n", tip, axis) < (axis @ corners.T).max(axis=1) - slack)
     if not bad.any():
         return []
     k = int(rows[np.flatnonzero(bad)[0]])

@@ -8,7 +8,8 @@ import numpy as np
 
 from postproc.job.job import Job
 from postproc.path.model import FEED, TRAVERSE
-from postproc.readback.comparison.align import align, unreached
+from postproc.readback.alignment.align import EndPoses, aligned, unreached
+from postproc.readback.alignment.split_as_written import split_as_written
 from postproc.readback.comparison.approaches import leads_down
 from postproc.readback.comparison.bound_search import DeviationBound
 from postproc.readback.comparison.checks import (
@@ -51,6 +52,7 @@ class Comparison:
     """Worst deviations (mm, rad) with the CL line and program line of each, and the poses and matching they rest on.
 
     Attributes:
+        moves: those of the CL file, rapids split as the program splits them; `match` and `owner` count them without pecks
         worst_tip, worst_axis: the worst of the places that were looked at
         tip_bound, axis_bound: what no block exceeds anywhere, see `deviation_bound`; blocks without a bound
             count by the places that were looked at
@@ -59,6 +61,7 @@ class Comparison:
         executed: what was compared, the words of the program and their motion, so that nothing reads it again
     """
 
+    moves: Moves
     worst_tip: float
     worst_axis: float
     worst_tip_line: tuple[int, int]
@@ -88,14 +91,16 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
     Faults point into the CL file, or into the program where `gcode` names it. `planned`: its feeds were.
     """
     tolerance, axis_tolerance = job.options.tolerance, job.axis_tolerance
-    moves, faults = job.moves.without_pecks(), Faults(job.toolpath.file, gcode)
     tip, axis = _ends(motion, executed)
+    sweep, faults = arc_sweeps(motion, executed.control), Faults(job.toolpath.file, gcode)
     words = job.controller.format
     grain = max(1e-3, 1.5 * job.controller.grain), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
-    number = rewinds(motion, tip, axis, moves.tip, executed.control.rotary,
+    number = rewinds(motion, tip, axis, job.commanded.without_pecks().tip, executed.control.rotary,
                      (2.0 * tolerance, 2.0 * axis_tolerance))
-    match, owner = _aligned(as_slice(np.flatnonzero(number < 0)), tip, axis, arc_sweeps(motion, executed.control), moves,
-                            tolerance, axis_tolerance, grain)
+    ends = EndPoses(tip, axis, sweep, as_slice(np.flatnonzero(number < 0)))
+    job = job.with_moves(split_as_written(motion, executed, job, ends, grain))
+    moves = job.moves.without_pecks()
+    match, owner = aligned(ends, moves, moves.link, tolerance, axis_tolerance, grain)
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
     (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match,
@@ -129,7 +134,7 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_reach_bounds(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
-    return Comparison(worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics),
+    return Comparison(job.moves, worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics),
                       max(bound.tip, worst_tip), max(bound.axis, worst_axis), bound.unbounded, *_cuts(moves, owner, bound))
 
 
@@ -178,16 +183,6 @@ def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
     ends = rapid & np.append(False, (rapid & far)[:-1]) & feed_next
     begins = (rapid & rapid_next) | (feed & feed_next)
     return np.asarray((travel <= still) | ((begins | ends) & ~far))
-
-
-def _aligned(kept: Ints | slice, tip: Floats, axis: Floats, sweep: Floats, moves: Moves, tolerance: float,
-             axis_tolerance: float, grain: tuple[float, float]) -> tuple[Ints, Ints]:
-    """`align` without the blocks of rewinds, which get no move (M + 1): but for them the tool only rests there."""
-    match, short = align(tip[kept], axis[kept], sweep[kept], moves.curves(), moves.link, tolerance,
-                         axis_tolerance, grain)
-    owner = np.full(len(tip), len(moves) + 1)
-    owner[kept] = short
-    return np.where(match >= 0, np.arange(len(tip))[kept][match], match), owner
 
 
 WorstPlace = tuple[float, tuple[int, int]]

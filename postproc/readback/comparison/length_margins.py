@@ -49,7 +49,7 @@ class LengthMargin:
     """bodies of the set-up are not looked at"""
 
     def line(self, said: LengthText = MM) -> str:
-        """For the head of the program, in its units, and the summary; margins are rounded down."""
+        """For the header of the program, in its units, and the summary; margins are rounded down."""
         ends = (f"by {sign}{said.down(mm, 3)} {said.name}, then {what}" if mm < MUCH
                 else f"by {sign}{MUCH / said.unit:.3g} {said.name} and more"
                 for sign, mm, what in (("-", self.shorter, self.ends_shorter), ("+", self.longer, self.ends_longer)))

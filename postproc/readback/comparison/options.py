@@ -33,8 +33,8 @@ def check_options(code: Canonical, motion: Motion, job: Job, faults: Faults) -> 
     helices = np.flatnonzero((motion.code == 2) & (np.abs(_rise(motion, job)) > RISES))
     if len(helices):
         lines["helical"] = motion.line[helices]
-    return [faults.error("verify.option", f"the program uses an option that the machine file says the control has not: "
-                         f"{name} = false", 0, int(found[0]), len(found), "convert again, or state the option under "
+    return [faults.error("verify.option", f"the program uses an option that the control does not have by the machine "
+                         f"file: {name} = false", 0, int(found[0]), len(found), "convert again, or state the option under "
                          "[control] of the machine file where it is fitted")
             for name, found in lines.items() if options.absent(name)]
 

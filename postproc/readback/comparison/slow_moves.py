@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.header_words import feeds_place, read_head, with_feeds_mark
+from postproc.base.header_words import feeds_place, read_header, with_feeds_mark
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.job.job import Job
@@ -36,13 +36,13 @@ def planned_feeds(data: bytes, others: Mapping[str, bytes], gcode: str) -> tuple
     Feeds that were planned keep acceleration and jerk, which the program does not show: they count as
     explained only as they were written.
     """
-    head = read_head(data)
-    if not head.planned:
+    header = read_header(data)
+    if not header.planned:
         return False, []
     now = feed_fingerprint(data, others)
-    if head.feeds == now:
+    if header.feeds == now:
         return True, []
-    found = f"its header names {head.feeds}, the F words are {now}" if head.feeds else \
+    found = f"its header names {header.feeds}, the F words are {now}" if header.feeds else \
         "its header names no fingerprint of them"
     return True, [error("verify.slow", f"the planned feeds were changed after the program was written: {found}", file=gcode,
                         hint="convert again; where feeds were lowered by hand, no plan explains them")]

@@ -35,14 +35,14 @@ def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats,
     spindle, coolant = _on(code, (3, 4, 5), 5.0, changes), _on(code, (7, 8, 9), 9.0, changes)
     lines = in_files(code.line[changes], code.files)
     result, near = _others(code, job, faults), AWAY + correction(job, place, motion.tool[np.maximum(before, 0)])[:, axes]
+    far = (away > near).any(axis=1)
+    where = _distance(job, axes, away[int(far.argmax())]) if far.any() else ""
     for bad, what, hint in (
-            ((away > near).any(axis=1), "the tool is changed away from home", "the retract to home before it is missing"),
+            (far, f"the tool is changed away from home{where}", "the retract to home before it is missing"),
             (spindle != 5.0, "the tool is changed while the spindle turns", "M5 before it"),
             (coolant != 9.0, "the tool is changed while coolant flows", "M9 before it")):
         if bad.any():
-            k = int(bad.argmax())
-            where = _distance(job, axes, away[k]) if what.endswith("home") else ""
-            result.append(faults.error("verify.tool_change", what + where, 0, int(lines[k]), int(bad.sum()), hint))
+            result.append(faults.error("verify.tool_change", what, 0, int(lines[int(bad.argmax())]), int(bad.sum()), hint))
     return result
 
 

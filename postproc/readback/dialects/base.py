@@ -158,7 +158,8 @@ class Reader(ABC):
         """Canonical words of blocks in running order, with what turns and flows behind stops."""
         code, found = self.canonical(text, line, file)
         words, more = unrolled(code.words, line, self.axes, self.rolls, self.home, self.turn_codes, file)
-        return replace(code, words=self.cooled(self.stopped(words))), [*found, *more]
+        kept = self.controller is not None and self.controller.feed.kept_by_units
+        return replace(code, words=self.cooled(self.stopped(words)), feed_kept=kept), [*found, *more]
 
     def stopped(self, words: Words) -> Words:
         """The words with the blocks before which the control itself has stopped the spindle."""
@@ -211,7 +212,7 @@ class Reader(ABC):
         return (text, structure), found
 
     def stems(self, call: str) -> tuple[str, ...]:
-        """Names that the file of a subprogram may bear, in capitals, without their ending."""
+        """Names that the file of a subprogram may have, in capitals, without their ending."""
         return (call,)
 
 

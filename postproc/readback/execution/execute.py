@@ -174,8 +174,18 @@ def _motion(words: Words, modal: Modal, rows: MotionRows, code: Canonical, used:
 
 
 def feed_units(modal: Modal, code: Canonical) -> Floats:
-    """(B + 1,) mm that 1 of F stands for at each block where it counts a length."""
-    return np.where(modal.inch, INCH / code.feed_parts, 1.0) if modal.inch.any() else repeated(1.0, len(modal.inch))
+    """(B + 1,) mm that 1 of F stands for at each block where it counts a length.
+
+    Where the control carries out F before a change of units, and that leaves the feed alone (`feed_kept`; order of
+    execution: NIST RS274/NGC table 8), F counts in the units of the block before its own.
+    """
+    inch = modal.inch
+    if not inch.any():
+        return repeated(1.0, len(inch))
+    if code.feed_kept:
+        at = np.unique(code.words.pick("F")[0])
+        inch = np.asarray(fill_values(at, inch[at - 1].astype(np.float64), code.words.lines) == 1.0)
+    return np.where(inch, INCH / code.feed_parts, 1.0)
 
 
 def _threads(modal: Modal, rows: MotionRows, feed: Floats, call: Floats,

@@ -100,7 +100,7 @@ class FrameTable:
             q[:, control.slides] = 0.0
             tip = np.einsum("nij,nj->ni", self.rotation[at], coordinates[np.ix_(k, control.xyz)]) + self.origin[at]
             rest = tip - kin.forward(q)[0]
-            slopes = kin.jacobian(q)[:, :3][:, :, control.slides]
+            slopes = kin.slide_directions(q, control.slides)
             result[np.ix_(k, control.slides)] = np.linalg.solve(slopes, rest[:, :, None])[:, :, 0]
         return result
 
@@ -139,7 +139,7 @@ def frame_of(law: WordMeaning, control: Control | None, length: float, position:
         return AXES
     kin = control.kinematics if control is not None else None
     if control is None or kin is None or not kin.straight_slides or (control.xyz < 0).any():
-        found.append(error("gcode.mode", f"{law.code}: the control does not own the kinematics of this machine", file=file,
+        found.append(error("gcode.mode", f"{law.code}: the control does not have the kinematics of this machine", file=file,
                            lines=[line], hint="machine coordinates are all that it can run"))
         return AXES
     kin = kin.with_tool(length)
@@ -191,7 +191,7 @@ def entered(control: Control, kin: Kinematics, q: Floats) -> tuple[Floats, Float
     at[:, control.slides] = 0.0
     at[1, table_axes(control)] = 0.0
     seen, machine = kin.forward(at)[0]
-    rotation = kin.jacobian(at[:1])[0, :3][:, control.xyz]
+    rotation = kin.slide_directions(at[:1], control.xyz)[0]
     return np.asarray(rotation), np.asarray(seen + rotation @ (control.origin - machine))
 
 

@@ -129,7 +129,7 @@ class Canonical:
 
     `line` (B + 1,) is the line that a block stands in; lines of further files count on from those before.
     `files`: their names, and the lines that stand before each; empty for one file. `feed_parts`: what an inch
-    per minute is in units of F.
+    per minute is in units of F. `feed_kept`: F counts in the units before its block, and keeps them.
     """
 
     words: Words
@@ -138,6 +138,7 @@ class Canonical:
     drills: tuple[Drill, ...] = ()
     files: Files = ()
     feed_parts: float = 1.0
+    feed_kept: bool = False
 
     def without(self, letters: tuple[str, ...]) -> Canonical:
         """The same without the words of some letters."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,3 +55,25 @@ def test_inspect_counts_surface_normals(tmp_path: Path) -> None:
     assert "  surface normals at 2 points" in noted
     file.write_text("UNITS/MM\nFEDRAT/MMPM,500\nGOTO/0,0,0\nGOTO/1,0,0\nFINI\n")
     assert "surface normals" not in CliRunner().invoke(app, ["inspect", str(file)]).output
+
+
+def undescribed(schema: Any) -> Iterator[str]:
+    """Keys of a schema without a text; one that refers to a table has that of the table, a fixed word none."""
+    if isinstance(schema, dict):
+        if isinstance(keys := schema.get("properties"), dict):
+            yield from (name for name, one in keys.items() if isinstance(one, dict) and not one.get("description")
+                        and not {"$ref", "const"} & set(one))
+        schema = list(schema.values())
+    if isinstance(schema, list):
+        yield from (name for one in schema for name in undescribed(one))
+
+
+@pytest.mark.parametrize("command", [
+    "machine schema", "controller schema", "setup schema", "errors schema", "calibrate --schema"])
+def test_a_schema_says_what_each_key_is(command: str) -> None:
+    got = CliRunner().invoke(app, command.split())
+    assert got.exit_code == 0 and list(undescribed(json.loads(got.stdout))) == []
+
+
+def test_a_key_without_a_text_is_noticed() -> None:
+    assert list(undescribed({"$defs": {"A": {"properties": {"x": {"type": "number"}, "kind": {"const": "a"}}}}})) == ["x"]

@@ -91,6 +91,29 @@ def test_every_position_of_the_cl_file_is_still_reached(controller: str) -> None
 
 
 @pytest.mark.parametrize("controller", BENT)
+@pytest.mark.parametrize("written", ["auto", "axes", "tilted"])
+def test_the_proof_knows_nothing_of_how_rapids_were_split(controller: str, written: str) -> None:
+    """A program is right for jobs of every output mode, as for one whose rapids are to be fed."""
+    text = converted(controller, written).text
+    for output in ("auto", "axes", "tilted"):
+        assert not errors(converted(controller, output), text), output
+
+
+@pytest.mark.parametrize("controller", BENT)
+def test_a_split_rapid_may_go_across_at_any_height_above_its_ends(controller: str) -> None:
+    """The level of one split rapid edited: right above both ends, whatever was planned, wrong below them."""
+    result = converted(controller, "axes")
+    lines = result.text.splitlines()
+    at = next(k for k in range(len(lines) - 2) if re.fullmatch(r"Z\S+", lines[k]) and re.fullmatch(
+        r"X\S+ Y\S+", lines[k + 1]) and re.fullmatch(r"Z\S+", lines[k + 2]))
+    level, cut = float(lines[at][1:]), 20.0
+    assert level > cut + 50.0
+    for change, right in ((7.0, True), (cut + 3.0 - level, True), (cut + 1.0 - level, False)):
+        edited = [*lines[:at], f"Z{level + change:.3f}", *lines[at + 1:]]
+        assert bool(errors(result, "\n".join(edited))) != right, change
+
+
+@pytest.mark.parametrize("controller", BENT)
 def test_the_machine_file_may_say_that_rapids_are_straight(controller: str, tmp_path: Path) -> None:
     """The bought option: nothing is split, the diagonal rapid is one block; the other direction on Siemens."""
     file = tmp_path / "shop.toml"
@@ -183,3 +206,23 @@ def test_the_read_back_knows_what_is_cut_by_itself(controller: str, monkeypatch:
     tools = setup_of("[tools.1]\ngauge_length = 90\n")
     made = postproc.convert(toolpath(*STEP), machines.load("mill-3axis"), controller, tools)
     assert not made.ok and any(d.code == "verify.link" and "below what is cut" in d.message for d in made.diagnostics)
+
+
+@pytest.mark.parametrize("controller", BENT)
+@pytest.mark.parametrize("stock", [False, True])
+def test_the_second_witness_holds_dog_legs_above_what_is_cut(controller: str, stock: bool) -> None:
+    """The level of a split rapid taken down to the lower of its ends: below what is cut, or above that but in the stock."""
+    box = "[rewind.stock]\nlow = [-5, -5, -5]\nhigh = [70, 30, 40]\n" if stock else ""
+    setup = setup_of("[tools.1]\ngauge_length = 90\n" + box)
+    steps = [line.replace(",17,5", ",17,25").replace("GOTO/30,0,5", "GOTO/30,0,25") for line in STEP] if stock else STEP
+    made = postproc.convert(toolpath(*steps), machines.load("mill-3axis"), controller, setup)
+    assert made.ok and made.job is not None
+    across = np.flatnonzero((made.job.moves.phase == 1) & (made.job.moves.tip[:, 0] == 60.0))
+    level = float(made.job.moves.tip[across[0], 2])
+    low = "Z25." if stock else "Z5."
+    text = re.sub(rf"Z{level:g}\.?$", low, made.text, flags=re.MULTILINE)
+    comparison, _ = read_back(text, made.job, "test.apt")
+    for program, finds in ((made.text, False), (text, True)):
+        blocks = comparison if finds else made.comparison
+        said, _ = second_witness.second_witness(made.source, setup, made.options, made.job, blocks, program)
+        assert (("clearance" in {f.code for f in said.findings}) is finds), (level, said.findings)

@@ -20,10 +20,15 @@ TEXTS = {"description", "sources"}
 """for people"""
 ONE_VALUE = {"kinematics.linear"}
 """statements of the file that have one allowed value so far"""
-OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "units.others",
+OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "feed.kept_by_units", "feed.length",
+          "feed.arc_inverse", "units.others",
           "inch.degree", "levels", "smoothing_words", "kinematics.smoothing_in_modes",
           "modes.tcp", "modes.tilted", "arcs.helix_planes",
           "cutter_compensation.begins_on_arc", "cutter_compensation.ends_on_arc", "cutter_compensation.modal_register",
+          "cutter_compensation.holds",
+          *(f"pivots.{key}" for key in ("table", "table_to_table", "tool_to_head", "head_to_head", "mixed_table",
+                                        "mixed_head", "mixed_closing_table", "mixed_closing_head", "closing_table",
+                                        "closing_head")),
           "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload",
           "tools.length_automatic", "program.operation", "program.carried_out", "program.relies_on_turns", "program.stock",
           "program.exact_path", "program.smoothing_option", "program.without_smoothing", "arcs.helical_option",
@@ -35,7 +40,7 @@ OTHERS = {"kinematics.rapids", "feed.length", "feed.arc_inverse", "units.others"
                                           "needs"))}
 """keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py,
 test_compensated_arcs.py, test_parts.py, test_rollover.py, test_inch_output.py, test_smoothing_levels.py, test_options.py,
-test_hooks_refused.py, test_output_quality.py and test_output_modes*.py show what they do"""
+test_hooks_refused.py, test_output_quality.py, test_cycle_time_program.py and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief", "cycles.plane_at_start", "arcs.helix_by_angle"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states, and what rounding moves"""
 OTHER: dict[str, Any] = {

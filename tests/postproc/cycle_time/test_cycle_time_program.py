@@ -44,6 +44,14 @@ def test_feeds_keep_the_units_in_which_linuxcnc_took_them() -> None:
     assert blocks(text, controller="generic-iso").speed == pytest.approx([10.0, 254.0, 12.7, 0.5, 15.0])
 
 
+def test_blending_where_no_path_mode_is_stated_is_a_key_of_the_controller(tmp_path: Path) -> None:
+    shop = tmp_path / "shop.toml"
+    shop.write_text('base = "generic-iso"\nkinematics.blends_unstated = true\n')
+    text = f"{HEAD}\nF600\nG1 X1\nG64 P0.02\nG1 X2"
+    own, plain, fast = (blocks(text, controller=name).tolerance for name in ("linuxcnc", "generic-iso", str(shop)))
+    assert own.tolist() == fast.tolist() == [np.inf, 0.02] and np.isnan(plain[0]) and plain[1] == 0.02
+
+
 def test_a_dwell_of_nothing_is_a_stop() -> None:
     line = "\n".join(f"G4 P{{}}\nG1 X{10 * i}" for i in range(1, 9))
     none, some = (blocks(f"{HEAD}\nF3000\n{line.format(*[s] * 8)}") for s in ("0", "0.1"))

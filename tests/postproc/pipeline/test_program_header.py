@@ -1,4 +1,4 @@
-"""The head of programs: the tools that move, and for which place and lengths a program is."""
+"""The header of programs: the tools that move, and for which place and lengths a program is."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import machines
-from postproc.readback.comparison.align import align
+from postproc.readback.alignment.align import align
 from postproc.readback.execution import assembly
 from tests.postproc.kit import convert, good, goto, sample, toolpath
 from toolpaths.shape import Curves

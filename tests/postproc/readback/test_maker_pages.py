@@ -228,6 +228,15 @@ def test_inverse_time_in_arcs_is_by_the_radius_on_fanuc_alone() -> None:
     assert {name for name in builtin_files() if spec(name).feed.arc_inverse == "radius"} == {FANUC}
 
 
+def test_units_of_a_feed_where_the_units_change() -> None:
+    """N table 8: F is carried out before G20 and G21 of its block; measured on LinuxCNC 2.9: both leave the feed as it is.
+    Elsewhere F counts in the units of the block that moves."""
+    body = "F600\nG1 X10\nG20\nG1 X1\nF30\nG1 X2\nG21 F30\nG1 X60\nF900\nG1 X70\n"
+    for dialect, units in ((NGC, [1.0, 1.0, 25.4, 25.4, 1.0]), (ISO, [1.0, 25.4, 25.4, 1.0, 1.0])):
+        motion = good(dialect, program(dialect, f"G0 X0. Y0. Z9.\n{body}"))
+        assert motion.unit[motion.code == 1].tolist() == units
+
+
 @pytest.mark.parametrize(("dialect", "linear", "feed", "writer"), [
     (TNC, 4, 3, "heidenhain"), (HAAS, 3, 3, "haas"), (FANUC, 4, 4, "fanuc"), (SIEMENS, 4, 4, "siemens")])
 def test_last_decimals(dialect: str, linear: int, feed: int, writer: str) -> None:

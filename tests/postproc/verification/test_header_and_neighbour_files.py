@@ -1,4 +1,4 @@
-"""What verify takes from the head of a program and from its folder: no comments of the CL file, no other programs."""
+"""What verify takes from the header of a program and from its folder: no comments of the CL file, no other programs."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 import postproc
 import toolpaths
-from postproc.base.header_words import head_of
+from postproc.base.header_words import header_of
 from postproc.base.options import Options
 from postproc.pipeline.convert import verify
 from postproc.pipeline.result import PostResult
@@ -32,8 +32,8 @@ def written(more: str, controller: str, part: str = "T", **options: object) -> t
 def test_comments_of_the_cl_file_are_not_of_the_head(controller: str, tmp_path: Path) -> None:
     path, result = written("".join(f"PPRINT/{said}\n" for said in SAID), controller)
     assert all(said in result.text.upper().replace("  ", " ") for said in SAID[:1])
-    head = head_of(result.text.encode()).upper()
-    assert b"TOOL T1" in head and not any(said.encode() in head for said in SAID)
+    header = header_of(result.text.encode()).upper()
+    assert b"TOOL T1" in header and not any(said.encode() in header for said in SAID)
     (tmp_path / "a.ngc").write_text(result.text)
     again = verify(tmp_path / "a.ngc", path, "mill-3axis", controller)
     assert again.ok and "verify.setup" not in {d.code for d in again.diagnostics}

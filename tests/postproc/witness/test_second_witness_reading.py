@@ -123,4 +123,4 @@ def test_holes_that_are_not_read_refuse_no_program_that_comes_back_to_where_it_w
     path, found = toolpaths.read_bytes(text)
     result = postproc.convert(path, "mill-3axis", diagnostics=found)
     assert result.ok, [str(d) for d in result.diagnostics]
-    assert result.witness is not None and [what for what in result.witness.not_compared if "CYCLE" in what]
+    assert result.witness is not None and [what for what in result.witness.not_compared if "CYCLE" in what.why]

@@ -34,7 +34,7 @@ def test_a_tool_measured_into_the_work_offset(control: str, text: bytes, number:
     result = converted(text, {"tools": {number: {"gauge_length": 120.0}}, "output": {
         "tool_call": False, "spindle": {"rpm": 3000.0}}}, control)
     assert result.ok and result.witness is not None, [str(d) for d in result.diagnostics]
-    assert not result.witness.not_compared and any("positions" in said for said in result.witness.compared)
+    assert not result.witness.not_compared and any(said.what == "positions" for said in result.witness.compared)
 
 
 def test_systems_are_kept_once() -> None:
@@ -65,7 +65,7 @@ def test_the_spindle_of_the_setup_is_expected(setup: dict[str, object],
     text = LOADED.replace(b"SPINDL/RPM,3000,CLW\n", b"")
     result = converted(text, setup)
     assert result.ok and result.witness is not None, [str(d) for d in result.diagnostics]
-    assert not result.witness.not_compared and "spindle states" in str(result.witness.compared)
+    assert not result.witness.not_compared and any(said.what == "spindle states" for said in result.witness.compared)
     old = ToolpathBuilder.event
 
     def hidden(self: ToolpathBuilder, word: str, values: tuple[object, ...]) -> None:
@@ -111,7 +111,7 @@ def test_a_witness_that_fails_proves_nothing(proof: bool, monkeypatch: pytest.Mo
         raise IndexError("planted")
     monkeypatch.setattr(postproc.verification.second_witness, "testify", fails)
     result = converted(LOADED, {}, require_proof=proof)
-    assert result.witness is not None and "failed: IndexError: planted" in result.witness.not_compared[0]
+    assert result.witness is not None and "failed: IndexError: planted" in result.witness.not_compared[0].why
     assert [d.code for d in result.diagnostics if d.code.startswith("witness")] == ["witness.failed"] * proof
     assert result.ok is not proof
     assert second_witness(None, SetupFile(), Options(), result.job, result.comparison)[1] == []

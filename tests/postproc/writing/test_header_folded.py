@@ -1,4 +1,4 @@
-"""Head of a program on a control with short blocks: figures stand whole."""
+"""Header of a program on a control with short blocks: figures stand whole."""
 
 from __future__ import annotations
 

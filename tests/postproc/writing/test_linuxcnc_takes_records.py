@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile
 from tests.linuxcnc import outputs
 from tests.linuxcnc.interpreter import Canonical, ToolEntry
 from tests.postproc.kit import convert, good, toolpath
@@ -23,6 +24,25 @@ def read(result: PostResult, interpret, folder: Path) -> Canonical:
     program.write_text(outputs.on_machine(result))
     table = {number: ToolEntry(entry.z, 10.0) for number, entry in outputs.tools(result).items()}
     return interpret(program, table)
+
+
+@pytest.mark.parametrize(("tool", "diameter", "shift"), [
+    ({"compensation": "wear"}, 0.0, 0.0), ({"compensation": "wear"}, 0.2, 0.1), ({"compensation": "wear"}, -0.2, -0.1),
+    ({"contour": True}, 10.0, 5.0), ({"compensation": "none"}, 10.0, 0.0)])
+def test_the_tool_table_holds_what_the_head_says(tool: dict[str, object], diameter: float, shift: float, interpret,
+                                                 tmp_path: Path) -> None:
+    """Wear: 0 is the path of the CL file, a greater radius to the left of it, a lesser one to the right; the contour
+    by the radius; written uncompensated the table counts for nothing."""
+    setup = SetupFile.model_validate({"tools": {"1": {"gauge_length": 90.0, **tool}}})
+    lines = [*SQUARE, "CUTCOM/OFF", "GOTO/80,-20,0"]
+    result = good(convert(toolpath(*lines, head=HEAD), "mill-3axis", setup=setup))
+    program = tmp_path / "program.ngc"
+    program.write_text(outputs.on_machine(result))
+    c = interpret(program, {n: ToolEntry(entry.z, diameter) for n, entry in outputs.tools(result).items()})
+    assert c.error == ""
+    text = result.text.splitlines()
+    up, across = (c.pos[c.line == 1 + text.index(word)] for word in ("Y60", "X60"))
+    assert np.abs(up[-1, 0] + shift) < 1e-9 and np.abs(across[-1, 1] - 60.0 - shift) < 1e-9
 
 
 @pytest.mark.parametrize("lines", [

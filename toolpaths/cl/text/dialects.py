@@ -40,6 +40,12 @@ class Dialect:
         table_frames: under ROTATE and TRANS points stand about the rotation axis (`indexing`)
         axis_reset: the axis is the local z again at each operation
         six_sizes: CUTTER may have six numbers
+        eleven_clockwise: a CIRCLE of eleven numbers, NX's own form which others have taken over, goes clockwise as there;
+            True in systems that write fewer numbers themselves
+        cycles_by_table: numbers of cycles without words stand in the order of a table that shops change
+        operations_in_comments: comments name the operations
+        trntyp_begins: TRNTYP begins an operation, which has no name
+        multax_off_keeps: behind MULTAX/OFF points of three numbers keep the last axis
         planes: how cycles state their planes
     """
 
@@ -55,18 +61,24 @@ class Dialect:
     table_frames: bool = False
     axis_reset: bool = False
     six_sizes: bool = False
+    eleven_clockwise: bool = False
+    cycles_by_table: bool = False
+    operations_in_comments: bool = False
+    trntyp_begins: bool = False
+    multax_off_keeps: bool = False
     planes: Planes = Planes.RELATIVE
 
 
 DIALECTS: dict[DialectName, Dialect] = {d.name: d for d in (
-    Dialect("generic", "APT text", six_sizes=True),
+    Dialect("generic", "APT text", six_sizes=True, eleven_clockwise=True),
     Dialect("nx", "Siemens NX", arc_sense=-1, full_circles=False, depth_sign=-1, axis_reset=True),
     Dialect("makino", "Makino FF/CAM", arc_sense=-1, full_circles=False),
     Dialect("creo", "PTC Creo", six_common=True, table_frames=True),
-    Dialect("solidworks", "SolidWorks CAM .apt", six_common=True, insert_is_comment=True),
+    Dialect("solidworks", "SolidWorks CAM .apt", six_common=True, insert_is_comment=True, eleven_clockwise=True,
+            trntyp_begins=True),
     Dialect("solidworks-clt", "SolidWorks CAM .clt", arc_sense=0, six_common=True, insert_is_comment=True,
             rotabl_radians=True, frame_turns=True),
-    Dialect("catia", "CATIA"),
+    Dialect("catia", "CATIA", cycles_by_table=True, operations_in_comments=True, multax_off_keeps=True),
     Dialect("ncl", "NCL", six_sizes=True),
     Dialect("camplete", "Autodesk APT for CAMplete or MANUSnc", arc_sense=-1, planes=Planes.HEIGHTS),
     Dialect("mfgsuite", "Autodesk APT for MfgSuite", planes=Planes.DOWN),

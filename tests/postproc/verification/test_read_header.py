@@ -1,4 +1,4 @@
-"""The head of a program: what one place writes, the same place reads back, however a control changes its comments."""
+"""The header of a program: what one place writes, the same place reads back, however a control changes its comments."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from postproc.base import header_words as words
-from postproc.base.header_words import AxesNamed, Head, SetupNamed, read_head, same_name, with_feeds_mark
+from postproc.base.header_words import AxesNamed, ProgramHeader, SetupNamed, read_header, same_name, with_feeds_mark
 
 BEGIN = ["postproc 0.1.0", "part plate", "source plate.cls"]
 STYLES: dict[str, Callable[[str], str]] = {
@@ -24,22 +24,22 @@ def test_every_line_is_read_back(style: str) -> None:
     lines = [*BEGIN, words.feed_line("planned", 0.1), words.chosen_axes("per-pass", 60.0),
              words.setup_line("a b.toml", "0123abcd"), words.feeds_line(), words.corrected_here("mill.toml"),
              words.model_mark("89abcdef")]
-    head = read_head(with_feeds_mark(text(lines, style).decode(), "00ff00ff").encode())
-    assert head.corrected is not None and same_name(head.corrected, "mill.toml")
-    assert head.setup is not None and same_name(head.setup.name, "a b.toml")
-    assert head == Head(True, head.corrected, "89abcdef", False, AxesNamed("per-pass", "60"),
-                        SetupNamed(head.setup.name, "0123abcd"), True, "00ff00ff")
+    header = read_header(with_feeds_mark(text(lines, style).decode(), "00ff00ff").encode())
+    assert header.corrected is not None and same_name(header.corrected, "mill.toml")
+    assert header.setup is not None and same_name(header.setup.name, "a b.toml")
+    assert header == ProgramHeader(True, header.corrected, "89abcdef", False, AxesNamed("per-pass", "60"),
+                        SetupNamed(header.setup.name, "0123abcd"), True, "00ff00ff")
 
 
 @pytest.mark.parametrize("style", STYLES)
 def test_what_a_head_does_not_say_is_not_read(style: str) -> None:
-    assert read_head(text(BEGIN, style)) == Head(True, None, "", False, None, None, False, "")
-    assert read_head(text(["another post", "source x"], style)) == Head(False, None, "", False, None,
+    assert read_header(text(BEGIN, style)) == ProgramHeader(True, None, "", False, None, None, False, "")
+    assert read_header(text(["another post", "source x"], style)) == ProgramHeader(False, None, "", False, None,
                                                                         None, False, "")
     more = [words.corrected_by_control("mill.toml"), words.setup_line("", ""), words.feeds_line()]
-    head = read_head(text([*BEGIN, *more], style))
-    assert head.by_control and head.corrected is None and head.feeds == "" and not head.planned
-    assert head.setup is not None and (head.setup.name.lower(), head.setup.mark) == (words.NO_FILE, "")
+    header = read_header(text([*BEGIN, *more], style))
+    assert header.by_control and header.corrected is None and header.feeds == "" and not header.planned
+    assert header.setup is not None and (header.setup.name.lower(), header.setup.mark) == (words.NO_FILE, "")
 
 
 def test_only_the_place_in_the_head_is_filled() -> None:

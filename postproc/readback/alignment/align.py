@@ -3,16 +3,41 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.compiled import chosen, loop
 from toolpaths.shape import Curves
+from toolpaths.shapes import arrays
 
 _COMPILE_FROM = 20_000
 _ROWS, _NUMBERS, _KINDS, _NUMBER = ("float64", 2), ("float64", 1), ("int8", 1), ("float64", 0)
+
+
+@dataclass(frozen=True)
+@arrays(tip="E 3", axis="E 3", sweep="E")
+class EndPoses:
+    """Poses at the ends of executed blocks; `sweep` in rad of those that are arcs, else NaN; `kept`: blocks of no rewind."""
+
+    tip: Floats
+    axis: Floats
+    sweep: Floats
+    kept: Ints | slice
+
+
+def aligned(ends: EndPoses, moves: Moves, link: Bools, tolerance: float, axis_tolerance: float,
+            grain: tuple[float, float]) -> tuple[Ints, Ints]:
+    """`align` without the blocks of rewinds, which get no move (M + 1): but for them the tool only rests there."""
+    kept, count = ends.kept, len(ends.tip)
+    match, short = align(ends.tip[kept], ends.axis[kept], ends.sweep[kept], moves.curves(), link, tolerance,
+                         axis_tolerance, grain)
+    owner = np.full(count, len(moves) + 1)
+    owner[kept] = short
+    return np.where(match >= 0, np.arange(count)[kept][match], match), owner
 
 
 def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools, tolerance: float,

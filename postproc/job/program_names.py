@@ -1,0 +1,29 @@
+"""Names that the set-up gives and the control or the program cannot have: its work offset, its number."""
+
+from __future__ import annotations
+
+from postproc.base.options import Options
+from postproc.controllers.model import ControllerFile
+from postproc.setup.model import SetupFile
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.toolpath import Toolpath
+
+
+def work_offset(controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:
+    """A work offset that the control does not have."""
+    program = controller.program
+    if program.offset_block(setup.work_offset_code) is not None:
+        return []
+    return [error("setup.work_offset_code", f"work_offset_code = {setup.work_offset_code!r}: this control has no such work "
+                  "offset", file=options.setup, hint=f"allowed are {program.offsets_named}")]
+
+
+def program_number(toolpath: Toolpath, controller: ControllerFile, setup: SetupFile,
+                    options: Options) -> list[Diagnostic]:
+    """A number of the program that one of its subprograms bears."""
+    last, number = 1000 + len(toolpath.operations), setup.output.program_number
+    numbered = setup.output.divided and "{number}" in controller.subprograms.call
+    if number is None or not numbered or not 1000 < number <= last:
+        return []
+    return [error("setup.program_number", f"program_number = {number}: subprograms have the numbers 1001 to {last}",
+                  file=options.setup, hint=f"a number below 1001 or above {last}")]

@@ -1,0 +1,1 @@
+"""Which blocks run each move of the CL file."""
