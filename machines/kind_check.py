@@ -11,6 +11,7 @@ import numpy as np
 
 from machines.kinematics import by_samples
 from machines.kinematics.base import Kinematics
+from machines.kinematics.chain import LINEAR, ROTARY
 from machines.machine import Limits
 from machines.models import KeyProblem, KinematicsModel
 from toolpaths.arrays import Bools, Floats
@@ -54,7 +55,7 @@ def _letters(kin: Kinematics) -> Iterator[KeyProblem]:
         yield _problem(f"axis_names {kin.axis_names} and rotary {kin.rotary} do not go together, one letter a joint")
         return
     for letter, rotary in zip(kin.axis_names, kin.rotary, strict=True):
-        allowed = "ABC" if rotary else "XYZUVWPQR"
+        allowed = ROTARY if rotary else LINEAR
         if len(letter) != 1 or letter not in allowed:
             yield _problem(f"{letter!r} is not a letter of a {'rotary' if rotary else 'linear'} axis, allowed: "
                            f"{' '.join(allowed)}")

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from machines.kinematics.chain import Joint
+from machines.kinematics.chain import ROTARY, Joint
 from machines.kinematics.serial import Serial
 from machines.machine import ControlKinematics
 from machines.models import KeyProblem, KinematicsModel, Vector
@@ -79,7 +79,7 @@ class SerialModel(KinematicsModel):
     def _joint(self, name: str) -> Joint:
         axis = self.axes.get(name, SerialAxisModel())
         direction = np.array(axis.direction or _ISO_841[name], dtype=np.float64) * axis.positive
-        return Joint(name, name in "ABC", direction, np.array(axis.point or (0.0, 0.0, 0.0)))
+        return Joint(name, name in ROTARY, direction, np.array(axis.point or (0.0, 0.0, 0.0)))
 
     def problems(self) -> Iterator[KeyProblem]:
         """Tables that do not fit the code, vectors that are not of length 1, axes that depend on each other."""
@@ -94,13 +94,13 @@ class SerialModel(KinematicsModel):
             if name not in self.letters:
                 yield KeyProblem("machine.axis-unknown", path, f"structure {self.structure!r} has no axis {name!r}",
                                  f"its axes are {', '.join(self.axis_names)}")
-            elif name not in "ABC" and axis.point is not None:
+            elif name not in ROTARY and axis.point is not None:
                 yield KeyProblem("machine.geometry", (*path, "point"), f"linear axis {name} has no point",
                                  "take it out")
             if axis.direction is not None:
                 yield from _unit_problems((*path, "direction"), axis.direction)
         for name in self.letters:
-            if name in "ABC" and (name not in self.axes or self.axes[name].point is None):
+            if name in ROTARY and (name not in self.axes or self.axes[name].point is None):
                 yield KeyProblem("machine.geometry", ("axes", name), f"rotary axis {name} has no point",
                                  f"add [kinematics.axes.{name}] point = [x, y, z], a point of its line in mm")
         yield from _unit_problems(("tool_axis",), self.tool_axis)
@@ -138,7 +138,7 @@ class SerialModel(KinematicsModel):
         if self.letters[:2] != ("C", tilt) or set(self.letters[2:]) != set("XYZ"):
             raise ValueError(f"{module} is for w C' {tilt}' and X, Y, Z in any order, not {self.structure!r}")
         for name in self.letters:
-            direction = np.array(_ISO_841[name]) * (-1 if name in "ABC" else 1)
+            direction = np.array(_ISO_841[name]) * (-1 if name in ROTARY else 1)
             if not np.array_equal(self._joint(name).direction, direction):
                 raise ValueError(f"{module} needs axis {name} along {direction.tolist()}")
         if self.tool_axis != (0.0, 0.0, 1.0):
@@ -163,7 +163,7 @@ def _chain(code: str) -> tuple[str, ...]:
     bed = tokens.index("b")
     found = [_letter(token, at < bed, code) for at, token in enumerate(tokens) if token not in ("w", "b", "t")]
     names = tuple(name for name in found if name)
-    linear = [name for name in names if name not in "ABC"]
+    linear = [name for name in names if name not in ROTARY]
     if len(set(names)) < len(names) or len(linear) != 3 or len(names) > 5:
         raise ValueError(f"structure {code!r} has the axes {', '.join(names)}; three linear and up to two rotary ones, "
                          "each once, can be handled")

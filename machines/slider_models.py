@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator
 
+from machines.kinematics.chain import LINEAR
 from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
@@ -143,7 +144,7 @@ class SliderModel(KinematicsModel):
             if abs(length - 1.0) > UNIT:
                 yield KeyProblem("machine.geometry", ("legs", name, "direction"),
                                  f"{list(leg.direction)} has length {length:.6g}, not 1", "write a unit vector")
-            if len(name) != 1 or name not in "XYZUVWPQR":
+            if len(name) != 1 or name not in LINEAR:
                 yield KeyProblem("machine.axis-letter", ("legs", name), f"{name!r} is not a letter of a linear axis",
                                  "choose from X Y Z U V W P Q R")
             if len(leg.rods) > 2:

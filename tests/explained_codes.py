@@ -12,13 +12,13 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import get_args
 
-from postproc.witness.evidence import FindingCode
-
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from postproc.witness.evidence import FindingCode
 from tests.hints.case import example
 from tests.hints.cases import CASES
 
@@ -125,6 +125,7 @@ SAYS = frozenset({"error", "warning", "info", "fault", "problem", "KeyProblem", 
 """names of calls that make a diagnostic"""
 
 
+@cache
 def _trees(*rooms: str) -> list[ast.Module]:
     return [ast.parse(path.read_text("utf-8")) for top in rooms or ("toolpaths", "machines", "postproc")
             for path in sorted((ROOT / top).rglob("*.py"))]
@@ -141,6 +142,7 @@ def said_codes() -> set[str]:
             for one in n.args[:3] if isinstance(one, ast.Constant) and isinstance(one.value, str) and CODE.match(one.value)}
 
 
+@cache
 def codes() -> dict[str, dict[str, list[str]]]:
     """Messages and remedies by code, in order."""
     areas = frozenset(tomllib.loads((DATA / "areas.toml").read_text("utf-8")))

@@ -40,6 +40,7 @@ BORDERS = {
     "postproc/cli/time.py": FIGURES, "postproc/cli/place.py": FIGURES, "postproc/cli/orient.py": FIGURES,
     "postproc/cli/console.py": FIGURES, "postproc/cli/error_text.py": FIGURES, "postproc/cli/error_files.py": FIGURES,
     "postproc/cli/catalogue.py": FIGURES, "postproc/cli/setup_new.py": FIGURES,
+    "postproc/cli/setup_align.py": FIGURES, "postproc/alignment/report.py": FIGURES,
     "postproc/cli/job_defaults.py": "defaults of options", "postproc/setup_sheet/text.py": TABLES,
     "postproc/verification/second_witness.py": TABLES, "postproc/witness/states.py": TABLES,
     "postproc/witness/sides.py": TABLES,

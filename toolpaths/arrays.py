@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,8 +25,16 @@ def shared(values: Array) -> Array:
 
 def repeated(row: npt.ArrayLike, count: int) -> Array:
     """`count` times the same row, which is kept once, read-only."""
-    one = np.array(row)
-    return np.broadcast_to(one, (count, *one.shape))
+    return _rows_of_one(np.array(row), count)
+
+
+def _rows_of_one(row: Array, count: int) -> Array:
+    """`numpy.broadcast_to(row, (count, ...))`, which takes ten times as long."""
+    if row.dtype.hasobject:
+        return np.broadcast_to(row, (count, *row.shape))
+    made: Array = np.ndarray((count, *row.shape), row.dtype, row, 0, (0, *row.strides))
+    made.flags.writeable = False
+    return made
 
 
 def _bits(values: Array) -> Array:
@@ -38,7 +46,7 @@ def taken(values: Array, index: Array | slice) -> Array:
     if isinstance(index, slice) or not len(values) or values.strides[0] != 0:
         return np.asarray(values[index])
     count = int(np.count_nonzero(index)) if index.dtype == np.bool_ else len(index)
-    return np.broadcast_to(values[0], (count, *values.shape[1:]))
+    return _rows_of_one(np.asarray(values[0]), count)
 
 
 def joined(parts: Sequence[Array]) -> Array:
@@ -49,6 +57,14 @@ def joined(parts: Sequence[Array]) -> Array:
         if ends.strides[0] == 0 or len(rows) == 1:
             return repeated(ends[0], sum(map(len, parts)))
     return np.concatenate(parts)
+
+
+def among(values: Array, some: Iterable[float]) -> Bools:
+    """(N,) which of the values (N,) are one of a few numbers: `numpy.isin`, which takes many times as long for few."""
+    found = np.zeros(values.shape, dtype=bool)
+    for one in some:
+        found |= values == one
+    return found
 
 
 def runs(which: Bools) -> Ints:

@@ -14,7 +14,7 @@ from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.csv_table import UNITS
 from machines.geometric_error.tables.curves import TableCurve
-from machines.geometric_error.tables.table_curves import ROTARY
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Floats
 
 CURVE = 5

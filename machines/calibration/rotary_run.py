@@ -27,6 +27,7 @@ from machines.geometric_error.actual.serial_errors import Component, SerialError
 from machines.geometric_error.tables.csv_table import UNITS, CsvTable
 from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Floats
 
 ARCSEC = UNITS["arcsec"]
@@ -130,7 +131,7 @@ def _sense(run: CalibrationRun, letter: str) -> int:
         run.problem("calibrate.axis", f"{machine.name} has no axis {letter}", "it has " + ", ".join(machine.axis_names),
                     "axis")
         return 0
-    along = kinematics.axis_line(letter)[0]["ABC".index(letter)]
+    along = kinematics.axis_line(letter)[0][ROTARY.index(letter)]
     if abs(along) < 1.0 - ALONG:
         run.problem("calibrate.axis", f"{letter} of {machine.name} is inclined: E{letter}{letter} is not its "
                     "positioning error", "measure poses, and name its parameters", "axis")

@@ -10,6 +10,9 @@ import numpy.typing as npt
 from toolpaths.arrays import Floats, read_only
 from toolpaths.shapes import arrays
 
+LINEAR, ROTARY = "XYZUVWPQR", "ABC"
+"""letters of axes by what they are (ISO 841)"""
+
 
 @dataclass(frozen=True, eq=False)
 @arrays(direction="3", point="3")

@@ -80,6 +80,9 @@ ToolTableOption = Annotated[str, typer.Option("--tool-table", metavar="FILE", he
                                               "the lengths of tools at the machine")]
 ErrorsOfProgram = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric "
                                               "errors that the program corrects")]
+CheckProgram = Annotated[Path | None, typer.Option("--check-program", metavar="FILE", help="write a program too that checks "
+                                                   "the pivots at the machine: five poses of a ball or probe, with the "
+                                                   "readings expected")]
 OutputModeOption = Annotated[OutputMode, word_option("--output-mode", OutputMode, (
     "axes: machine coordinates, no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, TCPM, G234); tilted: tilted work "
     "plane, 3+2 (G68.2, CYCLE800, PLANE SPATIAL, G254)"))]
@@ -117,6 +120,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             dialect: DialectOption = "", allow_unknown: Allow = None, error_model: Errors = "", beyond: Beyond = False,
             residuals: Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="errors at each CL "
                                  "point before and after correction: .csv, or drawn: .png, .svg; may be repeated")] = None,
+            check_program: CheckProgram = None,
             require_proof: RequireProof = False, proof: ProofOption = False, json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
@@ -127,10 +131,12 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
     refuse_overwriting({"-o": str(output), "--json": json, "--proof": f"{output}.proof.json" if proof else "",
+                        "--check-program": str(check_program or ""),
                         **{f"--residuals {name}": str(name) for name in fields}},
                        inputs := {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
                                   **own_files(machine, controller)})
     from postproc.cycle_time.conversion import estimate_of
+    from postproc.pipeline.check_program import checked_file
     from postproc.pipeline.convert import convert as run
     from postproc.proof import command
     from postproc.report import summary
@@ -153,7 +159,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             refuse_inputs(list(texts)[:-1], inputs)
             kept, unlike = command.kept(result, machine, controller, proof, known, output)
             more += unlike
-            outputs = {**dict(zip(fields, noted, strict=True)), **kept, **texts}
+            check = checked_file(result, spec, check_program)
+            outputs = {**dict(zip(fields, noted, strict=True)), **kept, **check, **texts}
     found = [*result.diagnostics, *more]
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 

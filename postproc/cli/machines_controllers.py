@@ -17,6 +17,8 @@ from postproc.cli.console import (
     shown_errors,
 )
 from postproc.cli.group import Group
+from postproc.cli.setup_align import EXAMPLES as ALIGNED
+from postproc.cli.setup_align import setup_align
 from postproc.cli.setup_new import EXAMPLES, setup_new
 from toolpaths.table_text import table_text
 
@@ -25,10 +27,11 @@ machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                        help="Set-up files: new, check, schema.")
+                        help="Set-up files: new, align, check, schema.")
 
 
 setup_app.command("new", epilog=EXAMPLES)(setup_new)
+setup_app.command("align", epilog=ALIGNED)(setup_align)
 
 
 @machine_app.command("list")

@@ -54,7 +54,7 @@ class Cutter:
 
 
 def stated_cutter(tool: Tool | None, given: ToolBody) -> Cutter:
-    """What is known of a cutter; the set-up's word `given` goes before the CL file's."""
+    """What is known of a cutter; what the set-up states, `given`, takes precedence over the CL file."""
     tool = tool or Tool(0)
     drill = "DRILL" in tool.shape.upper() or given.tip_angle is not None
     seven = tool.cutter if len(tool.cutter) == _APT else (0.0,) * _APT

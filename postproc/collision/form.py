@@ -49,7 +49,7 @@ def tool_form(number: int, tool: Tool | None, setup: ToolSetup | None,
 
     Args:
         tool: as the CL file describes it
-        setup: as the set-up does, which goes before it
+        setup: as the set-up does, which takes precedence
         file: the set-up file
     """
     given = setup or _ANY

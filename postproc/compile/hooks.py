@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from machines.hooks import HooksModel
+from machines.kinematics.chain import ROTARY
 from postproc.compile.clamps import CLAMP, FIRST, UNCLAMP, cutting, turning
 from postproc.compile.program import Command, CommandName, Program
 from toolpaths.arrays import Ints, runs
@@ -97,7 +98,7 @@ def indexing_moves(program: Program) -> tuple[dict[int, int], dict[int, int]]:
     """CL lines by the first block that may turn a rotary axis between two cuts, and by the block behind the last one.
 
     A tilted plane belongs to the indexing that it follows."""
-    rotary = [j for j, letter in enumerate(program.letters) if letter in "ABC"]
+    rotary = [j for j, letter in enumerate(program.letters) if letter in ROTARY]
     cut = cutting(program)
     turns = np.flatnonzero(turning(program, rotary) & ~cut) if rotary else np.zeros(0, dtype=np.int64)
     if not len(turns):

@@ -13,7 +13,8 @@ from machines.kinematics.base import Kinematics
 from postproc.base.options import Options, OutputMode
 from postproc.control.control import Control, InterpolationMode, tool_frames
 from postproc.control.planes import Plane, stated
-from postproc.controllers.model import ControllerFile, Mode
+from postproc.controllers.model import ControllerFile
+from postproc.controllers.output_modes import Mode
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Array, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error

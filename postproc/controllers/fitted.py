@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from machines.machine import ControlOptions
-from postproc.controllers.model import ArcRules, ControllerFile, Modes, Start
+from postproc.controllers.model import ArcRules, ControllerFile, Start
+from postproc.controllers.output_modes import Modes
 from postproc.controllers.spelling import ProgramBlocks
 
 

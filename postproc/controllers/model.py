@@ -12,12 +12,14 @@ from pydantic import Field
 from machines.choices import Rapids, RolloverRule, Stop
 from machines.user_file import UserModel, load_toml
 from postproc.base.length_text import INCH, MM, LengthText
+from postproc.controllers.output_modes import Modes
 from postproc.controllers.pivots import PivotNames
 from postproc.controllers.spelling import (
     Codes,
     Comment,
     Format,
     InchFormat,
+    PartAlignment,
     ProgramBlocks,
     SmoothingLevel,
     SubprogramFormat,
@@ -36,8 +38,6 @@ Worded = Annotated[str, placeholders("letter", "value")]
 
 WriterName = Literal["iso", "linuxcnc", "fanuc", "haas", "siemens", "heidenhain"]
 """dialects: each has a writer, a reader and a form of tool tables"""
-LengthState = Literal["any", "off", "on"]
-"""whether the length register is in force where a mode begins"""
 
 
 class ArcRules(UserModel):
@@ -141,7 +141,7 @@ class CutterCompensation(UserModel):
     """D holds until another is stated, whatever tool is loaded: where CUTCOM names none, the number of the
     tool's length register is written"""
     holds: str = "D{register}"
-    """what holds the radius or its wear, as the head of the program names it: {register} is that of CUTCOM, else the
+    """what holds the radius or its wear, as the header names it: {register} is that of CUTCOM, else the
     number of the tool"""
 
 
@@ -195,78 +195,6 @@ class Start(UserModel):
     codes: tuple[Annotated[str, Field(pattern=r"^G[0-9]+(\.[0-9]+)?$")], ...] = ()
     """codes that the control itself puts in force before every program, whatever ran before it (power-on or reset states
     that no parameter changes): `verify` takes them as stated; all other states the program must state itself"""
-
-
-class Mode(UserModel):
-    """How a mode is switched on and off, and what may stand in it."""
-
-    enter: tuple[str, ...]
-    """blocks that switch it on"""
-    leave: tuple[str, ...]
-    """blocks that switch it off"""
-    start: tuple[str, ...] = ()
-    """blocks of the safe start, in programs that use the mode"""
-    option: str = ""
-    """the option of the control that the mode is: a comment likewise, where the machine file does not confirm it"""
-    relies_on: tuple[Annotated[str, placeholders("work_offset")], ...] = ()
-    """settings of the control that the mode needs: comments in the header of programs that use it; {work_offset}
-    is the name of the work offset"""
-    length: LengthState = "any"
-    """how the length register must stand where the mode is entered, and where its `leave` blocks begin"""
-    arcs: bool = True
-    """arcs may stand in it while the rotary axes stand still"""
-    arc_planes: tuple[Literal[17, 18, 19], ...] = (17, 18, 19)
-    """planes of those arcs"""
-    cycles: bool = True
-    """canned cycles may stand in it"""
-    compensation: bool = True
-    """cutter compensation may stand in it"""
-
-
-class TcpMode(Mode):
-    """Tool-centre-point mode: X, Y, Z are the tip in the work offset, fixed to the part; F is the speed of the tip."""
-
-    enter: tuple[Annotated[str, placeholders("register", "work_offset")], ...]
-    """blocks that switch it on; {register} is the length register in force"""
-    leave: tuple[Annotated[str, placeholders("register", "work_offset")], ...]
-    """blocks that switch it off"""
-    frame: Literal["table", "entry", "either"] = "table"
-    """what X, Y, Z are the tip in, where a rotary table stands turned when the mode is switched on: "table",
-    the part's frame, turned with the table by its scale; "entry", the frame of the work offset as it lies
-    unturned in the machine, which then goes with the table; "either": not known, so that the mode is entered
-    with the tables at zero, where both are one, and `verify` proves the program under both"""
-    cycles: bool = False
-    """canned cycles may stand in it"""
-    compensation: bool = False
-    """cutter compensation may stand in it"""
-
-
-class TiltedMode(Mode):
-    """Tilted work plane: rotary axes stand still, X, Y, Z are the tip in a turned frame at the work offset's zero."""
-
-    enter: tuple[Annotated[str, placeholders("first", "second", "third", "direction", "work_offset")], ...]
-    """blocks that state the plane; {first}, {second}, {third} are the angles in the order of `angles`,
-    {direction} is 1, or -1 where the first rotary axis that tilts the tool stands at a negative angle"""
-    leave: tuple[Annotated[str, placeholders("work_offset")], ...]
-    """blocks that end it"""
-    angles: Literal["ZXZ", "ZYX", "XYZ", "rotary"]
-    """turns about the axes of the moving frame, in order; "rotary": the frame is that of the rotary axes themselves"""
-    decimals: int = Field(default=4, ge=0, le=9)
-    """of the angles"""
-    turns_axes: bool = True
-    """the control may turn rotary axes where the plane is stated, if only by what its angles are rounded by:
-    axes whose clamps the program works are free there"""
-    tables_only: bool = False
-    """only for machines whose rotary axes all carry the part"""
-
-
-class Modes(UserModel):
-    """Output modes next to machine coordinates."""
-
-    tcp: TcpMode | None = None
-    """tool-centre-point mode"""
-    tilted: TiltedMode | None = None
-    """tilted work plane"""
 
 
 class Stops(UserModel):
@@ -324,6 +252,7 @@ class ControllerFile(UserModel):
     "G05 P10000" = 0.005"""
     links: LinkRules = LinkRules()
     pivots: PivotNames = PivotNames()
+    alignment: PartAlignment = PartAlignment()
 
     @property
     def keeps_length(self) -> bool:

@@ -11,6 +11,7 @@ from machines.hooks import PASSIVE, PassiveWord
 from machines.user_file import UserModel
 from postproc.controllers.texts import (
     WORK_OFFSETS,
+    AlignmentText,
     DwellText,
     Named,
     Numbered,
@@ -284,3 +285,15 @@ class SubprogramFormat(UserModel):
     """before the main program's first block, behind its end, or each in a file of its own next to the program"""
     file: Named = "{name}_{number}"
     """name of such a file"""
+
+
+class PartAlignment(UserModel):
+    """What the control can do by itself about a part that is not where it was meant (`postproc setup align`)."""
+
+    turns: Literal["space", "plane", "none"] = "none"
+    """by which turns its work offset can be turned: in space, about Z alone, or not at all"""
+    corrects: tuple[Literal["tcp", "tilted"], ...] = ()
+    """output modes in which it turns the rotary axes with the part; elsewhere only the frame is turned"""
+    entry: tuple[AlignmentText, ...] = ()
+    """lines for the operator: {x}, {y}, {z} the work offset in machine coordinates, {dx}, {dy}, {dz} by how much its origin
+    has gone, {a}, {b}, {c} degrees about the fixed X, then Y, then Z; {offset} and {number}: its name, 1 for G54"""

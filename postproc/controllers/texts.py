@@ -43,6 +43,7 @@ WorkOffsets = Annotated[dict[str, str], AfterValidator(_all_offsets)]
 Named = Annotated[str, placeholders("name", "number", "units")]
 Numbered = Annotated[str, placeholders("number")]
 Registered = Annotated[str, placeholders("register")]
+AlignmentText = Annotated[str, placeholders("x", "y", "z", "dx", "dy", "dz", "a", "b", "c", "offset", "number")]
 DwellText = Annotated[str, placeholders("seconds", "milliseconds")]
 
 

@@ -19,7 +19,7 @@ from postproc.readback.text.modal import columns, fill_values, modal_state
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
 from toolpaths.shapes import arrays
-from toolpaths.units import DEG
+from toolpaths.units import DEG, MM_PER_INCH
 
 RESTING_M = (0.0, 1.0, 3.0, 4.0, 5.0, 7.0, 8.0, 9.0)
 """Codes that are carried out at rest; LinuxCNC waits for motion before each (emctaskmain.cc, preconditions)."""
@@ -29,8 +29,6 @@ CHORD = 0.1
 """rad of an arc that one straight piece stands for where the control bends it through its kinematics"""
 BEND, MOST_PIECES = 0.002, 64
 """mm or degrees off its axes' straight line that one piece of a block may be, and pieces of a block at most"""
-INCH = 25.4
-
 
 @dataclass(frozen=True)
 @arrays(operation="E", cl_line="E", move="E")
@@ -162,7 +160,7 @@ def _path_modes(words: Words, blends_unstated: bool) -> tuple[Array, Floats, Flo
     at, codes = words.pick("G")
     keep = np.isin(codes, (61.0, 61.1, 64.0))
     at, codes = at[keep], codes[keep]
-    scale = np.where(modal_state(words).inch, INCH, 1.0)[at]
+    scale = np.where(modal_state(words).inch, MM_PER_INCH, 1.0)[at]
     p, q = (columns(words, letter)[at, 0] * scale for letter in "PQ")
     blend = codes == 64.0
     path = np.where(blend, CornerMode.BLEND, np.where(codes == 61.0, CornerMode.EXACT, CornerMode.STOP))

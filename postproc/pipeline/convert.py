@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as FilePath
 
@@ -17,13 +18,20 @@ from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
 from postproc.pipeline.stages import staged
+from postproc.readback.comparison.compare import Comparison
 from postproc.setup.fingerprint import fingerprint
 from postproc.setup.model import SetupFile, load_setup
 from postproc.setup.system import standing
 from postproc.verification.neighbour_files import NeighbourFiles, unfinished
 from postproc.verification.read_back import other_axes, other_setup, read_back
 from postproc.verification.second_witness import second_witness
-from postproc.verification.tool_table import measured_lengths, read_tool_table, with_measured
+from postproc.verification.tool_table import (
+    MeasuredLength,
+    measured_lengths,
+    read_tool_table,
+    with_allowed,
+    with_measured,
+)
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors, require
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import Toolpath
@@ -144,7 +152,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     found += [*more, *(refused_hooks(job) if job is not None else [])]
     if job is None or has_errors(found):
         return replace(begun, diagnostics=tuple(found))
-    asked = start.asked or start.setup
+    asked, at_gauge = start.asked or start.setup, job.setup
     if tool_table:
         measured, more = measured_lengths(read_tool_table(tool_table, spec), job, str(tool_table))
         begun, found, asked = replace(begun, measured=tuple(measured)), [*found, *more], with_measured(asked, measured)
@@ -152,9 +160,23 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
             return replace(begun, diagnostics=tuple(found))
         job = replace(job, setup=with_measured(job.setup, measured))
     comparison, more = read_back(data, job, path.file, progress, str(gcode), NeighbourFiles(gcode))
+    if begun.measured:
+        begun = replace(begun, measured=_with_allowed(begun.measured, comparison, has_errors(more), lambda: read_back(
+            data, replace(job, setup=at_gauge), path.file, progress, str(gcode), NeighbourFiles(gcode))))
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more]
     said = None
     if comparison is not None and not has_errors(found):
         said, more = second_witness(start.source, asked, options, job, comparison, data)
         found += more
     return replace(begun, comparison=comparison, diagnostics=tuple(found), witness=said)
+
+
+def _with_allowed(measured: tuple[MeasuredLength, ...], comparison: Comparison | None, failed: bool,
+                  with_gauge_lengths: Callable[[], tuple[Comparison | None, list[Diagnostic]]],
+                  ) -> tuple[MeasuredLength, ...]:
+    """Lengths at the machine with what the program takes: from what is proved with them, else with gauge lengths."""
+    if comparison is not None and not failed:
+        return tuple(with_allowed(list(measured), comparison.lengths, False))
+    other, found = with_gauge_lengths()
+    margins = other.lengths if other is not None and not has_errors(found) else ()
+    return tuple(with_allowed(list(measured), margins, True))

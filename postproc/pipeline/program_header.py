@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from postproc.base.header_words import LENGTHS_PENDING, PENDING, corrected_by_control, corrected_here, feeds_line, model_mark
+from postproc.base.header_words import PENDING, corrected_by_control, corrected_here, feeds_line, model_mark
 from postproc.base.version import VERSION
 from postproc.compile.program import Program
 from postproc.control.control import MODE_NAMES
@@ -15,7 +15,7 @@ from postproc.job.job import Job
 from postproc.pipeline.cutcom_header import cutcom_lines
 from postproc.pipeline.pivot_header import pivot_lines
 from postproc.pipeline.stage_values import CompiledStage
-from postproc.readback.comparison.length_margins import length_matters
+from postproc.readback.comparison.length_margins import pending_lines
 from postproc.setup.model import stated_value
 
 
@@ -84,8 +84,7 @@ def _tools(job: Job) -> list[str]:
                  *([f"diameter {tool.diameter / said.unit:.4g} {said.name}"] if tool and tool.diameter else []),
                  f"gauge length {said.text(length)}" if length else "gauge length not stated"]
         found[number] = ", ".join(parts)
-    margins = [f"T{number}: {LENGTHS_PENDING}" for number in sorted(found)] if length_matters(job) else []
-    return [*found.values(), *margins]
+    return [*found.values(), *pending_lines(sorted(found), job)]
 
 
 def _orientations(made: CompiledStage) -> list[str]:

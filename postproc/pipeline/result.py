@@ -42,7 +42,7 @@ class PostResult:
     setup: SetupFile
     diagnostics: tuple[Diagnostic, ...]
     toolpath: Toolpath
-    """as it was read, oriented and, where it could be, with its records spelt out"""
+    """as it was read, oriented and, where it could be, with its records expanded"""
     job: Job | None = None
     moves: Moves | None = None
     """that are written: those of `job`, with --smooth moved"""

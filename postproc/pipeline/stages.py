@@ -260,8 +260,7 @@ def stated(made: VerifiedStage, progress: Progress | None) -> tuple[VerifiedStag
     """What is proved, in the header of the program: another comment in the place of the one that was read back."""
     if made.comparison is None:
         return made, []
-    text, found = with_statement(made.text, made.controller, made.comparison, made.witness,
-                                 made.toolpath.file)
+    text, found = with_statement(made.text, made.controller, made.comparison, made.witness, made.job)
     return replace(made, text=text), found
 
 

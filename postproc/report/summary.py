@@ -11,6 +11,7 @@ import numpy as np
 
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.readback.comparison.compare import Comparison
+from postproc.readback.comparison.length_margins import margin_lines
 from postproc.reference.events import cutting, spindle_states
 from postproc.report.unwinding import unwinding, unwinding_lines
 from postproc.verification.proof_text import statement
@@ -184,7 +185,7 @@ def tools_of(result: PostResult) -> list[dict[str, Any]]:
 
 
 def _length_margin(result: PostResult, number: int) -> dict[str, Any] | None:
-    """By how much a tool may differ from its gauge length, and what ends that; None where its register takes it up."""
+    """By how much a tool may differ from its gauge length (null: more than is looked for), and what ends that."""
     one = next((one for one in (result.comparison.lengths if result.comparison else ()) if one.number == number), None)
     return None if one is None else {
         "shorter": _number(one.shorter), "ends_shorter": one.ends_shorter,
@@ -199,7 +200,9 @@ def tool_lines(result: PostResult) -> list[str]:
         lines.append("no tool call: for the tool in the spindle, measured into the work offset, which "
                      + (f"holds its gauge length {length:.4f} mm" if length else "must hold its length besides"))
     lines += [f"T{number}: {what}, of the set-up" for number, what in (result.job.stated if result.job else ())]
-    return lines + [one.line() for one in (result.comparison.lengths if result.comparison else ())]
+    if result.job is None or result.comparison is None:
+        return lines
+    return lines + margin_lines(result.comparison.lengths, result.job)
 
 
 def points_added(result: PostResult) -> int:
@@ -269,7 +272,9 @@ def verify_dict(result: VerifyResult) -> dict[str, Any]:
         "worst_axis_lines": list(c.worst_axis_line) if c else None,
         "witness": witness_dict(result.witness),
         "tool_table": [{"number": one.number, "register": one.register, "gauge_length_mm": one.gauge,
-                        "measured_mm": one.measured} for one in result.measured],
+                        "measured_mm": one.measured, "allowed_mm": None if one.allowed is None else
+                        [_number(-one.allowed.shorter), _number(one.allowed.longer)], "fails": one.beyond or None}
+                       for one in result.measured],
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }
 

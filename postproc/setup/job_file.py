@@ -18,7 +18,7 @@ _NAMES = ("machine", "controller")
 
 
 class JobFile(UserModel):
-    """What a job is converted with; every key has an option that goes before it. Files are named from its folder."""
+    """What a job is converted with; every key has an option that takes precedence. Files are named from its folder."""
 
     machine: Annotated[str, Field(min_length=1)] | None = None
     """as -m"""

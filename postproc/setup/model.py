@@ -98,7 +98,7 @@ class OutputSettings(UserModel):
     controller file has them ([format] units), mm. Angles, and feeds of rotary axes alone, stay degrees"""
     default: OutputMode = "auto"
     """axes: machine coordinates; tcp: tool-centre-point control; tilted: the tip in a tilted work plane,
-    rotary axes standing still; auto: the best that controller and machine can. --output-mode goes before it"""
+    rotary axes standing still; auto: the best that controller and machine can. --output-mode takes precedence"""
     operations: dict[str, OutputMode] = Field(default_factory=dict)
     """by name of the operation"""
     smoothing: dict[str, str | Annotated[float, Field(gt=0.0)]] = Field(default_factory=dict)

@@ -1,15 +1,17 @@
 """What the proof of a program covers and by what: a line for the summary, and one for the header of the program.
 
-The head is part of the text that is read back. So it is written with a line in its place first (`PENDING`),
+The header is part of the text that is read back. So it is written with a line in its place first (`PENDING`),
 and that line is replaced when the proof is complete; the control sees a comment before and after, which is checked.
 """
 
 from __future__ import annotations
 
-from postproc.base.header_words import HEADER, LENGTHS_PENDING, PENDING
+from postproc.base.header_words import HEADER, PENDING
 from postproc.base.length_text import MM, LengthText
 from postproc.controllers.model import ControllerFile
+from postproc.job.job import Job
 from postproc.readback.comparison.compare import Comparison
+from postproc.readback.comparison.length_margins import margin_lines, pending_lines
 from postproc.readback.text.words import plain
 from postproc.witness.evidence import Testimony
 from postproc.writing.state import clean, comment_room
@@ -18,6 +20,8 @@ from toolpaths.units import DEG
 
 PLACES = 4
 """decimals of mm and degrees in the header"""
+PER_LINE = 200
+"""characters that a line of the header has at most, with the line of its tool"""
 ELSEWHERE = "proof: not said here"
 """in the header of a program whose blocks are too short for it; the summary and the file of the proof say it"""
 
@@ -70,37 +74,36 @@ def _up(degrees: float) -> str:
 
 
 def with_statement(text: str, controller: ControllerFile, comparison: Comparison, witness: Testimony | None,
-                   file: str) -> tuple[str, list[Diagnostic]]:
-    """The text of a proved program with its proof in the header; an error where a comment of the controller cannot hold it.
-
-    Args:
-        file: the CL file, for messages
-    """
-    lines = {PENDING: head_line(comparison, witness, comment_room(controller), controller.lengths)}
-    lines |= {f"T{one.number}: {LENGTHS_PENDING}": one.line(controller.lengths) for one in comparison.lengths}
-    found: list[Diagnostic] = []
+                   job: Job) -> tuple[str, list[Diagnostic]]:
+    """The text of a proved program with its proof in the header; an error where no comment of the controller can hold it."""
+    lines, file = {PENDING: head_line(comparison, witness, comment_room(controller), controller.lengths)}, job.toolpath.file
+    lines |= dict(zip(pending_lines([one.number for one in comparison.lengths], job),
+                      margin_lines(comparison.lengths, job, controller.lengths, comment_room(controller)),
+                      strict=True))
+    room = HEADER + PER_LINE * len(lines)
+    head, found = text[:room], list[Diagnostic]()
     for pending, line in lines.items():
-        text, faults = _in_place_of(text, controller, pending, line, file)
+        head, faults = _in_place_of(head, controller, pending, line, file)
         found += faults
-    return text, found
+    return head + text[room:], found
 
 
-def _in_place_of(text: str, controller: ControllerFile, pending: str, line: str,
+def _in_place_of(head: str, controller: ControllerFile, pending: str, line: str,
                  file: str) -> tuple[str, list[Diagnostic]]:
-    """The text with another comment in the header in the place of one that was read back."""
+    """The header with another comment in the place of one that was read back."""
     style = controller.comment
-    capitals = f"{style.open}{_cleaned(controller, pending, True)}{style.close}" in text[:HEADER]
+    capitals = f"{style.open}{_cleaned(controller, pending, True)}{style.close}" in head
     mark = f"{style.open}{_cleaned(controller, pending, capitals)}{style.close}"
-    at = text.find(mark, 0, HEADER)
+    at = head.find(mark)
     if at < 0:
-        return text, []
+        return head, []
     line = f"{style.open}{_cleaned(controller, line, capitals)}{style.close}"
-    begin, end = text.rfind("\n", 0, at) + 1, at + len(mark)
-    if plain(text[begin:end].encode()) != plain((text[begin:at] + line).encode()):
-        return text, [error("proof.comment", f"the proof cannot stand in a comment of the header: {line}",
+    begin, end = head.rfind("\n", 0, at) + 1, at + len(mark)
+    if plain(head[begin:end].encode()) != plain((head[begin:at] + line).encode()):
+        return head, [error("proof.comment", f"the proof cannot stand in a comment of the header: {line}",
                             file=file, hint="comment.forbidden of the controller file must name all that "
                             "ends a comment")]
-    return text[:at] + line + text[end:], []
+    return head[:at] + line + head[end:], []
 
 
 def _cleaned(controller: ControllerFile, text: str, capitals: bool) -> str:

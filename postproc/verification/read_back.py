@@ -17,7 +17,7 @@ from postproc.readback.comparison.clamps import check_clamps, check_index
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.hooks import check_hooks
-from postproc.readback.comparison.length_margins import LengthMargin, length_margins, longer_run
+from postproc.readback.comparison.length_margins import LengthMargin
 from postproc.readback.comparison.options import check_options
 from postproc.readback.comparison.slow_moves import planned_feeds
 from postproc.readback.comparison.starts import check_end, check_start
@@ -29,8 +29,10 @@ from postproc.readback.dialects.base import UNITS_UNSTATED, as_bytes
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
-from postproc.readback.execution.poses import BlockPoses, poses_before
+from postproc.readback.execution.poses import BlockPoses
 from postproc.readback.text.canonical import placed
+from postproc.verification.executed import executed_poses
+from postproc.verification.length_limits import LengthTrial, length_margins
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -97,7 +99,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     motion, found = run(code, machine.axis_names, offsets, gcode)
     give_back()
     faults = Faults(job.toolpath.file, gcode)
-    unseen, longer = check_start(code, job, faults), longer_run(code, offsets, job)
+    unseen, trial = check_start(code, job, faults), LengthTrial(code, offsets, job)
     code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))
     diagnostics += [_located(d, job.toolpath.file, of_cl) for d in found]
     if has_errors(diagnostics):
@@ -106,7 +108,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         return None, [*diagnostics, error("verify.no_motion", "the program moves nothing", file=gcode)]
     if progress:
         progress("read back", 0, len(motion))
-    executed = _executed(job, motion, offsets.lengths)
+    executed = executed_poses(job, motion, offsets.lengths)
     with np.errstate(invalid="ignore"):
         called = {name: others[name] for name, _ in code.files[1:]} if others else {}
         planned, changed = planned_feeds(as_bytes(data), called, gcode or job.toolpath.file)
@@ -124,17 +126,12 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
                    _uncorrected(header, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
     return replace(comparison, executed=(code, motion), poses=executed, planned=planned,
-                   lengths=_margins(motion, executed, longer, job, comparison)), [*diagnostics, *noted]
+                   lengths=_margins(motion, executed, trial, comparison)), [*diagnostics, *noted]
 
 
-def _margins(motion: Motion, executed: BlockPoses, longer: tuple[Motion, Job, dict[int, float]] | None, job: Job,
-             c: Comparison) -> tuple[LengthMargin, ...]:
-    """How much tools may differ from their gauge lengths; () where registers take that up, or where the program fails."""
-    if longer is None or has_errors([*c.diagnostics]):
-        return ()
-    again, other, held = longer
-    left = job.options.tolerance - c.tip_bound, job.axis_tolerance - c.axis_bound
-    return length_margins(motion, executed, again, _executed(other, again, held), job, c.owner, left)
+def _margins(motion: Motion, executed: BlockPoses, trial: LengthTrial, c: Comparison) -> tuple[LengthMargin, ...]:
+    """How much tools may differ from their gauge lengths; () where the program fails."""
+    return () if has_errors([*c.diagnostics]) else length_margins(trial, motion, executed, c)
 
 
 def _unmeasured(motion: Motion, executed: BlockPoses, job: Job, faults: Faults) -> list[Diagnostic]:
@@ -224,13 +221,3 @@ def _located(d: Diagnostic, file: str, of_cl: Callable[[int], tuple[int, ...]] |
         return d
     message = f"{d.message} (line {d.lines[0]} of the program)"
     return replace(d, file=file, lines=of_cl(d.lines[0]) if of_cl else (), message=message)
-
-
-def _executed(job: Job, motion: Motion, lengths: dict[int, float]) -> BlockPoses:
-    """Poses of the machine as it is: with its errors where the program corrects them."""
-    before = poses_before(motion, job.control)
-    if job.errors is None or not job.corrects:
-        return BlockPoses(job.control, job.kinematics_of, lengths, before)
-    from postproc.readback.execution.actual import ActualBlockPoses
-
-    return ActualBlockPoses(job.control, job.kinematics_of, lengths, before, model=job.errors, motion=motion)

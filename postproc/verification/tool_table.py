@@ -1,9 +1,10 @@
 """Lengths of tools as the control's own tool table has them, from the file that the control writes of it.
 
-LinuxCNC: the tool table itself (`T1 P1 Z120.03 D6 ; remark`). Fanuc and Haas: G10 L10 (geometry) and L11 (wear), each with P
-and R (B-63944EN 14.2; Haas "G10 Set Offsets"), in mm or, behind G20, in inches. Siemens: $TC_DP3 (length 1),
-$TC_DP12 (wear) and $TC_DP21 (adapter) of edge 1 of a tool archive. Heidenhain: TOOL.T, columns T, L and DL
-below the names in its head line.
+LinuxCNC: the tool table itself (`T1 P1 Z120.03 D6 ; remark`). Fanuc and Haas: G10 L10 (geometry) and L11 or L1 (wear), each
+with P and R (B-63944EN 14.2; Haas "G10 Set Offsets"), in mm or, behind G20, in inches. Haas besides: the file of offsets
+that the control saves (.OFS; no manual shows it, a shop's guide to the HTS400 presetter does): LENGTH_GEOMETRY and
+LENGTH_WEAR of each TOOL1, TOOL2 ...; it states no units, mm are taken. Siemens: $TC_DP3 (length 1), $TC_DP12 (wear) and
+$TC_DP21 (adapter) of edge 1 of a tool archive. Heidenhain: TOOL.T, columns T, L and DL below the names in its head line.
 Any control: a table of text with the columns `register` or `tool`, `length` and, where there is any, `wear`, mm.
 """
 
@@ -11,12 +12,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from postproc.controllers.model import ControllerFile, WriterName
 from postproc.job.job import Job
+from postproc.readback.comparison.length_margins import MUCH, LengthMargin
 from postproc.reference.events import tool_loads
 from postproc.setup.model import SetupFile, ToolSetup
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors, require, warning
@@ -30,6 +34,8 @@ FAR = 10.0
 _HINT = "name the file that the control writes of its tool table, or one of text with the columns register and length"
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
 _WORD = re.compile(r"\s*([A-DF-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?=[\sA-Z]|$)", re.IGNORECASE)
+_HAAS_TOOL = re.compile(r"<TOOL(\d+)>(.*?)</TOOL\1>", re.IGNORECASE | re.DOTALL)
+_HAAS_LENGTH = re.compile(r"<LENGTH_(GEOMETRY|WEAR)>([^<]*)</LENGTH_\1>", re.IGNORECASE)
 _SIEMENS = re.compile(r"\$TC_DP(3|12|21)\s*\[\s*(\d+)\s*,\s*1\s*\]\s*=\s*([^\s;$]*)", re.IGNORECASE)
 _INCH_OF_SIEMENS = re.compile(r"(?<![A-Z0-9_])G7(?:00|0)(?![0-9])", re.IGNORECASE)
 _KLARTEXT = re.compile(r"^\s*BEGIN\s+\S*\s*\.T\s+(MM|INCH)\b", re.IGNORECASE)
@@ -115,17 +121,48 @@ def table_of(text: str, controller: ControllerFile, file: str) -> ToolTable:
 
 @dataclass(frozen=True)
 class MeasuredLength:
-    """A tool's length at the machine (mm) next to its gauge length."""
+    """A tool's length at the machine (mm) next to its gauge length; `allowed`: what the program takes, None where that is
+    not known."""
 
     number: int
     register: int
     gauge: float
     measured: float
+    allowed: LengthMargin | None = None
+
+    @property
+    def off(self) -> float:
+        """mm that the tool is longer than its gauge length."""
+        return self.measured - self.gauge
+
+    @property
+    def beyond(self) -> str:
+        """What fails with this length; "" for nothing."""
+        if self.allowed is None or -self.allowed.shorter <= self.off <= self.allowed.longer:
+            return ""
+        return self.allowed.ends_longer if self.off > self.allowed.longer else self.allowed.ends_shorter
 
     def line(self) -> str:
         """For people."""
-        return (f"T{self.number}: gauge length {self.gauge:.4f} mm, register {self.register} of the tool table "
-                f"{self.measured:.4f} mm ({self.measured - self.gauge:+.4f})")
+        text = (f"T{self.number}: gauge length {self.gauge:.4f} mm, register {self.register} of the tool table "
+                f"{self.measured:.4f} mm ({self.off:+.4f}")
+        if self.allowed is None:
+            return f"{text})"
+        ends = (f"{sign}{mm:.4f}" if mm < np.inf else f"{sign}{MUCH:g} and more"
+                for sign, mm in (("-", self.allowed.shorter), ("+", self.allowed.longer)))
+        return f"{text}; allowed {' to '.join(ends)}{': ' + self.beyond + ' fails' if self.beyond else ''})"
+
+
+def with_allowed(found: list[MeasuredLength], margins: tuple[LengthMargin, ...], from_gauge: bool) -> list[MeasuredLength]:
+    """With what the program takes; `from_gauge`: margins count from gauge lengths, else from the lengths measured."""
+    by_tool = {margin.number: margin for margin in margins}
+    result = []
+    for one in found:
+        margin, more = by_tool.get(one.number), 0.0 if from_gauge else one.off
+        if margin is not None:
+            margin = replace(margin, shorter=margin.shorter - more, longer=margin.longer + more)
+        result.append(replace(one, allowed=margin))
+    return result
 
 
 def measured_lengths(table: ToolTable, job: Job, file: str) -> tuple[list[MeasuredLength], list[Diagnostic]]:
@@ -149,7 +186,7 @@ def measured_lengths(table: ToolTable, job: Job, file: str) -> tuple[list[Measur
 def _questionable(found: list[MeasuredLength], job: Job, file: str) -> list[Diagnostic]:
     """Lengths that may be in other units, or of another tool; bodies that the lengths do not reach."""
     far = [one for one in found if one.gauge and abs(one.measured - one.gauge) > FAR]
-    result = [warning("tool-table.far", f"{one.line()}: is that this tool, and are the numbers mm?", file=file,
+    result = [warning("tool-table.far", f"{one.line()}: {_inch_or_other(one)}", file=file,
                       hint="look at the tool and its register; inches are read behind G20 and in TOOL.T INCH")
               for one in far]
     shorter = [one for one in found if one.measured < one.gauge]
@@ -159,6 +196,12 @@ def _questionable(found: list[MeasuredLength], job: Job, file: str) -> list[Diag
                               f"them, but tools are shorter ({names})", file=file,
                               hint="write the lengths into the set-up, and shank and holder as they stand now"))
     return result
+
+
+def _inch_or_other(one: MeasuredLength) -> str:
+    inches = abs(one.measured * MM_PER_INCH - one.gauge) <= FAR
+    return f"{one.measured:g} inches would be {one.measured * MM_PER_INCH:.4f} mm: is the table in inches?" if inches \
+        else "is that this tool, and are the numbers mm?"
 
 
 def with_measured(setup: SetupFile, found: list[MeasuredLength]) -> SetupFile:
@@ -214,13 +257,26 @@ def _offsets(lines: list[str], rows: _Rows) -> None:
             rows.fault("increments", "G91: the numbers are added to what the control holds", n,
                        "write the table with G90")
         kinds = [value for letter, value in words if letter == "L"]
-        if 10.0 not in codes or not set(kinds) & {10.0, 11.0}:
+        if 10.0 not in codes or not set(kinds) & {1.0, 10.0, 11.0}:
             continue
         if "." not in block.upper().rpartition("R")[2]:
             rows.fault("point", f"{block[:40]!r}: R has no decimal point, it may be mm or increments", n,
                        "write R with a decimal point: R120. is 120 mm")
         elif values := _single(words, "LPR", n, rows):
             rows.add(values["P"], "geometry" if values["L"] == 10.0 else "wear", values["R"] * unit, n)
+
+
+def _haas(lines: list[str], rows: _Rows) -> None:
+    if not any("<TOOL_OFFSET" in line.upper() for line in lines):
+        _offsets(lines, rows)
+        return
+    text, parts = "\n".join(lines), dict[str, Part]({"GEOMETRY": "geometry", "WEAR": "wear"})
+    for tool in _HAAS_TOOL.finditer(text):
+        for found in _HAAS_LENGTH.finditer(tool[2]):
+            line = text.count("\n", 0, tool.start(2) + found.start()) + 1
+            value = rows.number(found[2], line)
+            if value:  # pockets without a tool hold 0
+                rows.add(float(tool[1]), parts[found[1].upper()], value, line)
 
 
 def _siemens(lines: list[str], rows: _Rows) -> None:
@@ -294,5 +350,5 @@ def _separated(lines: list[str], rows: _Rows) -> None:
 
 
 _Form = Callable[[list[str], _Rows], None]
-_FORMS: dict[WriterName, _Form] = {"linuxcnc": _linuxcnc, "iso": _linuxcnc, "fanuc": _offsets, "haas": _offsets,
+_FORMS: dict[WriterName, _Form] = {"linuxcnc": _linuxcnc, "iso": _linuxcnc, "fanuc": _offsets, "haas": _haas,
                             "siemens": _siemens, "heidenhain": _klartext}

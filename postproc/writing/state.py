@@ -10,8 +10,10 @@ from textwrap import wrap
 
 import numpy as np
 
+from machines.kinematics.chain import ROTARY
 from postproc.compile.program import PER_MINUTE, Hole, Program, Section
-from postproc.controllers.model import CannedCycle, ControllerFile, LengthState, Mode
+from postproc.controllers.model import CannedCycle, ControllerFile
+from postproc.controllers.output_modes import LengthState, Mode
 from postproc.controllers.texts import CYCLE_LENGTHS
 from postproc.job.smoothing import Smoothing
 from postproc.path.model import ARC
@@ -146,7 +148,7 @@ class WriterState:
     def stated(self, axis: int, rows: Ints | int) -> Floats:
         """Words of an axis in blocks, in the units of the program."""
         values = self.program.words[np.atleast_1d(rows), axis]
-        return values if self.program.letters[axis] in "ABC" else np.asarray(values / self.controller.unit)
+        return values if self.program.letters[axis] in ROTARY else np.asarray(values / self.controller.unit)
 
     def share(self, length: float) -> str:
         """A length that the control's smoothing may take, mm, in the units of the program, rounded down in inches."""

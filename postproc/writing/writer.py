@@ -10,11 +10,12 @@ from itertools import chain
 import numpy as np
 
 from machines.hooks import filled
+from machines.kinematics.chain import ROTARY
 from postproc.compile.clamps import CLAMP, UNCLAMP
 from postproc.compile.hooks import HOOK
 from postproc.compile.program import PER_MINUTE, Command, Hole
 from postproc.control.rollover import HALF
-from postproc.controllers.model import Mode
+from postproc.controllers.output_modes import Mode
 from postproc.controllers.texts import blocks_of
 from postproc.reference.coolant import COMMANDS
 from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name
@@ -155,7 +156,7 @@ class Writer(WriterState, ABC):
         """Rotary axes with words of a full turn or more, which a control may roll over."""
         p = self.program
         far = np.flatnonzero(((np.abs(p.words) >= FULL_TURN) & p.write & ~p.home[:, None]).any(axis=0)).tolist()
-        return [p.letters[j] for j in far if p.letters[j] in "ABC" and j not in p.rolls]
+        return [p.letters[j] for j in far if p.letters[j] in ROTARY and j not in p.rolls]
 
     def numbered(self, block: str) -> str:
         """The block with its number where the controller numbers blocks; the sign of the block switch stays in front."""

@@ -39,8 +39,8 @@ class Clocked:
 
 def main() -> None:
     """Print the table."""
-    bound = Clocked(compare._bound)
-    compare._bound = bound
+    bound = Clocked(compare.bound_of_blocks)
+    compare.bound_of_blocks = bound
     for points in sys.argv[1:] or ["1000", "100000"]:
         for kind in ([], ["--five-axis"]):
             with tempfile.TemporaryDirectory() as folder:

@@ -1,7 +1,8 @@
 """Figures of the layout: `python tests/benchmarks/layout_figures.py [REVISION ...]`; of the working tree without one.
 
 Circles of files and of rooms by imports (those in functions and for the type checker too; the front doors
-`__init__.py` left out), files per room, lines of files and functions (median, 90 %, largest), lines of product and of tests.
+`__init__.py` left out), files per room, lines of files and functions (median, 90 %, largest), lines of product and of tests;
+of the working tree also the rows of files in each recipe of CONTRIBUTING.md, without those that are only read.
 """
 
 from __future__ import annotations
@@ -98,12 +99,21 @@ def figures(root: Path) -> str:
         f"lines: product {sum(lines.values())}, tests {sum(tests)} in {len(tests)} files"])
 
 
+def recipes(text: str) -> str:
+    """Rows of files of each recipe."""
+    found = []
+    for part in text.split("\n### ")[1:]:
+        rows = [row for row in part.splitlines() if row.startswith("| ") and not row.startswith("| file |")]
+        found.append(f"{part.splitlines()[0]} {sum('read only' not in row for row in rows) or 1}")
+    return "files to touch: " + ", ".join(found)
+
+
 def main() -> None:
     sys.setrecursionlimit(10_000)
     for revision in sys.argv[1:] or [""]:
         print(revision or "working tree")
         if not revision:
-            print(figures(ROOT))
+            print(figures(ROOT), recipes((ROOT / "CONTRIBUTING.md").read_text("utf-8")), sep="\n")
             continue
         made = subprocess.run(["git", "archive", revision, *TOPS, "tests"], cwd=ROOT, check=True,
                               capture_output=True)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
-from toolpaths.arrays import Array, as_slice, joined, repeated, shared, taken
+from toolpaths.arrays import Array, among, as_slice, joined, repeated, shared, taken
 
 ROWS = [np.zeros(5), np.full((4, 3), -0.0), np.full(3, np.nan), np.ones(6, dtype=bool), np.arange(4), np.zeros((0, 3)),
         np.array([0.0, -0.0]), np.array([[1.0, 2.0], [1.0, 3.0], [1.0, 2.0]]), np.array([7])]
@@ -53,3 +55,18 @@ def test_parts_with_one_row_stay_one_row() -> None:
 def test_only_an_index_that_counts_up_is_a_slice(index: list[int], found: slice | None) -> None:
     given = np.array(index, dtype=np.int64)
     assert as_slice(given) == found if found is not None else as_slice(given) is given
+
+
+@pytest.mark.parametrize("row", [1.5, "text", True, np.zeros(3), np.arange(12.0).reshape(3, 4).T, np.zeros((0, 2))], ids=str)
+@pytest.mark.parametrize("count", [0, 1, 4])
+def test_a_repeated_row_is_that_of_numpy(row: Array | float | str, count: int) -> None:
+    made, want = repeated(row, count), np.broadcast_to(np.array(row), (count, *np.shape(row)))
+    assert bits(made) == bits(want) and not made.flags.writeable
+    assert count == 0 or not taken(made, np.arange(count)).flags.writeable
+
+
+@pytest.mark.parametrize("some", [(), (2.0,), (np.nan, -0.0), (1, 2, 9), [ord("G"), 300]])
+@pytest.mark.parametrize("values", [*ROWS[:1], np.array([0.0, 1.0, 2.0, np.nan]), np.frombuffer(b"GXG", dtype=np.uint8)],
+                         ids=str)
+def test_values_among_a_few_are_those_of_numpy(values: Array, some: Sequence[float]) -> None:
+    np.testing.assert_array_equal(among(values, some), np.isin(values, some))

@@ -34,10 +34,10 @@ from machines.geometric_error.actual.lost_motion import GRAIN
 from machines.geometric_error.tables.curve_banks import Bank, banks
 from machines.geometric_error.tables.curves import Curve, TableCurve
 from machines.geometric_error.tables.names import OWN, ErrorName, parse
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Bools, Floats
 
 ErrorFrame = Literal["fixed", "moving"]
-ROTARY = "ABC"
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import Component, ErrorFrame
 from machines.geometric_error.tables.curves import EVERYWHERE, Curve, Fourier, TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
+from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.rotations import rotation
@@ -116,7 +117,7 @@ def in_bed_frame(model: ErrorModel, machine: Machine) -> tuple[list[Component], 
     for letter in dict.fromkeys(c.name.axis for c in model.axes.components):
         mine = {c.name.part: c for c in model.axes.components if c.name.axis == letter}
         side = bed_side(machine, letter)
-        if letter not in "ABC" or frame.get(letter, "fixed") == side or not on_line(model, machine, letter):
+        if letter not in ROTARY or frame.get(letter, "fixed") == side or not on_line(model, machine, letter):
             components += mine.values()
             continue
         components += _turned(letter, mine, machine.kinematics.axis_line(letter)[0], back=side == "moving")

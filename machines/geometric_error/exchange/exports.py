@@ -25,10 +25,10 @@ from machines.geometric_error.tables.averages import SAME
 from machines.geometric_error.tables.choices import MapDirections
 from machines.geometric_error.tables.csv_table import UNITS, write_csv
 from machines.geometric_error.tables.curves import Polynomial, TableCurve
-from machines.geometric_error.tables.lattice import POINT, ROTARY, ErrorMap
+from machines.geometric_error.tables.lattice import POINT, ErrorMap
 from machines.geometric_error.tables.names import DIRECTIONS, OWN
 from machines.geometric_error.tables.screw_tables import LINUXCNC_ROWS, to_linuxcnc
-from machines.kinematics.chain import Joint
+from machines.kinematics.chain import ROTARY, Joint
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
@@ -336,4 +336,4 @@ def named(values: Mapping[str, float]) -> dict[str, float]:
 
 def in_units(values: Mapping[str, float]) -> dict[str, float]:
     """mm and degrees by axis or coordinate, as mm and rad."""
-    return {letter: value * (DEG if letter in "ABC" else 1.0) for letter, value in values.items()}
+    return {letter: value * (DEG if letter in ROTARY else 1.0) for letter, value in values.items()}

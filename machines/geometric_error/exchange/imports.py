@@ -34,6 +34,7 @@ from machines.geometric_error.tables.readings import (
 )
 from machines.geometric_error.tables.screw_tables import from_linuxcnc
 from machines.geometric_error.tables.table_curves import Fault, table_curve
+from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
 from machines.user_file import nearest
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
@@ -296,13 +297,13 @@ def _axis(table: CsvTable, positions: list[str], machine: Machine,
     if not names and not found:
         found.append(error("error-model.column", f"no errors of {letter}", file=table.file, lines=[table.head],
                            hint=f"write columns {', '.join(f'E{d}{letter} [{_unit(d)}]' for d in DIRECTIONS)}"))
-    frame: dict[str, ErrorFrame] = {letter: bed_side(machine, letter)} if letter in "ABC" else {}
+    frame: dict[str, ErrorFrame] = {letter: bed_side(machine, letter)} if letter in ROTARY else {}
     model = ErrorModel(SerialErrors(tuple(components), frame=frame))
     return (None if found else model), found
 
 
 def _unit(direction: str) -> str:
-    return "arcsec" if direction in "ABC" else "um"
+    return "arcsec" if direction in ROTARY else "um"
 
 
 def _names(table: CsvTable, letter: str) -> tuple[list[ErrorName], list[Diagnostic]]:

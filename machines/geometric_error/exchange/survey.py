@@ -17,12 +17,12 @@ from machines.geometric_error.tables.csv_table import UNITS
 from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, TableCurve
 from machines.geometric_error.tables.lattice import COLUMNS, ErrorMap
 from machines.geometric_error.tables.names import DIRECTIONS, SPINDLE, parse
+from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.units import DEG
 
-ROTARY = "ABC"
 UM, ARCSEC = UNITS["um"], UNITS["arcsec"]
 PLACES = 20_000
 """of the work volume at which the model is looked at"""

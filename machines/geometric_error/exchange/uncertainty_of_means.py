@@ -13,6 +13,7 @@ from machines.geometric_error.tables.averages import Averaged, levels_of
 from machines.geometric_error.tables.csv_table import UNITS
 from machines.geometric_error.tables.lattice import COLUMNS
 from machines.geometric_error.tables.lattice_file import zeroed_covariance
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, info
 
@@ -21,7 +22,7 @@ def with_scatter(model: ErrorModel, read: Averaged,
                  zero: Mapping[str, float]) -> tuple[ErrorModel, Diagnostic]:
     """The model with the uncertainty of its means, and what is reported of it; none is written of more than
     `MOST_UNCERTAINTY` values."""
-    units = {name: UNITS["arcsec" if name[0] == "r" or name[1] in "ABC" else "um"] for name in read.scatter}
+    units = {name: UNITS["arcsec" if name[0] == "r" or name[1] in ROTARY else "um"] for name in read.scatter}
     spread = ", ".join(f"{name} {value / units[name]:.3g}" for name, value in read.scatter.items())
     noted = info("error-import.averaged", f"{read.rows} readings at {len(read.table)} places; standard deviation "
                  f"of one: {spread} (um, arcsec)", file=read.table.file)

@@ -16,11 +16,11 @@ from machines.geometric_error.tables.curves import EVERYWHERE, Fourier, Polynomi
 from machines.geometric_error.tables.lattice import ErrorMap
 from machines.geometric_error.tables.lattice_file import map_to_csv
 from machines.geometric_error.tables.names import ErrorName
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Floats
 from toolpaths.transaction import write_together
 from toolpaths.units import DEG
 
-ROTARY = "ABC"
 LENGTH, ANGLE = "um", "arcsec"
 
 

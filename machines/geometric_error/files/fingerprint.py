@@ -12,8 +12,9 @@ from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.csv_table import UNITS
 from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, TableCurve
-from machines.geometric_error.tables.lattice import ROTARY, ErrorMap
+from machines.geometric_error.tables.lattice import ErrorMap
 from machines.geometric_error.tables.names import ErrorName
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

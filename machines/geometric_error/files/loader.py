@@ -20,7 +20,8 @@ from machines.geometric_error.tables.curves import EVERYWHERE, Curve, Fourier, P
 from machines.geometric_error.tables.lattice import ErrorMap
 from machines.geometric_error.tables.lattice_file import map_from_csv, zeroed, zeroed_covariance
 from machines.geometric_error.tables.names import SPINDLE, ErrorName, parse
-from machines.geometric_error.tables.table_curves import ROTARY, Fault, table_curve
+from machines.geometric_error.tables.table_curves import Fault, table_curve
+from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.arrays import Floats, Ints

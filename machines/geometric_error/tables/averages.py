@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from machines.geometric_error.tables.csv_table import CsvTable
-from machines.geometric_error.tables.table_curves import ROTARY, Fault
+from machines.geometric_error.tables.table_curves import Fault
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
 

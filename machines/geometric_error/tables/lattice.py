@@ -16,13 +16,13 @@ from typing import Self
 
 import numpy as np
 
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 COLUMNS = ("dx", "dy", "dz", "rx", "ry", "rz")
 POINT = "xyz"
-ROTARY = "ABC"
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,8 @@ import numpy as np
 
 from machines.geometric_error.tables.averages import SAME, levels_of
 from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, CsvTable, write_csv
-from machines.geometric_error.tables.lattice import COLUMNS, POINT, ROTARY, ErrorMap
+from machines.geometric_error.tables.lattice import COLUMNS, POINT, ErrorMap
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG

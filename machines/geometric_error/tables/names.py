@@ -8,6 +8,7 @@ about the axis itself. S is the spindle.
 from __future__ import annotations
 
 import re
+from functools import cache
 from typing import NamedTuple
 
 DIRECTIONS = "XYZABC"
@@ -44,6 +45,7 @@ class ErrorName(NamedTuple):
         return f"E{DIRECTIONS[self.part]}{'0' if self.location else ''}{self.axis}"
 
 
+@cache
 def parse(name: str) -> ErrorName | None:
     """The parts of a name, None where it is none."""
     found = _NAME.match(name)

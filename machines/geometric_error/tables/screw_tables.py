@@ -6,10 +6,10 @@ import numpy as np
 
 from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import ErrorName
+from machines.kinematics.chain import ROTARY
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
-ROTARY = "ABC"
 LINUXCNC_ROWS = 256
 """entries that LinuxCNC's motion module holds per joint (EMCMOT_COMP_SIZE)"""
 UNLIKELY = {False: 2.0, True: DEG}

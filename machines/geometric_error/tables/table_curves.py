@@ -11,11 +11,11 @@ from machines.geometric_error.tables.choices import TableRule
 from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, UNITS, CsvTable
 from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import ErrorName
+from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
-ROTARY = "ABC"
 CLOSES = 1e-6
 """share of a period, and part of a um or arcsec, that counts as nothing"""
 

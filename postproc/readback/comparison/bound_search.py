@@ -82,11 +82,11 @@ class PieceBounds:
 class BoundSearch:
     """The state of the search: worst poses seen, largest bounds of closed pieces, pieces that are still open.
 
-    Everything in pairs, of tip and axis.
+    Everything in pairs, of tip and axis. `judge`: only whether the tolerances are kept is looked for, not by how much.
     """
 
-    def __init__(self, allowed: tuple[float, float]) -> None:
-        self.allowed = np.array(allowed)
+    def __init__(self, allowed: tuple[float, float], judge: bool = False) -> None:
+        self.allowed, self.judge = np.array(allowed), judge
         self.seen, self.closed = np.zeros(2), np.zeros(2)
         self.k = [-1, -1]
         self.open: list[tuple[Pieces, PieceBounds]] = []
@@ -104,8 +104,13 @@ class BoundSearch:
 
     def _limit(self) -> Floats:
         """Bounds up to here are near enough: to the worst seen, and inside the tolerance where that is."""
-        near = np.maximum(TIGHT * self.seen, np.array(GRAIN))
+        near = np.maximum(TIGHT * self.seen, self.allowed if self.judge else np.array(GRAIN))
         return np.asarray(np.where(self.seen <= self.allowed, np.minimum(near, self.allowed), near))
+
+    @property
+    def judged(self) -> bool:
+        """True where only the judgement is looked for, and a pose outside the tolerances has been seen."""
+        return self.judge and bool((self.seen > self.allowed).any())
 
     def _sort_out(self) -> None:
         """Close the pieces whose bounds are near enough to the worst seen."""

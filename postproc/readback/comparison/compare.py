@@ -107,7 +107,7 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
                                                                owner, tolerance)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
-    bound = _bound(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects)
+    bound = bound_of_blocks(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects)
     if not has_errors(diagnostics):
         diagnostics += _unproved(bound, (tolerance, axis_tolerance), moves, motion, owner, faults)
     if bound.unbounded and job.options.require_proof:
@@ -210,21 +210,21 @@ def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: F
                         "the program is not made from this CL file with this machine, set-up and tools")
 
 
-def _bound(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allowed: tuple[float, float],
-           corrects: bool) -> DeviationBound:
+def bound_of_blocks(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allowed: tuple[float, float],
+                    corrects: bool, judge: bool = False) -> DeviationBound:
     """Bounds of every block of the moves that are no links. From hole to hole dog-legs are looked at in
     height alone; so are all paths where geometric errors are corrected: a control that drills the holes takes
     up lost motion on its path."""
     rows = np.flatnonzero(moves.run_by(owner))
-    begin, share = _place(motion, executed, rows, owner, moves)
+    begin, share = place_on_moves(motion, executed, rows, owner, moves)
     free = executed.bent(motion, rows) | corrects
     level = (moves.phase[owner[rows]] == Phase.POSITION) & (motion.code[rows] == 0) & free
     some = as_slice(np.flatnonzero(~level))
     found = deviation_bound(motion, executed, moves, rows[some], owner[rows[some]], begin[some],
-                            share[some], allowed)
+                            share[some], allowed, judge)
     for corner in (0.0, 0.5, *executed.corners(motion, rows[level]).T) if level.any() else ():
         tip, _ = executed.poses(motion, rows[level], corner)
-        height = float(_off_level(moves.curves(owner[rows[level]]), tip).max())
+        height = float(off_level(moves.curves(owner[rows[level]]), tip).max())
         found = replace(found, tip=max(found.tip, height))
     return found
 
@@ -242,7 +242,7 @@ def _unproved(bound: DeviationBound, allowed: tuple[float, float], moves: Moves,
     return found
 
 
-def _off_level(curve: Curves, tip: Floats) -> Floats:
+def off_level(curve: Curves, tip: Floats) -> Floats:
     """How far (K,) mm tips are above or below the stretch between the ends of curves, along the tool's axis."""
     height, first, last = ((p * curve.axis1).sum(axis=1) for p in (tip, curve.start, curve.end))
     return np.asarray(np.maximum(np.maximum(np.minimum(first, last) - height, height - np.maximum(first, last)), 0.0))
@@ -257,30 +257,31 @@ def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, 
     tip_off, axis_off = np.zeros(len(rows)), np.zeros(len(rows))
     if not len(rows):
         return tip_off, axis_off
-    begin, share = _place(motion, executed, rows, owner, moves)
+    begin, share = place_on_moves(motion, executed, rows, owner, moves)
     level = (moves.phase[owner[rows]] == Phase.POSITION) & executed.bent(motion, rows)
     for at in range(0, len(rows), CHUNK):
         part = slice(at, at + CHUNK)
         here = rows[part]
         curve = moves.curves(owner[here])
+        executed.look_ahead(motion, here, SAMPLES)
         for t in SAMPLES:
             tip, axis = executed.poses(motion, here, t)
             guess = np.minimum(begin[part] + t * share[part], 1.0)
             d, e, _ = curve.deviation(tip, axis, guess, within)
-            d = np.where(level[part], _off_level(curve, tip), d)
+            d = np.where(level[part], off_level(curve, tip), d)
             tip_off[part] = np.fmax(tip_off[part], np.nan_to_num(d, nan=np.inf))
             axis_off[part] = np.fmax(axis_off[part], np.nan_to_num(e, nan=np.inf))
         for k, places in executed.looks(motion, here):
             tip, axis = executed.poses(motion, here[k], places)
             some = moves.curves(owner[here[k]])
             d, e, _ = some.deviation(tip, axis, np.minimum(begin[part][k] + places * share[part][k], 1.0), within)
-            d = np.where(level[part][k], _off_level(some, tip), d)
+            d = np.where(level[part][k], off_level(some, tip), d)
             np.fmax.at(tip_off, at + k, np.nan_to_num(d, nan=np.inf))
             np.fmax.at(axis_off, at + k, np.nan_to_num(e, nan=np.inf))
     return tip_off, axis_off
 
 
-def _place(motion: Motion, executed: BlockPoses, rows: Ints, owner: Ints,
+def place_on_moves(motion: Motion, executed: BlockPoses, rows: Ints, owner: Ints,
            moves: Moves) -> tuple[Floats, Floats]:
     """Where on its move each block (K,) begins, and what part of it it is: by length along arcs, else by count."""
     length = np.ones(len(rows))

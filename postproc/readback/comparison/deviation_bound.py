@@ -57,20 +57,22 @@ class _Ends:
 
 
 def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, owner: Ints, begin: Floats,
-                    share: Floats, allowed: tuple[float, float]) -> DeviationBound:
+                    share: Floats, allowed: tuple[float, float], judge: bool = False) -> DeviationBound:
     """Bounds of the blocks `rows` (K,) from the curves of their moves `owner` (K,).
 
     `begin`, `share` (K,): where on its curve each begins and what part of it it is, by count; `allowed`: tolerances of tip
-    (mm) and axis (rad). Rapids that are dog-legs are bounded piece by piece between their corners.
+    (mm) and axis (rad); `judge`: see `BoundSearch`. Rapids that are dog-legs are bounded piece by piece between corners.
     """
     ends = _Ends(rows, owner, begin, share)
-    worst = BoundSearch(allowed)
+    worst = BoundSearch(allowed, judge)
     for at in range(0, len(rows), CHUNK):
         for pieces in _whole(motion, executed, ends, np.arange(at, min(at + CHUNK, len(rows)))):
             worst.add(pieces, _values(motion, executed, moves, ends, pieces, allowed))
     for divided in range(HALVINGS):
         if divided >= _PATIENCE:
             worst.give_up()
+        if worst.judged:
+            break
         pieces = worst.taken()
         if not len(pieces):
             break

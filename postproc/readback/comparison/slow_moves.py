@@ -17,13 +17,13 @@ from postproc.readback.comparison.checks import CHUNK, STILL, block_lengths
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinates
-from postproc.readback.execution.rows import INCH
 from postproc.readback.text.words import plain
 from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import lengths
 from toolpaths.toolpath import Kind
+from toolpaths.units import MM_PER_INCH
 
 _FEED = re.compile(rb"(?i)(?<![A-Z])F *(\d[\d.]*|\.\d+)")
 
@@ -122,7 +122,7 @@ class Slack:
     @classmethod
     def of(cls, job: Job, inch: bool = False) -> Slack:
         """Of a job; programs that correct geometric errors take up lost motion on the path."""
-        unit = INCH if inch else 1.0
+        unit = MM_PER_INCH if inch else 1.0
         if job.corrects:
             return cls(0.25, 0.002, 10.0 * unit * 10.0**-job.controller.format.linear_decimals)
         return cls(0.003, 1e-5, 2.0 * unit * 10.0**-job.controller.format.linear_decimals)

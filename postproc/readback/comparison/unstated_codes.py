@@ -14,7 +14,7 @@ import numpy as np
 from postproc.readback.text.canonical import INCREMENTAL, LAW, OFFSET, REGISTER, Canonical
 from postproc.readback.text.modal import CYCLES, GROUPS, codes, fill
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Ints
+from toolpaths.arrays import Ints, among
 from toolpaths.diagnostics import Diagnostic, error
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ def _needs(code: Canonical, reader: Reader) -> Iterator[Need]:
     moves, machine = _moves(words, reader.axes), codes(words, "G", (53,))[0]
     work, motion = moves[~np.isin(moves, machine)], fill(*codes(words, "G", GROUPS["motion"]),
                                                          words.lines, -1.0)
-    feeds, cycles = moves[motion[moves] != 0], moves[np.isin(motion[moves], CYCLES)]
-    arcs = moves[np.isin(motion[moves], _ARCS)]
+    feeds, cycles = moves[motion[moves] != 0], moves[among(motion[moves], CYCLES)]
+    arcs = moves[among(motion[moves], _ARCS)]
     heights = np.intersect1d(work, _moves(words, ("Z",)))
     relying = {"motion": moves, "distance": moves, "compensation": moves, "plane": work, "feed_mode": feeds, "level": cycles,
                "arc_distance": arcs, "offset": work, "length": heights}
@@ -64,13 +64,13 @@ def _known(reader: Reader) -> set[str]:
     """The groups whose state the controller file says."""
     said = reader.controller.start.codes if reader.controller is not None else ()
     numbers = [float(m[1]) for text in said if (m := re.fullmatch(r"G(\d+\.?\d*)", text))]
-    return {name for name, group in reader.groups.items() if np.isin(numbers, group).any()}
+    return {name for name, group in reader.groups.items() if among(numbers, group).any()}
 
 
 def _moves(words: Words, axes: tuple[str, ...]) -> Ints:
     """Blocks with words of axes, absolute or relative."""
     letters = [ord(a) + d for a in axes for d in (0, INCREMENTAL)]
-    return np.unique(words.line[np.isin(words.letter, letters)])
+    return np.unique(words.line[among(words.letter, letters)])
 
 
 def _undone(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]:

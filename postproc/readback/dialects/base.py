@@ -33,7 +33,7 @@ from postproc.readback.text.modal import GROUPS, Groups, check_codes, check_end,
 from postproc.readback.text.rollover import unrolled
 from postproc.readback.text.words import Words
 from postproc.reference.coolant import ALL, switched_by
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Floats, Ints, among
 from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
 ParsedProgram = tuple[ProgramText, Structure]
@@ -186,7 +186,7 @@ class Reader(ABC):
         words = code.words
         stated = codes(words, "G", GROUPS["units"])[0].min(initial=words.lines + 1)
         letters = [ord(a) for axis in self.axes for a in (axis, axis.lower())]
-        blocks = np.unique(words.line[np.isin(words.letter, letters) & (words.line < stated)])
+        blocks = np.unique(words.line[among(words.letter, letters) & (words.line < stated)])
         return [self.unstated(file, int(code.line[blocks[0]]), len(blocks))] if len(blocks) else []
 
     def unstated(self, file: str, line: int, count: int = 1) -> Diagnostic:

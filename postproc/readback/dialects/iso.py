@@ -20,7 +20,7 @@ from postproc.readback.text.canonical import (
 from postproc.readback.text.flow import Structure
 from postproc.readback.text.modal import CYCLES, GROUPS, codes, columns, fill, number_of
 from postproc.readback.text.words import Words, tokenise
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, among
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import MM_PER_INCH
 
@@ -101,7 +101,7 @@ class IsoReader(Reader):
         """G4: its word is no axis word, and counts as seconds."""
         for b in codes(words, "G", (4,))[0].tolist():
             low, high = np.searchsorted(words.line, [b, b + 1])
-            drop[low:high] |= np.isin(words.letter[low:high], [ord(a) for a in ("P", "X", "U")])
+            drop[low:high] |= among(words.letter[low:high], [ord(a) for a in ("P", "X", "U")])
             seconds = self.seconds(words, low, high)
             if seconds is None:
                 found.append(error("gcode.dwell", "G4 lacks P", file=file, lines=[int(line[b])],
@@ -168,10 +168,10 @@ class IsoReader(Reader):
         """I, J, K count from the start unless G90.1 holds; P of an arc is the number of its turns."""
         motion = motion_of(words)
         absolute = fill(*codes(words, "G", (90.1, 91.1)), words.lines, 91.1) == 90.1
-        center = np.isin(words.letter, [ord(c) for c in "IJK"]) & ~np.isin(motion, CYCLES)[words.line]
+        center = among(words.letter, [ord(c) for c in "IJK"]) & ~among(motion, CYCLES)[words.line]
         letter = words.letter.copy()
         letter[center & ~absolute[words.line]] += INCREMENTAL
-        turns = np.isin(motion, (2, 3))[words.line] & (words.letter == ord("P"))
+        turns = among(motion, (2, 3))[words.line] & (words.letter == ord("P"))
         new += [(int(b), TURNS, float(v) - 1.0) for b, v in zip(words.line[turns], words.value[turns], strict=True)]
         return Words(letter, words.value, words.line, words.lines, words.point)
 
@@ -189,8 +189,8 @@ def relative_words(words: Words, axes: tuple[str, ...]) -> Words:
     relative = fill(blocks, code, words.lines, 90.0) == 91
     machine = np.zeros(words.lines + 1, dtype=bool)
     machine[codes(words, "G", (53,))[0]] = True
-    cycle = np.isin(motion_of(words), CYCLES)
-    axis = np.isin(words.letter, [ord(a) for a in axes]) | (cycle[words.line] & (words.letter == ord("R")))
+    cycle = among(motion_of(words), CYCLES)
+    axis = among(words.letter, [ord(a) for a in axes]) | (cycle[words.line] & (words.letter == ord("R")))
     letter = words.letter.copy()
     letter[axis & (relative & ~machine)[words.line]] += INCREMENTAL
     return Words(letter, words.value, words.line, words.lines, words.point)

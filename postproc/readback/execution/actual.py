@@ -58,10 +58,11 @@ class ActualBlockPoses(BlockPoses):
             self._seen[:] = [*self._seen[1 - PLACES:], (rows, t, found)]
         return found
 
-    def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[Floats]) -> None:
+    def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[float | Floats]) -> None:
         """See `BlockPoses`."""
         if len(times) <= PLACES and len(rows) * len(times) <= AT_ONCE:
-            found = self._at(motion, np.tile(rows, len(times)), np.concatenate(times))
+            shares = np.concatenate([np.broadcast_to(np.asarray(t), len(rows)) for t in times])
+            found = self._at(motion, np.tile(rows, len(times)), shares)
             pose, q, approach = (part.reshape(len(times), len(rows), -1) for part in found)
             self._seen[:] = [(rows, t, (pose[k], q[k], approach[k])) for k, t in enumerate(times)]
 

@@ -11,7 +11,7 @@ import numpy as np
 from postproc.readback.execution import frames
 from postproc.readback.execution.frames import AXES, ExecutionFrame, FrameTable
 from postproc.readback.execution.offsets import Offsets
-from postproc.readback.execution.rows import INCH, BlockSection, MotionRows
+from postproc.readback.execution.rows import BlockSection, MotionRows
 from postproc.readback.execution.sections import run_section
 from postproc.readback.text.canonical import CALL, LAW, REST, TURNS, Canonical, WordMeaning, in_files, placed
 from postproc.readback.text.modal import Modal, columns, fill, fill_values, modal_state, number_of
@@ -20,6 +20,7 @@ from postproc.reference.coolant import FLOOD, MIST
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.shapes import arrays
+from toolpaths.units import MM_PER_INCH
 
 
 @dataclass(frozen=True)
@@ -185,7 +186,7 @@ def feed_units(modal: Modal, code: Canonical) -> Floats:
     if code.feed_kept:
         at = np.unique(code.words.pick("F")[0])
         inch = np.asarray(fill_values(at, inch[at - 1].astype(np.float64), code.words.lines) == 1.0)
-    return np.where(inch, INCH / code.feed_parts, 1.0)
+    return np.where(inch, MM_PER_INCH / code.feed_parts, 1.0)
 
 
 def _threads(modal: Modal, rows: MotionRows, feed: Floats, call: Floats,

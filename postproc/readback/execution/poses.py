@@ -19,6 +19,8 @@ from toolpaths.shapes import arrays
 
 SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)
 """where each block is looked at; other places than those that linearising looks at"""
+FEW = 5_000
+"""places that are made at once: more cost as much together as one after the other"""
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,8 @@ class BlockPoses:
     before: Floats | None = None
     _asked: list[tuple[Motion, Ints, BlockMotions]] = field(default_factory=list, init=False, repr=False,
                                                             compare=False)
+    _ahead: list[tuple[Motion, Ints, float | Floats, Floats]] = field(default_factory=list, init=False, repr=False,
+                                                                      compare=False)
 
     def _approaches(self, motion: Motion, rows: Ints) -> BlockMotions:
         """Those of the blocks asked for last are kept: the same ones are asked for at several fractions."""
@@ -44,10 +48,26 @@ class BlockPoses:
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
-        return self._placed(motion, rows, motion.end[rows] if _whole(t) else self._approaches(motion, rows).at(t))
+        return self._placed(motion, rows, self._position(motion, rows, t))
 
-    def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[Floats]) -> None:
-        """Said before the poses and joints of the same blocks at several fractions (K,) are asked for."""
+    def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[float | Floats]) -> None:
+        """Said before the poses and joints of the same blocks at several fractions, one or (K,), are asked for; of few
+        blocks they are made at once."""
+        between = [t for t in times if not _whole(t)]
+        self._ahead.clear()
+        if 0 < len(rows) * len(between) <= FEW:
+            shares = np.concatenate([np.broadcast_to(np.asarray(t), len(rows)) for t in between])
+            found = BlockMotions.of(motion, self.control, np.tile(rows, len(between))).at(shares)
+            parts = found.reshape(len(between), len(rows), -1)
+            self._ahead.extend((motion, rows, t, part) for t, part in zip(between, parts, strict=True))
+
+    def _position(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
+        """Machine coordinates (K, J) of the blocks `rows` at fraction t."""
+        if _whole(t):
+            return motion.end[rows]
+        known = (at for there, kept, time, at in self._ahead if there is motion and kept is rows and time is t)
+        found = next(known, None)
+        return self._approaches(motion, rows).at(t) if found is None else found
 
     def at_coordinates(self, motion: Motion, rows: Ints, beginning: Floats, xyz: Floats) -> Floats:
         """Tips (K, 3) where X, Y, Z of the frames of blocks stand at `xyz` (K, 3), all else as in `beginning` (K, J)."""
@@ -68,7 +88,7 @@ class BlockPoses:
 
     def joints(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """Joints (K, J) of the blocks `rows` at fraction t."""
-        position = motion.end[rows] if _whole(t) else self._approaches(motion, rows).at(t)
+        position = self._position(motion, rows, t)
         if self.control.base != "tcp":
             return np.asarray(position / self.control.unit)
         q = np.empty_like(position)
@@ -138,10 +158,11 @@ class BlockPoses:
         return _bent(motion, self.control, rows)
 
     def times(self, motion: Motion, rows: Ints) -> list[float | Floats]:
-        """Fractions at which blocks are looked at: SAMPLES, and the corners of dog-legs, (K,) each."""
-        if self.control.rapids != "dog-leg":
-            return list(SAMPLES)
-        return [*SAMPLES, *self.corners(motion, rows).T]
+        """Fractions at which blocks are looked at: SAMPLES, and the corners of dog-legs, (K,) each; made ready."""
+        corners = self.corners(motion, rows).T if self.control.rapids == "dog-leg" else ()
+        times: list[float | Floats] = [*SAMPLES, *corners]
+        self.look_ahead(motion, rows, times)
+        return times
 
     def corners(self, motion: Motion, rows: Ints) -> Floats:
         """(K, J) fractions at which the axes of dog-legs come to their ends, 1 in blocks that are none."""

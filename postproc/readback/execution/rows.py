@@ -10,11 +10,10 @@ import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats, Ints, joined
 from toolpaths.shapes import arrays, rows_of
+from toolpaths.units import MM_PER_INCH
 
 if TYPE_CHECKING:
     from postproc.readback.execution.offsets import Offsets
-
-INCH = 25.4
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ class BlockSection:
     @property
     def scale(self) -> Floats:
         """(N,) mm per unit of length."""
-        return np.where(self.inch, INCH, 1.0)
+        return np.where(self.inch, MM_PER_INCH, 1.0)
 
 
 @dataclass(frozen=True)

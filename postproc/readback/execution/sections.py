@@ -15,7 +15,7 @@ from postproc.readback.execution.rows import BlockSection, MotionRows, SectionSt
 from postproc.readback.text.canonical import Canonical
 from postproc.readback.text.cycles import CycleLeg
 from postproc.readback.text.modal import CYCLES
-from toolpaths.arrays import Bools, Floats, Ints, repeated, shared
+from toolpaths.arrays import Bools, Floats, Ints, among, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def run_section(section: BlockSection, frame: ExecutionFrame, number: int, posit
     """Rows of the blocks of one law, begun at machine position (J,)."""
     start, moving = frame.coordinates(position[None, :])[0], _moving(section)
     _refused(section, frame, moving, code.line, file, found)
-    cycles = bool((moving & np.isin(section.motion, CYCLES)).any() or np.isfinite(section.call).any())
+    cycles = bool((moving & among(section.motion, CYCLES)).any() or np.isfinite(section.call).any())
     size = len(moving) if cycles or section.has_steps else _PART
     parts: list[MotionRows] = []
     for first in range(0, len(moving), size):
@@ -49,7 +49,7 @@ def run_section(section: BlockSection, frame: ExecutionFrame, number: int, posit
 def _moving(section: BlockSection) -> Bools:
     """(N,) blocks that move, or drill where the tool stands."""
     moving = section.stated.any(axis=1) & ~section.rest
-    arc = np.isin(section.motion, (2, 3)) & ~section.rest
+    arc = among(section.motion, (2, 3)) & ~section.rest
     return np.asarray(moving | (arc & (np.isfinite(section.relative) | np.isfinite(section.absolute)).any(axis=1)))
 
 
@@ -58,7 +58,7 @@ def _rows(section: BlockSection, frame: ExecutionFrame, number: int, start: Floa
           file: str, found: list[Diagnostic]) -> tuple[MotionRows, Floats]:
     """(rows of blocks, begun at `start` (J,) in the coordinates of the frame, where they end in those)."""
     state = _state(section, start, frame, offsets)
-    drilling = np.flatnonzero((moving & np.isin(section.motion, CYCLES)) | np.isfinite(section.call))
+    drilling = np.flatnonzero((moving & among(section.motion, CYCLES)) | np.isfinite(section.call))
     spelt = spell_holes(state, moving, drilling, code, file, found) if len(drilling) else {}
     moving[list(spelt)] = True
     lines = np.flatnonzero(moving)
@@ -67,7 +67,7 @@ def _rows(section: BlockSection, frame: ExecutionFrame, number: int, start: Floa
     ends = state.carried()[1:]
     end = ends[line]
     motion = section.motion[line]
-    kind = np.where(motion == 0, 0, np.where(np.isin(motion, (2, 3)), 2, 1)).astype(np.int8)
+    kind = np.where(motion == 0, 0, np.where(among(motion, (2, 3)), 2, 1)).astype(np.int8)
     rows = MotionRows(line + section.first, kind, end, *(repeated(one, len(line)) for one in (
         np.zeros(3), number, False, np.nan, 0.0)))
     if spelt:
@@ -79,7 +79,7 @@ def _rows(section: BlockSection, frame: ExecutionFrame, number: int, start: Floa
 def _state(section: BlockSection, start: Floats, frame: ExecutionFrame, offsets: Offsets) -> SectionState:
     """Words in the coordinates of the law."""
     xyz = offsets.xyz[offsets.xyz >= 0]
-    drilling = np.isin(section.motion, CYCLES)
+    drilling = among(section.motion, CYCLES)
     steps = np.array(section.steps) if section.has_steps or drilling.any() else section.steps
     if section.inch.any():
         columns = section.columns.copy()

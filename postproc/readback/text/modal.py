@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.readback.text.canonical import COOLANT, LOADED, OFFSET, REGISTER, SMOOTH, STANDS
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Array, Floats, Ints, repeated, shared
+from toolpaths.arrays import Array, Floats, Ints, among, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.shapes import arrays
 
@@ -87,7 +87,7 @@ def fill_values(lines: Ints, values: Floats, count: int) -> Floats:
 def codes(words: Words, letter: str, numbers: tuple[float, ...]) -> tuple[Ints, Floats]:
     """(blocks, numbers) of those G or M codes."""
     line, value = words.pick(letter)
-    pick = np.isin(value, numbers)
+    pick = among(value, numbers)
     return line[pick], value[pick]
 
 
@@ -98,7 +98,7 @@ def number_of(words: Words, letter: str) -> Floats:
 
 def columns(words: Words, letters: str | tuple[str, ...]) -> Floats:
     """(B + 1, len(letters)) numbers by block, NaN where a block does not state the word."""
-    if not np.isin(words.letter, [ord(letter) for letter in letters]).any():
+    if not among(words.letter, [ord(letter) for letter in letters]).any():
         return repeated(np.full(len(letters), np.nan), words.lines + 1)
     result = np.full((words.lines + 1, len(letters)), np.nan)
     for j, letter in enumerate(letters):
@@ -144,10 +144,10 @@ def drop_passive(words: Words, passive: tuple[str, ...]) -> Words:
         value = float(code[1:])
         for k in np.flatnonzero((words.letter == ord(code[0])) & (words.value == value)).tolist():
             stop = int(np.searchsorted(words.line, words.line[k], side="right"))
-            ends = np.isin(words.letter[k + 1:stop], [ord("G")] if code in MACROS else [ord("G"), ord("M")])
+            ends = among(words.letter[k + 1:stop], [ord("G")] if code in MACROS else [ord("G"), ord("M")])
             stop = k + 1 + int(np.flatnonzero(ends)[0]) if ends.any() else stop
             drop[k] = True
-            drop[k + 1:stop] |= True if code in MACROS else np.isin(words.letter[k + 1:stop],
+            drop[k + 1:stop] |= True if code in MACROS else among(words.letter[k + 1:stop],
                                                                     _ARGUMENTS[code[0]])
     return words.take(~drop)
 
@@ -157,7 +157,7 @@ def check_end(words: Words, file: str, called: tuple[tuple[int, int], ...] = ())
     outside = np.ones(len(words.line), dtype=bool)
     for first, last in called:
         outside &= (words.line < first) | (words.line > last)
-    ends = words.line[outside & (words.letter == ord("M")) & np.isin(words.value, (2, 30))]
+    ends = words.line[outside & (words.letter == ord("M")) & among(words.value, (2, 30))]
     if not len(ends):
         return [error("gcode.no_end", "the program has no end (M2 or M30)", file=file, lines=[words.lines],
                       hint="write M30 in its last line where it is whole; it may have been cut off")]
@@ -175,7 +175,7 @@ def check_codes(words: Words, groups: Groups, m_codes: tuple[float, ...], letter
     known_g = [code for numbers in groups.values() for code in numbers]
     bad = (words.letter == ord("G")) & ~np.isin(words.value, known_g)
     m = (words.letter == ord("M")) & ~np.isin(words.value, m_codes)
-    known = np.isin(words.letter, [ord(c) for c in (*axes, *letters)])
+    known = among(words.letter, [ord(c) for c in (*axes, *letters)])
     for pick, what in ((bad, "G"), (m, "M")):
         for value in np.unique(words.value[pick]):
             lines = words.line[pick & (words.value == value)]
@@ -195,7 +195,7 @@ def _repeated(words: Words, groups: Groups, file: str) -> list[Diagnostic]:
     group = np.zeros(len(words.letter), dtype=np.int8)
     is_g = words.letter == ord("G")
     for k, numbers in enumerate(groups.values(), 1):
-        group[is_g & np.isin(words.value, numbers)] = k
+        group[is_g & among(words.value, numbers)] = k
     twice = [_twice(words.line[part], words.letter[part], group[part]) for part in by_lines(words)]
     lines = np.unique(np.concatenate([words.line[:0], *twice]))
     if not len(lines):

@@ -139,7 +139,12 @@ SLIPS = {
 }
 
 
-@pytest.mark.parametrize("name", SLIPS)
+AGAIN = {"probe, a tenth", "laser, a tenth", "reversal, a tenth", "dx turned round", "six, ez tenfold", "probe far",
+         "ex turned round", "ex for ey"}
+"""faults that others show of another file, or the other way round: with -m slow"""
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in AGAIN else ()) for name in SLIPS])
 def test_a_fault_is_reported_and_gives_no_model(name: str, folder: Path) -> None:
     file, change, code, words = SLIPS[name]
     (folder / file).write_text((change or along_machine)((folder / file).read_text()))

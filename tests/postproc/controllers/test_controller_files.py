@@ -78,7 +78,7 @@ def test_work_offsets_are_given_for_every_code_of_a_setup(tmp_path: Path) -> Non
 def test_the_schema_explains_every_key() -> None:
     text = schema(ControllerFile)
     tables = {"format", "comment", "program", "codes", "tools", "subprograms", "arcs", "cycles", "feed", "kinematics",
-              "modes", "cutter_compensation", "start", "stops", "rollover", "links", "pivots"}
+              "modes", "cutter_compensation", "start", "stops", "rollover", "links", "pivots", "alignment"}
     silent = {f"{name}.{key}" for name, model in {**text["$defs"], "": text}.items()
               for key, value in model.get("properties", {}).items() if not value.get("description")}
     assert silent == {f".{key}" for key in tables}

@@ -21,7 +21,7 @@ TEXTS = {"description", "sources"}
 ONE_VALUE = {"kinematics.linear"}
 """statements of the file that have one allowed value so far"""
 OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "feed.kept_by_units", "feed.length",
-          "feed.arc_inverse", "units.others",
+          "feed.arc_inverse", "units.others", "alignment.turns", "alignment.corrects", "alignment.entry",
           "inch.degree", "levels", "smoothing_words", "kinematics.smoothing_in_modes",
           "modes.tcp", "modes.tilted", "arcs.helix_planes",
           "cutter_compensation.begins_on_arc", "cutter_compensation.ends_on_arc", "cutter_compensation.modal_register",
@@ -40,7 +40,8 @@ OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "feed.kept_by_units
                                           "needs"))}
 """keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py,
 test_compensated_arcs.py, test_parts.py, test_rollover.py, test_inch_output.py, test_smoothing_levels.py, test_options.py,
-test_hooks_refused.py, test_output_quality.py, test_cycle_time_program.py and test_output_modes*.py show what they do"""
+test_hooks_refused.py, test_output_quality.py, test_align.py, test_cycle_time_program.py and test_output_modes*.py show what
+they do"""
 READ_BACK = {"cycles.peck_relief", "cycles.plane_at_start", "arcs.helix_by_angle"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states, and what rounding moves"""
 OTHER: dict[str, Any] = {

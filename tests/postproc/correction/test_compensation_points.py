@@ -46,7 +46,7 @@ def converted(sample: str, machine: str, controller: str, setup: str) -> PostRes
     return postproc.convert(few_sides(sample), machine, controller, options=options)
 
 
-@pytest.mark.covering
+@pytest.mark.covering(of=("machine",))
 @pytest.mark.parametrize(("sample", "machine", "controller", "setup"), CASES)
 def test_points_are_inside_the_rounding_of_their_words(sample: str, machine: str, controller: str,
                                                        setup: str) -> None:
@@ -58,7 +58,7 @@ def test_points_are_inside_the_rounding_of_their_words(sample: str, machine: str
     assert np.median(found.tip) > 0.1 * result.job.rounding.tip
 
 
-@pytest.mark.covering
+@pytest.mark.covering(of=("machine",))
 @pytest.mark.parametrize(("sample", "machine", "controller", "setup"), CASES)
 def test_corrected_programs_are_proved_on_the_machine_with_errors(sample: str, machine: str, controller: str,
                                                                   setup: str) -> None:

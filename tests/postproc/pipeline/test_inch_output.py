@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -111,19 +112,23 @@ WRONG = {
 """what each control must be found to say wrongly in every_cycle.cls"""
 
 
+@cache
+def found(text: str, controller: str) -> set[str]:
+    """Errors in a program of every_cycle.cls in inches."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "part.nc"
+        file.write_text(text)
+        result = verify(file, toolpaths.read(CYCLES)[0], machine(CONTROLS[controller]), controller, in_inches())
+    return {d.code for d in result.diagnostics if d.severity.name == "ERROR"}
+
+
 @pytest.mark.parametrize(("controller", "pattern", "instead"), [
     (controller, *edit) for controller, edits in WRONG.items() for edit in edits])
-def test_words_in_the_wrong_unit_are_found(controller: str, pattern: str, instead: str, tmp_path: Path) -> None:
+def test_words_in_the_wrong_unit_are_found(controller: str, pattern: str, instead: str) -> None:
     inch = both(CYCLES, controller)[1]
-    file, path = tmp_path / "part.nc", toolpaths.read(CYCLES)[0]
-
-    def found(text: str) -> set[str]:
-        file.write_text(text)
-        result = verify(file, path, machine(CONTROLS[controller]), controller, in_inches())
-        return {d.code for d in result.diagnostics if d.severity.name == "ERROR"}
     changed = re.sub(pattern, instead, inch.text)
-    assert changed != inch.text and not found(inch.text)
-    assert found(changed), f"{pattern} as {instead} is not found"
+    assert changed != inch.text and not found(inch.text, controller)
+    assert found(changed, controller), f"{pattern} as {instead} is not found"
 
 
 def test_units_that_contradict_the_output_are_refused_by_name(tmp_path: Path) -> None:

@@ -15,8 +15,8 @@ from machines.kinematics.serial import Serial
 from postproc.readback.comparison import compare as compare_module
 from postproc.readback.comparison import deviation_bound as bound_module
 from postproc.readback.execution import actual as actual_module
+from postproc.verification.executed import executed_poses
 from postproc.verification.proof_text import statement
-from postproc.verification.read_back import _executed
 from tests.postproc.kit import SAMPLES, codes, convert, good, goto, setup_of, toolpath
 from toolpaths import read
 from toolpaths.diagnostics import Severity
@@ -58,11 +58,11 @@ def dense(result, more: tuple[float, ...] = ()) -> tuple[float, float]:
     """The worst (tip, axis) at many places of all blocks but dog-legs from hole to hole, from the nearest points."""
     comparison, job = result.comparison, result.job
     _, motion = comparison.executed
-    executed, moves = _executed(job, motion, job.register_lengths()), job.moves.without_pecks()
+    executed, moves = executed_poses(job, motion, job.register_lengths()), job.moves.without_pecks()
     owner = comparison.owner
     rows = np.flatnonzero((owner < len(moves)) & ~moves.link[np.minimum(owner, len(moves) - 1)])
     rows = rows[~((moves.phase[owner[rows]] == compare_module.Phase.POSITION) & executed.bent(motion, rows))]
-    begin, share = compare_module._place(motion, executed, rows, owner, moves)
+    begin, share = compare_module.place_on_moves(motion, executed, rows, owner, moves)
     curves, worst = moves.curves(owner[rows]), np.zeros(2)
     for t in (*np.linspace(0.0, 1.0, DENSE + 1).tolist(), *more):
         tip, axis = executed.poses(motion, rows, t)

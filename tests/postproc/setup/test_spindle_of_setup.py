@@ -211,7 +211,8 @@ def test_every_command_knows_it(tmp_path: Path) -> None:
     out = str(tmp_path / "part.ngc")
     shown = json.loads(run("convert", "-o", out, "--json", "-"))["tools"]
     assert shown == [{"number": 1, "name": "", "gauge_length_mm": 100.0, "spindle_rpm": [4000.0],
-                     "of_setup": ["4000 rev/min clockwise", "coolant flood"], "length_margin_mm": None}]
+                     "of_setup": ["4000 rev/min clockwise", "coolant flood"], "length_margin_mm": {
+                         "shorter": None, "ends_shorter": "", "longer": None, "ends_longer": ""}}]
     assert "T1: 4000 rev/min clockwise, of the set-up" in run("convert", "-o", out)
     assert "(T1: 4000 rev/min clockwise, of the set-up)" in Path(out).read_text()
     point = json.loads(run("trace", "--line", "7", "--json", "-"))["points"][0]

@@ -13,7 +13,7 @@ import pytest
 from postproc.job.job import prepare
 from postproc.report.summary import as_text, tools_of
 from postproc.verification.read_back import read_back
-from tests.postproc.kit import SAMPLES, convert, good, setup_of
+from tests.postproc.kit import SAMPLES, convert, good, setup_of, toolpath
 from toolpaths import read
 
 GOLDEN = Path(__file__).parents[2] / "golden"
@@ -35,7 +35,12 @@ def made(name: str) -> Any:
 
 def faults_with(result: Any, number: int, other: float) -> list[str]:
     """Codes of the errors that the program gives where a tool is longer by `other` mm."""
-    tools = {n: t.model_copy(update={"gauge_length": t.length + (other if n == str(number) else 0.0)})
+    return faults_with_all(result, {str(number): other})
+
+
+def faults_with_all(result: Any, longer: dict[str, float]) -> list[str]:
+    """Codes of the errors that the program gives where tools are longer by so many mm."""
+    tools = {n: t.model_copy(update={"gauge_length": t.length + longer.get(n, 0.0)})
              for n, t in result.asked.tools.items()} if result.asked else {}
     job, found = prepare(result.toolpath, result.machine, result.controller,
                          result.setup.model_copy(update={"tools": tools}), result.options)
@@ -44,31 +49,70 @@ def faults_with(result: Any, number: int, other: float) -> list[str]:
     return [d.code for d in faults if d.severity == 2]
 
 
+def margins_hold(result: Any, limits: dict[str, str]) -> int:
+    """How many ends were judged: just inside nothing fails, 5 % outside what the margin names; `limits`: words to codes."""
+    judged = 0
+    for one in result.comparison.lengths:
+        for sign, margin, what in ((-1.0, one.shorter, one.ends_shorter), (1.0, one.longer, one.ends_longer)):
+            assert faults_with(result, one.number, sign * min(margin, 20.0)) == [], (one, sign)
+            if margin < 50.0:
+                far = sign * (1.05 * margin + (1.1e-3 if what.startswith("travel") else 0.0))
+                assert limits[what.split()[0]] in faults_with(result, one.number, far), (one, sign)
+                judged += 1
+    return judged
+
+
+LIMITS = {"tolerance": "verify.tip", "axis": "verify.axis", "travel": "verify.travel", "clearance": "verify.link"}
+
+
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_a_program_verifies_with_lengths_inside_its_margins_and_not_outside(name: str) -> None:
-    """Outside: as far as it may be where what linearising leaves points the other way."""
+    """1.1 um: what rounded words may pass travel by."""
+    assert margins_hold(made(name), LIMITS)
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_all_tools_at_their_margins_at_once(name: str) -> None:
+    """What one tool may differ by does not depend on the others."""
     result = made(name)
-    comparison, tolerance = result.comparison, result.options.tolerance
-    other_way = (tolerance + comparison.tip_bound) / (tolerance - comparison.tip_bound)
-    codes = {"tolerance": "verify.tip", "axis tolerance": "verify.axis"}
-    judged = 0
-    for one in comparison.lengths:
-        for sign, margin, what in ((-1.0, one.shorter, one.ends_shorter), (1.0, one.longer, one.ends_longer)):
-            inside = min(0.98 * margin, 20.0)
-            assert faults_with(result, one.number, sign * inside) == [], (one, sign)
-            if what != "clearance" and margin < 50.0:
-                far = margin * (other_way if what == "tolerance" else 1.0) * 1.05
-                assert codes.get(what, "verify.travel") in faults_with(result, one.number, sign * far), (one, sign)
-                judged += 1
-    assert judged
+    for sign in (-1.0, 1.0):
+        other = {str(one.number): sign * min(one.shorter if sign < 0.0 else one.longer, 20.0)
+                 for one in result.comparison.lengths}
+        assert faults_with_all(result, other) == []
 
 
 def test_a_register_takes_up_the_length_where_only_the_table_turns() -> None:
-    """Nothing is stated, and nothing fails."""
-    path, _ = read(GOLDEN / "short_five_axis.apt")
+    """Travel and links alone can fail: one line at the head, the figures by tool."""
+    path, _ = read(SAMPLES / "blade.cls")
     result = good(convert(path, "mikron-ucp710", "linuxcnc", setup=setup_of((SAMPLES / "tools.setup.toml").read_text())))
-    assert result.comparison.lengths == () and "length may differ" not in result.text
-    assert faults_with(result, 1, 3.0) == []
+    (one,) = result.comparison.lengths
+    assert one.ends_longer == "travel Z" and 1.0 < one.longer < 50.0 and one.shorter == np.inf
+    assert margins_hold(result, LIMITS) == 1
+    longer = np.floor(one.longer * 1e3) / 1e3
+    line = f"lengths off are taken up by registers: -50 mm and more to +{longer:.3f} mm, then T4 travel Z"
+    assert f"({line})" in result.text and line in as_text(result, "part.ngc")
+
+
+def test_links_that_come_too_near_end_a_margin(tmp_path: Path) -> None:
+    """Home is below the end of travel: a longer tool crosses the part from there before the slide ends."""
+    file = tmp_path / "low.toml"
+    file.write_text('base = "mill-3axis"\n[axes.Z]\nhome = 300\n')
+    text = "[part]\norigin = [0, 0, 140]\n[clearance]\nmargin = 15\n[tools.1]\ngauge_length = 120\n"
+    path = toolpath("RAPID", "GOTO/-20,0,12", "GOTO/-20,0,0", "GOTO/20,0,0", "GOTO/20,0,12")
+    result = good(convert(path, str(file), "haas-ngc", setup=setup_of(text)))
+    (one,) = result.comparison.lengths
+    assert one.ends_longer == "clearance" and 10.0 < one.longer < 50.0, one
+    assert margins_hold(result, LIMITS) == 1
+
+
+def test_the_head_of_many_tools_states_each() -> None:
+    """Heads longer than what `verify` reads of them keep no line that is pending."""
+    records = [line for n in range(1, 61) for line in (
+        f"LOADTL/{n}", "SPINDL/RPM,1000,CLW", "RAPID", f"GOTO/{n},0,60,0,0.1,0.995", f"GOTO/{n},0,5,0,0.1,0.995")]
+    setup = setup_of("".join(f"[tools.{n}]\ngauge_length = {100 + n}\n" for n in range(1, 61)))
+    path = toolpath(*records, head=["UNITS/MM", "FEDRAT/MMPM,600"])
+    result = good(convert(path, "head-table", "generic-iso", setup=setup))
+    assert "pending" not in result.text.lower() and result.text.count("length may differ") == 60
 
 
 def test_head_summary_and_figures_state_the_margin(tmp_path: Path) -> None:

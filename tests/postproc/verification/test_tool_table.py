@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,32 @@ def test_tables_of_text() -> None:
     found = read("tool\tlength\twear\n1\t120.0\t0.031\n2\t95.5\t\n")
     assert found.by == "tool" and found.lengths == pytest.approx({1: 120.031, 2: 95.5})
     assert read("tool,register,length\n1,2,95.5\n") == ToolTable({2: 95.5})
+
+
+OFS = """<OFFSETS>
+<TOOL_OFFSET>
+  <TOOL1>
+    <DESCRIPTION>T9 Z1</DESCRIPTION>
+    <LENGTH_GEOMETRY>120.000</LENGTH_GEOMETRY>
+    <LENGTH_WEAR>0.031</LENGTH_WEAR><DIAMETER_GEOMETRY>12.720</DIAMETER_GEOMETRY>
+  </TOOL1>
+  <TOOL2><LENGTH_GEOMETRY>95.5</LENGTH_GEOMETRY><LENGTH_WEAR>0.0</LENGTH_WEAR></TOOL2>
+  <TOOL3><LENGTH_GEOMETRY>0.0</LENGTH_GEOMETRY><LENGTH_WEAR>0.0</LENGTH_WEAR></TOOL3>
+</TOOL_OFFSET>
+"""
+
+
+def test_the_file_of_offsets_that_haas_saves() -> None:
+    """Tools without a length are none; a number that is none has its line."""
+    assert read(OFS, "haas-ngc").lengths == pytest.approx({1: 120.031, 2: 95.5})
+    with pytest.raises(DiagnosticError) as caught:
+        read(OFS.replace("0.031", "0,031"), "haas-ngc")
+    assert list(caught.value.diagnostics[0].lines) == [6]
+
+
+def test_wear_by_the_older_word() -> None:
+    """L1 is L11 (B-63944EN 14.2, Haas G10)."""
+    assert read("G10 L10 P1 R120.\nG10 L1 P1 R-0.5\n", "haas-ngc").lengths == {1: 119.5}
 
 
 def test_inches_are_inches() -> None:
@@ -95,6 +122,7 @@ def test_verify_takes_the_lengths_of_the_table(tmp_path: Path) -> None:
         code, text = run(*verify)
         assert code == (0 if right else 1), text
         assert f"register 1 of the tool table {float(length):.4f} mm" in text
+        assert re.search(r"allowed -0\.02\d\d to \+0\.02\d\d", text) and (": tolerance fails)" in text) == (not right)
         assert ("NOT proved" in text) == (not right) and ("second witness agrees" in text) == right
     table.write_text("T7 P1 Z120\n")
     code, text = run(*verify)

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.postproc.kit import body, codes, convert, execute, good, goto, shop_file, tilted, tool_poses, toolpath
+from postproc.setup.model import OutputSettings
+from tests.postproc.kit import body, codes, convert, execute, good, goto, shop_file, tilted, tool_poses, tool_setup, toolpath
 from toolpaths.rotations import rotation
 
 
@@ -120,7 +121,7 @@ def test_a_command_between_holes_ends_the_first_level_too(controller: str) -> No
 @pytest.mark.parametrize("seed", [1, 3])
 def test_holes_of_one_plane_may_differ_by_the_last_decimal(controller: str, kind: str, seed: int) -> None:
     """Points of four decimals in a tilted plane: the levels of the holes differ by the last one here and
-    there, and a rapid of that length is no cut that was left out."""
+    there, and a rapid of that length is no cut that was left out. Dog-leg rapids of a head between them are fed."""
     turned = rotation(np.array([0.6, -0.8, 0.0]), np.array([0.5]))[0]
     places = np.random.default_rng(seed).uniform(-20, 20, (40, 3)) * [1, 1, 0]
     feed = "MMPR,1" if kind == "TAP" else "MMPM,100"
@@ -128,7 +129,8 @@ def test_holes_of_one_plane_may_differ_by_the_last_decimal(controller: str, kind
     above = goto((turned @ [0, 0, 40.0])[None], turned[:, 2][None])
     path = toolpath("RAPID", *above, f"CYCLE/{kind},DEPTH,9,{feed},RAPTO,3,RTRCTO,3", *holes, "CYCLE/OFF",
                     "RAPID", *above)
-    result = convert(path, "head-table", controller)
+    fed = tool_setup().model_copy(update={"output": OutputSettings(rapids_as_feed=True)})
+    result = convert(path, "head-table", controller, setup=fed)
     assert result.ok, [str(d) for d in result.diagnostics]
 
 

@@ -1,0 +1,319 @@
+"""How far the lengths of tools may be off before their program fails, looked for where the read-back looks.
+
+With a tool longer by x mm the tip of a place goes x times its speed (mm per mm) along a straight line, and what is left of
+a tolerance or a clearance changes no faster than the tip. So from a place with room r the length may go r / speed
+farther, and so on until no room is left. Cuts are then proved: the program is executed once more with tools of the
+lengths found, and the bound of its deviation (`deviation_bound`) must keep the tolerances. Joints go evenly with the length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from machines import reach
+from postproc.job.job import Job
+from postproc.joints.tracks import TRAVEL_SLACK
+from postproc.readback.comparison.checks import CHUNK, off_line
+from postproc.readback.comparison.compare import Comparison, bound_of_blocks, off_level, place_on_moves
+from postproc.readback.comparison.length_margins import MUCH, LengthMargin, length_matters
+from postproc.readback.execution.execute import Motion, run
+from postproc.readback.execution.offsets import Offsets
+from postproc.readback.execution.poses import BlockPoses, begins
+from postproc.readback.text.canonical import Canonical
+from postproc.reference.moves import Moves, Phase
+from postproc.setup.model import ToolSetup
+from postproc.verification.executed import executed_poses
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.rotations import lengths
+
+STEP = 0.1
+"""mm that all tools are made longer by, to see what goes with the length"""
+LEAST = 1e-6
+"""mm or rad per mm: less is arithmetic"""
+SHARE = 0.997
+"""of a length that was found, which is then proved; of the proved one, which is stated: not on the edge"""
+NEAR = 1.02
+"""of a length that is proved to one that is not, which is near enough"""
+FIRST = 0.02
+"""by how much less is tried where that is not proved"""
+_ROUNDS, _CLOSE, _PROOFS = 60, 1e-5, 12
+_SIGNS = -1.0, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class LengthTrial:
+    """A program and what the control holds, to be executed with tools of other lengths."""
+
+    code: Canonical
+    offsets: Offsets
+    job: Job
+
+    def executed(self, longer: Mapping[int, float]) -> tuple[Motion, BlockPoses]:
+        """With tools longer by so many mm, by their numbers."""
+        tools = dict(self.job.setup.tools)
+        for number, mm in longer.items():
+            tools[str(number)] = tools.get(str(number), ToolSetup()).model_copy(
+                update={"gauge_length": self.job.length_of(number) + mm})
+        job = replace(self.job, setup=self.job.setup.model_copy(update={"tools": tools}))
+        held = job.register_lengths()
+        motion, _ = run(self.code, job.machine.axis_names, replace(self.offsets, lengths=held))
+        return motion, executed_poses(job, motion, held)
+
+
+@dataclass
+class _Ends:
+    """The least length found so far: mm (T, 2) by tool and sign, and what fails there."""
+
+    numbers: Ints
+    mm: Floats = field(init=False)
+    what: list[list[str]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.mm = np.full((len(self.numbers), 2), MUCH)
+        self.what = [["", ""] for _ in self.numbers]
+
+    def add(self, tool: Ints, sign: int, mm: Floats, what: str) -> None:
+        """Lengths (N,) of tools (N,), as indices; the shorter ones stay."""
+        for t in np.unique(tool).tolist():
+            least = float(mm[tool == t].min())
+            if least < self.mm[t, sign]:
+                self.mm[t, sign], self.what[t][sign] = max(least, 0.0), what
+
+    def follow(self, tool: Ints, speed: Floats, room: Callable[[Ints, Floats], Floats], what: str) -> None:
+        """Places (N,) with a speed (N,) mm or rad per mm; `room` gives what is left of some of them with tools longer by
+        (K,) mm, and changes no faster than they move."""
+        goes = np.flatnonzero(speed > LEAST)
+        for sign, direction in enumerate(_SIGNS):
+            x, k = np.zeros(len(goes)), np.arange(len(goes))
+            most = self.mm[tool[goes], sign]
+            for _ in range(_ROUNDS):
+                step = np.maximum(room(goes[k], direction * x[k]), 0.0) / speed[goes[k]]
+                x[k] += step
+                k = k[(step > _CLOSE * (x[k] + LEAST)) & (x[k] < most[k])]
+                if not len(k):
+                    break
+            self.add(tool[goes], sign, x, what)
+
+
+@dataclass(frozen=True, eq=False)
+class _Places:
+    """Blocks at one fraction of each: tips and axes as they are, and by how much both go on per mm of length."""
+
+    tip: Floats
+    axis: Floats
+    d_tip: Floats
+    d_axis: Floats
+
+    @classmethod
+    def of(cls, here: tuple[Floats, Floats], there: tuple[Floats, Floats]) -> _Places:
+        """From poses with gauge lengths and with tools longer by `STEP`."""
+        return cls(*here, *(np.nan_to_num((b - a) / STEP) for a, b in zip(here, there, strict=True)))
+
+    def at(self, k: Ints, x: Floats) -> tuple[Floats, Floats]:
+        """(tip, axis) of some with tools longer by x (K,) mm."""
+        axis = self.axis[k] + x[:, None] * self.d_axis[k]
+        return self.tip[k] + x[:, None] * self.d_tip[k], axis / lengths(axis)[:, None]
+
+
+def length_margins(trial: LengthTrial, motion: Motion, executed: BlockPoses, c: Comparison) -> tuple[LengthMargin, ...]:
+    """Of every tool that moves, in order of their numbers; () where the program calls none."""
+    job, numbers = trial.job, np.unique(motion.tool[motion.tool >= 0])
+    if not job.setup.output.tool_call or not len(numbers):
+        return ()
+    again, longer = trial.executed(dict.fromkeys(numbers.tolist(), STEP))
+    if len(again) != len(motion):
+        return tuple(LengthMargin(number, 0.0, 0.0, "other blocks", "other blocks") for number in numbers.tolist())
+    ends, matters = _Ends(numbers), length_matters(job)
+    look = _Look(job, motion, executed, again, longer, c, ends, matters)
+    look.cuts_and_links()
+    look.points()
+    look.travel()
+    look.bounds_of_reach()
+    if matters:
+        _prove(trial, c, ends)
+    return tuple(_margin(job, ends, t) for t in range(len(numbers)))
+
+
+def _margin(job: Job, ends: _Ends, t: int) -> LengthMargin:
+    (shorter, longer), (why, so), number = ends.mm[t].tolist(), ends.what[t], int(ends.numbers[t])
+    whole = job.length_of(number)
+    if shorter >= whole > 0.0:
+        shorter, why = whole, "length 0"
+    return LengthMargin(number, shorter if shorter < MUCH else np.inf, longer if longer < MUCH else np.inf, why, so,
+                        job.setup.bodies is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """Looks at the places of a program; `matters`: the length is in the program, else registers take it up."""
+
+    job: Job
+    motion: Motion
+    executed: BlockPoses
+    again: Motion
+    longer: BlockPoses
+    c: Comparison
+    ends: _Ends
+    matters: bool
+
+    @property
+    def moves(self) -> Moves:
+        """What the program is compared with."""
+        return self.job.moves.without_pecks()
+
+    def _tool(self, rows: Ints) -> Ints:
+        return np.asarray(np.searchsorted(self.ends.numbers, np.maximum(self.motion.tool[rows], self.ends.numbers[0])))
+
+    def _taken_up(self, ends: Floats, others: Floats) -> Bools:
+        """(K,) places of machine coordinates (K, J) where the gauge point goes up by just what the tool is longer."""
+        up = np.zeros(ends.shape[1])
+        up[self.job.control.xyz[2]] = STEP
+        return np.asarray((np.abs(others - ends - up) < LEAST * STEP).all(axis=1))
+
+    def _rows(self) -> Iterator[Ints]:
+        """Blocks whose tips go with the length, some at a time."""
+        for first in range(0, len(self.motion), CHUNK):
+            rows = np.arange(first, min(first + CHUNK, len(self.motion)))
+            if not self.matters:
+                still = self._taken_up(self.motion.end[rows], self.again.end[rows])
+                still &= self._taken_up(begins(self.motion, rows), begins(self.again, rows))
+                rows = rows[~still]
+            if len(rows):
+                yield rows
+
+    def _poses(self, rows: Ints, t: float | Floats) -> _Places:
+        return _Places.of(self.executed.poses(self.motion, rows, t), self.longer.poses(self.again, rows, t))
+
+    def cuts_and_links(self) -> None:
+        """Tolerances in cuts, clearance of links, at the places of `check_links` and `compare`."""
+        for rows in self._rows():
+            run_by = self.moves.run_by(self.c.owner[rows])
+            cuts, links = rows[run_by], rows[~run_by]
+            for which, look in ((cuts, self._cut), (links[links > 0], self._link)):
+                for t in self.executed.times(self.motion, which) if len(which) else ():
+                    look(which, t, self._poses(which, t))
+
+    def _cut(self, rows: Ints, t: float | Floats, places: _Places) -> None:
+        moves, tolerance = self.moves, self.job.options.tolerance
+        curves = moves.curves(self.c.owner[rows])
+        begin, share = place_on_moves(self.motion, self.executed, rows, self.c.owner, moves)
+        guess, tool = np.minimum(begin + t * share, 1.0), self._tool(rows)
+        level = (moves.phase[self.c.owner[rows]] == Phase.POSITION) & (self.motion.code[rows] == 0) & (
+            self.executed.bent(self.motion, rows) | self.job.corrects)
+        speed, turn = lengths(places.d_tip), lengths(places.d_axis)
+
+        def left(k: Ints, x: Floats) -> Floats:
+            some, (tip, axis) = curves.take(k), places.at(k, x)
+            off, _, _ = some.deviation(tip, axis, guess[k], tolerance)
+            return np.asarray(tolerance - np.where(level[k], off_level(some, tip), off))
+
+        def left_of_axis(k: Ints, x: Floats) -> Floats:
+            return np.asarray(self.job.axis_tolerance - curves.take(k).deviation(*places.at(k, x), guess[k], tolerance)[1])
+
+        self.ends.follow(tool, speed, left, "tolerance")
+        self.ends.follow(tool, turn, left_of_axis, "axis tolerance")
+
+    def _link(self, rows: Ints, t: float | Floats, places: _Places) -> None:
+        near = self.job.options.tolerance + self.executed.corrected_between(self.motion, rows)
+
+        def left(k: Ints, x: Floats) -> Floats:
+            return _room(self.job, self.moves, self.c.owner[rows[k]], *places.at(k, x), near[k])
+
+        self.ends.follow(self._tool(rows), lengths(places.d_tip), left, "clearance")
+
+    def points(self) -> None:
+        """Points of the CL file, which blocks must come to within the tolerance."""
+        done = np.flatnonzero(self.c.match >= 0)
+        rows, tolerance = self.c.match[done], self.job.options.tolerance
+        if not self.matters:
+            keep = ~self._taken_up(self.motion.end[rows], self.again.end[rows])
+            done, rows = done[keep], rows[keep]
+        for first in range(0, len(rows), CHUNK):
+            part = slice(first, first + CHUNK)
+            places, to = self._poses(rows[part], 1.0), self.moves.tip[done[part]]
+
+            def left(k: Ints, x: Floats, places: _Places = places, to: Floats = to) -> Floats:
+                return np.asarray(tolerance - lengths(places.at(k, x)[0] - to[k]))
+
+            self.ends.follow(self._tool(rows[part]), lengths(places.d_tip), left, "tolerance")
+
+    def travel(self) -> None:
+        """Travel of all axes, at the places of `check_travel`."""
+        limits, names = self.job.machine.limits, self.job.machine.axis_names
+        for first in range(0, len(self.motion), CHUNK):
+            rows = np.arange(first, min(first + CHUNK, len(self.motion)))
+            tool = self._tool(rows)
+            for t in self.executed.times(self.motion, rows):
+                q, other = self.executed.joints(self.motion, rows, t), self.longer.joints(self.again, rows, t)
+                slope = (other - q) / STEP
+                for sign, direction in enumerate(_SIGNS):
+                    for j, name in enumerate(names):
+                        goes = direction * slope[:, j]
+                        k = np.flatnonzero(np.abs(goes) > LEAST)
+                        room = np.where(goes[k] > 0.0, limits.upper[j] - q[k, j], q[k, j] - limits.lower[j])
+                        self.ends.add(tool[k], sign, (room + TRAVEL_SLACK) / np.abs(goes[k]), f"travel {name}")
+
+    def bounds_of_reach(self) -> None:
+        """Bounds of a parallel machine's workspace and joints, where those go with the length."""
+        kin = self.job.control.machine.kinematics
+        for first in range(0, len(self.motion) if reach.is_checked(kin) else 0, CHUNK):
+            rows = np.arange(first, min(first + CHUNK, len(self.motion)))
+            q, other = self.executed.joints(self.motion, rows, 1.0), self.longer.joints(self.again, rows, 1.0)
+            k = np.flatnonzero((np.abs(other - q) > LEAST * STEP).any(axis=1))
+            if not len(k):
+                continue
+            here = reach.reach(kin, q[k])
+            slope = (reach.reach(kin, other[k]).values - here.values) / STEP
+            for sign, direction in enumerate(_SIGNS):
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    mm = np.where(direction * slope < -LEAST, here.values / (-direction * slope), np.inf)
+                for name, column in zip(here.names, np.nan_to_num(mm, nan=np.inf).T, strict=True):
+                    self.ends.add(self._tool(rows[k]), sign, column, name)
+
+
+def _prove(trial: LengthTrial, c: Comparison, ends: _Ends) -> None:
+    """Lengths at which the bound of every cut keeps the tolerances: those that were found, else less.
+
+    `low` is proved, `high` is not: a little less first, as places lie near to each other, then half between.
+    """
+    for sign, direction in enumerate(_SIGNS):
+        by_place = np.array([what[sign].endswith("tolerance") for what in ends.what])
+        found = np.where(by_place, SHARE, 1.0) * ends.mm[:, sign]
+        low, high, next_, less = np.zeros(len(found)), np.array(found), np.array(found), FIRST
+        for _ in range(_PROOFS):
+            k = np.flatnonzero((high > low) & (high > NEAR * low))
+            if not len(k):
+                break
+            kept = _keeps(trial, c, ends.numbers[k], direction * next_[k])
+            low[k[kept]], high[k[~kept]] = next_[k[kept]], next_[k[~kept]]
+            next_ = high - (high - low) * np.where(low > 0.0, 0.5, less)
+            less = min(3.0 * less, 0.5)
+        short = low < found
+        for t in np.flatnonzero(short).tolist():
+            ends.what[t][sign] = "tolerance"
+        ends.mm[:, sign] = np.where(short | by_place, SHARE * low, ends.mm[:, sign])
+
+
+def _keeps(trial: LengthTrial, c: Comparison, numbers: Ints, longer: Floats) -> Bools:
+    """(K,) True where the cuts of each of the tools `numbers` (K,) keep the tolerances, all longer by so many mm (K,)."""
+    motion, executed = trial.executed(dict(zip(numbers.tolist(), longer.tolist(), strict=True)))
+    job, moves = trial.job, trial.job.moves.without_pecks()
+    allowed, result = (job.options.tolerance, job.axis_tolerance), np.zeros(len(numbers), dtype=bool)
+    for k, number in enumerate(numbers.tolist()):
+        owner = np.where(motion.tool == number, c.owner, len(moves))
+        bound = bound_of_blocks(motion, executed, moves, owner, allowed, job.corrects, judge=True)
+        result[k] = bound.tip <= allowed[0] and bound.axis <= allowed[1]
+    return result
+
+
+def _room(job: Job, moves: Moves, owner: Ints, tip: Floats, axis: Floats, near: Floats) -> Floats:
+    """(K,) mm that tips of linking moves may go: clear of what is cut, or within `near` (K,) on the line of an approach or
+    a retract, whichever is more (as `check_links` has it)."""
+    clear = job.space.room(tip, axis) + job.options.tolerance
+    to, before = (np.clip(owner + behind, 0, len(moves) - 1) for behind in (0, -1))
+    on = [np.where(there, near - off_line(tip, moves.tip[at], moves.axis[at]), 0.0)
+          for at, there in ((to, owner < len(moves)), (before, owner > 0))]
+    return np.asarray(np.maximum(np.maximum.reduce([clear, *on]), 0.0))
