@@ -322,9 +322,11 @@ def _refused(toolpath: Toolpath) -> list[Diagnostic]:
     result = []
     turning = [op for op in toolpath.operations if op.turning]
     if turning:
-        result.append(error("convert.turning", "turning operations cannot be converted", file=toolpath.file,
+        named = ", ".join(op.name or f"the operation in line {op.line}" for op in turning[:3])
+        whole = "this is a turning file" if len(turning) == len(toolpath.operations) else "turning stands between milling"
+        result.append(error("convert.turning", f"{whole} ({named}): milling alone is converted", file=toolpath.file,
                             lines=[op.line for op in turning][:6], count=len(turning),
-                            hint="take them out of the CL file; inspect reads them"))
+                            hint="take turning operations out of the CL file; inspect reads them"))
     if not bool((toolpath.role != Role.START).any()):
         result.append(error("convert.no_motion", "the file commands no motion", file=toolpath.file,
                             hint="it needs GOTO records"))

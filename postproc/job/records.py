@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 
 from machines.machine import Machine
@@ -44,4 +45,12 @@ def job_records(toolpath: Toolpath, machine: Machine, controller: ControllerFile
         diagnostics += standing_cuts(toolpath)
     toolpath = by_rule(toolpath, controller, machine.length_register, machine.radius_register)
     toolpath, found = own_registers(toolpath, controller)
-    return JobRecords(toolpath, stated, cutcom), [*diagnostics, *found]
+    return JobRecords(toolpath, stated, cutcom), _of_milling(toolpath, [*diagnostics, *found])
+
+
+def _of_milling(toolpath: Toolpath, found: list[Diagnostic]) -> list[Diagnostic]:
+    """Without errors of turning operations: that they are turning is said once, elsewhere."""
+    begins = [op.line for op in toolpath.operations] + [sys.maxsize]
+    ranges = [range(op.line, begins[k + 1]) for k, op in enumerate(toolpath.operations) if op.turning]
+    return [d for d in found if d.severity is not Severity.ERROR or not d.lines
+            or not all(any(line in one for one in ranges) for line in d.lines)] if ranges else found

@@ -269,4 +269,10 @@ CL_WORDS = [
     HintCase(
         "cl.open", "inspect part.cls", {"part.apt": GENERIC}, "name a CL file", (Edit(COMMAND, "part.cls", "part.apt"),)
     ),
+    _whole(
+        "cl.format",
+        "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('INTEGRATED_CNC_SCHEMA'));\n",
+        r"APT or CL text \((GOTO) records\)",
+        _in("ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('INTEGRATED_CNC_SCHEMA'));\n", r"UNITS/MM\nFEDRAT/MMPM,100\n\1/1,2,3\n"),
+    ),
 ]

@@ -98,7 +98,7 @@ _PATH = [
     convert(
         "convert.turning",
         FACED + nx("A", 1, 5),
-        "take them out of the CL file",
+        "take turning operations out of the CL file",
         part(
             FACED,
             "",

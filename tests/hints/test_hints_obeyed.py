@@ -12,6 +12,9 @@ from tests.hints.case import HintCase, called
 from tests.hints.cases import CASES
 from tests.hints.open_codes import OPEN
 
+VERDICTS = frozenset({"do not run this program"})
+"""what is said of a program that is wrong: no remedy, the fault is in the project or in what others have edited"""
+
 
 @pytest.mark.parametrize("case", CASES, ids=[f"{c.code}-{k}" for k, c in enumerate(CASES)])
 def test_a_hint_obeyed_is_the_end_of_its_fault(case: HintCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,9 +35,9 @@ def test_a_hint_obeyed_is_the_end_of_its_fault(case: HintCase, tmp_path: Path, m
 
 def test_every_code_with_a_remedy_is_under_the_law_or_named() -> None:
     """A new remedy comes with its case; the table of those without one only shrinks."""
-    known = {code for code, one in codes().items() if one["remedies"]}
+    known = {code for code, one in codes().items() if set(one["remedies"]) - VERDICTS}
     proved = {case.code for case in CASES}
     assert proved & set(OPEN) == set(), "take it out of the table"
     assert known - proved - set(OPEN) == set(), "write a case"
     assert set(OPEN) <= known, "no such remedy"
-    assert len(OPEN) <= 132 and all(len(why) > 10 for why in OPEN.values())
+    assert len(OPEN) <= 131 and all(len(why) > 10 for why in OPEN.values())

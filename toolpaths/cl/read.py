@@ -18,6 +18,7 @@ from toolpaths.cl.records import counted
 from toolpaths.cl.structure import open_paths
 from toolpaths.cl.text.dialects import DIALECTS, Dialect, detect, units_said
 from toolpaths.cl.text.log import DiagnosticLog
+from toolpaths.cl.text.other_formats import HEAD, other_format
 from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, ReadProgress, scan
 from toolpaths.cl.text.source import normalise
 from toolpaths.cl.text.statements import Lexer, StatementList
@@ -79,6 +80,10 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     _check_options(units, dialect)
     allow_unknown = frozenset(allow_unknown)
     log = DiagnosticLog(file)
+    other = other_format(data if isinstance(data, bytes) else data[:HEAD].encode("utf-8", "replace"))
+    if other:
+        log.error("cl.format", f"this is {other[0]}", hint=other[1])
+        return ReadResult(_with_faults(_empty(file), log.diagnostics()), log.diagnostics())
     plain = normalise(data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data), log)
     largest = LARGEST_OWN if plain.startswith(_OWN_HEAD) else LARGEST
     parts = scan(plain, progress, largest)
