@@ -7,13 +7,14 @@ import numpy as np
 from postproc.compile.program import CycleKey, Hole
 from postproc.compile.word_rows import WordRows
 from postproc.control.control import Control
+from postproc.controllers.cycles import CannedCycle
 from postproc.controllers.model import ControllerFile
 from postproc.path.model import FEED, TRAVERSE, JointPath
 from postproc.reference.events import spindle_states
 from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
 from toolpaths.choices import CycleKind
-from toolpaths.toolpath import Kind, Toolpath
+from toolpaths.toolpath import Cycle, Kind, Toolpath
 
 ROUNDED = 1.5
 """last decimals by which words along a hole may differ in a plane whose printed angles are rounded"""
@@ -129,7 +130,8 @@ def _rises_beyond(moves: Moves, path: JointPath, words: WordRows, z: int, first:
 
 def _states_retract(controller: ControllerFile, key: CycleKey) -> bool:
     """True where the controller's cycle names the level that it retracts to."""
-    specs = [table[key] for table in (controller.cycles.table, controller.cycles.with_dwell) if key in table]
+    cycles = controller.cycles
+    specs = [table[key] for table in (cycles.table, cycles.with_dwell, cycles.falling) if key in table]
     return any(name in spec.code for spec in specs for name in STATES_RETRACT)
 
 
@@ -159,7 +161,6 @@ def _hole(toolpath: Toolpath, moves: Moves, path: JointPath, rows: WordRows, con
     """The hole of blocks `first` to `last`; the tool goes to the very place at the plane where blocks of
     their own have `placed` it there."""
     cycle = toolpath.cycles[int(moves.cycle[path.move[first]])]
-    spec = controller.cycles.with_dwell if cycle.dwell > 0.0 else controller.cycles.table
     phases = moves.phase[path.move[first:last + 1]]
     bottom = first + int(np.flatnonzero(phases == Phase.DRILL)[-1])
     z = int(control.xyz[2])
@@ -171,13 +172,32 @@ def _hole(toolpath: Toolpath, moves: Moves, path: JointPath, rows: WordRows, con
     plane, out, deepest = float(words[start, z]), float(words[-1, z]), float(words[bottom - first + 1, z])
     if feeding_rapid(moves, path, np.arange(first, last + 1)).any() or phases[-1] == Phase.DRILL:
         return None
-    if key not in spec or not along or deepest >= plane or len(set(cycle.steps)) > 1:
+    if cycle_spec(controller, cycle, key) is None or not along or deepest >= plane:
         return None
     near = [level for level in (plane, initial) if abs(out - level) <= slack]
     if not near and not _states_retract(controller, key):
         return None
     out = near[0] if near else out
     return Hole(first, last, int(moves.cycle[path.move[first]]), plane, deepest, out, initial, key, bottom)
+
+
+def cycle_spec(controller: ControllerFile, cycle: Cycle, key: CycleKey) -> CannedCycle | None:
+    """The controller's cycle that makes a hole as the CL file has it; None where it has none that is equal.
+
+    Pecks that are not all alike are equal only to a cycle with a first step, a decrement and a least step: first
+    1STPECK, decrement 1STPECK - SUBPECK, least SUBPECK, where SUBPECK is the smaller one (DEEP2 of SolidWorks).
+    """
+    cycles = controller.cycles
+    if len(set(cycle.steps)) <= 1:
+        return (cycles.with_dwell if cycle.dwell > 0.0 else cycles.table).get(key)
+    spec = cycles.falling.get(key) if falls(cycle) else None
+    says = spec is not None and (spec.dwell or "{dwell}" in spec.code)
+    return spec if says or not cycle.dwell > 0.0 else None
+
+
+def falls(cycle: Cycle) -> bool:
+    """True where all pecks behind the first are one smaller one."""
+    return len(cycle.steps) == 2 and 0.0 < cycle.steps[1] < cycle.steps[0]
 
 
 def cycle_key(kind: CycleKind, turning: int) -> CycleKey:

@@ -10,7 +10,7 @@ from postproc.compile.block_delete import after, skipped, with_skips
 from postproc.compile.canned import holes_of
 from postproc.compile.clamps import with_clamps
 from postproc.compile.commands import commands_of
-from postproc.compile.cycle_refusals import not_native
+from postproc.compile.cycle_refusals import as_moves, not_native
 from postproc.compile.feed import Feeds, PlannedTimes, plan_feeds
 from postproc.compile.hooks import with_hooks
 from postproc.compile.long_turns import long_turns, standing_unsaid, without_standing
@@ -66,7 +66,8 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                              toolpath.file)
     return program, feeds, [*diagnostics, *found, *_slowed(feeds, moves, path, planned is not None, job),
                             *_mapped(feeds, moves, path, job),
-                            *not_native(toolpath, moves, path, native, controller, skip)]
+                            *not_native(toolpath, moves, path, native, controller, skip),
+                            *as_moves(toolpath, moves, path, native, controller, skip)]
 
 
 def words_of(job: Job, moves: Moves, path: JointPath, again: Ints | None = None) -> WordRows:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.compile.canned import cycle_key, may_cycle
+from postproc.compile.canned import cycle_key, cycle_spec, falls, may_cycle
 from postproc.controllers.model import ControllerFile
 from postproc.path.model import JointPath
 from postproc.reference.events import spindle_states
 from postproc.reference.moves import Moves, Phase
 from toolpaths.arrays import Bools, Ints
-from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.choices import CycleKind
+from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Cycle, Toolpath
 
 SINGLE_MOVES = frozenset({"DRILL", "THRU", "CSINK", "FACE", "DEEP", "BRKCHP", "BORE", "REAM"})
@@ -36,6 +37,36 @@ def not_native(toolpath: Toolpath, moves: Moves, path: JointPath, native: Bools,
     return [error("cycle.not_native", f"a cycle {key} cannot be written as single moves, and this one not as a canned "
                   f"cycle: {why}", file=toolpath.file, lines=lines[:6], count=len(lines), hint=hint)
             for (key, why, hint), lines in sorted(found.items())]
+
+
+def as_moves(toolpath: Toolpath, moves: Moves, path: JointPath, native: Bools, controller: ControllerFile,
+             skip: Bools) -> list[Diagnostic]:
+    """Cycles that the control has and that are written as single moves all the same, once for each kind and reason."""
+    if not controller.cycles.enabled:
+        return []
+    only = only_canned(toolpath, controller)
+    rows = np.flatnonzero((moves.phase == Phase.DRILL) & (moves.cycle >= 0))
+    rows = rows[~only[moves.cycle[rows]] & ~native[np.minimum(path.begin[rows], len(native) - 1)]]
+    found: dict[tuple[CycleKind, str], list[int]] = {}
+    for row in rows.tolist():
+        block = min(int(path.begin[row]), len(native) - 1)
+        cycle = toolpath.cycles[int(moves.cycle[row])]
+        if cycle.kind in controller.cycles.table or cycle.kind in controller.cycles.with_dwell:
+            why = _unequal(cycle, controller) or _at_its_place(path, block, controller, bool(skip[block]))[0]
+            found.setdefault((cycle.kind, why), []).append(int(moves.line[row]))
+    return [info("cycle.as_moves", f"{len(lines)} {'hole' if len(lines) == 1 else 'holes'} of CYCLE/{kind} written as "
+                 f"single moves: {why}", file=toolpath.file, lines=lines[:6], count=len(lines))
+            for (kind, why), lines in sorted(found.items())]
+
+
+def _unequal(cycle: Cycle, controller: ControllerFile) -> str:
+    """Why no cycle of the controller is equal, "" where one is."""
+    if cycle_spec(controller, cycle, cycle.kind) is not None:
+        return ""
+    if len(set(cycle.steps)) > 1:
+        return "its pecks are not all alike" + (", and the controller's cycles.falling has none" if falls(cycle) else "")
+    waits = "with" if cycle.dwell > 0.0 else "without"
+    return f"the controller has none {waits} a dwell"
 
 
 def only_canned(toolpath: Toolpath, controller: ControllerFile) -> Bools:

@@ -12,6 +12,7 @@ from pydantic import Field
 from machines.choices import Rapids, RolloverRule, Stop
 from machines.user_file import UserModel, load_toml
 from postproc.base.length_text import INCH, MM, LengthText
+from postproc.controllers.cycles import Cycles
 from postproc.controllers.output_modes import Modes
 from postproc.controllers.pivots import PivotNames
 from postproc.controllers.spelling import (
@@ -26,7 +27,7 @@ from postproc.controllers.spelling import (
     Tools,
     Units,
 )
-from postproc.controllers.texts import CYCLE_VALUES, placeholders
+from postproc.controllers.texts import placeholders
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.units import MM_PER_INCH
 
@@ -56,57 +57,6 @@ class ArcRules(UserModel):
     helical_option: str = ""
     """the option that arcs which rise need: a comment in the header of programs with such, where the machine file does
     not confirm it"""
-
-
-class CannedCycle(UserModel):
-    """One drilling cycle of the controller."""
-
-    code: Annotated[str, placeholders(*CYCLE_VALUES)]
-    """its code, or its whole text with values in braces (`CYCLE_VALUES`), a line each"""
-    peck: str = ""
-    """word of the peck depth"""
-    dwell: str = ""
-    """word of the dwell"""
-
-
-class Cycles(UserModel):
-    """Canned cycles by the kind of the CL file.
-
-    Where a kind is missing, DRILL, THRU, CSINK, FACE, DEEP, BRKCHP, BORE and REAM become single moves; others
-    are refused. TAP_LEFT stands for taps that turn anti-clockwise.
-    """
-
-    enabled: bool = True
-    """canned cycles are written, else single moves"""
-    table: dict[str, CannedCycle] = Field(default_factory=dict)
-    """by kind"""
-    with_dwell: dict[str, CannedCycle] = Field(default_factory=dict)
-    """used instead where the cycle dwells"""
-    to_initial: str = "G98"
-    """retract to the level that the tool came from"""
-    to_plane: str = "G99"
-    """retract to the R plane"""
-    cancel: str = "G80"
-    """ends a canned cycle; empty: it ends by itself"""
-    planes: tuple[int, ...] = (17,)
-    """planes in which cycles may run"""
-    rigid_only: tuple[str, ...] = ("TAP",)
-    """kinds that must not become single moves, next to those that never do"""
-    rigid_option: str = ""
-    """the option that rigid tapping needs: a comment in the header of programs that tap, where the machine file does not
-    confirm it"""
-    floating: str = ""
-    """what taps need where rigid tapping is not fitted, and `codes.rigid_tap` is left out: a comment in the header; empty:
-    the control's cycles are rigid alone, taps are then refused"""
-    dwell_milliseconds: bool = False
-    """the dwell of a cycle is a whole number of ms, else s"""
-    rises_first: bool = False
-    """before a hole that ends at the first level of its sequence, a tool that stands at the plane of the hole is brought to
-    that level on the path there (RS274/NGC)"""
-    plane_at_start: bool = False
-    """cycles return to the R plane until the program states the level (LinuxCNC when it is switched on)"""
-    peck_relief: float = Field(default=0.254, ge=0.0)
-    """mm before the last depth to which the tool returns rapidly"""
 
 
 class FeedRules(UserModel):
@@ -270,6 +220,11 @@ class ControllerFile(UserModel):
             return self
         more = {"passive": tuple(dict.fromkeys((*self.program.passive, *passive))), "number": number or self.program.number}
         return self.model_copy(update={"program": self.program.model_copy(update=more)})
+
+    def with_names(self, names: dict[int, str]) -> ControllerFile:
+        """The controller that calls tools by these names too."""
+        tools = self.tools.model_copy(update={"names": {**self.tools.names, **names}})
+        return self.model_copy(update={"tools": tools}) if names else self
 
     def in_units(self, units: Literal["mm", "inch"] | None) -> ControllerFile:
         """The controller that writes lengths and feeds in the units asked for, else in its own."""

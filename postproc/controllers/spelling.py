@@ -243,6 +243,9 @@ class Codes(UserModel):
     """the tool of the next change is made ready"""
     tool_change: Numbered = "T{number} M6"
     """tool change, a block a line"""
+    tool_by_name: Annotated[str, placeholders("name")] = ""
+    """what stands in the place of {number} for tools that the control knows by name, with the blank or letter before it:
+    '"{name}"' behind TOOL CALL, '="{name}"' behind T; empty: the control knows numbers alone"""
     length_offset: Registered = "G43 H{register}"
     """length register in force; empty: the controller has none"""
     length_cancel: str = "G49"
@@ -259,6 +262,10 @@ class Codes(UserModel):
     """cutter compensation off"""
 
 
+TOOL_NAME = r"^[A-Za-z0-9_.+-]{1,31}$"
+"""names of tools that all controls with names take"""
+
+
 class Tools(UserModel):
     """Tool change, length register and preload."""
 
@@ -268,6 +275,8 @@ class Tools(UserModel):
     """the length register stands in the first block that states Z, not in a block of its own"""
     length_automatic: bool = False
     """a tool change puts the tool's length in force by itself; with an empty `length_cancel` it cannot be taken back"""
+    names: dict[int, Annotated[str, Field(pattern=TOOL_NAME)]] = Field(default_factory=dict)
+    """by number: the name by which the control calls a tool; [tools.N] called of the set-up goes before it"""
     home_without_length: bool = False
     """blocks in machine coordinates switch the length register off"""
     cutting_edges: bool = False

@@ -25,6 +25,7 @@ from postproc.job.rapids import safe_rapids
 from postproc.job.records import job_records
 from postproc.job.rounding import Rounding, helix_bound, rounding_bound
 from postproc.job.smoothing import SmoothingPlan, smoothing_plan
+from postproc.job.tool_names import called_tools
 from postproc.job.units import other_units
 from postproc.path.links import SafeSpace, safe_space
 from postproc.reference.cutcom_of_tools import CutcomOfTool
@@ -222,6 +223,7 @@ def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) ->
     """The controller with its options, the codes of the shop's own blocks, the number of the program and its units."""
     passive = machine.hooks.under(setup.hooks).passive
     shop = fitted(controller, machine.options).with_shop(passive, setup.output.program_number)
+    shop = shop.with_names({int(n): tool.called for n, tool in setup.tools.items() if tool.called})
     return shop.in_units(setup.output.units)
 
 
@@ -231,7 +233,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     output modes that "auto" passes over."""
     records, diagnostics = job_records(toolpath, machine, controller, setup, options.setup)
     toolpath = records.toolpath
-    diagnostics += [*work_offset(controller, setup, options), *other_units(controller, options.setup),
+    diagnostics += [*work_offset(controller, setup, options), *called_tools(controller, options.setup),
+                    *other_units(controller, options.setup),
                     *smoothing_plan(controller, setup, options, toolpath, machine)[1]]
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += [*found, *program_number(toolpath, controller, setup, options)]

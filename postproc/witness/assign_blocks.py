@@ -40,12 +40,12 @@ def _fast() -> Callable[..., Any]:
         signature = (rows, rows, rows, rows, rows, numbers, rows, flags, types.float64, types.float64)
         own = dict(globals())  # of the compiled functions: those of the module stay interpreted
 
-        def made(name: str, *signature: Any) -> Callable[..., Any]:
+        def made(name: str, signature: Any = None) -> Callable[..., Any]:
             function = FunctionType(own[name].__code__, own, name)
             try:
-                result: Callable[..., Any] = njit(*signature, cache=True)(function)
+                result: Callable[..., Any] = njit(signature, cache=True)(function)
             except RuntimeError:  # no folder for the cache
-                result = njit(*signature)(function)
+                result = njit(signature)(function)
             return result
 
         for name in ("_apart", "_near", "_turned"):

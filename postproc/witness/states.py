@@ -313,9 +313,10 @@ def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: flo
     reached = np.append(-total, deepest[:-1])
     if (~fed & (depth > np.maximum(reached, -total) + 1e-3)).any():
         found.append("rapid motion into uncut material of a hole")
-    steps = np.diff(np.append(-cycle.depth, np.unique(np.round(deepest[np.isfinite(deepest)], 6))))
-    pecked = cycle.kind in _PECKED and len(cycle.steps) > 0
-    if pecked and steps.max(initial=0.0) > max(cycle.steps) + 0.01:
+    turns = deepest[np.isfinite(deepest) & fed & (np.diff(depth, append=-np.inf) < -0.01)]
+    steps = np.diff(np.append(-cycle.depth, np.maximum(np.unique(np.round(turns, 6)), -cycle.depth)))
+    allowed = [max(cycle.steps[min(k, len(cycle.steps) - 1):], default=np.inf) for k in range(len(steps))]
+    if cycle.kind in _PECKED and (steps > np.array(allowed) + 0.01).any():
         found.append("the hole is drilled in deeper pecks than the CL file says")
     if not cycle.steps and len(blocks) > 1 and (np.diff(depth) < -0.01).any():
         found.append("the hole is drilled in pecks, the CL file has none")

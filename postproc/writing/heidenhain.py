@@ -154,7 +154,7 @@ class KlartextWriter(Writer):
         elif command.name == "CHANGE_TOOL":
             speed = self.speed_after(command)
             self.called = speed or self.called
-            yield f"TOOL CALL {self.plain(command.args[0])} Z" + (f" S{self.plain(speed)}" if speed else "")
+            yield f"TOOL CALL {self.tool_said(self.plain(command.args[0]))} Z" + (f" S{self.plain(speed)}" if speed else "")
         elif command.name == "DWELL" and float(command.args[0]) > LONGEST_DWELL:
             for part in (LONGEST_DWELL, float(command.args[0]) - LONGEST_DWELL):
                 yield from self.command(replace(command, args=(part,)))

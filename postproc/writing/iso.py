@@ -9,8 +9,7 @@ import numpy as np
 
 from postproc.compile.program import INVERSE, PER_MINUTE, Hole
 from postproc.control.word_arcs import PLANE_AXIS
-from postproc.controllers.model import CannedCycle
-from postproc.writing.state import peck_of
+from postproc.controllers.cycles import CannedCycle
 from postproc.writing.writer import CHUNK, Writer
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.toolpath import Cycle
@@ -193,6 +192,9 @@ class IsoWriter(Writer):
         if self.in_cycle and text == self.cycle_text:
             yield place.removeprefix(" ")
             return
+        if self.in_cycle and bool(spec.less) != self.falling:
+            yield from self.end_cycle()  # the words of falling pecks hold from block to block
+        self.falling = bool(spec.less)
         if hole.key.startswith("TAP") and self.controller.codes.rigid_tap:
             yield from self.end_cycle()
             yield self.controller.codes.rigid_tap.format(speed=self.plain(abs(self.speed)))
@@ -218,14 +220,22 @@ class IsoWriter(Writer):
                 result += f"{self.space}{letter}{self.number_text(self.stated(j, hole.last), int(p.decimals[j]))[0]}"
         return result
 
+    def _word(self, letter: str, length: float) -> str:
+        """A word of a length in mm, a blank before it where there is one."""
+        return f"{self.space}{letter}{self.lengths(np.array([length]))[0]}"
+
     def _cycle_text(self, hole: Hole, cycle: Cycle, spec: CannedCycle, feed: float) -> str:
         cycles = self.controller.cycles
         z, r = self.lengths(np.array([hole.bottom, hole.plane_level]))
         out = cycles.to_plane if abs(hole.retract - hole.plane_level) < 1e-9 else cycles.to_initial
         extra = ""
         if spec.peck:
-            extra += f"{self.space}{spec.peck}{self.lengths(np.array([peck_of(cycle)]))[0]}"
-        if spec.dwell:
+            whole = cycle.depth + cycle.clearance
+            first = max(self.peck_of(cycle, hole.plane_level - hole.bottom), cycle.steps[0]) if cycle.steps else whole
+            extra += self._word(spec.peck, first)
+        if spec.less and spec.least:
+            extra += self._word(spec.less, cycle.steps[0] - min(cycle.steps)) + self._word(spec.least, min(cycle.steps))
+        if spec.dwell and cycle.dwell > 0.0:
             dwell = str(round(cycle.dwell * 1000.0)) if cycles.dwell_milliseconds else self.plain(cycle.dwell)
             extra += f"{self.space}{spec.dwell}{dwell}"
         self.feed = self.feed_text(feed)

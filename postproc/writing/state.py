@@ -11,8 +11,10 @@ from textwrap import wrap
 import numpy as np
 
 from machines.kinematics.chain import ROTARY
+from postproc.compile.canned import cycle_spec
 from postproc.compile.program import PER_MINUTE, Hole, Program, Section
-from postproc.controllers.model import CannedCycle, ControllerFile
+from postproc.controllers.cycles import CannedCycle
+from postproc.controllers.model import ControllerFile
 from postproc.controllers.output_modes import LengthState, Mode
 from postproc.controllers.texts import CYCLE_LENGTHS
 from postproc.job.smoothing import Smoothing
@@ -55,6 +57,7 @@ class WriterState:
         self.law, self.register, self.length_off, self.speed = program.sections[0].law, "", False, 0.0
         self.rounded = 1.0
         self.in_cycle, self.cycle_text, self.operations = False, "", 0
+        self.falling = False
         self.plane, self.mode = 17, PER_MINUTE
         self.turning: bool | None = None
         self.cooling: bool | None = None
@@ -168,6 +171,16 @@ class WriterState:
             text = text.replace(" ", ". ")
         return _MINUS_ZERO.sub(f"{sign}0", text).split()
 
+    def peck_of(self, cycle: Cycle, depth: float) -> float:
+        """Depth of the first peck of a hole of `depth`, mm: the whole of it where the cycle names none. Pecks that divide it
+        but for what rounding has made of it are rounded up: the control would drill a last one of that."""
+        step = min(cycle.steps[0], depth) if cycle.steps else depth
+        grain, count = self.controller.grain, max(round(depth / step), 1)
+        rest = depth - count * grain * round(step / grain)
+        if len(set(cycle.steps)) > 1 or not 0.0 < rest < _REST:
+            return step
+        return math.ceil(depth / count / grain - 1e-6) * grain
+
     def hole_feed(self, hole: Hole) -> float:
         """Feed of drilling down in a hole, as F states it; that of a tap keeps the pitch at the speed that is written."""
         return float(self.program.feed[hole.drill]) * (self.rounded if hole.key.startswith("TAP") else 1.0)
@@ -181,8 +194,9 @@ class WriterState:
 
     def cycle_of(self, hole: Hole) -> CannedCycle:
         """The controller's cycle for a hole."""
-        cycles = self.controller.cycles
-        return (cycles.with_dwell if self.cycles[hole.cycle].dwell > 0.0 else cycles.table)[hole.key]
+        spec = cycle_spec(self.controller, self.cycles[hole.cycle], hole.key)
+        assert spec is not None  # `holes_of` has taken no other
+        return spec
 
     def cycle_values(self, hole: Hole) -> dict[str, float]:
         """The values that the text of a cycle may name (`CYCLE_VALUES`), lengths in the units of the program."""
@@ -193,10 +207,12 @@ class WriterState:
         """The same in mm; the feed as F states it."""
         cycle, feed = self.cycles[hole.cycle], self.hole_feed(hole)
         surface = hole.plane_level - cycle.clearance
-        depth, step = surface - hole.bottom, min(peck_of(cycle), surface - hole.bottom)
+        depth = surface - hole.bottom
+        step, least = self.peck_of(cycle, depth), min((*cycle.steps, depth))
         pitch = cycle.pitch or (feed * self.controller.feed_unit / abs(self.speed) if self.speed else 0.0)
         return {"retract": hole.retract, "surface": surface, "clearance": cycle.clearance, "bottom": hole.bottom,
-                "depth": depth, "level": -depth, "step": step, "breaks": float(math.ceil(depth / step)),
+                "depth": depth, "level": -depth, "step": step, "less": max(step - least, 0.0), "least": least,
+                "breaks": float(math.ceil(depth / step)),
                 "relief": self.controller.cycles.peck_relief, "dwell": cycle.dwell, "feed": feed,
                 "pitch": -pitch if hole.key == "TAP_LEFT" else pitch, "speed": abs(self.speed),
                 "second": hole.retract - surface}
@@ -266,6 +282,8 @@ class WriterState:
 
 SHARE = 1e6
 """steps in an inch that a share of the tolerance is rounded down to"""
+_REST = 0.005
+"""mm that are no peck of their own"""
 SPEED_DIGITS = 3
 """decimals of a speed from 1 to 10; one less each time that it is ten times as great"""
 _ZEROS = re.compile(r"0+ ")
@@ -275,10 +293,6 @@ _MINUS_ZERO = re.compile(r"-0(?=\.?0* )")
 NUMBER_ROOM = 12
 """characters that a block number may take"""
 
-
-def peck_of(cycle: Cycle) -> float:
-    """Depth of a peck, mm: the whole depth where the cycle names none."""
-    return cycle.steps[0] if cycle.steps else cycle.depth + cycle.clearance
 
 def comment_room(controller: ControllerFile) -> int:
     """Characters that a comment block holds, a block number before it counted."""

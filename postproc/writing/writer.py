@@ -353,7 +353,7 @@ class Writer(WriterState, ABC):
         if command.name == "CHANGE_TOOL":
             yield from self.change_tool(value)
         elif command.name == "SELECT_TOOL":
-            yield codes.tool_select.format(number=value)
+            yield codes.tool_select.format(number=self.tool_said(value))
         elif command.name == "USE_TOOL_LENGTH_OFFSET":
             yield from self.use_length(value)
         elif command.name == "DWELL":
@@ -365,12 +365,17 @@ class Writer(WriterState, ABC):
         else:
             raise ValueError(f"no text for the command {command.name}")
 
+    def tool_said(self, number: str) -> str:
+        """The number of a tool, or what stands in its place where the control knows it by name."""
+        codes, name = self.controller.codes, self.controller.tools.names.get(int(float(number)))
+        return codes.tool_by_name.format(name=name) if name and codes.tool_by_name else number
+
     def change_tool(self, number: str) -> Iterator[str]:
         """The tool change, with the length register off."""
         codes = self.controller.codes
         if self.length_offsets and codes.length_cancel and not self.length_off:
             yield codes.length_cancel
-        yield from blocks_of(codes.tool_change.format(number=number))
+        yield from blocks_of(codes.tool_change.format(number=self.tool_said(number)))
         if self.controller.tools.length_automatic and not self.length_offsets and codes.length_cancel:
             yield codes.length_cancel
             self.length_off = True

@@ -94,7 +94,7 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
             pecks = _turning_points(depth)
             deepest = np.maximum.accumulate(np.concatenate([[-cycle.depth], depth[pecks]]))
             out = int((depth <= 0.01 - total).sum())
-            if np.diff(deepest).max(initial=0.0) > max(cycle.steps) + 0.01:
+            if (np.diff(deepest) > _allowed(cycle.steps, int(pecks.sum())) + 0.01).any():
                 bad_peck.append(part[0])
             elif cycle.kind == "DEEP" and out < int(pecks.sum()) - 1:
                 bad_out.append(part[0])
@@ -110,6 +110,11 @@ def check_holes(motion: Motion, job: Job, moves: Moves, tip: Floats, owner: Ints
             result.append(faults.error("verify.hole", what, int(moves.line[owner[bad[0]]]), int(motion.line[bad[0]]),
                                        len(bad)))
     return result
+
+
+def _allowed(steps: tuple[float, ...], count: int) -> Floats:
+    """(count,) mm that each peck may go deeper: the CL file's steps, the last of them from there on."""
+    return np.array([max(steps[min(k, len(steps) - 1):]) for k in range(count)], dtype=np.float64)
 
 
 def _turning_points(depth: Floats) -> Bools:

@@ -31,6 +31,7 @@ from postproc.readback.text.flow import Structure, expand
 from postproc.readback.text.magnitude import negative_smoothing, too_large
 from postproc.readback.text.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
 from postproc.readback.text.rollover import unrolled
+from postproc.readback.text.tool_names import numbered_tools
 from postproc.readback.text.words import Words
 from postproc.reference.coolant import ALL, switched_by
 from toolpaths.arrays import Floats, Ints, among
@@ -137,7 +138,9 @@ class Reader(ABC):
         stems = {PurePath(name).stem.upper(): name for name in others}
         while waiting:
             name = next(iter(waiting))
-            read, more = self.program(as_bytes(waiting.pop(name)), name)
+            numbered, more = self.numbered(as_bytes(waiting.pop(name)), name)
+            found += more
+            read, more = self.program(numbered, name) if not has_errors(more) else (None, [])
             found += more
             if read is None:
                 return None, found
@@ -153,6 +156,12 @@ class Reader(ABC):
         code, last = self.translated(text, line, file)
         last = [*self.units(code, file), *negative_smoothing(code, file), *last]
         return replace(code, files=files), [*found, *more, *placed(last, files)]
+
+    def numbered(self, data: bytes, file: str) -> tuple[bytes, list[Diagnostic]]:
+        """The program with numbers in the place of the names of tools, where the control knows names."""
+        if self.controller is None or not self.controller.codes.tool_by_name:
+            return data, []
+        return numbered_tools(data, self.controller.tools.names, file)
 
     def translated(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words of blocks in running order, with what turns and flows behind stops."""

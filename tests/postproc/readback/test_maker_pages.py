@@ -184,6 +184,15 @@ def test_names_of_work_offsets_on_a_tnc() -> None:
     assert "247" in names["G54"] and "Q339=+1 " in names["G54"] and "Q339=+2 " in names["G55"]
 
 
+@pytest.mark.parametrize(("dialect", "call"), [(SIEMENS, 'T="EM10"\n'), (TNC, 'TOOL CALL "EM10" Z'),
+                                               (TNC, 'TOOL DEF "EM10"')])
+def test_names_of_tools(dialect: str, call: str) -> None:
+    """S1: T="identifier"; T1: a tool is called by its number, or by its name in quotation marks. Fanuc, Haas: numbers."""
+    codes = spec(dialect).codes
+    assert codes.tool_by_name.format(name="EM10") in call and '"' in codes.tool_by_name
+    assert not spec(FANUC).codes.tool_by_name and not spec(HAAS).codes.tool_by_name and spec(dialect).tools.names == {}
+
+
 @pytest.mark.parametrize(("dialect", "on", "blend"), [
     (HAAS, "G187 P3 E0.02\n", 0.02), (NGC, "G64 P0.02 Q0.01\n", 0.03), (SIEMENS, "CYCLE832(0.02,_ORI_FINISH,0.05)\n", 0.02),
     (FANUC, "G05.1 Q1\n", 0.002)])
