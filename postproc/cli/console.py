@@ -151,7 +151,8 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
         values = values | unwritten | {"diagnostics": [d.as_dict() for d in diagnostics]}
         text, outputs = "", {}
     more, failed = _written(target, _headed(values, ok), dict(outputs or {}))
-    for line in lines_of((*diagnostics, *more), Severity.WARNING if SAYS.quiet else Severity.INFO):
+    lines = lines_of((*diagnostics, *more), Severity.WARNING if SAYS.quiet else Severity.INFO)
+    for line in ([SAYS.job_line] if SAYS.job_line and lines else []) + lines:
         typer.echo(line, err=True)
     if failed and outputs:
         values, text = {"diagnostics": [d.as_dict() for d in (*diagnostics, *more)]}, ""

@@ -18,7 +18,7 @@ def given_defaults(command: Any, arguments: list[str], context: typer.Context) -
 
     The file is looked for upwards from the folder of the CL file, for commands without one from the present folder.
     """
-    SAYS.job_units = ""
+    SAYS.job_units = SAYS.job_line = ""
     names = {one.name for one in command.params}
     if "machine" not in names and ONLY_OF_CL not in names:
         return
@@ -34,8 +34,11 @@ def given_defaults(command: Any, arguments: list[str], context: typer.Context) -
     SAYS.job_units = str(where) if "units" in taken else ""
     if taken:
         context.default_map = {command.name: taken}
-        if "quiet" not in given:
-            typer.echo(f"{where}: {', '.join(f'{key} {_shown(value)}' for key, value in taken.items())}", err=True)
+        line = f"{where}: {', '.join(f'{key} {_shown(value)}' for key, value in taken.items())}"
+        if "quiet" in given:
+            SAYS.job_line = line  # it stands before warnings and errors
+        else:
+            typer.echo(line, err=True)
 
 
 def _shown(value: object) -> str:
@@ -52,6 +55,9 @@ def _given(command: Any, arguments: list[str]) -> dict[str, str] | None:
     found, rest = dict[str, str](), list(arguments)
     while rest:
         word = rest.pop(0)
+        while len(word) > 2 and word[0] == "-" != word[1] and _is_flag(options.get(word[:2])):
+            found[options[word[:2]].name] = ""  # -qmNAME, -qv: short options together
+            word = f"-{word[2:]}"
         name, sign, value = word.partition("=")
         if not word.startswith("--") and len(word) > 2 and word[:2] in options:
             name, sign, value = word[:2], "=", word[2:]  # -mNAME
@@ -60,9 +66,13 @@ def _given(command: Any, arguments: list[str]) -> dict[str, str] | None:
                 found[places.pop(0)] = word
             continue
         one = options[name]
-        takes = not (getattr(one, "is_flag", False) or getattr(one, "count", False))
-        found[one.name] = value if sign else rest.pop(0) if takes and rest else ""
+        found[one.name] = value if sign else rest.pop(0) if not _is_flag(one) and rest else ""
     return found
+
+
+def _is_flag(option: Any) -> bool:
+    """True for an option that takes no value."""
+    return option is not None and bool(getattr(option, "is_flag", False) or getattr(option, "count", False))
 
 
 def _values(folder: Path, json: str) -> tuple[dict[str, Any], Path | None]:

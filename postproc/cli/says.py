@@ -13,6 +13,7 @@ class Says:
         quiet: notes, figures and the job file's line are left out
         verbose: each stage is named as it begins
         strict: warnings are errors
+        job_line: what --quiet holds back until there is a warning or an error: the values that a job file gives
         job_units: the job file whose units the command takes, "" where it has its own or none
     """
 
@@ -20,6 +21,7 @@ class Says:
     verbose: bool = False
     strict: bool = False
     job_units: str = ""
+    job_line: str = ""
 
 
 SAYS = Says()

@@ -41,6 +41,9 @@ def setup_new(file: ClFile, machine: MachineName,
                                                                      help=f"gauge length {_ALL_TOOLS}")] = None,
               spindle: Annotated[list[str] | None, typer.Option("--spindle", metavar="[N=]RPM", help="spindle speed where "
                                                                 f"the CL file states none, {_ALL_TOOLS}")] = None,
+              tool_number: Annotated[list[str] | None, typer.Option("--tool-number", metavar="NAME=N", help="number in the "
+                                                                    "magazine of a tool to which the CL file gives "
+                                                                    "none; may be repeated")] = None,
               feed: Annotated[float | None, typer.Option("--feed", metavar="MM/MIN", min=0.001, max=2e5,
                                                          help="feed of cuts for which the CL file states none")] = None,
               coolant: Annotated[str, typer.Option("--coolant", metavar="KIND", help="where the CL file states none: off, "
@@ -55,7 +58,7 @@ def setup_new(file: ClFile, machine: MachineName,
     refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), **own_files(machine, controller)})
     if output.exists() and not force:
         raise typer.BadParameter(f"{output} exists; --force replaces it", param_hint="-o")
-    given = _given(gauge_length or [], spindle or [], feed, coolant)
+    given = _given(gauge_length or [], spindle or [], feed, coolant, tool_number or [])
     _known_register(work_offset_code)
     options = Options(tolerance, axis_tolerance, units=units, dialect=dialect,
                       allow_unknown=tuple(w.upper() for w in allow_unknown or ()))
@@ -113,7 +116,9 @@ class _Asking:
 
         result = given
         for question, value in self.done:
-            if question.kind == "coolant":
+            if question.name:
+                result = replace(result, tool_number={**result.tool_number, question.name: int(float(value))})
+            elif question.kind == "coolant":
                 result = replace(result, coolant=str(value))
             elif question.kind == "feed":
                 result = replace(result, feed=float(value))
@@ -151,7 +156,7 @@ def _line() -> str:
     return line
 
 
-def _given(lengths: list[str], speeds: list[str], feed: float | None, coolant: str) -> GivenAnswers:
+def _given(lengths: list[str], speeds: list[str], feed: float | None, coolant: str, numbers: list[str]) -> GivenAnswers:
     from typing import get_args
 
     from postproc.setup.spindle import CoolantKind
@@ -160,7 +165,19 @@ def _given(lengths: list[str], speeds: list[str], feed: float | None, coolant: s
     if coolant and coolant not in get_args(CoolantKind):
         raise typer.BadParameter(f"{coolant!r} is not available; choose from {', '.join(get_args(CoolantKind))}",
                                  param_hint="--coolant")
-    return GivenAnswers(_numbers(lengths, "--gauge-length", 2000.0), _numbers(speeds, "--spindle", 200000.0), feed, coolant)
+    return GivenAnswers(_numbers(lengths, "--gauge-length", 2000.0), _numbers(speeds, "--spindle", 200000.0), feed, coolant,
+                        _by_name(numbers))
+
+
+def _by_name(values: list[str]) -> dict[str, int]:
+    """Tool numbers by name; wrong use where a value is none."""
+    result = {}
+    for text in values:
+        name, _, value = text.rpartition("=")
+        if not name or not value.isdecimal() or not 0 < int(value) < 10**6:
+            raise typer.BadParameter(f"{text!r} is not NAME=number", param_hint="--tool-number")
+        result[name] = int(value)
+    return result
 
 
 def _numbers(values: list[str], option: str, most: float) -> dict[int, float]:

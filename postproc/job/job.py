@@ -36,11 +36,11 @@ from postproc.reference.split_operations import cut_operations
 from postproc.reference.stated_feeds import without_feed
 from postproc.reference.unnumbered_tools import measured_length
 from postproc.setup.model import Placement, SetupFile, part_placement, work_frame
-from postproc.setup.system import standing
+from postproc.setup.system import standing, upside_down
 from toolpaths.arrays import Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
 from toolpaths.rotations import angle_between
-from toolpaths.toolpath import Frame, Role, Toolpath
+from toolpaths.toolpath import Frame, Kind, Role, Toolpath
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
@@ -255,10 +255,9 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     origin = placement.points(np.array([frame.origin]))[0]
     largest = controller.arcs.largest_radius if controller.arcs.enabled else 0.0
     law: InterpolationMode = "tcp" if tip_law else "axes"
-    own, found = control_kinematics(machine, setup, options)
-    diagnostics += found
+    own, pivots = control_kinematics(machine, setup, options)
     geometric, found = _error_model(machine, options)
-    diagnostics += found
+    diagnostics += [*pivots, *found]
     rolls, found = rollovers(machine, controller)
     diagnostics += found
     corrects = geometric is not None and geometric.corrected_by == "post"  # tables that are corrected do not stand at zero
@@ -267,7 +266,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
                       rapids=machine.rapids or controller.kinematics.rapids, feed_rule=controller.feed.length,
                       degree_is_inch=controller.degree_is_inch, helix_planes=controller.arcs.helix_planes,
                       rolls=rolls, measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
-    diagnostics += _measured(control, controller, moves.axis, setup, options)
+    diagnostics += [*_measured(control, controller, moves.axis, setup, options), *upside_down(
+        moves.axis[moves.kind != Kind.RAPID], machine.home_axis, placement, options.setup)]
     places = word_grid(control, controller).places
     modes, found = output_modes(control, controller, setup, options, toolpath, places, refused)
     diagnostics += found

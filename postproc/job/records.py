@@ -11,7 +11,7 @@ from postproc.reference.length_registers import by_rule, own_registers
 from postproc.reference.records import checked_records, plain_records
 from postproc.reference.spindle_defaults import Stated, standing_cuts, stated_by_setup, with_defaults
 from postproc.reference.tool_numbers import numbered
-from postproc.setup.model import SetupFile, assumed_values
+from postproc.setup.model import SetupFile, assumed_values, other_machine
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.toolpath import Toolpath
 
@@ -30,7 +30,7 @@ def job_records(toolpath: Toolpath, machine: Machine, controller: ControllerFile
                 file: str) -> tuple[JobRecords, list[Diagnostic]]:
     """The records of a job, and what cannot be carried out; `file` is the set-up's."""
     toolpath, diagnostics = numbered(toolpath, setup, file)
-    diagnostics += assumed_values(setup, file)
+    diagnostics += [*other_machine(setup, machine.name, file), *assumed_values(setup, file)]
     cutcom = tools_under_cutcom(toolpath, setup)
     toolpath, found = with_compensation(toolpath, setup)
     diagnostics += found

@@ -11,8 +11,9 @@ from postproc.setup.model import SetupFile
 from toolpaths.input_files import read_input
 
 DIGITS = 8
-_ASIDE = {"description", "placement", "assumed"}
-"""keys that change no word of a program: what `place` may choose from, which values nobody has stated"""
+_ASIDE = {"description", "placement", "assumed", "machine"}
+"""keys that change no word of a program: what `place` may choose from, which values nobody has stated, the machine
+that it is for"""
 _LATER: tuple[tuple[str, ...], ...] = (
     ("hooks",), ("output", "stop_between_tools"), ("output", "program_number"), ("output", "program_name"),
     ("clearance", "index"), ("output", "units"), ("output", "smoothing"), ("output", "rapids_as_feed"))

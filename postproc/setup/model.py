@@ -197,6 +197,8 @@ class SetupFile(UserModel):
     """one line"""
     assumed: list[str] = Field(default_factory=list)
     """keys whose values nobody has stated, e.g. assumed = ["tools.1.spindle", "output.feed"]: convert warns of each"""
+    machine: str = ""
+    """name of the machine that the set-up is for: on another one convert warns; default: any"""
     work_offset: str = ""
     """name of the system of the CL file that is the work offset; default: its first"""
     work_offset_code: str = Field(default="G54", pattern=r"^(G[0-9]+(\.[0-9])?( P[0-9]+)?|preset [0-9]+)$")
@@ -238,6 +240,16 @@ def stated_value(setup: SetupFile, key: str) -> Any:
         value = value.get(step) if isinstance(value, dict) else getattr(value, step, None) if isinstance(
             value, BaseModel) and step in type(value).model_fields else None
     return value
+
+
+def other_machine(setup: SetupFile, machine: str, file: str) -> list[Diagnostic]:
+    """A warning where the set-up is for another machine than that of this name."""
+    if not setup.machine or setup.machine == machine:
+        return []
+    return [warning("setup.machine", f"the set-up is for the machine {setup.machine!r}, this is {machine!r}: places, "
+                    "lengths and speeds may be wrong here", file=file, lines=_line(file, ("machine",)),
+                    hint=f"write one for this machine (postproc setup new), or machine = {machine!r} in it where it fits "
+                    "both")]
 
 
 def assumed_values(setup: SetupFile, file: str) -> list[Diagnostic]:

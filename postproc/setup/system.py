@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.setup.model import PartPlacement, Placement, SetupFile, part_placement, system_of, work_frame
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, Severity, info
+from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 from toolpaths.toolpath import Frame, Toolpath
 from toolpaths.units import DEG
 
@@ -18,6 +18,8 @@ UPRIGHT = 0.1
 """degrees that the z of a system may lean by on the table and still stand upright"""
 AWAY = 1e-3
 """mm between two origins that are the same"""
+_BELOW = 1e-6
+"""cosine of a direction with the upright one, beyond which it comes from below"""
 BEYOND = ("travel.exceeded", "reach.axis", "reach.position", "reach.clearance")
 """codes of errors that another place of the part may heal"""
 
@@ -45,6 +47,24 @@ def standing(setup: SetupFile, toolpath: Toolpath, file: str = "") -> tuple[Setu
                 f"file's absolute frame at {_text(part.origin, 4)} mm, x along {_text(x, 6)}, y along {_text(y, 6)}",
                 file=file)
     return setup.model_copy(update={"part": part}), [*found, said]
+
+
+def upside_down(axes: Floats, home: Floats, placement: Placement, file: str) -> list[Diagnostic]:
+    """A warning where most tool axes come from below the table: the part may stand on its head.
+
+    Args:
+        axes (N, 3): of the cuts, in the table frame
+        home (3,): tool axis with all joints at home, in the table frame
+        file: of the set-up
+    """
+    below = float((axes @ home < -_BELOW).mean()) if len(axes) else 0.0
+    if below <= 0.5:
+        return []
+    x, y = _text(placement.rotation[:, 0], 6), _text(-placement.rotation[:, 1], 6)
+    return [warning("setup.upside_down", f"the tool comes from below the table in {100.0 * below:.0f} % of the cuts: the "
+                    "part may stand upside down", file=file,
+                    hint=f"[part] x_axis = [{x.strip('()')}], y_axis = [{y.strip('()')}] in the set-up turns it over; "
+                    "postproc setup new turns it by the tool axes to a place that fits")]
 
 
 def placed(frame: Frame) -> Placement:

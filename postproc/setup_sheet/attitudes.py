@@ -46,7 +46,7 @@ def attitudes_of(toolpath: Toolpath, machine: Machine, axis_tolerance: float) ->
         axis_tolerance: rad
     """
     axes = _axes(toolpath)
-    home = machine.kinematics.forward(machine.home[None, :])[1][0]
+    home = machine.home_axis
     found = [_judged(turn, why, axes, home, machine, axis_tolerance) for turn, why in _quarters(
         _candidates(toolpath, axes, home), home)]
     return sorted(found, key=lambda one: (one.unreachable > 0.0, one.below > 0.5, one.unreachable))

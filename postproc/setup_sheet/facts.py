@@ -85,9 +85,15 @@ class SheetFacts:
         return {one.name: one.number for one in self.named}
 
 
-def facts_of(toolpath: Toolpath, machine: Machine, controller: ControllerFile, options: Options) -> SheetFacts:
-    """What a path states and leaves open on a machine and a control."""
-    named = (*_without_number(toolpath), *_of_one_number(toolpath))
+def named_tools(toolpath: Toolpath) -> tuple[NumberedTool, ...]:
+    """Tools to which [tool_numbers] must give numbers, with numbers that are free."""
+    return (*_without_number(toolpath), *_of_one_number(toolpath))
+
+
+def facts_of(toolpath: Toolpath, machine: Machine, controller: ControllerFile, options: Options,
+             named: tuple[NumberedTool, ...] | None = None) -> SheetFacts:
+    """What a path states and leaves open on a machine and a control; `named` as of `named_tools`, with its answers."""
+    named = named_tools(toolpath) if named is None else named
     numbers = {one.name: one.number for one in named}
     path, _ = numbered(toolpath, SetupFile(tool_numbers=numbers))
     path, _ = plain_records(path, controller)
@@ -100,7 +106,7 @@ def facts_of(toolpath: Toolpath, machine: Machine, controller: ControllerFile, o
                       tuple(d for d in errors if d.code not in OF_SETUP))
 
 
-def _taken(toolpath: Toolpath) -> set[int]:
+def taken_numbers(toolpath: Toolpath) -> set[int]:
     """Numbers that the file itself uses."""
     loads = {int(v) for e in toolpath.events if e.word in ("LOADTL", "LOAD/TOOL", "LOAD", "TURRET")
              for v in e.values[:1] if isinstance(v, float)}
@@ -108,7 +114,7 @@ def _taken(toolpath: Toolpath) -> set[int]:
 
 
 def _free(toolpath: Toolpath) -> Iterator[int]:
-    taken = _taken(toolpath)
+    taken = taken_numbers(toolpath)
     return (n for n in count(1) if n not in taken)
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 
 from machines.machine import Machine
@@ -11,9 +13,9 @@ from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.controllers.model import load_controller
 from postproc.setup.model import SetupFile
-from postproc.setup_sheet.facts import SheetFacts, facts_of
+from postproc.setup_sheet.facts import NumberedTool, SheetFacts, facts_of, named_tools, taken_numbers
 from postproc.setup_sheet.place import Fit, fitted
-from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, questions_of
+from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, number_questions, questions_of
 from postproc.setup_sheet.text import TOOL_NUMBERS, SheetHeader, sheet_text, sheet_values
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, require, warning
 from toolpaths.toolpath import Toolpath
@@ -59,11 +61,14 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     known = [*found, *(d for d in toolpath.faults if d not in found)]
     if has_errors(known):
         return SetupSheet("", tuple(known))
-    facts = facts_of(toolpath, machine, spec, options)
-    if facts.refused:
+    named, asked, unnumbered = _numbers(toolpath, given, ask, assume)
+    facts = facts_of(toolpath, machine, spec, options, named)
+    known += _of_two(named, toolpath) + _no_such_name(given, [one.name for one in asked], toolpath)
+    if facts.refused or has_errors(known):
         return SetupSheet("", (*known, *facts.refused), facts)
-    questions = questions_of(facts)
-    answers, left = answered(questions, given, ask, assume)
+    questions = [*asked, *questions_of(facts)]
+    answers, left = answered(questions[len(asked):], given, ask, assume)
+    left = [*unnumbered, *left]
     known += _unused(given, facts, toolpath)
     for tool in () if facts.lengths else facts.tools:  # not needed, but given: travel is checked with it
         length = given.gauge_length.get(tool.number, given.gauge_length.get(0))
@@ -72,7 +77,8 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     known += _short(facts, answers, toolpath.file)
     if left:
         return SetupSheet("", (*known, _open(left, toolpath.file)), facts, tuple(questions), tuple(answers.items()))
-    values = sheet_values(facts, answers, toolpath.name or Path(toolpath.file).name, code)
+    values = sheet_values(facts, answers, toolpath.name or Path(toolpath.file).name, code,
+                          machine.name)
     setup = SetupFile.model_validate({**values, "work_offset": toolpath.frames[0].name})
     fit = fitted(toolpath, machine, controller, setup, options, found, progress)
     made = SetupSheet("", tuple(known), facts, tuple(questions), tuple(answers.items()), fit)
@@ -81,6 +87,35 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     header = SheetHeader(Path(toolpath.file).name, machine.name, fit.result.controller_name, toolpath.units,
                      _units(found, options), options.tolerance, options.axis_tolerance)
     return _with(made, _assumed(made, fit), text=sheet_text(header, facts, answers, fit, toolpath))
+
+
+def _numbers(toolpath: Toolpath, given: GivenAnswers, ask: Callable[[Question], float | str] | None,
+             assume: bool) -> tuple[tuple[NumberedTool, ...], list[Question], list[Question]]:
+    """Numbers of tools by name, answered or assumed; the questions, and those without an answer."""
+    named = named_tools(toolpath)
+    asked = number_questions(named)
+    answers, left = answered(asked, given, ask, assume)
+    said = {q.name: int(answers[q.key].value) for q in asked if q.key in answers and answers[q.key].source == "answered"}
+    return tuple(replace(one, number=said[one.name], why="answered", assumed=False) if one.name in said else one
+                 for one in named), asked, left
+
+
+def _of_two(named: tuple[NumberedTool, ...], toolpath: Toolpath) -> list[Diagnostic]:
+    """Answered numbers that another tool has."""
+    own, used = {one.name: one.number for one in named}, taken_numbers(toolpath)
+    free = next(n for n in count(1) if n not in used and n not in own.values())
+    return [error("setup.number_taken", f"T{one.number} is the number of another tool, not free for {one.name!r}",
+                  file=toolpath.file, hint=f"{free} is free: --tool-number {shlex.quote(f'{one.name}={free}')}")
+            for one in named if one.why == "answered" and (one.number in used or any(
+                n == one.number for name, n in own.items() if name != one.name))]
+
+
+def _no_such_name(given: GivenAnswers, names: list[str], toolpath: Toolpath) -> list[Diagnostic]:
+    """Numbers for names that no tool without a number has."""
+    wrong = [name for name in given.tool_number if name.upper() not in {n.upper() for n in names}]
+    said = f"tools that need one: {', '.join(names)}" if names else "every tool has its number in the CL file: leave it out"
+    return [error("setup.no_such_name", f"--tool-number {name}: no tool of that name needs a number", file=toolpath.file,
+                  hint=said) for name in wrong]
 
 
 def _units(found: list[Diagnostic], options: Options) -> str:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import math
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from postproc.setup.spindle import CoolantKind
-from postproc.setup_sheet.facts import SheetFacts, ToolFacts
+from postproc.setup_sheet.facts import NumberedTool, SheetFacts, ToolFacts
 
-QuestionKind = Literal["gauge_length", "spindle", "feed", "coolant"]
+QuestionKind = Literal["tool_number", "gauge_length", "spindle", "feed", "coolant"]
 AnswerSource = Literal["answered", "assumed"]
 ASSUMED_SPEED = 1000.0
 """rev/min, for a first run in the air: no cutting speed"""
@@ -20,15 +22,17 @@ ASSUMED_LENGTH = 150.0
 """mm, longer where CAM draws a longer cutter"""
 _ABOVE_CUTTER = 50.0
 """mm from the end of a cutter, as CAM draws it, to the gauge point, where that is assumed"""
-_LARGEST: dict[QuestionKind, float] = {"gauge_length": 2000.0, "spindle": 200000.0, "feed": 200000.0}
-_UNITS: dict[QuestionKind, str] = {"gauge_length": "mm", "spindle": "rev/min", "feed": "mm/min", "coolant": ""}
-_OPTIONS: dict[QuestionKind, str] = {"gauge_length": "--gauge-length", "spindle": "--spindle", "feed": "--feed",
-                             "coolant": "--coolant"}
+_LARGEST: dict[QuestionKind, float] = {"tool_number": 999999.0, "gauge_length": 2000.0, "spindle": 200000.0,
+                                       "feed": 200000.0}
+_UNITS: dict[QuestionKind, str] = {"tool_number": "", "gauge_length": "mm", "spindle": "rev/min", "feed": "mm/min",
+                                   "coolant": ""}
+_OPTIONS: dict[QuestionKind, str] = {"tool_number": "--tool-number", "gauge_length": "--gauge-length",
+                                     "spindle": "--spindle", "feed": "--feed", "coolant": "--coolant"}
 
 
 @dataclass(frozen=True)
 class Question:
-    """One value that is asked for; `number` is that of the tool, 0 for all.
+    """One value that is asked for; `number` is that of the tool, 0 for all; `name` is that of a tool without a number.
 
     Attributes:
         text: what is asked, without its unit
@@ -41,10 +45,13 @@ class Question:
     text: str
     default: float | str | None
     assumed: float | str | None
+    name: str = ""
 
     @property
     def key(self) -> str:
         """Its key in the set-up, as `assumed` names it."""
+        if self.name:
+            return f"tool_numbers.{self.name}"
         return f"tools.{self.number}.{self.kind}" if self.number else f"output.{self.kind}"
 
     @property
@@ -55,6 +62,8 @@ class Question:
     @property
     def option(self) -> str:
         """The option that answers it."""
+        if self.name:
+            return f"{_OPTIONS[self.kind]} {shlex.quote(f'{self.name}=N')}"
         value = "KIND" if self.kind == "coolant" else {"mm": "MM", "rev/min": "RPM"}.get(self.unit, "MM/MIN")
         return f"{_OPTIONS[self.kind]} {f'{self.number}=' if self.number else ''}{value}"
 
@@ -75,21 +84,30 @@ class Answer:
 
 @dataclass(frozen=True)
 class GivenAnswers:
-    """Answers on the command line: by tool number, 0 for all tools."""
+    """Answers on the command line: by tool number, 0 for all tools; numbers of tools by name."""
 
     gauge_length: Mapping[int, float] = field(default_factory=dict)
     spindle: Mapping[int, float] = field(default_factory=dict)
     feed: float | None = None
     coolant: str = ""
+    tool_number: Mapping[str, int] = field(default_factory=dict)
 
     def of(self, question: Question) -> float | str | None:
         """The answer to a question, None where there is none."""
+        if question.name:
+            return next((float(n) for name, n in self.tool_number.items() if name.upper() == question.name.upper()), None)
         if question.kind == "feed":
             return self.feed
         if question.kind == "coolant":
             return self.coolant or None
         known = self.gauge_length if question.kind == "gauge_length" else self.spindle
         return known.get(question.number, known.get(0))
+
+
+def number_questions(named: tuple[NumberedTool, ...]) -> list[Question]:
+    """The number in the magazine of each tool to which the CL file gives none of its own; a free one is offered."""
+    return [Question("tool_number", 0, f"tool {json.dumps(one.name, ensure_ascii=False)}: number in the magazine "
+                     f"({one.why})", float(one.number), float(one.number), one.name) for one in named if one.assumed]
 
 
 def questions_of(facts: SheetFacts) -> list[Question]:
@@ -130,6 +148,8 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
         value = float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
     except ValueError:
         return None, f"{text!r} is not a number"
+    if question.kind == "tool_number" and value != int(value):
+        return None, f"{text} is not a whole number"
     if not 0.0 < value <= _LARGEST[question.kind]:
         return None, f"{text} is not above 0 and at most {_LARGEST[question.kind]:g} {question.unit}"
     return value, ""

@@ -34,7 +34,8 @@ class SheetHeader:
     axis_tolerance: float
 
 
-def sheet_values(facts: SheetFacts, answers: Mapping[str, Answer], description: str, code: str) -> dict[str, Any]:
+def sheet_values(facts: SheetFacts, answers: Mapping[str, Answer], description: str, code: str,
+                 machine: str) -> dict[str, Any]:
     """The values of the set-up, [part] still at its defaults."""
     sides = {str(tool.number): tool.direction for tool in facts.tools}
     tools: dict[str, dict[str, Any]] = {}
@@ -45,8 +46,8 @@ def sheet_values(facts: SheetFacts, answers: Mapping[str, Answer], description: 
         (tools.setdefault(rest[0], {}) if where == "tools" else output)[rest[-1]] = value
     assumed = sorted(key for key, answer in answers.items() if answer.source == "assumed" and answer.value != "off")
     assumed += [TOOL_NUMBERS] * any(one.assumed for one in facts.named)
-    return {"description": description, "work_offset_code": code, "assumed": assumed, "tools": tools, "output": output,
-            "tool_numbers": facts.numbers}
+    return {"description": description, "machine": machine, "work_offset_code": code, "assumed": assumed, "tools": tools,
+            "output": output, "tool_numbers": facts.numbers}
 
 
 def sheet_text(header: SheetHeader, facts: SheetFacts, answers: Mapping[str, Answer], fit: Fit, toolpath: Toolpath) -> str:
@@ -83,6 +84,8 @@ def _top(header: SheetHeader, setup: SetupFile, toolpath: Toolpath) -> Iterator[
     yield f"# Proved with --tolerance {header.tolerance:g} (mm) and --axis-tolerance {header.axis_tolerance:g} (degrees)."
     yield f"# Units of the CL file: {header.units}, {header.units_from}"
     yield _line("description", toml_text(setup.description), "name of the part, or of the CL file")
+    if setup.machine:
+        yield _line("machine", toml_text(setup.machine), "as -m has it: on another machine convert warns")
     yield _line("work_offset_code", json.dumps(setup.work_offset_code), "register of the control: the first; or as the shop "
                 "uses it")
     named = setup.work_offset or toolpath.frames[0].name

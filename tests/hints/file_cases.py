@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.hints.case import COMMAND, Edit, HintCase
-from tests.hints.convert_cases import CUT, LENGTH, START
+from tests.hints.convert_cases import CUT, LENGTH, START, nx
 
 GOOD = "".join(f"{n},{n}\n" for n in range(5, 18))
 PROGRAM = (
@@ -291,4 +291,12 @@ _SHEETS = [
         (Edit(COMMAND, "p.ngc", "part.apt"),),
     ),
 ]
-FILE = [*_LOGS, *_MESHES, *_PROOFS, *_SHEETS]
+_NUMBERS = [
+    HintCase("setup.number_taken", "setup new part.cls -m mill-3axis -o new.toml --force --yes --tool-number EM6=2",
+             {"part.cls": "UNITS/MM\n" + nx("EM12", 2, 12) + nx("EM6", 2, 6)}, "(--tool-number EM6=[0-9]+)",
+             (Edit(COMMAND, "--tool-number EM6=2", r"\1"),)),
+    HintCase("setup.no_such_name", "setup new part.cls -m mill-3axis -o new.toml --force --yes --tool-number EM7=3",
+             {"part.cls": "UNITS/MM\n" + nx("EM12", 2, 12) + nx("EM6", 2, 6)}, "tools that need one: (EM6)",
+             (Edit(COMMAND, "EM7", r"\1"),)),
+]
+FILE = [*_NUMBERS, *_LOGS, *_MESHES, *_PROOFS, *_SHEETS]

@@ -224,4 +224,12 @@ _SPINDLE_FEED = [
         control="siemens-840d",
     ),
 ]
-TOOLS = [*_TOOLS, *_SPINDLE_FEED]
+BELOW = "RAPID\nGOTO/0,0,-50,0,0,-1\nGOTO/0,0,-5\nGOTO/10,0,-5\nRAPID\nGOTO/10,0,-50\n"
+_PART = [
+    convert("setup.machine", START + CUT, "or (machine = 'mill-3axis') in it", sheet("machine = 'mill-4axis'", r"\1"),
+            setup="machine = 'mill-4axis'\n" + LENGTH),
+    convert("setup.upside_down", START + BELOW, r"(\[part\]) (x_axis = .*?), (y_axis = .*?\]) in",
+            sheet("", r"\1\n\2\n\3\n"),
+            machine="fork-head-ab", stops=("travel.exceeded",)),
+]
+TOOLS = [*_PART, *_TOOLS, *_SPINDLE_FEED]

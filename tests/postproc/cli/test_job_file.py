@@ -105,7 +105,11 @@ def test_quiet_and_verbose(part: Path, tmp_path: Path) -> None:
     got = run("convert", part, "-o", out, "-q")
     assert got.exit_code == 0 and got.stdout == "" and got.stderr == "" and out.exists()
     (tmp_path / "job" / "s.toml").write_text("")
-    assert "warning [tool.length]" in run("convert", part, "-o", out, "--quiet").stderr
+    for words in (("--quiet",), ("-qm", "mill-3axis"), ("-qmmill-3axis",), ("-q",)):
+        found = run("convert", part, "-o", out, *words).stderr
+        assert "warning [tool.length]" in found and "info [" not in found, words
+        assert found.startswith(f"{tmp_path}/job/postproc.toml: "), "where the values come from stands before what is wrong"
+        assert ("machine mill-3axis" in found.splitlines()[0]) == (len(words) == 1 and "mmill" not in words[0]), words
     stages = run("convert", part, "-o", out, "-v").stderr.splitlines()
     assert {"blocks", "read back"} <= set(stages)
     assert "blocks" not in run("convert", part, "-o", out).stderr.splitlines(), "the option is for one command"

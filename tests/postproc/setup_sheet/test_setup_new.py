@@ -148,17 +148,40 @@ def test_free_numbers_for_all_tools_at_once(tmp_path: Path) -> None:
 def test_questions_are_asked_and_answered(tmp_path: Path) -> None:
     file, out = bare(tmp_path), tmp_path / "s.toml"
     words = ("setup", "new", file, "-m", "head-table", "-c", "fanuc-30i", "-o", out)
-    got = run(*words, stdin="fast\n-3\n8000\n350\nflood\n")
+    got = run(*words, stdin="one\n2.5\n\nfast\n-3\n8000\n350\nflood\n")
+    assert "2.5 is not a whole number" in got.stderr and "number in the magazine" in got.stderr
     assert "'fast' is not a number" in got.stderr and "-3 is not above 0" in got.stderr
     setup = tomllib.loads(out.read_text())
     assert setup["tools"]["1"]["spindle"] == {"rpm": 8000, "direction": "clockwise"}
     assert setup["output"] == {"default": "auto", "feed": 350, "coolant": "flood", "operations": {"SLOT": "auto"}}
-    assert setup["assumed"] == ["tool_numbers"] and "tool_numbers: EM10 = T1 is assumed" in got.stderr
+    assert "assumed" not in setup and setup["tool_numbers"] == {"EM10": 1}
     assert "ASSUMED: the CL file states none" in out.read_text()  # the units
     before = out.read_text()
     assert run(*words, "--yes", code=2).stderr and out.read_text() == before, "no file is replaced without --force"
     run(*words, "--yes", "--force", "--feed", "70")
     assert tomllib.loads(out.read_text())["output"]["feed"] == 70 and out.read_text() != before
+
+
+def test_numbers_of_tools_are_answers(tmp_path: Path) -> None:
+    file, out = bare(tmp_path), tmp_path / "s.toml"
+    words = ("setup", "new", file, "-m", "mill-3axis", "-o", out, "--yes", "--force")
+    got = run(*words)
+    assert tomllib.loads(out.read_text())["assumed"][-1] == "tool_numbers"
+    assert "tool_numbers: EM10 = T1 is assumed" in got.stderr
+    run(*words, "--tool-number", "em10=7")
+    setup = tomllib.loads(out.read_text())
+    assert setup["tool_numbers"] == {"EM10": 7} and "tool_numbers" not in setup["assumed"] and "7" in setup["tools"]
+    assert setup["machine"] == "mill-3axis"
+    assert "needs a number" in run(*words, "--tool-number", "EM6=7", code=1).stderr
+    assert "is not NAME=number" in run(*words, "--tool-number", "7", code=2).stderr
+    two = bare(tmp_path, "two tools of one number")
+    words = ("setup", "new", two, "-m", "mill-3axis", "-o", out, "--yes", "--force")
+    run(*words)
+    (name,) = [name for name, n in tomllib.loads(out.read_text())["tool_numbers"].items() if n != 1]
+    taken = run(*words, "--tool-number", f"{name}=1", code=1).stderr
+    free = re.search(r"--tool-number (\S+)", taken)
+    assert "setup.number_taken" in taken and free
+    run(*words, "--tool-number", free[1])
 
 
 def test_gauge_lengths_are_asked_for_where_words_depend_on_them(tmp_path: Path) -> None:
@@ -175,7 +198,7 @@ def test_gauge_lengths_are_asked_for_where_words_depend_on_them(tmp_path: Path) 
 
 def test_what_nobody_answers_is_one_list(tmp_path: Path) -> None:
     file, out = bare(tmp_path), tmp_path / "s.toml"
-    got = run("setup", "new", file, "-m", "mill-3axis", "-o", out, "--json", "-", stdin="900\n", code=1)
+    got = run("setup", "new", file, "-m", "mill-3axis", "-o", out, "--json", "-", stdin="\n900\n", code=1)
     assert not out.exists()
     values = json.loads(got.stdout)
     (fault,) = [d for d in values["diagnostics"] if d["severity"] == "error"]
