@@ -4,7 +4,8 @@ from __future__ import annotations
 
 _WHY = {
     "nothing is to be done: it says what was taken, or what a look at the machine decides": (
-        "calibrate.residual calibrate.ways cl.cycle-place collision.bound compensation.range cutcom.none cutcom.own_register "
+        "calibrate.residual calibrate.ways cl.cycle-place collision.bound compensation.range cutcom.none "
+        "cutcom.own_register "
         "cutcom.register error-import.unused error-model.no-effect error-model.range error-table.kind feed.largest "
         "file.mixed orient.error_model orient.own_limits orient.own_tilt orient.slower orient.unproved output.next_mode "
         "place.lifted tool-table.bodies tool-table.far tool.length_twice"),
