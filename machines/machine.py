@@ -132,6 +132,7 @@ class Machine:
         largest_feed: mm/s, the largest cutting feed; infinite where the machine file does not say
         cutting_velocity: per joint, mm/s or rad/s, largest at feed; () where that is the velocity of rapids
         options: what the file says of the options of the control
+        look_ahead, block_time: blocks that the control sees ahead, s that it takes for a block; None: not stated
         hooks: blocks of the shop at certain places of a program
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
@@ -158,6 +159,8 @@ class Machine:
     largest_feed: float = math.inf
     cutting_velocity: tuple[float, ...] = ()
     options: ControlOptions = field(default_factory=ControlOptions)
+    look_ahead: int | None = None
+    block_time: float | None = None
     hooks: HooksModel = field(default_factory=HooksModel)
 
     def __post_init__(self) -> None:

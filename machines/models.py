@@ -167,6 +167,11 @@ class ControlModel(UserModel):
     largest_feed: Positive | None = None
     """mm/min, as F words have it: the largest cutting feed of the machine, which the control clamps greater feeds to or
     refuses. Fanuc: parameter 1422; default: none but the velocities of the axes"""
+    look_ahead: int | None = Field(default=None, ge=1)
+    """blocks that the control sees ahead while it plans speeds, by the option that is fitted; default: as the model of the
+    cycle time has it"""
+    block_time: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    """s that the control takes for a block at least; default: likewise"""
     length_register: Register = "T"
     """the length register H of a tool for which the CL file names none or the tool's number T: "T", or "T +
     20"; of controls that name registers"""

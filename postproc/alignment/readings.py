@@ -94,7 +94,7 @@ def read_readings(file: Path, job: Job, probe_length: float, machine_coordinates
     shown = np.stack([table.columns[name] for name in MEASURED], axis=1)
     blank = ~(np.isfinite(nominal).all(axis=1) & np.isfinite(shown).all(axis=1))
     if blank.any():
-        return None, [_fault(table, "cell", "a coordinate is missing", [table.lines[k] for k in np.flatnonzero(blank)],
+        return None, [_fault(table, "align.cell", "a coordinate is missing", [table.lines[k] for k in np.flatnonzero(blank)],
                              "state all three coordinates of a point on the surface; nx, ny, nz say which count")]
     size = lengths(normal)
     frame, placement = job.work_system, job.placement
@@ -132,16 +132,17 @@ def _columns(table: CsvTable, job: Job) -> list[Diagnostic]:
     if missing or unknown:
         both = ("no column", missing), ("unknown column", unknown)
         what = [f"{text} {', '.join(names)}" for text, names in both if names]
-        found.append(_fault(table, "column", "; ".join(what), [table.head], f"columns are {', '.join(known)}: {_HEADER}"))
+        found.append(_fault(table, "align.column", "; ".join(what), [table.head],
+                            f"columns are {', '.join(known)}: {_HEADER}"))
     wanted: Iterable[tuple[str, dict[str, float]]] = (
         *((name, LENGTHS) for name in (*NOMINAL, *MEASURED, SIGMA)), *((name, ANGLES) for name in rotary))
     wrong = [f"{name} [{', '.join(units)}]" for name, units in wanted
              if name in table.columns and table.unit[name] not in units]
     if wrong and not found:
-        found.append(_fault(table, "unit", f"no unit that fits in the header of {', '.join(wrong)}", [table.head],
+        found.append(_fault(table, "align.unit", f"no unit that fits in the header of {', '.join(wrong)}", [table.head],
                             f"write the header as {_HEADER}"))
     return found
 
 
 def _fault(table: CsvTable, code: str, what: str, lines: list[int], hint: str) -> Diagnostic:
-    return error(f"align.{code}", what, file=table.file, lines=lines[:6], count=len(lines), hint=hint)
+    return error(code, what, file=table.file, lines=lines[:6], count=len(lines), hint=hint)

@@ -109,6 +109,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     assert spec is not None
     planner, found = load_model(model or model_name(controller, spec.writer))
     require(found)
+    planner = planner.of_machine(machine) if planner is not None else None
     data = read_file(file)
     if looks_like_gcode(data):
         setup, found = load_setup(options.setup or None)

@@ -270,6 +270,8 @@ class Tools(UserModel):
     """a tool change puts the tool's length in force by itself; with an empty `length_cancel` it cannot be taken back"""
     home_without_length: bool = False
     """blocks in machine coordinates switch the length register off"""
+    cutting_edges: bool = False
+    """a tool has cutting edges D1 to D9, so that a register 2 to 9 of the CL file may be one: refused"""
 
 
 class SubprogramFormat(UserModel):

@@ -67,6 +67,7 @@ def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with
         with_band: False leaves the band at the time itself, for many programs in a row
         times: of a motion that is planned already, instead of the model's; the uncertainties stay the model's
     """
+    model = model.of_machine(machine)
     times = times or timed(blocks, model)
     seconds = total(blocks, times)
     bound = lower_bound(blocks, model)

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from machines.machine import Machine
 from machines.user_file import UserModel, load_toml
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic
@@ -72,6 +73,15 @@ class CycleTimeModel(UserModel):
     assumed: tuple[str, ...] = ()
     """parameters that no document states and no run has shown"""
     calibration: CalibrationRecord | None = None
+
+    def of_machine(self, machine: Machine) -> CycleTimeModel:
+        """With what the machine file says of its control ([control] look_ahead, block_time); a block time that was measured
+        stays. Only of a control with look-ahead."""
+        stated = {"lookahead": machine.look_ahead, "block_time": None if self.calibration else machine.block_time}
+        known = {name: value for name, value in stated.items() if value is not None}
+        if self.kind != "lookahead" or not known:
+            return self
+        return self.model_copy(update={**known, "assumed": tuple(name for name in self.assumed if name not in known)})
 
     def values(self) -> Floats:
         """(5,) logarithms of PARAMETERS."""

@@ -54,9 +54,9 @@ def own_registers(toolpath: Toolpath, controller: ControllerFile) -> tuple[Toolp
     known: dict[int, set[int]] = {}
     for said, register, _ in loads:
         known.setdefault(said.number, set()).add(register)
-    edge = text.startswith("D")
     lengths = [said for said in named if len(known[said.number]) > 1]
-    edges = [said for said in named if edge and said not in lengths and said.register in EDGES and said.register != 1]
+    several = controller.tools.cutting_edges
+    edges = [said for said in named if several and said not in lengths and said.register in EDGES and said.register != 1]
     rest = [said for said in named if said not in lengths and said not in edges]
     found = _refused(toolpath, lengths, "names more than one length register, but this controller has one length of a tool",
                      "give each length a tool number of its own, or state no ADJUST in LOADTL")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -37,9 +38,19 @@ def _fast() -> Callable[..., Any]:
         rows, numbers = (types.Array(types.float64, n, "A", readonly=True) for n in (2, 1))
         flags = types.Array(types.boolean, 1, "A", readonly=True)
         signature = (rows, rows, rows, rows, rows, numbers, rows, flags, types.float64, types.float64)
+        own = dict(globals())  # of the compiled functions: those of the module stay interpreted
+
+        def made(name: str, *signature: Any) -> Callable[..., Any]:
+            function = FunctionType(own[name].__code__, own, name)
+            try:
+                result: Callable[..., Any] = njit(*signature, cache=True)(function)
+            except RuntimeError:  # no folder for the cache
+                result = njit(*signature)(function)
+            return result
+
         for name in ("_apart", "_near", "_turned"):
-            globals()[name] = njit(cache=True)(globals()[name])
-        _compiled.append(njit(signature, cache=True)(_walk))
+            own[name] = made(name)
+        _compiled.append(made("_walk", signature))
     return _compiled[0]
 
 

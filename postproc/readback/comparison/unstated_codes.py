@@ -63,8 +63,8 @@ def _needs(code: Canonical, reader: Reader) -> Iterator[Need]:
 def _known(reader: Reader) -> set[str]:
     """The groups whose state the controller file says."""
     said = reader.controller.start.codes if reader.controller is not None else ()
-    numbers = [float(m[1]) for text in said if (m := re.fullmatch(r"G(\d+\.?\d*)", text))]
-    return {name for name, group in reader.groups.items() if among(numbers, group).any()}
+    numbers = {float(m[1]) for text in said if (m := re.fullmatch(r"G(\d+\.?\d*)", text))}
+    return {name for name, group in reader.groups.items() if numbers.intersection(group)}
 
 
 def _moves(words: Words, axes: tuple[str, ...]) -> Ints:

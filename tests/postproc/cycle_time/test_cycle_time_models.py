@@ -138,6 +138,19 @@ def test_wider_corners_and_quicker_blocks_are_faster() -> None:
     assert total(b, timed(b, slow)) >= 0.2 * len(b)
 
 
+def test_the_machine_file_says_what_its_control_sees_ahead() -> None:
+    """Few blocks and slow ones take longer; neither is assumed then. Planners that have no such rule stay as they are."""
+    b = blocks(f"{HEAD}\nF30000\n" + "\n".join(f"G1 X{0.2 * i:.1f}" for i in range(1, 200)), controller="generic-iso")
+    plain = estimate(b, machine(), model("lookahead"), with_band=False)
+    few, slow = (replace(machine(), **stated) for stated in ({"look_ahead": 5}, {"block_time": 0.05}))
+    assert estimate(b, few, model("lookahead"), with_band=False).seconds > 1.3 * plain.seconds
+    made = estimate(b, slow, model("lookahead"), with_band=False)
+    assert made.seconds >= 0.05 * len(b) > plain.seconds and "block_time" not in made.model.assumed
+    assert "block_time" in plain.model.assumed
+    for kind in ("linuxcnc", "ideal"):
+        assert estimate(b, few, model(kind), with_band=False).seconds == estimate(b, machine(), model(kind), False).seconds
+
+
 def test_window_of_few_blocks_is_slower() -> None:
     b = blocks(f"{HEAD}\nF30000\n" + "\n".join(f"G1 X{0.2 * i:.1f}" for i in range(1, 500)),
                controller="generic-iso")

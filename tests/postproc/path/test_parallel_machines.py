@@ -38,11 +38,13 @@ def sample(file: str, name: str, setup_name: str) -> PostResult:
 
 
 @pytest.mark.parametrize(("name", "file", "moves"), [
-    *((name, "inch_plate.apt", 10) for name in DELTAS if name != "delta-cone"), ("delta-cone", "pocket.cls", 80),
+    *((name, "inch_plate.apt", 10) for name in DELTAS if name in ("delta-cone", "delta-hybrid", "delta-parallel-x")),
     ("uranesx", "pocket.cls", 80),
-    *(pytest.param(name, "pocket.cls", 80, marks=pytest.mark.slow)
-      for name in DELTAS[::2] if name not in ("delta-cone", "uranesx"))])
+    *(pytest.param(name, "inch_plate.apt", 10, marks=pytest.mark.slow)
+      for name in DELTAS if name not in ("delta-cone", "delta-hybrid", "delta-parallel-x")),
+    *(pytest.param(name, "pocket.cls", 80, marks=pytest.mark.slow) for name in DELTAS[::2] if name != "uranesx")])
 def test_three_axis_on_every_delta(name: str, file: str, moves: int) -> None:
+    """One of each way that rails run; all with -m slow, and each in test_every_machine_and_control.py."""
     result = sample(file, name, "delta")
     tip, axis, compared = deviations(result)
     assert compared >= moves and axis == 0.0
