@@ -52,6 +52,11 @@ class Shape:
     tail: list[str] = field(default_factory=lambda: ["FINI"])
 
 
+def _size(name: str) -> str:
+    """Diameter of a tool by its name, mm."""
+    return "8" if name == "EM8" else "10"
+
+
 def _points(form: str, vector: bool) -> Callable[[np.ndarray, np.ndarray], str]:
     count = 6 if vector else 3
     return lambda tip, axis: "GOTO" + form + ",".join(f"{v:.5f}" for v in (*tip, *axis)[:count])
@@ -97,6 +102,25 @@ SHAPES = (
           lambda name, n: [f"CUTTER/{'8' if name == 'EM8' else '10'},0,5,0,0,0,75",
                            *([f"LOADTL/{n},IN,1,LENGTH,75,OSETNO,{n}"] if n else [])],
           "SPINDL/RPM,3000,CLW", "FEDRAT/MMPM,250", "COOLNT/FLOOD", "/", True),
+    Shape("makino", "cls", ["UNITS/MM"], ["PARTNO/MAKINO-FF", "MULTAX/ON"],
+          lambda name, n: [f"TLDATA/MILL,{_size(name)}.0,0.0,75.0,0.0,0.0", *([f"LOAD/TOOL,{n}"] if n else [])],
+          "SPINDL/RPM,3000,CLW", "FEDRAT/MMPM,250.0", "COOLNT/FLOOD", "/", True),
+    Shape("camplete", "apt", ["UNITS/MM"], ["PARTNO/'slot'", "MODE/MILL", "MCS/1,0,0,0,1,0,0,0,1,0,0,0", "MULTAX/ON"],
+          lambda name, n: [f"CUTTER/{_size(name)}.0,0.0", "CSI_SET_FLUTE_LENGTH/40.0",
+                           *([f"LOADTL/{n}, 0, 75.0, {n}"] if n else [])],
+          "SPINDL/RPM, 3000, CLW", "FEDRAT/250.0, MMPM", "COOLNT/FLOOD", "/", True),
+    Shape("mfgsuite", "apt", ["UNITS/ MM"], ["PARTNO/ 'slot'", "BEGIN", "OPNAME/ 'Slot'", "APPLY/ MILL",
+                                             "MCSYS/ NUM, 1, POINT, 0, 0, 0, VECTOR, 1, 0, 0, VECTOR, 0, 1, 0",
+                                             "MULTAX/ ON"],
+          lambda name, n: [f"CUTTER/ {_size(name)}.0, 0.0", *([f"TOOLNO/ {n}, MILL, OSETNO, {n}, 9",
+                                                             f"LOAD/ TOOL, {n}, '{name}', NEXTTL, 1"] if n else [])],
+          "SPINDL/ RPM, 3000, CLW", "FEDRAT/ 250, MMPM", "COOLNT/ FLOOD", "/ ", True, tail=["END/"]),
+    Shape("autodesk-iso", "apt", ["UNITS/MM"], ["PARTNO/'slot'", "MODE/MILL", "PPRINT/'slot'", "MULTAX/ON"],
+          lambda name, n: [f"CUTTER/{_size(name)}.0, 0.0", *([f"LOADTL/{n}, 0, 75.0, {n}"] if n else [])],
+          "SPINDL/RPM, 3000, CLW", "FEDRAT/250.0, MMPM", "COOLNT/FLOOD", "/", True, tail=["END", "FINI"]),
+    Shape("hsmworks", "apt", ["UNITS/MM"], ["PARTNO/'slot'", "MULTAX/ON"],
+          lambda name, n: [f"CUTTER/{_size(name)}, 0", *([f"LOADTL/{n}, IN, 0, LENGTH, 75, OSETNO, {n}"] if n else [])],
+          "SPINDL/RPM, 3000, CLW", "FEDRAT/250, MMPM", "COOLNT/FLOOD", "/", True, tail=["END", "FINI"]),
 )
 
 

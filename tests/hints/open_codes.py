@@ -5,8 +5,9 @@ from __future__ import annotations
 _WHY = {
     "nothing is to be done: it says what was taken, or what a look at the machine decides": (
         "calibrate.residual calibrate.ways cl.cycle-place collision.bound compensation.range cutcom.none "
-        "cutcom.own_register cutcom.register error-import.unused error-model.no-effect error-model.range error-table.kind "
-        "feed.largest file.mixed orient.error_model orient.own_limits orient.own_tilt orient.slower orient.unproved output.next_mode "
+        "cutcom.own_register "
+        "cutcom.register error-import.unused error-model.no-effect error-model.range error-table.kind feed.largest "
+        "file.mixed orient.error_model orient.own_limits orient.own_tilt orient.slower orient.unproved output.next_mode "
         "place.lifted tool-table.bodies tool-table.far tool.length_twice"),
     "only by a fault of the program itself, or of a library call: no file leads there": (
         "arc.no_start axis.spin calibrate.converged cl.dropped cycle.pitch file.not_recovered gcode.open "
