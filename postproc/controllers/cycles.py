@@ -51,10 +51,10 @@ class Cycles(UserModel):
     rigid_only: tuple[str, ...] = ("TAP",)
     """kinds that must not become single moves, next to those that never do"""
     rigid_option: str = ""
-    """the option that rigid tapping needs: a comment at the head of programs that tap, where the machine file does not
+    """the option that rigid tapping needs: a comment in the header of programs that tap, where the machine file does not
     confirm it"""
     floating: str = ""
-    """what taps need where rigid tapping is not fitted, and `codes.rigid_tap` is left out: a comment at the head; empty:
+    """what taps need where rigid tapping is not fitted, and `codes.rigid_tap` is left out: a comment in the header; empty:
     the control's cycles are rigid alone, taps are then refused"""
     dwell_milliseconds: bool = False
     """the dwell of a cycle is a whole number of ms, else s"""
