@@ -27,6 +27,8 @@ FAULTS = (
     Fault("jacobian without the rotary axes", "kinematics", "Serial._rates",
           "rates[i, index, 0], rates[i, index, 1] = both",
           "rates[i, index, 0], rates[i, index, 1] = 0.0 * both[0], both[1]"),
+    Fault("slides seen from the part as with the tables at zero", "kinematics", "Serial.slide_directions",
+          "self._turned(joint, turning)", "columns.of_one(joint.direction)"),
     Fault("units of rotary words", "kinematics", "Control.unit", "np.where(self.machine.rotary, 1.0 / DEG, 1.0)",
           "np.where(self.machine.rotary, 1.0 / DEG * 1.001, 1.0)"),
     Fault("work offset 0.5 mm off", "kinematics", "Control.work_offset", "self.slides)[0] * self.unit",

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from postproc.readback.comparison import align
+from postproc.readback.alignment import align
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.text.words import tokenise
