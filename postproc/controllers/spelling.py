@@ -262,7 +262,7 @@ class Codes(UserModel):
     """cutter compensation off"""
 
 
-TOOL_NAME = r"^[A-Za-z0-9_.+-]{1,31}$"
+TOOL_NAME = r"^[A-Za-z0-9_.-]{1,31}$"
 """names of tools that all controls with names take"""
 
 

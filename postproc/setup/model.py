@@ -66,7 +66,7 @@ class ToolSetup(ToolBody):
     """where the CL file states no SPINDL for this tool, e.g. spindle = { rpm = 8000, direction = "clockwise" }"""
     coolant: CoolantKind | None = None
     """where the CL file states no COOLNT for this tool"""
-    called: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.+-]{1,31}$")] | None = None
+    called: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]{1,31}$")] | None = None
     """name by which the control calls the tool (Siemens Operate T="...", TNC TOOL CALL "..."); default: its number"""
     compensation: Compensation | None = None
     """what CUTCOM is for this tool. wear: its register holds by how much the radius is greater than the CAM system's, 0
