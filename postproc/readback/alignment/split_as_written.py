@@ -48,8 +48,9 @@ def _splits(motion: Motion, executed: BlockPoses, moves: Moves, blocks: Ints, ow
     number = np.arange(len(blocks)) - first[group]
     here = tip[blocks]
     above_begin, above_end = _aside(here - begin[group], axis[group]), _aside(here - end[group], axis[group])
-    rising = np.maximum.reduceat(np.where(above_begin <= NEAR, number, -1), first)
-    across = np.minimum.reduceat(np.where(above_end <= NEAR, number, len(blocks)), first)
+    to_begin = above_begin <= above_end  # of two lines that are near each other, the nearer one
+    rising = np.maximum.reduceat(np.where(to_begin & (above_begin <= NEAR), number, -1), first)
+    across = np.minimum.reduceat(np.where(~to_begin & (above_end <= NEAR), number, len(blocks)), first)
     rises, falls = rising >= 0, across < count - 1
     up, over = blocks[first + np.maximum(rising, 0)], blocks[first + np.minimum(across, count - 1)]
     low, high = along(begin, axis), along(end, axis)

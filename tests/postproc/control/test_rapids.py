@@ -226,3 +226,15 @@ def test_the_second_witness_holds_dog_legs_above_what_is_cut(controller: str, st
         blocks = comparison if finds else made.comparison
         said, _ = second_witness.second_witness(made.source, setup, made.options, made.job, blocks, program)
         assert (("clearance" in {f.code for f in said.findings}) is finds), (level, said.findings)
+
+
+@pytest.mark.parametrize("controller", BENT)
+@pytest.mark.parametrize("aside", [0.011, 0.015, 0.019, 0.025, 0.2])
+def test_a_rapid_that_goes_up_and_little_aside(controller: str, aside: float) -> None:
+    """Split although its two lines along the tool axis are nearly one."""
+    steps = [line.replace("GOTO/12,0,60", f"GOTO/{12 + 0.6 * aside:.4f},{0.8 * aside:.4f},60") for line in STEP]
+    for name in ("mill-3axis", "mikron-ucp710"):
+        made = postproc.convert(toolpath(*steps), machines.load(name), controller, setup_of("[tools.1]\ngauge_length = 90\n"),
+                                Options(output="axes"))
+        assert made.ok and made.job is not None, [str(d) for d in made.diagnostics]
+        assert len(made.job.moves) > len(made.job.commanded)
