@@ -234,7 +234,7 @@ def test_a_rapid_that_goes_up_and_little_aside(controller: str, aside: float) ->
     """Split although its two lines along the tool axis are nearly one."""
     steps = [line.replace("GOTO/12,0,60", f"GOTO/{12 + 0.6 * aside:.4f},{0.8 * aside:.4f},60") for line in STEP]
     for name in ("mill-3axis", "mikron-ucp710"):
-        made = postproc.convert(toolpath(*steps), machines.load(name), controller, setup_of("[tools.1]\ngauge_length = 90\n"),
-                                Options(output="axes"))
+        setup = setup_of("[tools.1]\ngauge_length = 90\n")
+        made = postproc.convert(toolpath(*steps), machines.load(name), controller, setup, Options(output="axes"))
         assert made.ok and made.job is not None, [str(d) for d in made.diagnostics]
         assert len(made.job.moves) > len(made.job.commanded)
