@@ -16,6 +16,7 @@ from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import DiagnosticError, Severity, error
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 POSES = 5
@@ -29,6 +30,7 @@ _CLEAR = 20.0
 
 
 @dataclass(frozen=True)
+@arrays(point="3", axes="5 3")
 class _Check:
     """The point (3,) and the axes (5, 3) of the poses in the table frame, the tool's number, what the words mean."""
 

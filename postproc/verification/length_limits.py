@@ -28,6 +28,7 @@ from postproc.setup.model import ToolSetup
 from postproc.verification.executed import executed_poses
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import lengths
+from toolpaths.shapes import arrays
 
 STEP = 0.1
 """mm that all tools are made longer by, to see what goes with the length"""
@@ -99,6 +100,7 @@ class _Ends:
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(tip="K 3", axis="K 3", d_tip="K 3", d_axis="K 3")
 class _Places:
     """Blocks at one fraction of each: tips and axes as they are, and by how much both go on per mm of length."""
 

@@ -313,7 +313,8 @@ def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: flo
     reached = np.append(-total, deepest[:-1])
     if (~fed & (depth > np.maximum(reached, -total) + 1e-3)).any():
         found.append("rapid motion into uncut material of a hole")
-    turns = deepest[np.isfinite(deepest) & fed & (np.diff(depth, append=-np.inf) < -0.01)]
+    back = np.append(depth[1:], -np.inf) < deepest - 0.01  # lost motion may be taken up first
+    turns = deepest[np.isfinite(deepest) & (depth >= deepest - 0.01) & back]
     steps = np.diff(np.append(-cycle.depth, np.maximum(np.unique(np.round(turns, 6)), -cycle.depth)))
     allowed = [max(cycle.steps[min(k, len(cycle.steps) - 1):], default=np.inf) for k in range(len(steps))]
     if cycle.kind in _PECKED and (steps > np.array(allowed) + 0.01).any():

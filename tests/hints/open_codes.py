@@ -23,8 +23,10 @@ _WHY = {
         "error-import.directions error-import.map error-import.name error-import.runs error-import.tool_length "
         "error-import.twice error-map.period error-map.scattered error-model.column error-model.rows error-model.series "
         "error-model.travel error-table.unreadable file.input file.own_name file.replaced file.twice file.unfinished "
-        "orient.contact_radius orient.cutter orient.max_tilt orient.no_motion orient.normals place.found place.limits "
-        "proof.comment proof.input_changed proof.older rapid.off_line setup.unanswered tool-table.empty tool-table.open "
+        "gcode.tool_name orient.contact_radius orient.cutter orient.max_tilt orient.no_motion orient.normals place.found "
+        "place.limits "
+        "proof.comment proof.input_changed proof.older rapid.off_line setup.unanswered tool.called tool-table.empty "
+        "tool-table.open "
         "verify.clamp verify.cutcom_arc verify.error_model_changed verify.hook verify.no_bound verify.orient"),
     "open: no case is written yet": (
         "align.cell align.column align.no_spare align.noise align.open align.tilt align.twice align.uncertain "

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice
 from toolpaths.compiled import chosen, loop
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -19,20 +19,20 @@ _ROWS, _NUMBERS, _KINDS, _NUMBER = ("float64", 2), ("float64", 1), ("int8", 1), 
 
 
 @dataclass(frozen=True)
-@arrays(tip="E 3", axis="E 3", sweep="E")
+@arrays(tip="E 3", axis="E 3", sweep="E", rewound="E")
 class EndPoses:
-    """Poses at the ends of executed blocks; `sweep` in rad of those that are arcs, else NaN; `kept`: blocks of no rewind."""
+    """Poses at the ends of executed blocks; `sweep` in rad of arcs, else NaN; `rewound`: blocks of rewinds."""
 
     tip: Floats
     axis: Floats
     sweep: Floats
-    kept: Ints | slice
+    rewound: Bools
 
 
 def aligned(ends: EndPoses, moves: Moves, link: Bools, tolerance: float, axis_tolerance: float,
             grain: tuple[float, float]) -> tuple[Ints, Ints]:
     """`align` without the blocks of rewinds, which get no move (M + 1): but for them the tool only rests there."""
-    kept, count = ends.kept, len(ends.tip)
+    kept, count = as_slice(np.flatnonzero(~ends.rewound)), len(ends.tip)
     match, short = align(ends.tip[kept], ends.axis[kept], ends.sweep[kept], moves.curves(), link, tolerance,
                          axis_tolerance, grain)
     owner = np.full(count, len(moves) + 1)

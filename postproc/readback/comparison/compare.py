@@ -97,7 +97,7 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
     grain = max(1e-3, 1.5 * job.controller.grain), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
     number = rewinds(motion, tip, axis, job.commanded.without_pecks().tip, executed.control.rotary,
                      (2.0 * tolerance, 2.0 * axis_tolerance))
-    ends = EndPoses(tip, axis, sweep, as_slice(np.flatnonzero(number < 0)))
+    ends = EndPoses(tip, axis, sweep, np.asarray(number >= 0))
     job = job.with_moves(split_as_written(motion, executed, job, ends, grain))
     moves = job.moves.without_pecks()
     match, owner = aligned(ends, moves, moves.link, tolerance, axis_tolerance, grain)

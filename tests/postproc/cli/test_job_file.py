@@ -83,9 +83,9 @@ def test_every_key_is_an_option_and_every_command_with_a_machine_and_a_cl_file_t
     found = commands(typer.main.get_command(app))
     assert set(JobFile.model_fields) <= found["convert"]
     on_cl_files = sorted(name for name, names in found.items() if {"machine", "dialect"} <= names)
-    assert on_cl_files == ["convert", "orient", "place", "setup new", "time", "trace", "verify"]
+    assert on_cl_files == ["convert", "orient", "place", "setup align", "setup new", "time", "trace", "verify"]
     for name in on_cl_files:
-        got = run(*name.split(), *(["x.nc"] if name == "verify" else []), part, "--no-such-option")
+        got = run(*name.split(), *({"verify": ["x.nc"], "setup align": ["x.csv"]}.get(name, [])), part, "--no-such-option")
         assert re.search(r"postproc\.toml: .*machine mill-3axis", got.stderr), name
 
 

@@ -74,6 +74,6 @@ def test_blocks_stand_on_a_helix_by_their_length(monkeypatch: pytest.MonkeyPatch
     curves = Curves(points[:1], points[-1:], up, up, np.array([True]), np.zeros((1, 3)), up,
                     np.array([6.0 * np.pi]))
     moves = SimpleNamespace(arc=np.array([0]), link=np.array([False]), curves=curves.take)
-    begin, share = compare._place(None, executed, np.arange(62), np.zeros(62, dtype=int), moves)
+    begin, share = compare.place_on_moves(None, executed, np.arange(62), np.zeros(62, dtype=int), moves)
     np.testing.assert_allclose(begin[[1, 61]], [1 / 3, 2 / 3], atol=1e-3)
     np.testing.assert_allclose(share[[0, 61]], 1 / 3, atol=1e-3)

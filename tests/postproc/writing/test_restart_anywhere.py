@@ -105,7 +105,8 @@ def test_after_a_stop_anywhere_in_the_operation_before(controller: str, machine:
     begins = [next(k for k, n in enumerate(lines) if "M6" in n or "TOOL CALL" in n), *labels(result, controller)]
     rng = np.random.default_rng(5)
     for before, label in pairwise(begins):
-        possible = [k for k in range(before + 10, label) if not lines[k - 1].endswith("~") and "G68.2" not in lines[k - 1]]
+        possible = [k for k in range(before + 10, label) if not lines[k - 1].endswith("~")
+                        and not any(word in lines[k - 1] for word in ("G68.2", "DEF 32.0", "DEF 9.0"))]  # one with the next
         for stop in rng.choice(possible, 5).tolist():
             broken = [*lines[:stop], *lines[label:]]
             assert taken_up(result, "\n".join(broken), stop, home, whole, label) > 0
