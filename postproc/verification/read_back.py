@@ -99,7 +99,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     motion, found = run(code, machine.axis_names, offsets, gcode)
     give_back()
     faults = Faults(job.toolpath.file, gcode)
-    unseen, trial = check_start(code, job, faults), LengthTrial(code, offsets, job)
+    unseen, whole = check_start(code, job, faults), code
     code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))
     diagnostics += [_located(d, job.toolpath.file, of_cl) for d in found]
     if has_errors(diagnostics):
@@ -126,7 +126,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
                    _uncorrected(header, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
     return replace(comparison, executed=(code, motion), poses=executed, planned=planned,
-                   lengths=_margins(motion, executed, trial, comparison)), [*diagnostics, *noted]
+                   lengths=_margins(motion, executed, LengthTrial(whole, offsets, job), comparison)), [*diagnostics, *noted]
 
 
 def _margins(motion: Motion, executed: BlockPoses, trial: LengthTrial, c: Comparison) -> tuple[LengthMargin, ...]:

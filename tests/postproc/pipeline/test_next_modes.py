@@ -183,7 +183,7 @@ def test_auto_converts_all_samples_that_another_mode_converts(machine: str, cont
 
 @pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc"])
 def test_a_program_in_the_next_mode_is_verified_in_it(controller: str, tmp_path: Path) -> None:
-    """Rapids that run as dog-legs are split by the mode; `verify` takes the modes that the program is in."""
+    """Rapids that run as dog-legs are split by the mode; `verify` reads off the program how, and so does the room of lengths."""
     y, z = np.array([0.0, 0.5 * np.sqrt(3.0), 0.5]), np.array([0.0, -0.5, 0.5 * np.sqrt(3.0)])
     at = [",".join(f"{v:.6f}" for v in (*(x * np.eye(3)[0] + u * y + h * z), *z)) for x, u, h in (
         (0, 0, 60), *zip(*zip(*PLACES, strict=True), HEIGHTS, strict=True))]
@@ -197,5 +197,7 @@ def test_a_program_in_the_next_mode_is_verified_in_it(controller: str, tmp_path:
     assert not errors_of(result) and "output.next_mode" in {d.code for d in result.diagnostics}
     program = tmp_path / "p.nc"
     program.write_text(result.text)
-    found = postproc.verify(program, path, "mikron-ucp710", controller, options=options).diagnostics
-    assert not has_errors(found), [str(d) for d in found]
+    verified = postproc.verify(program, path, "mikron-ucp710", controller, options=options)
+    assert not has_errors(verified.diagnostics), [str(d) for d in verified.diagnostics]
+    assert verified.comparison is not None and result.comparison is not None
+    assert verified.comparison.lengths == result.comparison.lengths
