@@ -39,10 +39,10 @@ def split_as_written(motion: Motion, executed: BlockPoses, job: Job, ends: EndPo
 def _splits(motion: Motion, executed: BlockPoses, moves: Moves, blocks: Ints, owner: Ints, tip: Floats,
             tolerance: float) -> tuple[Ints, Floats, Bools, Bools]:
     """(moves (K,) that are split, level (K,) mm along their axis, rises (K,), falls (K,)); `blocks` (B,) by their move."""
-    first = np.flatnonzero(np.diff(owner, prepend=-1) != 0)
+    begins = np.diff(owner, prepend=-1) != 0
+    first, group = np.flatnonzero(begins), np.cumsum(begins) - 1
     if not len(first):
         return owner, np.zeros(0), np.zeros(0, bool), np.zeros(0, bool)
-    group = np.cumsum(np.diff(owner, prepend=-1) != 0) - 1
     move, count = owner[first], np.diff(np.append(first, len(blocks)))
     axis, begin, end = moves.axis[move], moves.tip[move - 1], moves.tip[move]
     number = np.arange(len(blocks)) - first[group]

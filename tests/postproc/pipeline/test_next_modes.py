@@ -183,7 +183,7 @@ def test_auto_converts_all_samples_that_another_mode_converts(machine: str, cont
 
 @pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc"])
 def test_a_program_in_the_next_mode_is_verified_in_it(controller: str, tmp_path: Path) -> None:
-    """Rapids that run as dog-legs are split by the mode; `verify` reads off the program how, and so does the room of lengths."""
+    """Dog-leg rapids are split by the mode; `verify` reads off the program how, and the room of lengths follows."""
     y, z = np.array([0.0, 0.5 * np.sqrt(3.0), 0.5]), np.array([0.0, -0.5, 0.5 * np.sqrt(3.0)])
     at = [",".join(f"{v:.6f}" for v in (*(x * np.eye(3)[0] + u * y + h * z), *z)) for x, u, h in (
         (0, 0, 60), *zip(*zip(*PLACES, strict=True), HEIGHTS, strict=True))]
