@@ -19,7 +19,7 @@ from machines.kinematics.base import Kinematics
 from machines.machine import ClampCodes, ControlOptions, Limits, Machine, Timing, Turns
 from machines.models import ControlModel, KeyProblem, KinematicsModel, MachineModel, register_beyond
 from machines.user_file import UserFile, nearest_word, read_toml, schema, validate
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors, read_value
 from toolpaths.units import DEG, PER_MINUTE
 
 DATA = Path(__file__).parent / "data"
@@ -38,10 +38,7 @@ def load(source: str | Path) -> Machine:
     Raises:
         DiagnosticError: where the file has errors; carries all of them.
     """
-    machine, diagnostics = load_checked(source)
-    if machine is None:
-        raise DiagnosticError(diagnostics)
-    return machine
+    return read_value(load_checked(source))
 
 
 def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
