@@ -18,6 +18,7 @@ FLOORS = (
     ("machines.kinematics", "serial and parallel kinematics"),
     ("machines", "machine files, the Machine, polytopes, reach"),
     ("machines.data", "built-in machine files"),
+    ("machines.exchange", "machine files of others, LinuxCNC's written"),
     ("machines.analysis", "what a machine is good for"),
     ("machines.geometric_error.tables", "curves and tables of errors, their files"),
     ("machines.geometric_error.actual", "the machine with errors, corrected commands"),
