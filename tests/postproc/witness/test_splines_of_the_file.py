@@ -64,4 +64,4 @@ def test_points_are_those_of_scipy() -> None:
     points = points_of(control, inner)
     true = BSpline(np.concatenate([np.zeros(4), inner, np.ones(3)]), control, 3)(np.linspace(0.0, 1.0, 5001))
     assert off_chords(true, points).max() == 0.0
-    assert off_chords(true + [0.0, 0.0, 0.01], points).max() > 0.01 - 0.001 - 2.0 * CHORD
+    assert off_chords(true + np.array([0.0, 0.0, 0.01]), points).max() > 0.01 - 0.001 - 2.0 * CHORD
