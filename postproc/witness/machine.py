@@ -183,9 +183,8 @@ def other_limits(table: dict[str, Any], letters: tuple[str, ...], given: Array) 
     found = []
     for name, values in zip(letters, given.tolist(), strict=True):
         axis, scale = table.get("axes", {}).get(name, {}), math.pi / 180.0 if name in "ABC" else 1.0
-        travel = axis.get("travel", "unlimited")
-        stated = [*((-math.inf, math.inf) if isinstance(travel, str) else travel),
-                  *(axis.get(key) for key in LIMITS[2:])]
+        travel = (-math.inf, math.inf) if axis.get("travel") == "unlimited" else axis.get("travel") or (None, None)
+        stated = [*travel, *(axis.get(key) for key in LIMITS[2:])]
         found += [f"the {what} of {name} is {value / scale:g} here, {own:g} in the machine file"
                   for what, own, value in zip(LIMITS, stated, values, strict=True)
                   if own is not None and not math.isclose(own * scale, value, rel_tol=1e-9, abs_tol=1e-9)]
