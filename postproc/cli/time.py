@@ -62,7 +62,7 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
                                                         "the model": model if Path(model).suffix else ""})
     from postproc.base.options import Options
     from postproc.cycle_time import report as figures
-    from postproc.cycle_time.estimate import estimate
+    from postproc.cycle_time.estimate import estimate, measure_first
 
     options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model,
                       error_beyond=beyond)
@@ -83,8 +83,9 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
                 outputs[Path(output)] = as_toml(fitted)
         if blocks is not None:
             e = estimate(blocks, m, planner, times=times)
-            values = figures.as_dict(e) | {"feed_override_percent": override} | values
-            text = figures.as_text(e, file.name, share)
+            first = measure_first(e, m)
+            values = figures.as_dict(e, first) | {"feed_override_percent": override} | values
+            text = figures.as_text(e, file.name, share, first)
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]},
            text, outputs)
 
