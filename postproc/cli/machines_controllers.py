@@ -17,19 +17,22 @@ from postproc.cli.console import (
     shown_errors,
 )
 from postproc.cli.group import Group
+from postproc.cli.machine_new import EXAMPLES as NEW
+from postproc.cli.machine_new import machine_new
 from postproc.cli.setup_align import EXAMPLES as ALIGNED
 from postproc.cli.setup_align import setup_align
 from postproc.cli.setup_new import EXAMPLES, setup_new
 from toolpaths.table_text import table_text
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                          help="Machines: list, show, check, analyse, schema.")
+                          help="Machines: new, list, show, check, analyse, schema.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                         help="Set-up files: new, align, check, schema.")
 
 
+machine_app.command("new", epilog=NEW)(machine_new)
 setup_app.command("new", epilog=EXAMPLES)(setup_new)
 setup_app.command("align", epilog=ALIGNED)(setup_align)
 
@@ -64,6 +67,7 @@ def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")]
     import machines
 
     m, found = machines.load_checked(file)
+    found = [*found, *machines.implausible(file)] if m is not None else found
     good = f"{file}: OK: {m.name}, {m.structure}, axes {' '.join(m.axis_names)}" if m else ""
     report(tuple(found), json, {"name": m.name if m else None, "diagnostics": [d.as_dict() for d in found]}, good)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from postproc.cycle_time.estimate import Uncertain, Estimate
+from postproc.cycle_time.estimate import Estimate, Uncertain
 from postproc.cycle_time.shares import TimeShares, most_expensive, operations, shares
 from toolpaths.table_text import table_text
 
