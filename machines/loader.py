@@ -22,7 +22,7 @@ from machines.machine import ClampCodes, ControlOptions, Limits, Machine, Timing
 from machines.models import ControlModel, KinematicsModel, MachineModel, register_beyond
 from machines.plausible import implausible
 from machines.user_file import UserFile, nearest_word, read_toml, schema, validate
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, Severity, error, has_errors
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, Severity, error, has_errors, read_value
 from toolpaths.units import DEG, PER_MINUTE
 
 DATA = Path(__file__).parent / "data"
@@ -42,10 +42,7 @@ def load(source: str | Path) -> Machine:
     Raises:
         DiagnosticError: where the file has errors; carries all of them.
     """
-    machine, diagnostics = load_checked(source)
-    if machine is None:
-        raise DiagnosticError(diagnostics)
-    return machine
+    return read_value(load_checked(source))
 
 
 def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:

@@ -13,7 +13,7 @@ from machines.figures import ASSUMED
 from machines.machine import Machine
 from machines.user_file import read_toml
 from postproc.controllers.model import builtin_files, load_controller
-from toolpaths.diagnostics import DiagnosticError, require
+from toolpaths.diagnostics import read_value
 from toolpaths.table_text import table_text
 from toolpaths.units import DEG
 
@@ -109,11 +109,8 @@ def controller_values(source: str) -> tuple[dict[str, Any], dict[str, str]]:
     Raises:
         DiagnosticError: where the file has faults.
     """
-    spec, found = load_controller(source)
-    require(found)
-    file, _ = read_toml(source, builtin=builtin_files(), kind="controller")
-    if spec is None or file is None:
-        raise DiagnosticError(found)
+    spec = read_value(load_controller(source))
+    file = read_value(read_toml(source, builtin=builtin_files(), kind="controller"))
     values, origins = {}, {}
     for path, value in _flat(spec.model_dump(), ()):
         origin = file.origins.get(path)
