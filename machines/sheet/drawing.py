@@ -78,9 +78,10 @@ def _turning(joint: Joint, at: tuple[float, float], right: int, up: int, along: 
         return
     dx, dy = float(joint.direction[right]), -float(joint.direction[up])
     length = math.hypot(dx, dy) or 1.0
-    end = (x + 60 * dx / length, y + 60 * dy / length)
-    yield _arrow((x - 60 * dx / length, y - 60 * dy / length), end, _TURNS)
-    yield _text(end[0] + 4, end[1] - 4, joint.name, colour=_TURNS)
+    dx, dy = 60 * dx / length, 60 * dy / length
+    yield (f'<path d="M{x - dx:.1f} {y - dy:.1f}L{x + dx:.1f} {y + dy:.1f}" stroke="{_TURNS}" stroke-width="2" '
+           'stroke-dasharray="12 3 3 3"/>')
+    yield _text(x + dx + 4, y + dy - 4, joint.name, colour=_TURNS)
 
 
 def _words(machine: Machine, x: float, y: float) -> Iterator[str]:
@@ -95,7 +96,8 @@ def _words(machine: Machine, x: float, y: float) -> Iterator[str]:
         if joint.rotary:
             point = ", ".join(f"{v:g}" for v in joint.point)
             part = "table" if f"{joint.name}'" in machine.structure.split() else "head"
-            lines.append(f"{joint.name} ({part}): through ({point}); the arrow is how the {part} turns for plus")
+            lines.append(f"{joint.name} ({part}): through ({point})")
+    lines.append("round arrows: how table or head is seen to turn for plus")
     yield ('<defs><marker id="tip" markerWidth="8" markerHeight="8" refX="6" refY="3" orient="auto">'
            f'<path d="M0 0L7 3L0 6z" fill="{_TURNS}"/></marker></defs>')
     for k, line in enumerate(lines):

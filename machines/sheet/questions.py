@@ -35,7 +35,7 @@ class SheetQuestion:
 
     def prompt(self) -> str:
         """What stands before the answer."""
-        return f"{self.text}{'' if self.default is None else f' [{self.default}]'}: "
+        return f"{self.text}{f' [{self.default}]' if self.default else ''}: "
 
     def parsed(self, text: str) -> str:
         """What goes into the sheet.
@@ -71,7 +71,8 @@ def sheet_text(ask: Ask) -> str:
                     f"source = {sheet.text('document of its figures: maker, title, page', None)}"]
     table = _letters(sheet, "rotary axes in the table, the one next to the bed first, e.g. B C, or none", "B C")
     head = _letters(sheet, "rotary axes in the head, the one next to the slides first, or none", "none")
-    sheet.lines += [f"table = {json.dumps(table)}", f"head = {json.dumps(head)}"]
+    slides = _letters(sheet, "linear axes that move the table, the one next to the bed first, or none", "none", "XYZ", 3)
+    sheet.lines += [f"table = {json.dumps(table)}", f"head = {json.dumps(head)}", f"table_slides = {json.dumps(slides)}"]
     for letter in "XYZ":
         sheet.lines += _slide(sheet, letter)
     for letter in (*table, *head):
@@ -82,11 +83,11 @@ def sheet_text(ask: Ask) -> str:
     return "\n".join([*sheet.lines, *(["", "[times]", f"tool_change = {change}"] if change != '""' else [])]) + "\n"
 
 
-def _letters(sheet: _Sheet, words: str, default: str) -> list[str]:
+def _letters(sheet: _Sheet, words: str, default: str, known: str = "ABC", most: int = 2) -> list[str]:
     def check(text: str) -> str:
         letters = [] if text.lower() == "none" else text.upper().replace(",", " ").split()
-        if set(letters) - {"A", "B", "C"} or len(set(letters)) < len(letters) or len(letters) > 2:
-            raise ValueError(f"{text!r} is not up to two of A, B, C, or none")
+        if set(letters) - set(known) or len(set(letters)) < len(letters) or len(letters) > most:
+            raise ValueError(f"{text!r} is not up to {most} of {', '.join(known)}, or none")
         return " ".join(letters)
 
     return sheet.text(words, default, check).split()
