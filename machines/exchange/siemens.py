@@ -22,8 +22,6 @@ from toolpaths.units import MM_PER_INCH
 Carried = Literal["T", "P", "M"]
 """$TC_CARR23: tool, part or both are swivelled"""
 _TYPES: dict[int, Carried] = {24: "T", 40: "P", 56: "M"}
-BY_RECORD = 72
-"""transformation type that takes the swivel data record of MD24582"""
 UNLIMITED = 1e7
 """positions from which a limit is none: Siemens' own defaults are +-1e8"""
 _FIGURES = {"velocity": ("MA_MAX_AX_VELO", "", 1.0 / 60.0, 360.0 / 60.0),
@@ -117,7 +115,7 @@ class _SiemensMachine:
         same = first.carried == second.carried and np.allclose(first.vectors, second.vectors, atol=_BETWEEN) and np.allclose(
             first.points, second.points, atol=_BETWEEN)
         if not same:
-            self.draft.warn("import.contradiction", f"the swivel data record ({second.datum.said}) and TRAORI ("
+            self.draft.warning("import.contradiction", f"the swivel data record ({second.datum.said}) and TRAORI ("
                             f"{first.datum.said}, line {first.datum.line}) differ: TRAORI counts", second.datum.line,
                             "measure with CYCLE996 and enter the result in both")
         return first
@@ -128,8 +126,8 @@ class _SiemensMachine:
             if kind in _TYPES:
                 return self._of_type(datum, _TYPES[kind], n)
             if 16 <= kind <= 51:
-                self.draft.warn("import.kinematics", f"{datum.said}: of the 5-axis transformations only types 24, 40 and 56 "
-                                "are read, whose axes are vectors", datum.line, _HINT)
+                self.draft.warning("import.kinematics", f"{datum.said}: of the 5-axis transformations only types 24, 40 "
+                                   "and 56 are read, whose axes are vectors", datum.line, _HINT)
         return None
 
     def _types(self) -> list[MachineDatum]:
@@ -199,8 +197,8 @@ class _SiemensMachine:
     def _fine(self, n: str) -> None:
         fine = [self.data.get(f"TC_CARR{k}", n) for k in range(41, 61)]
         if found := next((one for one in fine if one is not None and one.number), None):
-            self.draft.warn("import.fine", f"{found.said}: fine offsets are not added; the control adds them where SD42974 "
-                            "$SC_TOCARR_FINE_CORRECTION is set", found.line, "add them to the vectors, or state the points")
+            self.draft.warning("import.fine", f"{found.said}: fine offsets are not added; the control adds them where SD42974 "
+                               "is set", found.line, "add them to the vectors, or state the points")
 
     def _letters(self, given: list[str], vectors: tuple[list[float], list[float]]) -> tuple[str, str]:
         """As the file names the axes, else by the direction of each vector."""

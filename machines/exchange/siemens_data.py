@@ -79,7 +79,7 @@ def read_data(draft: Draft, text: str) -> SiemensData:
         found = _ASSIGNMENT.match(statement)
         if found is None:
             if statement.startswith("$") or "$M" in statement.split(";")[0]:
-                draft.warn("import.line", f"not understood: {statement[:60]}", line,
+                draft.warning("import.line", f"not understood: {statement[:60]}", line,
                            "write $NAME[index] = value on one line")
             continue
         of_channel = found["name"].startswith(("MC_", "SC_", "TC_"))
@@ -88,7 +88,7 @@ def read_data(draft: Draft, text: str) -> SiemensData:
         datum = MachineDatum(found["name"], "".join((found["index"] or "").split()), found["value"].strip(), line)
         before = result.get(datum.name, datum.index)
         if before is not None and before.value != datum.value:
-            draft.warn("import.contradiction", f"{before.said} in line {before.line} and {datum.value}: the last one counts",
-                       line, "take out the line that is not meant")
+            draft.warning("import.contradiction", f"{before.said} in line {before.line} and {datum.value}: the last one "
+                          "counts", line, "take out the line that is not meant")
         result.data[datum.name, datum.index] = datum
     return result
