@@ -197,8 +197,8 @@ class _SiemensMachine:
     def _fine(self, n: str) -> None:
         fine = [self.data.get(f"TC_CARR{k}", n) for k in range(41, 61)]
         if found := next((one for one in fine if one is not None and one.number), None):
-            self.draft.warning("import.fine", f"{found.said}: fine offsets are not added; the control adds them where SD42974 "
-                               "is set", found.line, "add them to the vectors, or state the points")
+            self.draft.warning("import.fine", f"{found.said}: fine offsets are not added; the control adds them where "
+                               "SD42974 is set", found.line, "add them to the vectors, or state the points")
 
     def _letters(self, given: list[str], vectors: tuple[list[float], list[float]]) -> tuple[str, str]:
         """As the file names the axes, else by the direction of each vector."""
