@@ -56,6 +56,7 @@ class Control:
         rolls: modulo axes by joint
         degree_is_inch: where a feed in inches refers to all axes, degrees count as inches, else as mm
         measured: mm of tool length that the work offset holds, where the program calls none
+        place: number of the place whose work offset it is, where the part stands at several
     """
 
     machine: Machine
@@ -72,6 +73,7 @@ class Control:
     entry_frame: Literal["table", "entry", "either"] = "table"
     degree_is_inch: bool = False
     measured: float = 0.0
+    place: int = 0
     rolls: dict[int, Rollover] = field(default_factory=dict)
 
     def parked(self, q: Floats) -> Floats:

@@ -130,7 +130,8 @@ def _converted(made: PostResult, controller: str | Path, name: str, check: _Chec
         "longest": 0, "spindle": None, "coolant": None, "program_name": None})
     tools = {n: t.model_copy(update={"spindle": None, "coolant": None}) for n, t in made.setup.tools.items()
              if int(n) == check.tool}
-    setup = made.setup.model_copy(update={"output": output, "work_offset": "", "tool_numbers": {}, "assumed": [],
+    assert made.job is not None
+    setup = made.job.setup.model_copy(update={"output": output, "work_offset": "", "tool_numbers": {}, "assumed": [],
                                           "tools": tools})
     options = replace(made.options, output=check.output, setup="", setup_mark="", units="", dialect="", orient="keep",
                       feed="programmed", smooth=False, name=name)

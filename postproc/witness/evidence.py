@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
+
+import numpy as np
 
 from postproc.witness.text import Array
 
@@ -103,6 +105,16 @@ class ExecutedBlocks:
     def __len__(self) -> int:
         return len(self.line)
 
+    def take(self, rows: Array) -> ExecutedBlocks:
+        """Some of the blocks, each beginning where the program has it begin but for joints that go straight."""
+        columns = {f.name: getattr(self, f.name)[rows] for f in fields(self)
+                   if f.name != "start" and isinstance(getattr(self, f.name), np.ndarray)}
+        approach = self.approach_at
+        return replace(self, **columns, steps=lambda some: self.steps(rows[some]),
+                       joints_at=lambda some, t: self.joints_at(rows[some], t),
+                       poses_at=lambda some, t: self.poses_at(rows[some], t),
+                       approach_at=None if approach is None else lambda some, t: approach(rows[some], t))
+
 
 FindingCode = Literal["position", "path", "kind", "clearance", "arc", "hole", "feed", "velocity", "tool", "length",
                       "spindle", "coolant", "compensation", "offset", "turning", "clamp", "errors", "rods"]
@@ -164,3 +176,16 @@ class Testimony:
     def own_kinematics(self) -> bool:
         """True where positions are compared by the witness's own reading of the machine file."""
         return bool(self.compared) and all(one.what != "kinematics" for one in self.not_compared)
+
+
+def together(said: list[Testimony]) -> Testimony:
+    """What was said of each place of a program as one."""
+    if len(said) < 2:
+        return said[0] if said else Testimony((), ())
+    counts = {c.what: sum(d.count for one in said for d in one.compared if d.what == c.what)
+              for one in said for c in one.compared}
+    return Testimony(tuple(Compared(what, n) for what, n in counts.items()),
+                     tuple(dict.fromkeys(n for one in said for n in one.not_compared)),
+                     tuple(f for one in said for f in one.findings), sum(one.points for one in said),
+                     max(one.worst_tip for one in said), max(one.worst_axis for one in said),
+                     sum(one.seconds for one in said))
