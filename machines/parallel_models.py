@@ -8,13 +8,14 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from machines.key_problem import KeyProblem
 from machines.kinematics.h4_axes import H4SpindleAxis, H4TableAxis
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.h4_platform import H4Platform
 from machines.kinematics.linear_delta import LinearDelta
 from machines.machine import ControlKinematics
 from machines.mobility import delta_faults, h4_faults, reach_faults
-from machines.models import KeyProblem, NotNegative, Vector
+from machines.models import NotNegative, Vector
 from machines.slider_models import SliderModel
 from machines.user_file import UserModel
 from toolpaths.units import DEG

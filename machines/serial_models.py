@@ -10,10 +10,12 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, field_validator
 
+from machines.figures import FigureSource, FigureTable, by_key
+from machines.key_problem import KeyProblem
 from machines.kinematics.chain import ROTARY, Joint
 from machines.kinematics.serial import Serial
 from machines.machine import ControlKinematics
-from machines.models import KeyProblem, KinematicsModel, Vector
+from machines.models import KinematicsModel, Vector
 from machines.user_file import UserModel
 from toolpaths.arrays import Floats
 
@@ -29,6 +31,9 @@ INDEPENDENT = 1e-3
 """least sine between rotary axes, least volume of the linear directions"""
 
 
+SerialFigure = Literal["point", "direction"]
+
+
 class SerialAxisModel(UserModel):
     """One `[kinematics.axes.LETTER]` table; as the axis stands when all joints are 0."""
 
@@ -38,6 +43,10 @@ class SerialAxisModel(UserModel):
     """rotary: a point of its line, mm in machine coordinates"""
     positive: Literal[1, -1] = 1
     """-1 where the machine counts against `direction`"""
+    assumed: tuple[SerialFigure, ...] = ()
+    """keys of this table whose figure no document states; `direction` stands for `positive` too"""
+    source: dict[SerialFigure, FigureSource] = Field(default_factory=dict)
+    """by key: the document of `[sources]` that states its figure, and the place in it"""
 
 
 class SerialModel(KinematicsModel):
@@ -80,6 +89,11 @@ class SerialModel(KinematicsModel):
         axis = self.axes.get(name, SerialAxisModel())
         direction = np.array(axis.direction or _ISO_841[name], dtype=np.float64) * axis.positive
         return Joint(name, name in ROTARY, direction, np.array(axis.point or (0.0, 0.0, 0.0)))
+
+    def figures(self) -> list[FigureTable]:
+        """The tables of the axes."""
+        return [FigureTable(("kinematics", "axes", name), axis.assumed, by_key(axis.source))
+                for name, axis in self.axes.items()]
 
     def problems(self) -> Iterator[KeyProblem]:
         """Tables that do not fit the code, vectors that are not of length 1, axes that depend on each other."""

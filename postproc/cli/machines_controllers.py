@@ -36,14 +36,16 @@ setup_app.command("align", epilog=ALIGNED)(setup_align)
 
 @machine_app.command("list")
 def machine_list(json: Json = "") -> None:
-    """List the built-in machines."""
+    """List the built-in machines: those that people own, then models of kinds and classes."""
     import machines
 
-    found = [machines.load(name) for name in machines.names()]
-    rows = [{"name": m.name, "structure": m.structure, "axes": list(m.axis_names), "description": m.description}
-            for m in found]
-    report((), json, {"machines": rows},
-           "\n".join(table_text([(m.name, " ".join(m.axis_names), m.description) for m in found])))
+    real, models = ([machines.load(name) for name in names] for names in (machines.catalogued(), machines.names()))
+    rows = [{"name": m.name, "structure": m.structure, "axes": list(m.axis_names), "description": m.description,
+             "catalogue": m in real} for m in [*real, *models]]
+    parts = (("machines, with sources of their figures (machine show NAME):", real), ("models:", models))
+    text = [line for heading, found in parts
+            for line in (heading, *table_text([(m.name, " ".join(m.axis_names), m.description) for m in found], indent=2))]
+    report((), json, {"machines": rows}, "\n".join(text))
 
 
 @machine_app.command("show")

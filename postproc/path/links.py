@@ -146,15 +146,13 @@ def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeS
     """
     if turning is None:
         turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
-    first: Link | None = None
+    links = []
     for share in MARGINS if space.distance is None else (1.0,):
-        link = _link(control, kin0, kin1, space, before, after, by_home, turning, share)
-        if first is None:
-            first = link
+        links.append(link := _link(control, kin0, kin1, space, before, after, by_home, turning, share))
         q = np.concatenate([link.retract, link.index, link.approach])
         if link.clear and np.isfinite(q).all() and _inside(q, control.machine):
             return link
-    assert first is not None
+    first = links[0]
     reached = np.concatenate([first.retract, first.index, first.approach])
     if np.isfinite(reached).all() and not _inside(reached, control.machine):
         return replace(first, clear=True)

@@ -54,7 +54,6 @@ def _limits_table(machine: Machine) -> dict[str, dict[str, Any]]:
 
 def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlocks:
     """The motion of a program, read back, as plain arrays."""
-    assert comparison.executed is not None
     motion, control = comparison.executed[1], job.control
     every = np.arange(len(motion))
     degrees = _units(job.machine.axis_names)
@@ -127,7 +126,7 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
         setup: as the shop wrote it, [part] by whatever it names
         program: its text, which is looked at where the machine has modulo axes
     """
-    if options.orient != "keep" or source is None or comparison.executed is None or comparison.poses is None:
+    if options.orient != "keep" or source is None:
         why = "the tool axes were chosen" if options.orient != "keep" else "the path is not as it was read from a file"
         return Testimony((), (NotCompared("all", why),)), []
     found, said = list[Diagnostic](), list[Testimony]()

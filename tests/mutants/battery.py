@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 ROOT = Path(__file__).parents[2]
 GOLDEN, SAMPLES = ROOT / "tests" / "golden", ROOT / "samples"
 LENGTHS = {"1": {"gauge_length": 120.0}, "2": {"gauge_length": 95.5}, "3": {"gauge_length": 133.25}}
@@ -216,6 +218,11 @@ FINI
 """
 BARE = MILLED.replace("SPINDL/RPM,3000,CLW\n", "").replace("COOLNT/FLOOD\n", "").replace("FEDRAT/MMPM,250\n", "")
 FAST = FIVE.replace("FEDRAT/400", "FEDRAT/20000").replace("FEDRAT/600", "FEDRAT/30000")
+ROUND = FAST[:FAST.index("GOTO/20,5,2")] + "".join(
+    f"GOTO/{10 + 5 * np.sin(a):.4f},{8 - 5 * np.cos(a):.4f},0,0,0,1\n" for a in np.linspace(0.0, 3.0, 40)) + """RAPID
+GOTO/10,3,40,0,0,1
+FINI
+"""
 TALL = """UNITS/MM
 LOADTL/1
 SPINDL/RPM,3000,CLW
@@ -300,6 +307,7 @@ CASES: dict[str, Case] = {
     "per minute": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"feed_mode": "per-minute"}),
     "fast": Case(FAST, "mikron-ucp710", "linuxcnc"),
     "fast planned": Case(FAST, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
+    "round planned": Case(ROUND, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "loose": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"tolerance": 0.5}),
     "whole circle": Case(HELIX.replace("GOTO/-40,30,-8\n", ""), "mill-3axis", "linuxcnc"),
     "kept spindle": Case(FACES.replace("SPINDL/RPM,2000,CLW\n", ""), "trunnion-bc", "linuxcnc"),

@@ -174,11 +174,11 @@ FAULTS = (
     Fault("planned seconds of the block before", "planning", "plan_feeds", "np.fmax(needed, planned.needed)",
           "np.fmax(needed, np.roll(planned.needed, 1))", ("fast planned", "planned")),
     Fault("planned by jerk limits 1.1 times too high", "planning", "joint_limits", "limits.jerk)", "1.1 * limits.jerk)",
-          ("fast planned",)),
+          ("round planned",)),
     Fault("planned by acceleration limits 1.1 times too high", "planning", "joint_limits", "limits.acceleration,",
           "1.1 * limits.acceleration,", ("fast planned",)),
     Fault("planned without the jerk of a block", "planning", "span_speed", "orders, strict=True), 1)",
-          "orders[:2], strict=False), 1)", ("fast planned",)),
+          "orders[:2], strict=False), 1)", ("round planned",)),
     Fault("rounding of words to one place less", "planning", "word_grid", "style.linear_decimals).astype",
           "style.linear_decimals - 2).astype"),
 )

@@ -31,7 +31,8 @@ In all of them the part stands off the rotary axes, and tools have different len
 - **verify**: some conversion lets it pass, `verify` of the project without the fault refuses the program.
 - **tests**: neither, and a test of the room fails.
 - **no harm**: measured by the reader without the fault: every cut inside the tolerance, its time within 0.5 %, rests and
-  states the same; or the program is the same, and all wrong programs that were tried stay refused.
+  states the same; or the program is the same, and all wrong programs that were tried stay refused. A fault that acts
+  nowhere and has no reason beside it counts as caught by nothing.
 
 Readers and proof (the last rooms) change no program but what is made of it: they count by wrong programs that pass with the
 fault. Such a program needs a second fault to be written.
@@ -47,7 +48,7 @@ def column(outcome: Outcome) -> str:
         return "verify"
     if outcome.caught_by in ("survives", "blind"):
         return "tests" if outcome.test else "nothing"
-    return "no harm"
+    return "nothing" if outcome.caught_by == "not acting" and not outcome.fault.why else "no harm"
 
 
 def by_room(found: list[Outcome]) -> dict[str, Counter[str]]:

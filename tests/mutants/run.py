@@ -37,8 +37,10 @@ class Outcome:
 
     @property
     def survives(self) -> bool:
-        """True where the conversion's own proof lets harm pass, or wrong programs pass and no test fails."""
-        return self.caught_by in ("survives", "verify") or (self.caught_by == "blind" and not self.test)
+        """True where the conversion's own proof lets harm pass that nobody has explained, a fault acts nowhere, or wrong
+        programs pass and no test fails."""
+        unexplained = self.caught_by in ("verify", "not acting") and not self.fault.why
+        return self.caught_by == "survives" or unexplained or (self.caught_by == "blind" and not self.test)
 
 
 def apart(work: Callable[[], Any], seconds: int = SECONDS) -> Any:
