@@ -154,7 +154,6 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
 
 def _rows_at(comparison: Comparison, job: Job, place: int) -> Ints:
     """The executed blocks under the work offset of a place: what the program itself says, not what it was written for."""
-    assert comparison.executed is not None
     if len(job.places) < 2:
         return np.arange(len(comparison.executed[1]))
     reader = reader_for(job.controller, job.machine.axis_names)
