@@ -285,13 +285,14 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     control = Control(machine, law, origin, largest, law, entry_frame=entry, own_kinematics=own,
                       rapids=machine.rapids or controller.kinematics.rapids, feed_rule=controller.feed.length,
                       degree_is_inch=controller.degree_is_inch, helix_planes=controller.arcs.helix_planes,
-                      rolls=rolls, measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
+                      rolls=rolls, standing=places[0].standing,
+                      measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
     diagnostics += [*_measured(control, controller, moves.axis, setup, options), *upside_down(
         moves.axis[moves.kind != Kind.RAPID], machine.home_axis, placement, options.setup)]
     decimals = word_grid(control, controller).places
     modes, found = output_modes(control, controller, setup, options, toolpath, decimals, refused)
-    modes = modes_at(places, modes, frame)
-    diagnostics += found
+    modes, more = modes_at(places, modes, frame, options.setup)
+    diagnostics += [*found, *more]
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, moves,
               safe_space(moves, setup, placement), modes, geometric, tuple(records.stated), records.cutcom, places,
               repeats)

@@ -9,7 +9,8 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.base.options import Options
-from postproc.control.modes import OutputModes
+from postproc.control.control import Control
+from postproc.control.modes import ASKED, OutputModes
 from postproc.job.turned_places import turned
 from postproc.reference.repeated import Repeated, repeated
 from postproc.setup.model import Placement, SetupFile, at_places, part_placement
@@ -26,6 +27,8 @@ class Place:
     name: str
     setup: SetupFile
     placement: Placement
+    standing: tuple[tuple[str, float], ...] = ()
+    """degrees of rotary tables, by letter, with which its register is measured, where that is not with all at 0"""
 
     @property
     def code(self) -> str:
@@ -46,7 +49,8 @@ def places_of(setup: SetupFile, toolpath: Toolpath, machine: Machine,
         if setup.places:
             placement, more = turned(machine, setup.places[k], placement, options.setup)
             stood, found = _standing_at(stood, placement), [*found, *more]
-        result.append(Place(setup.places[k].name if setup.places else "", stood, placement))
+        given = setup.places[k] if setup.places else None
+        result.append(Place(given.name if given else "", stood, placement, tuple(given.turned.items()) if given else ()))
     if setup.places and setup.clearance.centre is not None:
         found.append(error("places.centre", "clearance.centre is a point of one part, the set-up has [[places]]",
                            file=options.setup, hint="take it out: safe planes stand round all parts, clearance.margin off "
@@ -77,11 +81,26 @@ def _from(first: Placement, there: Placement) -> Placement:
     return Placement(np.eye(3), first.rotation.T @ (there.origin - first.origin))
 
 
-def modes_at(places: Sequence[Place], modes: OutputModes, frame: Frame) -> OutputModes:
-    """The output modes with the work offset of every place; `frame`: the system of the CL file that is the work offset."""
+def control_at(places: Sequence[Place], control: Control, frame: Frame, k: int) -> Control:
+    """The control with the work offset of place k; `frame`: the system of the CL file that is the work offset."""
+    origin = places[k].placement.points(np.array([frame.origin]))[0]
+    return replace(control, origin=origin, place=k, standing=places[k].standing)
+
+
+def modes_at(places: Sequence[Place], modes: OutputModes, frame: Frame, file: str) -> tuple[OutputModes, list[Diagnostic]]:
+    """The output modes with the work offset of every place: where that is measured with the tables turned, machine
+    coordinates alone."""
+    axes, auto = ASKED.index("axes"), ASKED.index("auto")
+    place = np.arange(len(modes.asked)) // (len(modes.asked) // len(places))
+    turned = np.array([bool(one.standing) for one in places])[place]
+    wrong = np.flatnonzero(turned & (modes.asked != axes) & (modes.asked != auto))
+    found = [] if not len(wrong) else [error(
+        "places.measured", f"place {places[int(place[wrong[0]])].name}: measured = \"turned\" is for machine coordinates, "
+        f"output mode {ASKED[int(modes.asked[wrong[0]])]} is asked for", file=file, count=len(wrong),
+        hint='measured = "zero", which holds for all modes, or output mode axes')]
+    if turned.any():
+        modes = replace(modes, asked=np.where(turned, axes, modes.asked).astype(np.int8))
     if len(places) < 2:
-        return modes
-    origin, each = np.array([frame.origin]), len(modes.asked) // len(places)
-    others = tuple(replace(modes.control, origin=place.placement.points(origin)[0], place=k)
-                   for k, place in enumerate(places[1:], 1))
-    return replace(modes, others=others, place=np.arange(len(modes.asked)) // each)
+        return modes, found
+    others = tuple(control_at(places, modes.control, frame, k) for k in range(1, len(places)))
+    return replace(modes, others=others, place=place), found

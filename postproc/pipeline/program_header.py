@@ -51,7 +51,9 @@ def _work_offsets(job: Job) -> list[str]:
         values = zip(job.machine.axis_names, job.control_at(k).work_offset, job.machine.rotary, strict=True)
         offset = " ".join(f"{a}{v:.4f}" if turns else f"{a}{said.plain(v)}" for a, v, turns in values)
         at = f"place {place.name}: " if place.name else ""
-        result.append(f"{at}work offset {job.controller.program.offset_name(place.code)} in machine coordinates: {offset}")
+        turned = "".join(f" with {letter} at {angle:g}" for letter, angle in place.standing)
+        result.append(f"{at}work offset {job.controller.program.offset_name(place.code)} in machine coordinates{turned}: "
+                      f"{offset}")
     return result
 
 

@@ -25,6 +25,7 @@ def places(result: PostResult, estimate: Estimate | None) -> list[dict[str, Any]
     seconds = seconds_at(job, estimate)
     letters, units = result.machine.axis_names, job.control.unit.tolist()
     return [{"place": place.name, "work_offset": result.controller.program.offset_name(place.code),
+             "tables": dict(place.standing),
              "offset": dict(zip(letters, job.control_at(k).work_offset.tolist(), strict=True)),
              "axis_extents": {letter: [unit * low, unit * high] for letter, unit, low, high in zip(
                  letters, units, *(column.tolist() for column in _extents(job, path, k)), strict=True)},
@@ -48,7 +49,8 @@ def _extents(job: Job, path: JointPath, place: int) -> tuple[Floats, Floats]:
 def place_lines(result: PostResult, estimate: Estimate | None) -> list[str]:
     """The same for people."""
     rows = [(one["place"], one["work_offset"],
-             " ".join(f"{k}{round(v, 4) + 0.0:.4f}" for k, v in one["offset"].items()),
+             " ".join([*(f"{k}{round(v, 4) + 0.0:.4f}" for k, v in one["offset"].items()),
+                       *(f"with {letter} at {angle:g}" for letter, angle in one["tables"].items())]),
              ", ".join(f"{k} {low:.3f} to {high:.3f}" for k, (low, high) in one["axis_extents"].items()),
              "" if one["time_s"] is None else clock(one["time_s"])) for one in places(result, estimate)]
     return table_text([("place", "register", "work offset", "axes", "time"), *rows], align="llllr", indent=2) if rows else []

@@ -33,6 +33,15 @@ class PlaceSetup(UserModel):
     """degrees at which rotary tables stand when the part stands there, e.g. turn = { B = 90 } for a face of a
     tombstone: origin, x_axis and y_axis are then as the spindle sees them with the tables so"""
 
+    measured: Literal["zero", "turned"] = "zero"
+    """where tables stand for what the register of the work offset holds: all at zero, as every output mode takes it, or
+    "turned" as `turn` says, as the face is touched off; all is then in machine coordinates ("axes") there"""
+
+    @property
+    def turned(self) -> dict[str, float]:
+        """Degrees of the tables for which its register is measured, where they do not stand at zero."""
+        return self.turn if self.measured == "turned" else {}
+
     @property
     def stated(self) -> dict[str, tuple[float, float, float]]:
         """What it states of [part]."""

@@ -109,7 +109,7 @@ def offset_joints(control: Control) -> Floats | None:
     """(J,) joints of the program's zero; None where words are no machine coordinates by it, or it holds a tool's length."""
     if control.base == "tcp" or control.measured or not control.machine.kinematics.straight_slides:
         return None
-    return np.asarray(control.work_offset / _units(control.machine.axis_names))
+    return control.zero
 
 
 def _units(letters: tuple[str, ...]) -> Floats:
@@ -162,16 +162,15 @@ def _rows_at(comparison: Comparison, job: Job, place: int) -> Ints:
 
 def _case(source: ClSource, setup: SetupFile, options: Options, job: Job, comparison: Comparison, program: bytes | str,
           place: int) -> Case:
-    """What the witness is given of a program at one place; turns of modulo axes and clamps go by the text as a whole, and
-    are looked at where there is one place alone."""
-    control, codes, whole = job.control_at(place), job.controller.codes, len(job.places) < 2
+    """What the witness is given of a program at one place."""
+    control, codes = job.control_at(place), job.controller.codes
     errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})
     return Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
                 *errors, named := "{register}" in codes.length_offset,
                 job.machine.length_register if named else 0,
                 sum(COMMANDS[kind] for kind, (on, _) in switching(codes).items() if on),
-                program=as_bytes(program) if whole and (control.rolls or job.machine.clamp_codes) else b"",
-                clamps={a: (c.clamp, c.unclamp) for a, c in job.machine.clamp_codes.items()} if program and whole else {},
-                modulo={job.machine.axis_names[j]: roll.rule for j, roll in control.rolls.items()} if whole else {},
+                program=as_bytes(program) if control.rolls or job.machine.clamp_codes else b"",
+                clamps={a: (c.clamp, c.unclamp) for a, c in job.machine.clamp_codes.items()} if program else {},
+                modulo={job.machine.axis_names[j]: roll.rule for j, roll in control.rolls.items()},
                 origin=control.origin, work_offset=offset_joints(control))

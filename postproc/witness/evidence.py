@@ -71,6 +71,7 @@ class ExecutedBlocks:
         poses_at: (tip, axis) of blocks as the reader has them: the claim that rods are held against
         approach_at: from which direction joints (K, J) are where they are, 1 forwards, -1 backwards; None where
             no errors depend on it
+        begins: joints (E, J) where blocks begin, where that is not where the one before ends; None: it is
     """
 
     letters: tuple[str, ...]
@@ -101,16 +102,23 @@ class ExecutedBlocks:
     joints_at: Callable[[Array, Any], Array]
     poses_at: Callable[[Array, Any], tuple[Array, Array]]
     approach_at: Callable[[Array, Any], Array] | None = None
+    begins: Array | None = None
 
     def __len__(self) -> int:
         return len(self.line)
 
+    def before(self, rows: Array) -> Array:
+        """(K, J) joints where blocks begin."""
+        if self.begins is not None:
+            return np.asarray(self.begins[rows])
+        return np.where((rows == 0)[:, None], self.start, self.joints[np.maximum(rows - 1, 0)])
+
     def take(self, rows: Array) -> ExecutedBlocks:
-        """Some of the blocks, each beginning where the program has it begin but for joints that go straight."""
+        """Some of the blocks, each beginning where the program has it begin."""
         columns = {f.name: getattr(self, f.name)[rows] for f in fields(self)
-                   if f.name != "start" and isinstance(getattr(self, f.name), np.ndarray)}
+                   if f.name not in ("start", "begins") and isinstance(getattr(self, f.name), np.ndarray)}
         approach = self.approach_at
-        return replace(self, **columns, steps=lambda some: self.steps(rows[some]),
+        return replace(self, **columns, begins=self.before(rows), steps=lambda some: self.steps(rows[some]),
                        joints_at=lambda some, t: self.joints_at(rows[some], t),
                        poses_at=lambda some, t: self.poses_at(rows[some], t),
                        approach_at=None if approach is None else lambda some, t: approach(rows[some], t))

@@ -292,6 +292,16 @@ _OUTPUT = [
         setup=LENGTH + "[clearance]\ncentre = [0.0, 0.0, 0.0]\n" + PLACES,
     ),
     convert(
+        "places.measured",
+        START + CUT,
+        r"(measured = \"zero\")",
+        sheet('measured = "turned"', r"\1"),
+        setup=LENGTH + PLACES + 'turn = { A = 90 }\nmeasured = "turned"\n',
+        machine="mill-4axis",
+        control="fanuc-30i",
+        more=" --output-mode tcp",
+    ),
+    convert(
         "places.one",
         "CUTTER/10,5\n" + START + CUT,
         r"take \[\[places\]\] out of the set-up",

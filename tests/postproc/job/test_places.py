@@ -132,6 +132,21 @@ def test_faces_of_a_tombstone(control: str) -> None:
 
 
 @pytest.mark.parametrize("control", CONTROLS)
+def test_registers_of_faces_as_they_are_touched_off(control: str) -> None:
+    """With the tables turned every register holds the same, and the words of X, Y, Z are the same on every face."""
+    faces = [{**face, "measured": "turned"} for face in FACES]
+    result = good(made("pocket.cls", "mill-4axis", control, places=faces))
+    offsets = [result.job.control_at(k).work_offset for k in range(3)]
+    assert np.abs(offsets - offsets[0]).max() < 1e-9
+    at_zero = good(made("pocket.cls", "mill-4axis", control, places=FACES, output={"default": "axes"}))
+    for k in range(3):
+        assert np.abs(cuts(result, k) - cuts(at_zero, k)).max() < NEAR
+    assert "WITH A AT 180: X-20" in result.text.upper()
+    wrong = made("pocket.cls", "mill-4axis", control, places=faces, output={"default": "tcp"})
+    assert "places.measured" in codes(wrong.diagnostics) or "output.mode" in codes(wrong.diagnostics)
+
+
+@pytest.mark.parametrize("control", CONTROLS)
 def test_five_axes_in_every_mode(control: str) -> None:
     faces = [{**TWO[0], "turn": {"C": 90.0}}, {**TWO[1], "origin": (60.0, 20.0, 10.0)}]
     result = good(made("five_faces.cls", "trunnion-bc", control, places=faces, work_offset="MSYS 1"))
@@ -169,6 +184,16 @@ def test_a_place_that_is_left_out_is_found(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(places, "modes_at", lambda some, modes, frame: modes)
     result = made("pocket.cls", "mill-3axis", "linuxcnc", places=TWO)
     assert not result.ok
+
+
+def test_bodies_stand_at_every_place() -> None:
+    """A clamp of the part is in the path of both; what stands on the table is in that of the part next to it alone."""
+    clamp = {"name": "clamp", "frame": "part", "box": {"low": (-5.0, 38.0, -20.0), "high": (5.0, 60.0, 30.0)}}
+    post = {"name": "post", "frame": "table", "box": {"low": (110.0, -30.0, 0.0), "high": (140.0, 10.0, 80.0)}}
+    for body_of, named in ((clamp, {"fixture clamp at left", "fixture clamp at right"}), (post, {"fixture post"})):
+        result = made("pocket.cls", "mill-3axis", "linuxcnc", places=TWO, bodies={"fixtures": [body_of]})
+        said = " ".join(str(d) for d in result.diagnostics if d.code in ("collision.touch", "collision.near"))
+        assert not result.ok and all(name in said for name in named)
 
 
 @pytest.mark.parametrize(("setup", "code"), [
