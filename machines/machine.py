@@ -99,12 +99,15 @@ class ControlOptions:
 class ControlKinematics:
     """A kinematics module that the control itself runs, so that programs hold tip coordinates in the part.
 
-    `module` and `pins` name LinuxCNC's module and its HAL pins; `tool_length_pin` receives the tool length.
+    `module` and `pins` name LinuxCNC's module and its HAL pins; `tool_length_pin` receives the tool length. `idle` are
+    letters of joints that the module has and the machine has not, `sum_to` the pins that a sum of both connects (out, to).
     """
 
     module: str
     pins: Mapping[str, float] = field(default_factory=dict)
     tool_length_pin: str = ""
+    idle: str = ""
+    sum_to: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True)

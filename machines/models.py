@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
@@ -72,6 +72,10 @@ class KinematicsModel(UserModel):
             ValueError: where the module cannot describe this machine, saying why.
         """
         raise ValueError(f"no module of a control is known for kind {self.kind!r}")
+
+    def linuxcnc_keys(self) -> dict[str, str] | None:
+        """What LinuxCNC's INI has no key for, by key of its section [POSTPROC]; None where it cannot run the machine."""
+        return None
 
 
 class AxisModel(UserModel):
@@ -257,6 +261,11 @@ class MachineModel(UserModel):
                 yield KeyProblem("machine.home", ("axes", name, "home"),
                                  f"home {axis.home:g} of {name} lies outside its travel {list(axis.range)}",
                                  f"write home = {min(max(axis.home, axis.range[0]), axis.range[1]):g}, or correct travel")
+
+
+def blanks(numbers: Iterable[float]) -> str:
+    """Numbers with blanks between them, as LinuxCNC's files have them."""
+    return " ".join(f"{float(number):.15g}" for number in numbers)
 
 
 def register_beyond(rule: str) -> int:

@@ -25,7 +25,6 @@ LISTED = {
     "Toolpath.equals": "what a round trip means; for users of the package",
     "CorrectedCommands.tip_residual": "a result of `correct`, for users of the package",
     "CorrectedCommands.axis_residual": "likewise",
-    "ControlKinematics.tool_length_pin": "read where the machine is set up in LinuxCNC (tests/linuxcnc/config.py)",
     "PlannedMotion.trajectories": "samples of what is planned, for users of the package (postproc/README.md)",
     "StretchSpeeds.lowest": "a result of `Plan.blocks`, in the example of feedrate/README.md",
     "StretchSpeeds.highest": "likewise", "__getattr__": "called by Python",

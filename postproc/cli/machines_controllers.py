@@ -17,19 +17,22 @@ from postproc.cli.console import (
     shown_errors,
 )
 from postproc.cli.group import Group
+from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.setup_align import EXAMPLES as ALIGNED
 from postproc.cli.setup_align import setup_align
 from postproc.cli.setup_new import EXAMPLES, setup_new
 from toolpaths.table_text import table_text
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                          help="Machines: list, show, check, analyse, schema.")
+                          help="Machines: list, show, check, analyse, import, export, schema.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                         help="Set-up files: new, align, check, schema.")
 
 
+machine_app.command("import", epilog=IMPORTED)(machine_import)
+machine_app.command("export", epilog=EXPORTED)(machine_export)
 setup_app.command("new", epilog=EXAMPLES)(setup_new)
 setup_app.command("align", epilog=ALIGNED)(setup_align)
 

@@ -18,7 +18,7 @@ from postproc.joints.joint_path import TRAVEL_SLACK, nearest_solution
 from postproc.path.linearise import linearise
 from postproc.reference.moves import Moves
 from postproc.setup.model import Placement, SetupFile
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, box_corners
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -78,10 +78,8 @@ def safe_space(moves: Moves, setup: SetupFile, placement: Placement) -> SafeSpac
     centre = 0.5 * (low + high)
     if setup.clearance.centre is not None:
         centre = placement.points(np.array([setup.clearance.centre]))[0]
-    pick = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
-    corners = np.where(pick == 0, low, high)
     radius = float(np.sqrt(((tips - centre) ** 2).sum(axis=1).max()))
-    return SafeSpace(centre, radius, corners, setup.clearance.distance, setup.clearance.margin)
+    return SafeSpace(centre, radius, box_corners(low, high), setup.clearance.distance, setup.clearance.margin)
 
 
 def _outermost(curves: Curves) -> Floats:

@@ -74,7 +74,7 @@ def _steady(q: Floats) -> Floats:
 
 
 def as_csv(found: Residuals, result: PostResult) -> str:
-    """A table of the field, a row for each CL point; units in its head."""
+    """A table of the field, a row for each CL point; units in its header."""
     turns = np.array(result.machine.rotary)
     joints = [f"{letter} [{'deg' if turning else 'mm'}]" for letter, turning in
               zip(result.machine.axis_names, turns, strict=True)]

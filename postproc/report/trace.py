@@ -17,7 +17,7 @@ from postproc.readback.comparison.compare import Comparison
 from postproc.readback.text.canonical import in_files
 from postproc.reference.coolant import coolant_states, label
 from postproc.reference.events import spindle_states
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Floats, Ints, finite
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import check_input
 from toolpaths.toolpath import Kind, Role
@@ -83,7 +83,7 @@ def _running(job: Job, row: int) -> dict[str, Any]:
     direction, rpm = spindle_states(path)
     return {"tool": job.number_of(int(path.tool[row])),
             "gauge_length_mm": job.gauge_length(int(path.tool[row])) or None,
-            "spindle_rpm": _finite(float(direction[row] * rpm[row])) if direction[row] else 0.0,
+            "spindle_rpm": finite(float(direction[row] * rpm[row])) if direction[row] else 0.0,
             "coolant": label(int(coolant_states(path, job.controller.codes)[row]))}
 
 
@@ -94,8 +94,8 @@ def _turned(choice: OrientationChoice, plan: Orientation, row: int) -> dict[str,
     k = int(np.searchsorted([one.rows[0] for one in work.passes], move, side="right")) - 1
     made, before = choice.plans[plan].picked[k], choice.tried[k].own
     return {"tip_mm": work.toolpath.tip[row].tolist(), "axis": work.toolpath.axis[row].tolist(), "pass": k,
-            "fixed": made.one.fixed, "orientation_deg": made.rotary(), "time_s": _finite(made.seconds),
-            "reference_time_s": _finite(before.seconds)}
+            "fixed": made.one.fixed, "orientation_deg": made.rotary(), "time_s": finite(made.seconds),
+            "reference_time_s": finite(before.seconds)}
 
 
 def _move(result: PostResult, job: Job, m: int) -> dict[str, Any]:
@@ -104,7 +104,7 @@ def _move(result: PostResult, job: Job, m: int) -> dict[str, Any]:
     branches = kin.inverse(moves.tip[m:m + 1], moves.axis[m:m + 1])[:, 0] * unit
     entry: dict[str, Any] = {
         "table_frame": {"tip_mm": moves.tip[m].tolist(), "axis": moves.axis[m].tolist()},
-        "linked": bool(moves.link[m]), "feed_mm_per_min": _finite(moves.feed[m] * 60.0),
+        "linked": bool(moves.link[m]), "feed_mm_per_min": finite(moves.feed[m] * 60.0),
         "branches": [_named(result, b) for b in branches]}
     if result.path is None or result.program is None:
         return entry
@@ -137,11 +137,7 @@ def _program_line(c: Comparison, match: int) -> dict[str, Any]:
 
 
 def _named(result: PostResult, values: Floats) -> dict[str, float | None]:
-    return {k: _finite(v) for k, v in zip(result.machine.axis_names, values.tolist(), strict=True)}
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return {k: finite(v) for k, v in zip(result.machine.axis_names, values.tolist(), strict=True)}
 
 
 def _texts(program: Program, blocks: Ints) -> list[str]:

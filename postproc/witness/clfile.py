@@ -54,9 +54,13 @@ def commanded(data: bytes, units: str | None = None, dialect: str | None = None)
         e.shifted = True
     done = 0
     for record, before, line in zip(text.records, text.before, text.lines, strict=True):
+        if e.spline_line and (before > done or record.major not in ("KNOT", "CNTRL", "$$")):
+            _end_spline(e)
         e.row += before - done
         done = before
         _one(e, record, line)
+    if e.spline_line:
+        _end_spline(e)
     e.row += len(text.points) - done
     return assembled(e)
 
@@ -127,13 +131,27 @@ def _multax(e: Execution, r: Record, line: int) -> None:
 
 
 def _nurbs(e: Execution, r: Record, line: int) -> None:
-    """A spline: its path is not followed; it ends in the last CNTRL."""
-    e.lost("NURBS", line)
+    e.spline, e.spline_line = ([], []), line
+
+
+def _knot(e: Execution, r: Record, line: int) -> None:
+    e.spline[0].extend(r.numbers)
 
 
 def _cntrl(e: Execution, r: Record, line: int) -> None:
-    e.gap.update((e.row, e.row + 1))
-    e.known.set(e.row, e.known.now)
+    e.spline[1].append(tuple(r.numbers))
+
+
+def _end_spline(e: Execution) -> None:
+    """A spline goes from where the tool stands to its last CNTRL, two more of them than knots; others are lost."""
+    knots, control = e.spline
+    if e.row and len(control) == len(knots) + 2 and {len(p) for p in control} == {3} and knots[-1] > 0.0:
+        e.splines[e.row] = knots, np.array(control)
+        e.point(control[-1], _NAN3, e.spline_line)
+    else:
+        e.lost("NURBS", e.spline_line)
+        e.gap.update((e.row, e.row + 1))
+    e.spline_line = 0
 
 
 # ---- systems -----------------------------------------------------------------------------------------------
@@ -358,7 +376,7 @@ def _cycle(e: Execution, r: Record, line: int) -> None:
 HANDLERS: dict[str, Callable[[Execution, Record, int], None]] = {
     "GOTO": _goto, "GODLTA": _godlta, "FROM": _from, "GOHOME": _gohome,
     "TLAXIS": _tlaxis, "ZSURF": _zsurf, "MULTAX": _multax,
-    "NURBS": _nurbs, "CNTRL": _cntrl, "KNOT": _multax, "MSYS": _msys, "CSYS": _csys, "$$->CSYS": _csys, "CAMERA": _csys,
+    "NURBS": _nurbs, "CNTRL": _cntrl, "KNOT": _knot, "MSYS": _msys, "CSYS": _csys, "$$->CSYS": _csys, "CAMERA": _csys,
     "CATIA0": _csys, "TRANS": _turned, "ROTATE": _turned, "ROTABL": _turned, "SUB-BEGIN": _sub, "SUB-END": _sub,
     "SUB-UNKNOWN": _sub_unknown, "CIRCLE": _circle, "MOVARC": _movarc, "INDIRV": _indirv, "TLON,GOFWD": _tlon,
     "RAPID": _rapid, "FEDRAT": _fedrat, "LOAD": _load, "LOADTL": _load, "TURRET": _load, "TOOL PATH": _tool_path,

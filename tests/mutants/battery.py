@@ -223,6 +223,16 @@ ROUND = FAST[:FAST.index("GOTO/20,5,2")] + "".join(
 GOTO/10,3,40,0,0,1
 FINI
 """
+CURVE = HEAD + """NURBS/
+KNOT/0.1,0.4,0.5,0.8,1.0
+CNTRL/14,12,-3
+CNTRL/-5,25,-3
+CNTRL/-30,14,-3
+CNTRL/-34,-20,-3
+CNTRL/-4,-40,-3
+CNTRL/25,-24,-3
+CNTRL/-30,30,-3
+""" + AWAY + "END-OF-PATH\n"
 TALL = """UNITS/MM
 LOADTL/1
 SPINDL/RPM,3000,CLW
@@ -308,6 +318,7 @@ CASES: dict[str, Case] = {
     "fast": Case(FAST, "mikron-ucp710", "linuxcnc"),
     "fast planned": Case(FAST, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "round planned": Case(ROUND, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
+    "spline": Case(CURVE, "mill-3axis", "linuxcnc", TURNED),
     "loose": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"tolerance": 0.5}),
     "whole circle": Case(HELIX.replace("GOTO/-40,30,-8\n", ""), "mill-3axis", "linuxcnc"),
     "kept spindle": Case(FACES.replace("SPINDL/RPM,2000,CLW\n", ""), "trunnion-bc", "linuxcnc"),
