@@ -7,18 +7,16 @@ import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from machines.loader import assemble, check
 from machines.machine import Machine
-from machines.user_file import UserFile, ValueSource
+from machines.user_file import UserFile, Values, ValueSource
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.input_files import shown
 
 Value = str | bool | float | list[float] | list[str]
 KeyNames = tuple[str, ...]
-Tables = dict[str, Any]
-"""tables of a TOML file"""
 FEED_PER_JERK = 10.0
 """1/s: an assumed jerk is the acceleration times this, as in the built-in machines"""
 ASSUMED_LINEAR = {"travel": [-500.0, 500.0], "velocity": 200.0, "acceleration": 2000.0}
@@ -26,8 +24,9 @@ ASSUMED_LINEAR = {"travel": [-500.0, 500.0], "velocity": 200.0, "acceleration": 
 ASSUMED_ROTARY = {"travel": [-360.0, 360.0], "velocity": 60.0, "acceleration": 300.0}
 """degrees and s"""
 ASSUMED_TIMING = {"tool_change": 6.0, "clamp": 0.5, "unclamp": 0.5}
-FIRST = ("description", "retract_axis", "kinematics", "axes", "control", "timing")
-"""tables in the order of the file"""
+FIRST = ("description", "retract_axis", "kinematics", "axes", "control", "timing", "sources")
+FIGURES = ("travel", "velocity", "acceleration", "jerk", "home")
+"""of an axis, with a source each"""
 STATED_BY_USER = "--set"
 
 
@@ -76,11 +75,11 @@ class Draft:
         """What stands against the import."""
         self.found.append(error(code, message, file=file or self.file, lines=[line] if line else (), hint=hint))
 
-    def note(self, code: str, message: str, line: int = 0, file: str = "") -> None:
+    def info(self, code: str, message: str, line: int = 0, file: str = "") -> None:
         """What was taken."""
         self.found.append(info(code, message, file=file or self.file, lines=[line] if line else ()))
 
-    def warn(self, code: str, message: str, line: int = 0, hint: str = "", file: str = "") -> None:
+    def warning(self, code: str, message: str, line: int = 0, hint: str = "", file: str = "") -> None:
         """What is to be looked at."""
         self.found.append(warning(code, message, file=file or self.file, lines=[line] if line else (), hint=hint))
 
@@ -105,7 +104,7 @@ def finish(draft: Draft, rotary: dict[str, bool]) -> tuple[str, Machine | None, 
     for key, value in draft.stated.items():
         path = tuple(key.split("."))
         if path[0] in FIRST:
-            draft.values[path] = DraftValue(value, ValueSource(STATED_BY_USER, 1), "stated by the user", "user")
+            draft.values[path] = DraftValue(value, ValueSource(STATED_BY_USER, 1), f"{STATED_BY_USER} {key}", "user")
     _assume_rest(draft, rotary)
     file = UserFile(Path(draft.file).stem, draft.file, _tables(draft), {p: v.source for p, v in draft.values.items()})
     found = list(draft.found)
@@ -134,6 +133,8 @@ def _assume_rest(draft: Draft, rotary: dict[str, bool]) -> None:
         _home(draft, name)
     for key, seconds in ASSUMED_TIMING.items():
         draft.assume(("timing", key), seconds)
+    draft.assumed = list(dict.fromkeys(draft.assumed))
+    _sources(draft)
     for path in draft.assumed:
         table_path = (*path[:-1], "assumed")
         listed = draft.values.get(table_path)
@@ -144,13 +145,30 @@ def _assume_rest(draft: Draft, rotary: dict[str, bool]) -> None:
 def _home(draft: Draft, name: str) -> None:
     """0 where no home is stated, or the end of the travel next to it."""
     travel = draft.values["axes", name, "travel"].value
-    if ("axes", name, "home") not in draft.values:
-        home = min(max(0.0, float(travel[0])), float(travel[1])) if isinstance(travel, list) else 0.0
-        draft.values["axes", name, "home"] = DraftValue(home, ValueSource(draft.file, 1), "not stated", "made")
+    low, high = (float(end) for end in travel) if isinstance(travel, list) else (0.0, 0.0)
+    draft.assume(("axes", name, "home"), min(max(0.0, low), high))
 
 
-def _tables(draft: Draft) -> Tables:
-    result: Tables = {}
+def _sources(draft: Draft) -> None:
+    """[sources], and the `source` tables: of each figure that a file or the user states."""
+    names: dict[str, str] = {}
+    for path, found in list(draft.values.items()):
+        figure = path[0] == "timing" or path[:2] == ("kinematics", "axes") or (path[0] == "axes" and path[-1] in FIGURES)
+        if not figure or path in draft.assumed or found.origin not in ("read", "user"):
+            continue
+        file = found.source.file
+        name = names.setdefault(file, "user" if file == STATED_BY_USER else "file" + str(len(names) or ""))
+        line = f"line {found.source.line}, " if found.source.line and found.origin == "read" else ""
+        draft.values[*path[:-1], "source", path[-1]] = DraftValue(
+            f"{name}: {line}{' '.join(found.said.split())}", found.source, "", "made")
+    for file, name in names.items():
+        said = "stated at the import" if name == "user" else shown(Path(file).name)
+        for key, value in (("document", said), ("by", "others")):
+            draft.values["sources", name, key] = DraftValue(value, ValueSource(draft.file, 1), "", "made")
+
+
+def _tables(draft: Draft) -> Values:
+    result: Values = {}
     for path, found in draft.values.items():
         table = result
         for part in path[:-1]:
@@ -160,13 +178,14 @@ def _tables(draft: Draft) -> Tables:
 
 
 def _text(draft: Draft) -> str:
-    lines = [f"# Imported from {shown(Path(draft.file).name)}: behind each value the line that states it."]
+    lines = [f"# Imported from {shown(Path(draft.file).name)}."]
     table: KeyNames = ()
     for path, found in sorted(draft.values.items(), key=lambda one: _rank(one[0], list(draft.values))):
         if path[:-1] != table:
             table = path[:-1]
             lines += ["", f"[{'.'.join(table)}]"]
-        lines.append(f"{path[-1]} = {json.dumps(found.value, ensure_ascii=False)}" + _comment(found, draft.file))
+        lines.append(f"{path[-1]} = {json.dumps(found.value, ensure_ascii=False)}" + _comment(
+            found, draft.file, (*path[:-1], "source", path[-1]) in draft.values))
     return "\n".join(lines) + "\n"
 
 
@@ -182,8 +201,8 @@ def _places(table: KeyNames, order: list[KeyNames]) -> Iterator[str]:
         yield f"{first:06d}"
 
 
-def _comment(found: DraftValue, file: str) -> str:
-    if not found.said:
+def _comment(found: DraftValue, file: str, path_has_source: bool) -> str:
+    if not found.said or path_has_source:
         return ""
     place = found.source
     if found.origin != "read" or not place.line:

@@ -12,7 +12,7 @@ from toolpaths.diagnostics import Diagnostic, error, info
 
 LETTERS = "XYZABCUVW"
 """of LinuxCNC"""
-_KEPT = {"travel", "velocity", "acceleration", "jerk", "home", "modulo", "assumed"}
+_KEPT = {"travel", "velocity", "acceleration", "jerk", "home", "modulo", "assumed", "source"}
 """keys of [axes.LETTER] that LinuxCNC's files hold"""
 
 
@@ -55,7 +55,7 @@ def _timing(machine: Machine, model: MachineModel) -> dict[str, str]:
     timing = machine.timing
     found = {"TOOL_CHANGE": repr(timing.tool_change), "CLAMP": repr(timing.clamp), "UNCLAMP": repr(timing.unclamp)}
     found |= {"RETRACT_AXIS": model.retract_axis} if model.retract_axis else {}
-    assumed = [*sorted(machine.limits.assumed), *(f"timing.{key}" for key in sorted(timing.assumed))]
+    assumed = [f"{table.name}.{key}" for table in model.figures() for key in table.assumed]
     return found | ({"ASSUMED": " ".join(assumed)} if assumed else {})
 
 

@@ -8,12 +8,16 @@ from pathlib import Path
 from machines.exchange.choices import GivenForm, MachineForm
 from machines.exchange.draft import Draft, finish
 from machines.exchange.linuxcnc_ini import read_linuxcnc
+from machines.exchange.siemens import read_siemens
 from machines.machine import Machine
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import advice, read_input, reason
 
 _READERS: dict[MachineForm, Callable[[Path, str, Sequence[str]], tuple[Draft, dict[str, bool]]]] = {
-    "linuxcnc-ini": read_linuxcnc}
+    "linuxcnc-ini": read_linuxcnc, "siemens": read_siemens}
+UNDOCUMENTED: dict[MachineForm, str] = {
+    "heidenhain": "the form of Heidenhain's kinematics (KinematicsDesign, CfgKin..., backups of cycle 450) is not published"}
+"""form: why it is not read"""
 
 
 def import_machine(path: Path, form: GivenForm, stated: Sequence[str]) -> tuple[str, Machine | None, list[Diagnostic]]:
@@ -32,10 +36,15 @@ def import_machine(path: Path, form: GivenForm, stated: Sequence[str]) -> tuple[
     if known is None:
         return "", None, [error("import.format", "this is none of the files that are read: "
                                 f"{', '.join(_READERS)}", file=str(path), hint="name the form with --format")]
+    if known in UNDOCUMENTED:
+        return "", None, [error("import.format", UNDOCUMENTED[known], file=str(path),
+                                hint="postproc machine new asks for the pivots that the control shows")]
     return finish(*_READERS[known](path, text, stated))
 
 
 def _form_of(text: str) -> MachineForm | None:
     if "[KINS]" in text or "[TRAJ]" in text:
         return "linuxcnc-ini"
-    return None
+    if any(word in text for word in ("$MA_", "$MC_", "$TC_CARR")):
+        return "siemens"
+    return "heidenhain" if "CfgKin" in text or "KINEMATIC" in text.upper()[:2000] else None

@@ -34,7 +34,7 @@ def write(folder: Path, machine: Machine, tools: Mapping[int, ToolEntry | tuple[
     (folder / "sim.var").touch()
     (folder / "sim.tbl").write_text(table_text(tools))
     (folder / "job.json").write_text(json.dumps({
-        "warp": str(warp), "joints": len(machine.axis_names), "pins": kinds, "modules": MODULES, "time_limit": time_limit,
+        "warp": str(warp), "joints": joints(machine), "pins": kinds, "modules": MODULES, "time_limit": time_limit,
         "realtime": _realtime(machine, kinds)}))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +81,8 @@ def test_pivots_come_from_hal(tmp_path: Path) -> None:
     q = np.random.default_rng(2).uniform(-1.5, 1.5, (50, 5)) * [100, 100, 100, 1, 2]
     for mine, theirs in zip(ours.kinematics.forward(q), own.kinematics.forward(q), strict=True):
         np.testing.assert_allclose(mine, theirs, atol=1e-9)
-    assert "# shop.hal line 1: setp xyzac-trt-kins.x-rot-point 5" in text
+    assert 'point = "file: line 1, setp xyzac-trt-kins.x-rot-point 5, setp' in text
+    assert ours.figures["X.velocity"] == "shop.ini: line 17, [JOINT_0] MAX_VELOCITY = 4"
     assert found == ["INFO import.assumed 0"]
     assert ours.limits.assumed == {f"{letter}.jerk" for letter in "XYZAC"}
 
@@ -225,6 +225,8 @@ def test_modulo_and_largest_feed_go_there_and_back(tmp_path: Path) -> None:
 
 def test_what_is_assumed_stays_assumed(tmp_path: Path) -> None:
     """Written and read, a figure that no document states has not become one that a file states."""
-    ours = machines.load("mill-3axis")
-    ours = replace(ours, limits=replace(ours.limits, assumed=frozenset({"X.velocity"})))
-    assert there_and_back(ours, tmp_path).limits.assumed == {"X.velocity"}
+    (tmp_path / "own.toml").write_text('base = "mill-3axis"\n' + "".join(
+        f'[axes.{letter}]\nvelocity = 400\nassumed = {"[]" if letter != "X" else ["velocity"]}\n' for letter in "XYZ"))
+    back = there_and_back(machines.load(tmp_path / "own.toml"), tmp_path)
+    assert back.limits.assumed == {"X.velocity"}
+    assert back.figures["Y.velocity"].startswith("own.ini: line")
