@@ -226,6 +226,8 @@ class _IniMachine:
         for key in ("tool_change", "clamp", "unclamp"):
             if (entry := self.ini.first(OWN, key.upper())) and entry.number is not None:
                 self.draft.put(("timing", key), entry.number, entry.line, entry.said, entry.file)
+        if (entry := self.ini.first(OWN, "LARGEST_FEED")) and entry.number:
+            self.draft.put(("control", "largest_feed"), entry.number, entry.line, entry.said, entry.file)
         if entry := self.ini.first(OWN, "RETRACT_AXIS"):
             self.draft.put(("retract_axis",), entry.value, entry.line, entry.said, entry.file)
         elif "Z" in letters and self.module != "lineardeltakins":
