@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from machines.machine import Machine
     from toolpaths.diagnostics import Diagnostic
 
-__all__ = ["load", "load_checked", "names", "schema"]
+__all__ = ["catalogued", "load", "load_checked", "names", "schema"]
 
 
 def load(source: str | Path) -> Machine:
@@ -31,10 +31,17 @@ def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
 
 
 def names() -> list[str]:
-    """The built-in machines."""
+    """The built-in models of machines: one of each kind and class."""
     from machines import loader
 
     return loader.names()
+
+
+def catalogued() -> list[str]:
+    """The built-in machines that people own, their figures with sources."""
+    from machines import loader
+
+    return loader.catalogued()
 
 
 def schema() -> dict[str, Any]:

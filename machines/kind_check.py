@@ -9,11 +9,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from machines.key_problem import KeyProblem
 from machines.kinematics import by_samples
 from machines.kinematics.base import Kinematics
 from machines.kinematics.chain import LINEAR, ROTARY
 from machines.machine import Limits
-from machines.models import KeyProblem, KinematicsModel
+from machines.models import KinematicsModel
 from toolpaths.arrays import Bools, Floats
 
 NEAR, TOOL = 1e-6, 50.0

@@ -14,22 +14,25 @@ from pydantic import create_model
 
 import machines.kinds as kinds
 from machines.choices import BoughtOption
+from machines.figures import as_stated, origins_of_figures
+from machines.key_problem import KeyProblem
 from machines.kind_check import build_faults, contract_faults
 from machines.kinematics.base import Kinematics
 from machines.machine import ClampCodes, ControlOptions, Limits, Machine, Timing, Turns
-from machines.models import ControlModel, KeyProblem, KinematicsModel, MachineModel, register_beyond
+from machines.models import ControlModel, KinematicsModel, MachineModel, register_beyond
 from machines.user_file import UserFile, nearest_word, read_toml, schema, validate
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors, read_value
 from toolpaths.units import DEG, PER_MINUTE
 
 DATA = Path(__file__).parent / "data"
+CATALOGUE = Path(__file__).parent / "catalogue"
 KIND, OLDER = ("kinematics", "kind"), ("kinematics", "family")
 """the key that names the kind of machine, and the older word for it, which files may still have"""
 
 
 def builtin() -> dict[str, Path]:
-    """The built-in machine files by name."""
-    return {path.stem: path for path in sorted(DATA.glob("*.toml"))}
+    """The built-in machine files by name: models, then the catalogue."""
+    return {path.stem: path for folder in (DATA, CATALOGUE) for path in sorted(folder.glob("*.toml"))}
 
 
 def load(source: str | Path) -> Machine:
@@ -38,10 +41,7 @@ def load(source: str | Path) -> Machine:
     Raises:
         DiagnosticError: where the file has errors; carries all of them.
     """
-    machine, diagnostics = load_checked(source)
-    if machine is None:
-        raise DiagnosticError(diagnostics)
-    return machine
+    return read_value(load_checked(source))
 
 
 def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
@@ -61,7 +61,7 @@ def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
 
 def check(file: UserFile) -> tuple[MachineModel | None, list[Diagnostic]]:
     """The model of a machine file that has been read, or None and what is wrong with it."""
-    file = _with_kind(file)
+    file = as_stated(_with_kind(file))
     try:
         kinematics, diagnostics = _kinematics_model(file)
     except kinds.KindFault as fault:
@@ -165,6 +165,7 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         look_ahead=control.look_ahead, block_time=control.block_time,
         length_register=register_beyond(control.length_register),
         radius_register=None if control.radius_register is None else register_beyond(control.radius_register),
+        figures=origins_of_figures(model.sources, model.figures()), documents=tuple(model.sources.values()),
         clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
         turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))
 
@@ -174,7 +175,7 @@ def _limits(model: MachineModel, kinematics: Kinematics) -> Limits:
     axes = [model.axes[name] for name in names]
     travel = np.array([axis.range for axis in axes]) * scale[:, None]
     velocity, acceleration, jerk = np.array([(a.velocity, a.acceleration, a.jerk) for a in axes]).T * scale
-    assumed = frozenset(f"{name}.{key}" for name in names for key in model.axes[name].assumed)
+    assumed = frozenset(f"{name}.{key}" for name in names for key in model.axes[name].assumed if key != "home")
     return Limits(travel[:, 0], travel[:, 1], velocity, acceleration, jerk, assumed)
 
 
@@ -199,5 +200,10 @@ def _scale(kinematics: Kinematics) -> Any:
 
 
 def names() -> list[str]:
-    """The built-in machines."""
-    return list(builtin())
+    """The built-in machines that are models of a kind or a class, each different from the others."""
+    return sorted(path.stem for path in DATA.glob("*.toml"))
+
+
+def catalogued() -> list[str]:
+    """The built-in machines that people own, with a source for what a document states."""
+    return sorted(path.stem for path in CATALOGUE.glob("*.toml"))

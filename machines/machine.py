@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from machines.choices import BoughtOption, Park, Rapids, RolloverRule, Stop
+from machines.figures import Document
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
@@ -98,12 +99,15 @@ class ControlOptions:
 class ControlKinematics:
     """A kinematics module that the control itself runs, so that programs hold tip coordinates in the part.
 
-    `module` and `pins` name LinuxCNC's module and its HAL pins; `tool_length_pin` receives the tool length.
+    `module` and `pins` name LinuxCNC's module and its HAL pins; `tool_length_pin` receives the tool length. `idle` are
+    letters of joints that the module has and the machine has not, `sum_to` the pins that a sum of both connects (out, to).
     """
 
     module: str
     pins: Mapping[str, float] = field(default_factory=dict)
     tool_length_pin: str = ""
+    idle: str = ""
+    sum_to: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True)
@@ -134,6 +138,9 @@ class Machine:
         options: what the file says of the options of the control
         look_ahead, block_time: blocks that the control sees ahead, s that it takes for a block; None: not stated
         hooks: blocks of the shop at certain places of a program
+        figures: where a figure of the file comes from, by name ("X.velocity", "timing.clamp"): document and place, or
+            "assumed"; what is not in it is stated by whoever wrote the file
+        documents: those that figures come from
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
 
@@ -162,6 +169,8 @@ class Machine:
     look_ahead: int | None = None
     block_time: float | None = None
     hooks: HooksModel = field(default_factory=HooksModel)
+    figures: Mapping[str, str] = field(default_factory=dict)
+    documents: tuple[Document, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))

@@ -13,10 +13,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from machines.key_problem import KeyProblem
 from machines.kinematics.h4_platform import H4Platform
 from machines.kinematics.sliders import Legs, determinant
 from machines.kinematics.workspace import Workspace
-from machines.models import KeyProblem, Vector
+from machines.models import Vector
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

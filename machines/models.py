@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
 from machines.choices import Park, Rapids, RolloverRule, Stop
+from machines.figures import Document, FigureSource, FigureTable, by_key, source_problems
 from machines.hooks import HooksModel
+from machines.key_problem import KeyProblem
 from machines.kinematics.base import Kinematics
 from machines.machine import ControlKinematics
 from machines.user_file import UserModel
@@ -37,17 +38,9 @@ def _whole_turn(turn: tuple[float, float]) -> tuple[float, float]:
 Turn = Annotated[tuple[float, float], AfterValidator(_whole_turn)]
 Register = Annotated[str, Field(pattern=r"^T( \+ [1-9][0-9]{0,3})?$")]
 MCode = Annotated[str, Field(pattern=r"^(M[0-9]{1,5})?$")]
+AxisFigure = Literal["travel", "velocity", "acceleration", "jerk", "home"]
+TimingFigure = Literal["tool_change", "clamp", "unclamp"]
 Travel = Annotated[tuple[float, float] | Literal["unlimited"], AfterValidator(_upward)]
-
-
-@dataclass(frozen=True)
-class KeyProblem:
-    """A fault that only several keys together show: stable code, path of the key at fault, message, hint."""
-
-    code: str
-    path: tuple[str | int, ...]
-    message: str
-    hint: str = ""
 
 
 class KinematicsModel(UserModel):
@@ -68,6 +61,10 @@ class KinematicsModel(UserModel):
         """What makes the geometry unusable; paths within this table."""
         yield from ()
 
+    def figures(self) -> list[FigureTable]:
+        """Tables of the geometry that name sources of their figures; paths from the top of the file."""
+        return []
+
     def control(self, module: str) -> ControlKinematics:
         """The control's kinematics `module` with the pins that this geometry gives.
 
@@ -75,6 +72,10 @@ class KinematicsModel(UserModel):
             ValueError: where the module cannot describe this machine, saying why.
         """
         raise ValueError(f"no module of a control is known for kind {self.kind!r}")
+
+    def linuxcnc_keys(self) -> dict[str, str] | None:
+        """What LinuxCNC's INI has no key for, by key of its section [POSTPROC]; None where it cannot run the machine."""
+        return None
 
 
 class AxisModel(UserModel):
@@ -110,8 +111,10 @@ class AxisModel(UserModel):
     has it. Empty: the machine clamps by itself"""
     unclamp: MCode = ""
     """M code that releases it, before every block that turns it, e.g. "M11" """
-    assumed: tuple[Literal["travel", "velocity", "acceleration", "jerk"], ...] = ()
+    assumed: tuple[AxisFigure, ...] = ()
     """keys of this table whose figure no document states"""
+    source: dict[AxisFigure, FigureSource] = Field(default_factory=dict)
+    """by key: the document of `[sources]` that states its figure, and the place in it, e.g. travel = "brochure: p. 12" """
 
     @property
     def range(self) -> tuple[float, float]:
@@ -128,8 +131,10 @@ class TimingModel(UserModel):
     """to clamp a rotary axis"""
     unclamp: NotNegative
     """to release it"""
-    assumed: tuple[Literal["tool_change", "clamp", "unclamp"], ...] = ()
+    assumed: tuple[TimingFigure, ...] = ()
     """keys of this table whose figure no document states"""
+    source: dict[TimingFigure, FigureSource] = Field(default_factory=dict)
+    """by key: the document of `[sources]` that states its figure, and the place in it"""
 
 
 class ControlModel(UserModel):
@@ -195,11 +200,14 @@ class MachineModel(UserModel):
     """what the control of this machine does of its own, and which options it has"""
     hooks: HooksModel = HooksModel()
     """blocks of the shop round tool calls, indexing moves, operations and stops"""
+    sources: dict[str, Document] = Field(default_factory=dict)
+    """documents that figures come from, by a short name that `source` of the tables begins with"""
 
     def problems(self) -> Iterator[KeyProblem]:
         """Faults between tables; the geometry's first, for without it the rest means nothing."""
         geometry = [KeyProblem(p.code, ("kinematics", *p.path), p.message, p.hint) for p in self.kinematics.problems()]
         yield from geometry
+        yield from source_problems(self.sources, self.figures())
         if geometry:
             return
         kinematics = self.kinematics.build()
@@ -216,6 +224,11 @@ class MachineModel(UserModel):
             except ValueError as fault:
                 yield KeyProblem("machine.control", ("control", "module"), str(fault),
                                  "write one that is known, or take module out: joints are the program's axes then")
+
+    def figures(self) -> list[FigureTable]:
+        """The tables that hold figures with a source, or assumed ones."""
+        axes = [FigureTable(("axes", name), a.assumed, by_key(a.source)) for name, a in self.axes.items()]
+        return [*self.kinematics.figures(), *axes, FigureTable(("timing",), self.timing.assumed, by_key(self.timing.source))]
 
     def control_kinematics(self) -> ControlKinematics | None:
         """What the control runs; None where joints are the program's axes.
@@ -248,6 +261,11 @@ class MachineModel(UserModel):
                 yield KeyProblem("machine.home", ("axes", name, "home"),
                                  f"home {axis.home:g} of {name} lies outside its travel {list(axis.range)}",
                                  f"write home = {min(max(axis.home, axis.range[0]), axis.range[1]):g}, or correct travel")
+
+
+def blanks(numbers: Iterable[float]) -> str:
+    """Numbers with blanks between them, as LinuxCNC's files have them."""
+    return " ".join(f"{float(number):.15g}" for number in numbers)
 
 
 def register_beyond(rule: str) -> int:

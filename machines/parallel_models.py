@@ -8,13 +8,14 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from machines.key_problem import KeyProblem
 from machines.kinematics.h4_axes import H4SpindleAxis, H4TableAxis
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.h4_platform import H4Platform
 from machines.kinematics.linear_delta import LinearDelta
 from machines.machine import ControlKinematics
 from machines.mobility import delta_faults, h4_faults, reach_faults
-from machines.models import KeyProblem, NotNegative, Vector
+from machines.models import NotNegative, Vector, blanks
 from machines.slider_models import SliderModel
 from machines.user_file import UserModel
 from toolpaths.units import DEG
@@ -52,6 +53,11 @@ class LinearDeltaModel(SliderModel):
         if all(len(pair) == 2 for pair in pairs):
             across = np.array([np.subtract(pair[0], pair[1]) for pair in pairs])
             yield from delta_faults(self.build_legs(), self.platform_joints(), self.workspace.build(), across)
+
+    def linuxcnc_keys(self) -> dict[str, str]:
+        """The workspace; the legs are pins of lineardeltakins."""
+        return {f"WORKSPACE_{letter}": blanks(span) for letter, span in zip(
+            "XYZ", (self.workspace.x, self.workspace.y, self.workspace.z), strict=True)}
 
     def control(self, module: str) -> ControlKinematics:
         """Pins L and R of LinuxCNC's lineardeltakins: three slides along z at R from the z axis, 120 degrees apart.

@@ -10,10 +10,12 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, field_validator
 
+from machines.figures import FigureSource, FigureTable, by_key
+from machines.key_problem import KeyProblem
 from machines.kinematics.chain import ROTARY, Joint
 from machines.kinematics.serial import Serial
 from machines.machine import ControlKinematics
-from machines.models import KeyProblem, KinematicsModel, Vector
+from machines.models import KinematicsModel, Vector, blanks
 from machines.user_file import UserModel
 from toolpaths.arrays import Floats
 
@@ -23,10 +25,15 @@ _ISO_841 = {"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1), "U": (1, 0, 0), "V":
             "A": (1, 0, 0), "B": (0, 1, 0), "C": (0, 0, 1)}
 _TOKEN = re.compile(r"([XYZUVWABC])('?)$")
 _SPINDLE = re.compile(r"\([A-Z]\d*\)$")
+HEAD_MODULE, PIVOT_SUM = "5axiskins", "pivotsum"
+"""LinuxCNC's module of a head C B, and the name of the sum (sum2) of its pivot length and the tool length"""
 UNIT = 1e-6
 """how far the length of a direction in a file may be from 1 (it is normalised)"""
 INDEPENDENT = 1e-3
 """least sine between rotary axes, least volume of the linear directions"""
+
+
+SerialFigure = Literal["point", "direction"]
 
 
 class SerialAxisModel(UserModel):
@@ -38,6 +45,10 @@ class SerialAxisModel(UserModel):
     """rotary: a point of its line, mm in machine coordinates"""
     positive: Literal[1, -1] = 1
     """-1 where the machine counts against `direction`"""
+    assumed: tuple[SerialFigure, ...] = ()
+    """keys of this table whose figure no document states; `direction` stands for `positive` too"""
+    source: dict[SerialFigure, FigureSource] = Field(default_factory=dict)
+    """by key: the document of `[sources]` that states its figure, and the place in it"""
 
 
 class SerialModel(KinematicsModel):
@@ -80,6 +91,11 @@ class SerialModel(KinematicsModel):
         axis = self.axes.get(name, SerialAxisModel())
         direction = np.array(axis.direction or _ISO_841[name], dtype=np.float64) * axis.positive
         return Joint(name, name in ROTARY, direction, np.array(axis.point or (0.0, 0.0, 0.0)))
+
+    def figures(self) -> list[FigureTable]:
+        """The tables of the axes."""
+        return [FigureTable(("kinematics", "axes", name), axis.assumed, by_key(axis.source))
+                for name, axis in self.axes.items()]
 
     def problems(self) -> Iterator[KeyProblem]:
         """Tables that do not fit the code, vectors that are not of length 1, axes that depend on each other."""
@@ -126,29 +142,54 @@ class SerialModel(KinematicsModel):
                              f"rotary axis {second.name} is parallel to the tool and only turns it about itself",
                              "check the structure: it lists the axes from the workpiece to the tool")
 
-    def control(self, module: str) -> ControlKinematics:
-        """Pins of LinuxCNC's table-table modules (xyzac-trt-kins, xyzbc-trt-kins) from the lines of both rotary axes.
+    def linuxcnc_keys(self) -> dict[str, str]:
+        """Structure, directions and lines of the axes."""
+        found = {"STRUCTURE": self.structure, "TOOL_AXIS": blanks(self.tool_axis)}
+        for joint in map(self._joint, self.letters):
+            found[f"DIRECTION_{joint.name}"] = blanks(joint.direction)
+            found |= {f"POINT_{joint.name}": blanks(joint.point)} if joint.rotary else {}
+        return found
 
-        The modules hold the C line's point and the offset from it to the tilting axis; both axes turn against ISO 841.
+    def control(self, module: str) -> ControlKinematics:
+        """Pins of LinuxCNC's table-table modules (xyzac-trt-kins, xyzbc-trt-kins) and of 5axiskins, a head C B.
+
+        The former hold the C line's point and the offset from it to the tilting axis; both axes turn against ISO 841.
         """
         known = {"xyzac-trt-kins": ("A", 1), "xyzbc-trt-kins": ("B", 0)}
+        if module == HEAD_MODULE:
+            return self._head_control()
         if module not in known:
-            raise ValueError(f"module {module!r} is not known for serial machines; known: {', '.join(known)}")
+            raise ValueError(f"module {module!r} is not known for serial machines; known: "
+                             f"{', '.join((*known, HEAD_MODULE))}")
         tilt, across = known[module]
         if self.letters[:2] != ("C", tilt) or set(self.letters[2:]) != set("XYZ"):
             raise ValueError(f"{module} is for w C' {tilt}' and X, Y, Z in any order, not {self.structure!r}")
-        for name in self.letters:
-            direction = np.array(_ISO_841[name]) * (-1 if name in ROTARY else 1)
-            if not np.array_equal(self._joint(name).direction, direction):
-                raise ValueError(f"{module} needs axis {name} along {direction.tolist()}")
-        if self.tool_axis != (0.0, 0.0, 1.0):
-            raise ValueError(f"{module} needs the tool along z when all joints are 0")
+        self._check_directions(module, {name: -1 for name in self.letters if name in ROTARY})
         c, t = self._joint("C").point, self._joint(tilt).point
         offset = "xy"[across]
         pins = {"x-rot-point": c[0], "y-rot-point": c[1], "z-rot-point": c[2],
                 f"{offset}-offset": t[across] - c[across], "z-offset": t[2] - c[2]}
         return ControlKinematics(module, {f"{module}.{pin}": float(value) for pin, value in pins.items()},
                                  f"{module}.tool-offset")
+
+    def _head_control(self) -> ControlKinematics:
+        """The pivot length P of 5axiskins, to which a sum adds the tool length; B against ISO 841, C as there (s2r)."""
+        if self.letters[3:] != ("C", "B") or set(self.letters[:3]) != set("XYZ"):
+            raise ValueError(f"{HEAD_MODULE} is for X, Y, Z in any order, then C B t, not {self.structure!r}")
+        self._check_directions(HEAD_MODULE, {"B": -1, "C": 1})
+        c, b = self._joint("C").point, self._joint("B").point
+        if c[0] != 0.0 or c[1] != 0.0 or b[0] != 0.0:
+            raise ValueError(f"{HEAD_MODULE} needs the lines of C and B through the spindle's own: points [0, 0, z]")
+        return ControlKinematics(HEAD_MODULE, {f"{PIVOT_SUM}.in0": float(b[2])}, f"{PIVOT_SUM}.in1", "W",
+                                 (f"{PIVOT_SUM}.out", f"{HEAD_MODULE}.pivot-length"))
+
+    def _check_directions(self, module: str, turns: dict[str, int]) -> None:
+        for name in self.letters:
+            direction = np.array(_ISO_841[name]) * turns.get(name, 1)
+            if not np.array_equal(self._joint(name).direction, direction):
+                raise ValueError(f"{module} needs axis {name} along {direction.tolist()}")
+        if self.tool_axis != (0.0, 0.0, 1.0):
+            raise ValueError(f"{module} needs the tool along z when all joints are 0")
 
 
 def _chain(code: str) -> tuple[str, ...]:

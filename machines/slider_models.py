@@ -9,11 +9,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator
 
+from machines.key_problem import KeyProblem
 from machines.kinematics.chain import LINEAR
 from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
-from machines.models import KeyProblem, KinematicsModel, NotNegative, Positive, Vector
+from machines.models import KinematicsModel, NotNegative, Positive, Vector
 from machines.user_file import UserModel
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG

@@ -154,8 +154,7 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
           above: tuple[str, ...]) -> tuple[UserFile | None, list[Diagnostic]]:
     path = _resolve(source, builtin, wanted_by)
     key = str(place(path))
-    if key in above:
-        assert wanted_by is not None
+    if key in above and wanted_by is not None:
         message = f"base = {source!r} leads back to a file that it is the base of"
         return None, [wanted_by.problem("file.base-cycle", ("base",), message, "take one of the base keys out")]
     text, problem = _text(path, source, builtin, kind, wanted_by)

@@ -8,7 +8,7 @@ from functools import cache
 
 import pytest
 
-from tests import compile_once, cover, environment, one_command, rewrite_once
+from tests import compile_once, cover, environment, one_command, rewrite_once, tiers
 from tests.linuxcnc import interpreter, simulator
 from tests.processor_time import (
     pytest_addoption,
@@ -17,7 +17,6 @@ from tests.processor_time import (
     pytest_terminal_summary,
     pytest_testnodedown,
 )
-from tests.tiers import QUICK
 
 __all__ = ["environment", "pytest_addoption", "pytest_runtest_protocol", "pytest_sessionfinish", "pytest_terminal_summary",
            "pytest_testnodedown"]
@@ -31,9 +30,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever asks for LinuxCNC can be chosen with `-m linuxcnc`, the files of the quick tier with `-m
     quick`; the cases that a test marked `covering` can do without with `-m slow`."""
     cover.mark_slow(items)
+    tiers.mark_quick(items)
     for item in items:
-        if item.nodeid.split("::")[0] in QUICK:
-            item.add_marker(pytest.mark.quick)
         if {"interpret", "simulate", "recorded", "standstill"} & set(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.linuxcnc)
 
@@ -41,7 +39,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection_finish() -> None:
     """What stays until the end is not looked through by each collection of garbage, and there are fewer of them."""
     gc.freeze()
-    gc.set_threshold(50_000, 20, 20)
+    gc.set_threshold(100_000, 50, 100)
     gc.enable()
     compile_once.install()
     one_command.install()

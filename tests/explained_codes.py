@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from postproc.witness.evidence import FindingCode
 from tests.hints.case import example
 from tests.hints.cases import CASES
+from tests.source import tree, walked
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "postproc" / "explain"
@@ -68,7 +69,7 @@ def _texts_of(tree: ast.Module) -> dict[str, str]:
 def _signatures(trees: Iterable[ast.Module]) -> dict[str, set[Signature]]:
     """Parameters of all functions with a hint, and fields of classes with one, by name."""
     found: dict[str, set[Signature]] = {}
-    for node in (n for tree in trees for n in ast.walk(tree)):
+    for node in (n for one in trees for n in walked(one)):
         names: list[str] = []
         if isinstance(node, ast.FunctionDef):
             names = [a.arg for a in (*node.args.posonlyargs, *node.args.args) if a.arg != "self"]
@@ -100,7 +101,7 @@ def _given(node: ast.Call, name: str, at: int, signatures: set[Signature]) -> as
 def _said(tree: ast.Module, signatures: dict[str, set[Signature]]) -> Iterator[tuple[str, str, str]]:
     """(code, message, hint) of a file; texts "" where a code stands by itself."""
     known = _texts_of(tree)
-    for node in ast.walk(tree):
+    for node in walked(tree):
         for k, one in enumerate(node.args[:3]) if isinstance(node, ast.Call) else ():
             if isinstance(one, ast.Constant) and isinstance(one.value, str) and CODE.match(one.value):
                 assert isinstance(node, ast.Call)
@@ -127,7 +128,7 @@ SAYS = frozenset({"error", "warning", "info", "fault", "problem", "KeyProblem", 
 
 @cache
 def _trees(*rooms: str) -> list[ast.Module]:
-    return [ast.parse(path.read_text("utf-8")) for top in rooms or ("toolpaths", "machines", "postproc")
+    return [tree(path) for top in rooms or ("toolpaths", "machines", "postproc")
             for path in sorted((ROOT / top).rglob("*.py"))]
 
 
@@ -137,7 +138,7 @@ def _called(node: ast.Call) -> str:
 
 def said_codes() -> set[str]:
     """Codes that stand in the calls that make diagnostics, whatever their area."""
-    calls = [n for tree in _trees() for n in ast.walk(tree) if isinstance(n, ast.Call)]
+    calls = [n for one in _trees() for n in walked(one) if isinstance(n, ast.Call)]
     return {one.value for n in calls if _called(n) in SAYS
             for one in n.args[:3] if isinstance(one, ast.Constant) and isinstance(one.value, str) and CODE.match(one.value)}
 
@@ -149,8 +150,8 @@ def codes() -> dict[str, dict[str, list[str]]]:
     found: dict[str, dict[str, list[str]]] = {code: {"messages": [], "remedies": []} for code in MADE}
     trees = _trees()
     signatures = _signatures(trees)
-    found_by_witness = (said for tree in _trees("postproc/witness") for node in ast.walk(tree) for said in _found(node))
-    for code, message, hint in itertools.chain((said for tree in trees for said in _said(tree, signatures)),
+    found_by_witness = (said for one in _trees("postproc/witness") for node in walked(one) for said in _found(node))
+    for code, message, hint in itertools.chain((said for one in trees for said in _said(one, signatures)),
                                                found_by_witness):
         if code in NONE or code.split(".")[0] not in areas:
             continue

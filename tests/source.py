@@ -12,7 +12,13 @@ ROOT = Path(__file__).parents[1]
 @cache
 def tree(path: Path) -> ast.Module:
     """The syntax of a file; nobody changes it."""
-    return ast.parse(path.read_text("utf-8"))
+    return ast.parse(written(path))
+
+
+@cache
+def written(path: Path) -> str:
+    """A file as it stands."""
+    return path.read_text("utf-8")
 
 
 @cache

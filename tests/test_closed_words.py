@@ -13,7 +13,7 @@ from postproc.base.options import FeedModeChoice, FeedSource, Orientation, Outpu
 from postproc.cli.app import app
 from postproc.pipeline.result import StageName
 from postproc.pipeline.stages import STAGES
-from tests.test_imports import ROAD, ROOT
+from tests.source import ROOT, product, tree, walked
 from toolpaths.choices import CycleKind, DialectName
 from toolpaths.cl.cycle_words import KINDS
 from toolpaths.cl.text.dialects import DIALECTS
@@ -26,6 +26,7 @@ FROM_FILES = {
     "machines/geometric_error/tables/": "characters of CSV tables, letters of names",
     "machines/geometric_error/files/": "letters of names of parameters",
     "machines/geometric_error/exchange/imports.py": "letters of axes", "machines/serial_models.py": "letters of axes",
+    "machines/exchange/": "words of files of others",
     "machines/parallel_models.py": "names of LinuxCNC's modules"}
 """texts that others wrote; what is made of them is a Literal"""
 WORDS_OF_FILES = {"Event.word", "Statement.major", "Statement.body", "Record.major", "Record.body", "DialectStatement.name"}
@@ -38,16 +39,15 @@ OTHERS = {
 
 @cache
 def trees() -> dict[str, ast.Module]:
-    return {path.relative_to(ROOT).as_posix(): ast.parse(path.read_text("utf-8"))
-            for top in ROAD for path in sorted((ROOT / top).rglob("*.py"))}
+    return {path.relative_to(ROOT).as_posix(): tree(path) for path in product()}
 
 
 @cache
 def texts_of_classes() -> dict[str, set[str]]:
     """Fields and properties that are `str`, by class."""
     found: dict[str, set[str]] = {}
-    for tree in trees().values():
-        for node in ast.walk(tree):
+    for file in trees().values():
+        for node in walked(file):
             if isinstance(node, ast.ClassDef):
                 found.setdefault(node.name, set()).update(texts_of(node))
     return found
@@ -66,19 +66,21 @@ def words_in(node: ast.expr) -> set[str]:
     return {part.value for part in parts if isinstance(part, ast.Constant) and isinstance(part.value, str) and part.value}
 
 
-def compared(tree: ast.Module, classes: dict[str, set[str]]) -> Iterator[str]:
+def compared(module: ast.Module, classes: dict[str, set[str]]) -> Iterator[str]:
     """Parameters that are `str`, and fields that are (`Class.field`), where they are compared with words."""
-    for outer in ast.walk(tree):
+    for outer in walked(module):
         if not isinstance(outer, ast.ClassDef | ast.Module):
             continue
         for function in [item for item in outer.body if isinstance(item, ast.FunctionDef)]:
             given = [*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs]
+            comparisons = [node for node in walked(function) if isinstance(node, ast.Compare)]
+            if not comparisons:
+                continue
             kinds = {arg.arg: ast.unparse(arg.annotation) for arg in given if arg.annotation is not None}
             if isinstance(outer, ast.ClassDef) and given:
                 kinds[given[0].arg] = outer.name
-            for node in ast.walk(function):
-                if isinstance(node, ast.Compare):
-                    yield from of_comparison(node, kinds, classes)
+            for node in comparisons:
+                yield from of_comparison(node, kinds, classes)
 
 
 def of_comparison(node: ast.Compare, kinds: dict[str, str], classes: dict[str, set[str]]) -> Iterator[str]:
@@ -95,16 +97,16 @@ def of_comparison(node: ast.Compare, kinds: dict[str, str], classes: dict[str, s
 
 
 def test_no_text_is_compared_with_words() -> None:
-    found = {(file, name) for file, tree in trees().items() if not file.startswith(tuple(FROM_FILES))
-             for name in compared(tree, texts_of_classes()) if name not in WORDS_OF_FILES}
+    found = {(file, name) for file, module in trees().items() if not file.startswith(tuple(FROM_FILES))
+             for name in compared(module, texts_of_classes()) if name not in WORDS_OF_FILES}
     assert found - set(OTHERS) == set()
     assert set(OTHERS) - found == set(), "no longer there"
 
 
 def test_in_rooms_of_texts_only_texts_are_compared() -> None:
     """Where words of files are read, what is made of them is closed all the same: fields are Literals."""
-    found = {name for file, tree in trees().items() if file.startswith(tuple(FROM_FILES)) and "/witness/" not in file
-             for name in compared(tree, texts_of_classes()) if "." in name}
+    found = {name for file, module in trees().items() if file.startswith(tuple(FROM_FILES)) and "/witness/" not in file
+             for name in compared(module, texts_of_classes()) if "." in name}
     assert found - WORDS_OF_FILES == set()
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.cover import Case, chosen, mark_slow
+from tests.tiers import QUICK, mark_quick
 
 CASES: list[Case] = [{"machine": machine, "control": control, "mode": mode}
                      for machine, control, mode in product("abcdefg", range(6), ("axes", "tcp"))]
@@ -49,7 +50,7 @@ class Item:
             self.callspec = SimpleNamespace(params=params)
 
     def get_closest_marker(self, name: str) -> pytest.Mark | None:
-        return self.marker.mark if self.marker and name == "covering" else None
+        return self.marker.mark if self.marker and name == self.marker.name else None
 
     def add_marker(self, marker: pytest.MarkDecorator) -> None:
         self.added.append(marker.name)
@@ -63,6 +64,14 @@ def test_the_marker_leaves_the_others_to_the_slow_tests() -> None:
     mark_slow([*one, *two, *plain])
     assert [item.added for item in one] == [[], ["slow"], ["slow"], []]
     assert not any(item.added for item in (*two, *plain))
+
+
+def test_the_quick_tier_has_no_slow_tests() -> None:
+    """Asked for by `-m quick` alone, which is said in place of `-m "not slow"`."""
+    file = QUICK[0]
+    items = [Item(f"{file}::one[{k}]", pytest.mark.slow if k else None) for k in range(2)]
+    mark_quick([*items, Item("tests/other.py::one", None)])
+    assert [item.added for item in items] == [["quick"], []]
 
 
 def test_options_in_dictionaries_and_arrays_are_values_as_others() -> None:

@@ -25,8 +25,6 @@ LISTED = {
     "Toolpath.equals": "what a round trip means; for users of the package",
     "CorrectedCommands.tip_residual": "a result of `correct`, for users of the package",
     "CorrectedCommands.axis_residual": "likewise",
-    "ControlKinematics.tool_length_pin": "read where the machine is set up in LinuxCNC (tests/linuxcnc/config.py)",
-    "ControllerFile.sources": "documents of a controller file, for its readers; `controller show` prints all keys",
     "PlannedMotion.trajectories": "samples of what is planned, for users of the package (postproc/README.md)",
     "StretchSpeeds.lowest": "a result of `Plan.blocks`, in the example of feedrate/README.md",
     "StretchSpeeds.highest": "likewise", "__getattr__": "called by Python",
@@ -46,7 +44,7 @@ def module(path: Path) -> str:
 
 def imports(found: ast.AST) -> Iterator[tuple[str, str]]:
     """(module, name) of each import, and of each attribute of an imported module."""
-    alias = {}
+    alias: dict[str, str] = {}
     for node in walked(found):
         if isinstance(node, ast.ImportFrom) and node.module:
             for one in node.names:
@@ -97,13 +95,14 @@ def defined(node: ast.stmt) -> list[str]:
 
 def unused(file: ast.Module, imported: set[str]) -> Iterator[str]:
     """Names of a file that nobody imports, and that no other statement of the file uses."""
-    inside = [{n.id if isinstance(n, ast.Name) else n.value for n in ast.walk(node)
+    inside = [{n.id if isinstance(n, ast.Name) else n.value for n in walked(node)
                if isinstance(n, ast.Name | ast.Constant)} for node in file.body]
     uses = Counter(name for names in inside for name in names)
     for node, own in zip(file.body, inside, strict=True):
         yield from (name for name in defined(node) if uses[name] == (name in own) and name not in imported)
 
 
+@cache
 def all_unused() -> dict[str, str]:
     """Name to file of what is unused."""
     imported: dict[str, set[str]] = {}
@@ -122,7 +121,7 @@ def test_what_a_file_defines_is_used() -> None:
 
 def members(path: Path) -> Iterator[tuple[str, str]]:
     """(class, name) of methods, properties and annotated fields."""
-    for found in ast.walk(tree(path)):
+    for found in walked(tree(path)):
         if not isinstance(found, ast.ClassDef):
             continue
         for node in found.body:
@@ -134,6 +133,7 @@ def members(path: Path) -> Iterator[tuple[str, str]]:
                 yield found.name, node.target.id
 
 
+@cache
 def uncalled() -> set[str]:
     """Class.name of members that nobody names."""
     calls = Counter(word for found in users() for word in words(found))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import re
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from tests.source import ROOT
+from tests.source import ROOT, product
 from tests.test_imports import ROAD, circle, graph, texts
 
 FLOORS = (
@@ -17,7 +18,9 @@ FLOORS = (
     ("toolpaths.cl", "statements to a Toolpath, and back to text"),
     ("machines.kinematics", "serial and parallel kinematics"),
     ("machines", "machine files, the Machine, polytopes, reach"),
-    ("machines.data", "built-in machine files"),
+    ("machines.data", "built-in machine files: models of kinds and classes"),
+    ("machines.catalogue", "built-in machine files: machines that people own, with sources"),
+    ("machines.exchange", "machine files of others, LinuxCNC's written"),
     ("machines.analysis", "what a machine is good for"),
     ("machines.geometric_error.tables", "curves and tables of errors, their files"),
     ("machines.geometric_error.actual", "the machine with errors, corrected commands"),
@@ -152,6 +155,25 @@ def test_tests_stand_as_the_rooms_do() -> None:
     history = ("leftovers", "review", "second_reading", "everyday")
     assert [path.name for path in (ROOT / "tests").rglob("test_*.py") if path.stem.startswith(
         tuple(f"test_{word}" for word in history))] == []
+
+
+def unnamed(path: Path, page: str) -> bool:
+    """True where a README does not name a file; packages and their doors need no line."""
+    return not path.stem.startswith("__") and not re.search(rf"\b{re.escape(path.stem)}\b", page)
+
+
+def readme_of(path: Path) -> Path:
+    """The README of a room, else that of the one above it."""
+    return next(folder / "README.md" for folder in path.parents if (folder / "README.md").exists())
+
+
+def test_the_readme_of_a_room_names_its_files() -> None:
+    assert [path.relative_to(ROOT).as_posix() for path in product()
+            if unnamed(path, readme_of(path).read_text("utf-8"))] == []
+
+
+def test_an_unnamed_file_is_noticed() -> None:
+    assert unnamed(Path("walk.py"), "| `walks.py` | paths |") and not unnamed(Path("walk.py"), "| `low/walk.py` | paths |")
 
 
 def test_the_documents_list_the_rooms() -> None:

@@ -10,6 +10,7 @@ from tests.test_imports import texts
 
 READERS = {
     "toolpaths.cl": "CL files", "toolpaths.cl.text": "CL files", "machines.geometric_error.tables": "CSV tables",
+    "machines.exchange": "machine files of others",
     "postproc.controllers": "controller files",
     "postproc.readback.text": "programs", "postproc.readback.dialects": "programs",
     "postproc.witness": "CL files and machine files, by itself"}

@@ -1,9 +1,13 @@
 """Files of the quick tier, `make quick`: each part of the road in a minute; whatever converts many samples is left out.
 
-`tests/conftest.py` gives their tests the marker `quick`.
+`mark_quick` gives their tests the marker `quick`, but for those that `make test` leaves to `make slow`.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
 
 QUICK = (
     "tests/test_imports.py",
@@ -52,3 +56,10 @@ QUICK = (
     "tests/toolpaths/cl/test_cl_motion.py",
     "tests/toolpaths/cl/test_cl_records.py",
 )
+
+
+def mark_quick(items: Sequence[pytest.Item]) -> None:
+    """Tests of those files; whoever asks for them alone (`-m quick`) gets no slow ones with them."""
+    for item in items:
+        if item.nodeid.partition("::")[0] in QUICK and not item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.quick)

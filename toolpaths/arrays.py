@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 Array = npt.NDArray[Any]
+_CORNERS = np.array(list(product((False, True), repeat=3)))
 
 
 def shared(values: Array) -> Array:
@@ -65,6 +68,16 @@ def among(values: Array, some: Iterable[float]) -> Bools:
     for one in some:
         found |= values == one
     return found
+
+
+def box_corners(low: Floats, high: Floats) -> Floats:
+    """(8, 3) corners of the box from `low` (3,) to `high` (3,), these two first and last."""
+    return np.where(_CORNERS, high, low)
+
+
+def finite(value: float) -> float | None:
+    """None for inf and NaN, which JSON has no words for."""
+    return float(value) if math.isfinite(value) else None
 
 
 def runs(which: Bools) -> Ints:

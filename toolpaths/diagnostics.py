@@ -9,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import TypeVar
+
+_Value = TypeVar("_Value")
 
 
 class Severity(IntEnum):
@@ -72,6 +75,14 @@ def require(diagnostics: Sequence[Diagnostic]) -> None:
     """Raise DiagnosticError where any diagnostic is an ERROR."""
     if has_errors(diagnostics):
         raise DiagnosticError(diagnostics)
+
+
+def read_value(read: tuple[_Value | None, Sequence[Diagnostic]]) -> _Value:
+    """What a file was read as; DiagnosticError where it is None or an ERROR stands against it."""
+    value, diagnostics = read
+    if value is None or has_errors(diagnostics):
+        raise DiagnosticError(diagnostics)
+    return value
 
 
 def _stated(lines: Sequence[int]) -> tuple[int, ...]:

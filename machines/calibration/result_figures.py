@@ -15,7 +15,7 @@ from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.csv_table import UNITS
 from machines.geometric_error.tables.curves import TableCurve
 from machines.kinematics.chain import ROTARY
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, finite
 
 CURVE = 5
 """degrees between the points of a drawn series"""
@@ -150,8 +150,3 @@ def weighted(rows: Floats, sigma: Floats | float, names: list[str]) -> dict[str,
 def listed(values: Floats) -> Numbers:
     """Plain numbers, None where one is not finite."""
     return [finite(float(v)) for v in values]
-
-
-def finite(value: float) -> float | None:
-    """None where it is not."""
-    return float(value) if np.isfinite(value) else None

@@ -10,7 +10,6 @@ from machines.calibration.outcome import CalibrationOutcome, done
 from machines.calibration.result_figures import (
     CalibrationFigures,
     account,
-    finite,
     listed,
     series_signatures,
     signature,
@@ -28,7 +27,7 @@ from machines.geometric_error.tables.csv_table import UNITS, CsvTable
 from machines.geometric_error.tables.curves import TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from machines.kinematics.chain import ROTARY
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, finite
 
 ARCSEC = UNITS["arcsec"]
 SETUPS = 6

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,16 @@ class Joint:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", unit_vector(self.direction))
+
+    @cached_property
+    def along(self) -> list[float]:
+        """`direction` as plain numbers."""
+        return [float(x) for x in self.direction]
+
+    @cached_property
+    def place(self) -> list[float]:
+        """`point` as plain numbers."""
+        return [float(x) for x in self.point]
 
 
 def unit_vector(v: npt.ArrayLike) -> Floats:

@@ -14,23 +14,44 @@ from toolpaths.arrays import Bools, Floats
 
 Columns = Sequence[Floats | float] | Floats
 """x, y, z; arrays whose last axis is the points, or plain numbers"""
+Number = Floats | float
 BLOCK = 8192
 """points at a time"""
 
 
-def turn(direction: Floats, cos: Floats, sin: Floats, v: Columns) -> list[Floats | float]:
-    """v turned about the unit `direction` (3,) (Rodrigues); about an axis of coordinates two columns change."""
-    d: list[float] = direction.tolist()
-    i = next((i for i in range(3) if abs(d[i]) == 1.0), -1)
+def turn(direction: Floats, cos: Number, sin: Number, v: Columns) -> list[Number]:
+    """v turned about the unit `direction` (3,) (Rodrigues)."""
+    return turned(direction.tolist(), cos, sin, v)
+
+
+def turned(d: Sequence[float], cos: Number, sin: Number, v: Columns) -> list[Number]:
+    """v turned about the unit d, plain numbers; about an axis of coordinates two columns change."""
+    i = axis_of(d)
     if i >= 0:
         j, k = (i + 1) % 3, (i + 2) % 3
         signed = sin if d[i] > 0.0 else -sin
         result = list(v)
         result[j], result[k] = cos * v[j] - signed * v[k], signed * v[j] + cos * v[k]
         return result
-    along = dot(direction, v)
+    along = dot(d, v)
     return [along * d[i] + cos * (v[i] - along * d[i]) + sin * (d[j] * v[k] - d[k] * v[j])
             for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
+
+
+def axis_of(d: Sequence[float]) -> int:
+    """Which axis of coordinates the unit d is, in either direction; -1 for none."""
+    return 0 if abs(d[0]) == 1.0 else 1 if abs(d[1]) == 1.0 else 2 if abs(d[2]) == 1.0 else -1
+
+
+def across(d: Sequence[float], v: Columns) -> list[Number]:
+    """d x v, d plain numbers; of an axis of coordinates two columns are left."""
+    i = axis_of(d)
+    if i < 0:
+        return cross(d, v)
+    j, k = (i + 1) % 3, (i + 2) % 3
+    result: list[Number] = [0.0, 0.0, 0.0]
+    result[j], result[k] = (-v[k], v[j]) if d[i] > 0.0 else (v[k], -v[j])
+    return result
 
 
 def dot(a: Columns, b: Columns) -> Floats:
@@ -51,17 +72,18 @@ def cross(a: Columns, b: Columns) -> list[Floats | float]:
 
 def plus(a: Columns, b: Columns) -> list[Floats | float]:
     """a + b; adding a plain 0 makes no copy."""
-    return [y if _is(x, 0.0) else x if _is(y, 0.0) else x + y for x, y in zip(a, b, strict=True)]
+    return [y if x.__class__ is float and x == 0.0 else x if y.__class__ is float and y == 0.0 else x + y
+            for x, y in zip(a, b, strict=True)]
 
 
 def minus(a: Columns, b: Columns) -> list[Floats | float]:
     """a - b"""
-    return [x if _is(y, 0.0) else x - y for x, y in zip(a, b, strict=True)]
+    return [x if y.__class__ is float and y == 0.0 else x - y for x, y in zip(a, b, strict=True)]
 
 
 def times(value: Floats | float, v: Columns) -> list[Floats | float]:
-    """value v"""
-    return [value * x for x in v]
+    """value v; a plain 0 stays one."""
+    return [0.0 if _is(x, 0.0) else value * x for x in v]
 
 
 def norm(v: Columns) -> Floats:

@@ -151,12 +151,11 @@ class Serial(Kinematics):
         for joint in reversed(chain):
             if joint.rotary:
                 cos, sin = turning[joint.name]
-                place = columns.of_one(joint.point)
-                point = columns.plus(columns.turn(joint.direction, cos, sin, columns.minus(point, place)), place)
-                vectors = [columns.turn(joint.direction, cos, sin, v) for v in vectors]
+                point = columns.plus(columns.turned(joint.along, cos, sin, columns.minus(point, joint.place)), joint.place)
+                vectors = [columns.turned(joint.along, cos, sin, v) for v in vectors]
             elif q is not None:
                 value = q[:, self.axis_names.index(joint.name)]
-                point = [x if d == 0.0 else x + value * d for x, d in zip(point, joint.direction.tolist(), strict=True)]
+                point = [x if d == 0.0 else x + value * d for x, d in zip(point, joint.along, strict=True)]
         return [point, *vectors]
 
     # ---- rates ---------------------------------------------------------------------------------------------
@@ -183,16 +182,16 @@ class Serial(Kinematics):
         rates = np.zeros((3, self.joints, 2, n))
         done: list[int] = []
         for joint in reversed(self.chain):
-            index, w = self.axis_names.index(joint.name), columns.of_one(joint.direction)
+            index, w = self.axis_names.index(joint.name), joint.along
             if not joint.rotary:
                 tip = columns.plus(tip, columns.times(q[:, index], w))
                 rates[:, index, 0] = joint.direction[:, None]
             else:
                 cos, sin = turning[joint.name]
-                place = columns.of_one(joint.point)
-                tip = columns.turn(joint.direction, cos, sin, columns.minus(tip, place))
-                axis = columns.turn(joint.direction, cos, sin, axis)
-                for i, column in enumerate(columns.turn(joint.direction, cos, sin, rates[:, done])):
+                place = joint.place
+                tip = columns.turned(joint.along, cos, sin, columns.minus(tip, place))
+                axis = columns.turned(joint.along, cos, sin, axis)
+                for i, column in enumerate(columns.turned(joint.along, cos, sin, rates[:, done])):
                     rates[i, done] = column
                 for i, both in enumerate(zip(columns.cross(w, tip), w if twist else columns.cross(w, axis), strict=True)):
                     rates[i, index, 0], rates[i, index, 1] = both
@@ -205,9 +204,9 @@ class Serial(Kinematics):
         tip, axis = (TaylorVector(columns.of_one(v)) for v in (-self.tool_length * self.tool_axis, self.tool_axis))
         for joint in reversed(self.chain):
             j = self.axis_names.index(joint.name)
-            by, direction = TaylorAngle(0.5 * (q0[:, j] + q1[:, j]), q1[:, j] - q0[:, j]), columns.of_one(joint.direction)
+            by, direction = TaylorAngle(0.5 * (q0[:, j] + q1[:, j]), q1[:, j] - q0[:, j]), joint.along
             if joint.rotary:
-                tip, axis = tip.turned(direction, columns.of_one(joint.point), by), axis.turned(direction, ZERO, by)
+                tip, axis = tip.turned(direction, joint.place, by), axis.turned(direction, ZERO, by)
             else:
                 tip = tip.slid(direction, by)
         return tip, axis
@@ -280,7 +279,7 @@ class Serial(Kinematics):
             return
         first = turns[0]
         heading = azimuth(first.direction, axis)
-        free = columns.along(columns.of_one(first.direction), axis, ROUND_OFF)
+        free = columns.along(first.along, axis, ROUND_OFF)
         value = wanted[:, self.axis_names.index(first.name)]
         if len(turns) == 1:
             adjacent = float(azimuth(first.direction, columns.of_one(self.tool_axis)))
@@ -288,7 +287,7 @@ class Serial(Kinematics):
             return
         second = turns[1]
         for tilt in meet(first.direction, second.direction, self.tool_axis, from_pole):
-            carried = columns.turn(second.direction, np.cos(tilt), np.sin(tilt),
+            carried = columns.turned(second.along, np.cos(tilt), np.sin(tilt),
                                    columns.of_one(self.tool_axis))
             turned = wrap(heading - azimuth(first.direction, carried))
             yield np.where(free, value, turned), tilt
@@ -301,8 +300,8 @@ class Serial(Kinematics):
             return self._slides_apart(tip, turning)
         for joint in self.chain[:first]:
             cos, sin = turning[joint.name]
-            place = columns.of_one(joint.point)
-            tip = columns.plus(columns.turn(joint.direction, cos, -sin, columns.minus(tip, place)), place)
+            place = joint.place
+            tip = columns.plus(columns.turned(joint.along, cos, -sin, columns.minus(tip, place)), place)
         at_zero, = self._sweep(self.chain[last + 1:], None, turning, [self._tip_at_zero()])
         gap = columns.minus(tip, at_zero)
         return [columns.dot(columns.of_one(row), gap) for row in self._from_slides]
@@ -322,10 +321,10 @@ class Serial(Kinematics):
 
     def _turned(self, slide: Joint, turning: Turning) -> list[Floats | float]:
         """Direction of a linear axis in the table frame: turned by the rotary axes between it and the part."""
-        vector = columns.of_one(slide.direction)
+        vector: list[Floats | float] = [*slide.along]
         for joint in reversed(self.chain[: self.chain.index(slide)]):
             if joint.rotary:
-                vector = columns.turn(joint.direction, *turning[joint.name], vector)
+                vector = columns.turned(joint.along, *turning[joint.name], vector)
         return vector
 
     # ---- what directions there are -------------------------------------------------------------------------
@@ -379,7 +378,7 @@ class Serial(Kinematics):
             return np.zeros(len(q), dtype=np.bool_)
         _, carried = self._sweep(turns[1:], None, self._turning(q), [columns.of_one(np.zeros(3)),
                                                                      columns.of_one(self.tool_axis)])
-        found = columns.along(columns.of_one(turns[0].direction), carried, ROUND_OFF)
+        found = columns.along(turns[0].along, carried, ROUND_OFF)
         return np.broadcast_to(found, (len(q),)).copy()
 
 

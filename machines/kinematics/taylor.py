@@ -7,16 +7,17 @@ turns of jets are jets again (product rule, triangle inequality), so that a chai
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Self
 
 import numpy as np
 
 from machines.kinematics import columns
-from machines.kinematics.columns import Columns
+from machines.kinematics.columns import Columns, Number
 from toolpaths.arrays import Floats
 
-Number = Floats | float
 ZERO: Columns = [0.0, 0.0, 0.0]
 
 
@@ -65,13 +66,14 @@ class TaylorVector:
         s''), and |r'''| <= (a''' + 3 a'a'' + a'^3)|W s| + 3 (a'' + a'^2)|W s'| + 3 a'|W s''| + |s'''|, each at its largest.
         """
         arm = columns.minus(self.value, point)
-        around = [columns.cross(direction, v) for v in (arm, self.first, self.second)]
+        across, turn = _about(direction)
+        around = [across(v) for v in (arm, self.first, self.second)]
         first = columns.plus(columns.times(by.first, around[0]), self.first)
         second = columns.plus(columns.times(by.second, around[0]), self.second)
-        second = columns.plus(second, columns.times(np.square(by.first), columns.cross(direction, around[0])))
+        second = columns.plus(second, columns.times(np.square(by.first), across(around[0])))
         second = columns.plus(second, columns.times(2.0 * by.first, around[1]))
         cos, sin = np.cos(by.value), np.sin(by.value)
-        turned = [_turn(direction, cos, sin, v) for v in (arm, first, second)]
+        turned = [turn(cos, sin, v) for v in (arm, first, second)]
         return TaylorVector(columns.plus(turned[0], point), turned[1], turned[2], self._third(around, by))
 
     def _third(self, around: list[list[Floats | float]], by: TaylorAngle) -> Number:
@@ -98,6 +100,18 @@ def straight(start: Columns, end: Columns) -> TaylorVector:
 
 def _norm(v: Columns) -> Number:
     return np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+
+
+Across = Callable[[Columns], list[Number]]
+TurnAbout = Callable[[Number, Number, Columns], list[Number]]
+
+
+def _about(direction: Columns) -> tuple[Across, TurnAbout]:
+    """direction x v, and v turned about it: of plain numbers as `columns` has it, which leaves out what is 0."""
+    d = list(direction)
+    if all(isinstance(x, float) for x in d):
+        return partial(columns.across, d), partial(columns.turned, d)
+    return partial(columns.cross, direction), partial(_turn, direction)
 
 
 def _turn(direction: Columns, cos: Number, sin: Number, v: Columns) -> list[Floats | float]:

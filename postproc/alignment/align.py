@@ -23,7 +23,7 @@ from postproc.pipeline.convert import convert
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import PartPlacement, load_setup
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, has_errors, info, require, warning
+from toolpaths.diagnostics import Diagnostic, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
 
 MODES: tuple[InterpolationMode, ...] = ("axes", "tcp", "tilted")
@@ -71,10 +71,7 @@ def align(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
         large: takes a part that is farther off than a fixture's stops allow
         found: what reading the CL file found
     """
-    spec, faults = load_controller(controller)
-    setup, more = load_setup(options.setup or None)
-    require([*faults, *more])
-    assert spec is not None and setup is not None
+    spec, setup = read_value(load_controller(controller)), read_value(load_setup(options.setup or None))
     spec = with_shop(spec.divided(setup.output.files), machine, setup)
     known = [*found, *(d for d in toolpath.faults if d not in found)]
     if has_errors(known):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from postproc.alignment.align import COVERAGE, AlignedPart
 from postproc.alignment.control_entry import fixed_turns
 from postproc.alignment.fit import NAMES, Alignment
 from postproc.control.control import MODE_NAMES
+from toolpaths.arrays import finite
 from toolpaths.table_text import table_text
 from toolpaths.units import DEG
 
@@ -22,7 +22,7 @@ def as_dict(made: AlignedPart) -> dict[str, Any]:
         "readings": len(found.readings) if found else 0,
         "shift_mm": found.values[:3].tolist() if found else None,
         "turns_deg": list(fixed_turns(found.move.rotation)) if found else None,
-        "sigma": {name: _finite(sigma / (1.0 if name in "xyz" else DEG))
+        "sigma": {name: finite(sigma / (1.0 if name in "xyz" else DEG))
                   for name, sigma in zip(NAMES, found.sigma.tolist(), strict=True)} if found else None,
         "undetermined": found.undetermined if found else [],
         "worst_reading_mm": found.worst[0] if found else None,
@@ -83,7 +83,3 @@ def _place(found: Alignment) -> list[str]:
 
 def _known(sigma: float, scale: float) -> str:
     return f" +- {COVERAGE * sigma / scale:.4f}" if np.isfinite(sigma) else " (as meant)"
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

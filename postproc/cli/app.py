@@ -80,6 +80,16 @@ ToolTableOption = Annotated[str, typer.Option("--tool-table", metavar="FILE", he
                                               "the lengths of tools at the machine")]
 ErrorsOfProgram = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric "
                                               "errors that the program corrects")]
+FeedModeOption = Annotated[FeedModeChoice, word_option("--feed-mode", FeedModeChoice, "F in mm/min (G94), or one over the "
+                                                       "time of the block (G93)")]
+FeedOption = Annotated[FeedSource, word_option("--feed", FeedSource, "programmed: the feeds of the CL file; planned: lower "
+                                               "where an axis or a tool would exceed its limits")]
+MergeFeeds = Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="merge neighbouring "
+                                           "F words that differ by up to PERCENT")]
+SmoothOption = Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the tolerance")]
+ResidualFiles = Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="errors at each CL point "
+                                                          "before and after correction: .csv, or drawn: .png, .svg; may "
+                                                          "be repeated")]
 CheckProgram = Annotated[Path | None, typer.Option("--check-program", metavar="FILE", help="write a program too that checks "
                                                    "the pivots at the machine: five poses of a ball or probe, with the "
                                                    "readings expected")]
@@ -105,29 +115,18 @@ def options_of_all(version: Annotated[bool, typer.Option("--version", is_eager=T
 @app.command(epilog="Example: postproc convert part.cls -m mikron-ucp710 -c linuxcnc -o part.ngc")
 def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="G-code file to write")],
-            feed_mode: Annotated[FeedModeChoice, word_option("--feed-mode", FeedModeChoice, "F in mm/min (G94), or one over "
-                                                             "the time of the block (G93)")] = "auto",
-            output_mode: OutputModeOption = "auto",
+            feed_mode: FeedModeOption = "auto", output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-            feed: Annotated[FeedSource, word_option("--feed", FeedSource, "programmed: the feeds of the CL file; planned: "
-                                                    "lower where an axis or a tool would exceed its limits")] = "programmed",
-            merge_feeds: Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="merge "
-                                                       "neighbouring F words that differ by up to PERCENT")] = 0.0,
-            smooth: Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the "
-                                                 "tolerance")] = False,
+            feed: FeedOption = "programmed", merge_feeds: MergeFeeds = 0.0, smooth: SmoothOption = False,
             setup: Setup = "", tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
-            units: UnitsOption = "",
-            dialect: DialectOption = "", allow_unknown: Allow = None, error_model: Errors = "", beyond: Beyond = False,
-            residuals: Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="errors at each CL "
-                                 "point before and after correction: .csv, or drawn: .png, .svg; may be repeated")] = None,
+            units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
+            error_model: Errors = "", beyond: Beyond = False, residuals: ResidualFiles = None,
             check_program: CheckProgram = None,
             require_proof: RequireProof = False, proof: ProofOption = False, json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
-                      output=output_mode, feed=feed,
-                      merge_feeds=merge_feeds / 100.0, smooth=smooth,
-                      error_model=error_model, error_beyond=beyond, orient=orient,
-                      max_tilt=max_tilt, name=output.stem, require_proof=require_proof)
+                      output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth, error_model=error_model,
+                      error_beyond=beyond, orient=orient, max_tilt=max_tilt, name=output.stem, require_proof=require_proof)
     only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
     refuse_overwriting({"-o": str(output), "--json": json, "--proof": f"{output}.proof.json" if proof else "",
@@ -170,13 +169,14 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: ToleranceOption = 0.01,
            axis_tolerance: AxisToleranceOption = 0.05, units: UnitsOption = "", dialect: DialectOption = "",
            allow_unknown: Allow = None,
-           error_model: ErrorsOfProgram = "", orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
+           error_model: ErrorsOfProgram = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
            require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTableOption = "",
            json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
-                      error_model=error_model, orient=orient, max_tilt=max_tilt,
+                      error_model=error_model, error_beyond=beyond, orient=orient, max_tilt=max_tilt,
                       require_proof=require_proof)
+    only_with_errors(beyond, error_model)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup,
                                          "the error model": error_model, "the tool table": tool_table,
                                          "the proof file": proof or f"{gcode}.proof.json",

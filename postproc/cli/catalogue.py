@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from machines.figures import ASSUMED
 from machines.machine import Machine
 from machines.user_file import read_toml
 from postproc.controllers.model import builtin_files, load_controller
-from toolpaths.diagnostics import DiagnosticError, require
+from toolpaths.diagnostics import read_value
 from toolpaths.table_text import table_text
 from toolpaths.units import DEG
 
@@ -30,7 +31,8 @@ def machine_dict(machine: Machine) -> dict[str, Any]:
             value = float(getattr(machine.limits, key)[j]) * unit
             row[key] = round(value, 9) if np.isfinite(value) else None
         row["home"] = round(float(machine.home[j]) * unit, 9)
-        row["assumed"] = sorted(k.split(".", 1)[1] for k in machine.limits.assumed if k.split(".")[0] == name)
+        row["assumed"] = sorted(key for key, origin in figures_of(machine, name).items() if origin == ASSUMED)
+        row["sources"] = {key: origin for key, origin in figures_of(machine, name).items() if origin != ASSUMED}
         axes.append(row)
     control = machine.control_kinematics
     return {"name": machine.name, "description": machine.description, "structure": machine.structure,
@@ -38,7 +40,14 @@ def machine_dict(machine: Machine) -> dict[str, Any]:
             "retract_axis": machine.axis_names[machine.retract_axis] if machine.retract_axis >= 0 else None,
             "timing_s": {"tool_change": machine.timing.tool_change, "clamp": machine.timing.clamp,
                          "unclamp": machine.timing.unclamp},
+            "timing_assumed": sorted(machine.timing.assumed),
+            "documents": [one.model_dump() for one in machine.documents],
             "control": {"module": control.module, "pins": dict(control.pins)} if control else None}
+
+
+def figures_of(machine: Machine, table: str) -> dict[str, str]:
+    """Where the figures of one axis or of "timing" come from, by key: document and place, or "assumed"."""
+    return {key.split(".", 1)[1]: origin for key, origin in machine.figures.items() if key.split(".")[0] == table}
 
 
 def rotary_lines(machine: Machine) -> list[dict[str, Any]]:
@@ -76,10 +85,22 @@ def machine_text(machine: Machine) -> str:
     for row in d["rotary_axes"]:
         point, along = (", ".join(f"{v:g}" for v in row[key]) for key in ("point", "direction"))
         lines.append(f"  {row['letter']} turns about the line through ({point}) mm along ({along})")
+    lines += _sources(machine)
     if d["control"]:
         pins = ", ".join(f"{k} {v:g}" for k, v in d["control"]["pins"].items())
         lines.append(f"the control runs the kinematics {d['control']['module']} ({pins})")
     return "\n".join(lines)
+
+
+def _sources(machine: Machine) -> list[str]:
+    """What comes from documents: a line for each place, the figures of all axes that are from it together."""
+    places = dict[str, list[str]]()
+    for key, origin in sorted(machine.figures.items()):
+        if origin != ASSUMED:
+            places.setdefault(origin, []).append(key)
+    lines = [f"  {', '.join(keys)}: {origin}" for origin, keys in places.items()]
+    lines += [f"  {one.document}: {one.address}" for one in machine.documents if one.address]
+    return ["from documents:", *lines] if places else []
 
 
 def controller_values(source: str) -> tuple[dict[str, Any], dict[str, str]]:
@@ -88,11 +109,8 @@ def controller_values(source: str) -> tuple[dict[str, Any], dict[str, str]]:
     Raises:
         DiagnosticError: where the file has faults.
     """
-    spec, found = load_controller(source)
-    require(found)
-    file, _ = read_toml(source, builtin=builtin_files(), kind="controller")
-    if spec is None or file is None:
-        raise DiagnosticError(found)
+    spec = read_value(load_controller(source))
+    file = read_value(read_toml(source, builtin=builtin_files(), kind="controller"))
     values, origins = {}, {}
     for path, value in _flat(spec.model_dump(), ()):
         origin = file.origins.get(path)

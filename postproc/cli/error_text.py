@@ -135,8 +135,7 @@ def map_figures(model: ErrorModel, made: MadeMap) -> tuple[dict[str, Any], list[
     from machines.geometric_error.tables.csv_table import UNITS
 
     um, arcsec = UNITS["um"], UNITS["arcsec"]
-    lattice = made.model.map
-    assert lattice is not None
+    lattice = made.lattice
     figures: dict[str, Any] = {"nodes": {x: len(n) for x, n in zip(lattice.letters, lattice.nodes, strict=True)}}
     noted = [f"{lattice.table.size // 6} nodes: " + ", ".join(f"{x} {n}" for x, n in figures["nodes"].items())]
     for key, where, loss in (("lattice", "inside the lattice", made.inside),

@@ -17,33 +17,38 @@ from postproc.cli.console import (
     shown_errors,
 )
 from postproc.cli.group import Group
+from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.setup_align import EXAMPLES as ALIGNED
 from postproc.cli.setup_align import setup_align
 from postproc.cli.setup_new import EXAMPLES, setup_new
 from toolpaths.table_text import table_text
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                          help="Machines: list, show, check, analyse, schema.")
+                          help="Machines: list, show, check, analyse, import, export, schema.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                         help="Set-up files: new, align, check, schema.")
 
 
+machine_app.command("import", epilog=IMPORTED)(machine_import)
+machine_app.command("export", epilog=EXPORTED)(machine_export)
 setup_app.command("new", epilog=EXAMPLES)(setup_new)
 setup_app.command("align", epilog=ALIGNED)(setup_align)
 
 
 @machine_app.command("list")
 def machine_list(json: Json = "") -> None:
-    """List the built-in machines."""
+    """List the built-in machines: those that people own, then models of kinds and classes."""
     import machines
 
-    found = [machines.load(name) for name in machines.names()]
-    rows = [{"name": m.name, "structure": m.structure, "axes": list(m.axis_names), "description": m.description}
-            for m in found]
-    report((), json, {"machines": rows},
-           "\n".join(table_text([(m.name, " ".join(m.axis_names), m.description) for m in found])))
+    real, models = ([machines.load(name) for name in names] for names in (machines.catalogued(), machines.names()))
+    rows = [{"name": m.name, "structure": m.structure, "axes": list(m.axis_names), "description": m.description,
+             "catalogue": m in real} for m in [*real, *models]]
+    parts = (("machines, with sources of their figures (machine show NAME):", real), ("models:", models))
+    text = [line for heading, found in parts
+            for line in (heading, *table_text([(m.name, " ".join(m.axis_names), m.description) for m in found], indent=2))]
+    report((), json, {"machines": rows}, "\n".join(text))
 
 
 @machine_app.command("show")

@@ -109,11 +109,9 @@ def _chosen(file: Path, machine: Machine, controller: str, options: Options,
     import toolpaths
     from postproc.placement.place import place as run
     from postproc.setup.model import load_setup
-    from toolpaths.diagnostics import has_errors, require
+    from toolpaths.diagnostics import has_errors, read_value
 
-    settings, found = load_setup(options.setup)
-    require(found)
-    assert settings is not None
+    settings = read_value(load_setup(options.setup))
     path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
                                  allow_unknown=options.allow_unknown,
                                  progress=lambda at, total: progress("reading", at, total))

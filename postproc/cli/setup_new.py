@@ -21,6 +21,7 @@ from postproc.cli.options import (
 if TYPE_CHECKING:
     from postproc.base.options import Options
     from postproc.setup_sheet.make import SetupSheet
+    from postproc.setup_sheet.place import FoundPlace
     from postproc.setup_sheet.questions import GivenAnswers, Question
 
 EXAMPLES = """Example: postproc setup new part.cls -m mikron-ucp710 -c fanuc-30i -o part.setup.toml
@@ -67,9 +68,9 @@ def setup_new(file: ClFile, machine: MachineName,
         sheet = _made(file, machine, controller, options, given, yes, work_offset_code, progress)
     text = ""
     outputs: dict[Path, str | bytes] = {}
-    if sheet.text:
+    if sheet.text and sheet.fit is not None:
         outputs[output] = sheet.text
-        text = _text(sheet, output, file, machine, controller, options)
+        text = _text(sheet, sheet.fit.place, output, file, machine, controller, options)
     values = _values(sheet, output)
     report(sheet.diagnostics, json, values, text, outputs)
 
@@ -207,12 +208,12 @@ def _values(sheet: SetupSheet, output: Path) -> dict[str, Any]:
             "diagnostics": [d.as_dict() for d in sheet.diagnostics]}
 
 
-def _text(sheet: SetupSheet, output: Path, file: Path, machine: str, controller: str, options: Options) -> str:
+def _text(sheet: SetupSheet, place: FoundPlace | None, output: Path, file: Path, machine: str, controller: str,
+          options: Options) -> str:
     """What was written, and the command that uses it."""
     import shlex
 
-    assert sheet.fit is not None
-    place, questions = sheet.fit.place, len(sheet.questions)
+    questions = len(sheet.questions)
     assumed = f", {len(sheet.assumed)} assumed" if sheet.assumed else ""
     target = file.with_suffix(".nc").name if str(file) != "-" else "part.nc"
     words = [str(file), "-m", machine, "-c", controller, "--setup", str(output), *_reading(options), "-o", target]

@@ -62,7 +62,7 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
                                                         "the model": model if Path(model).suffix else ""})
     from postproc.base.options import Options
     from postproc.cycle_time import report as figures
-    from postproc.cycle_time.estimate import estimate
+    from postproc.cycle_time.estimate import estimate, measure_first
 
     options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model,
                       error_beyond=beyond)
@@ -74,16 +74,18 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
         m = machine_of(machine)
         blocks, planner, times, found = _blocks(file, m, controller, model, options, share, progress)
         if blocks is not None and calibrate:
-            planner, values, more = _calibrated(blocks, m, planner, calibrate)
-            if output and planner is not None:
+            fitted, values, more = _calibrated(blocks, m, planner, calibrate)
+            found, times = [*found, *more], None
+            blocks, planner = (None, planner) if fitted is None else (blocks, fitted)
+            if output and fitted is not None:
                 from postproc.cycle_time.calibrate import as_toml
 
-                outputs[Path(output)] = as_toml(planner)
-            found, times = [*found, *more], None
-        if blocks is not None and planner is not None:
+                outputs[Path(output)] = as_toml(fitted)
+        if blocks is not None:
             e = estimate(blocks, m, planner, times=times)
-            values = figures.as_dict(e) | {"feed_override_percent": override} | values
-            text = figures.as_text(e, file.name, share)
+            first = measure_first(e, m)
+            values = figures.as_dict(e, first) | {"feed_override_percent": override} | values
+            text = figures.as_text(e, file.name, share, first)
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]},
            text, outputs)
 
@@ -95,26 +97,20 @@ def _check(output: str, calibrate: str) -> None:
 
 
 def _blocks(file: Path, machine: Machine, controller: str, model: str, options: Options, override: float,
-            progress: Progress) -> tuple[MotionBlocks | None, CycleTimeModel | None, BlockTimes | None, list[Diagnostic]]:
+            progress: Progress) -> tuple[MotionBlocks | None, CycleTimeModel, BlockTimes | None, list[Diagnostic]]:
     """The blocks of a CL file (converted first) or of a program, the model of the control, and times that are planned."""
     from postproc.controllers.model import load_controller
     from postproc.cycle_time.model import load_model, model_name
     from postproc.cycle_time.source import from_conversion, from_gcode, looks_like_gcode, read_file
     from postproc.setup.model import load_setup
     from postproc.verification.neighbour_files import NeighbourFiles
-    from toolpaths.diagnostics import require
+    from toolpaths.diagnostics import read_value
 
-    spec, found = load_controller(controller)
-    require(found)
-    assert spec is not None
-    planner, found = load_model(model or model_name(controller, spec.writer))
-    require(found)
-    planner = planner.of_machine(machine) if planner is not None else None
+    spec = read_value(load_controller(controller))
+    planner = read_value(load_model(model or model_name(controller, spec.writer))).of_machine(machine)
     data = read_file(file)
     if looks_like_gcode(data):
-        setup, found = load_setup(options.setup or None)
-        require(found)
-        assert setup is not None
+        setup = read_value(load_setup(options.setup or None))
         blocks, found = from_gcode(data, machine, spec, setup, str(file), NeighbourFiles(file), override)
         return blocks, planner, None, found
     import toolpaths
@@ -124,7 +120,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
                                        dialect=options.dialect or None)
     del data
     result = convert(path, machine, controller, options=options, diagnostics=found, progress=progress)
-    if not result.ok or planner is None:
+    if not result.ok:
         return None, planner, None, list(result.diagnostics)
     blocks, times, found = from_conversion(result, override), None, []
     if planner.kind == "ideal":
@@ -134,13 +130,12 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     return blocks, planner, times, [*result.diagnostics, *found]
 
 
-def _calibrated(blocks: MotionBlocks, machine: Machine, planner: CycleTimeModel | None,
+def _calibrated(blocks: MotionBlocks, machine: Machine, planner: CycleTimeModel,
                 log: str) -> tuple[CycleTimeModel | None, dict[str, Any], list[Diagnostic]]:
     """The model fitted to a log (None where it cannot be), and its figures."""
     from postproc.cycle_time.calibrate import as_dict, calibrate
     from postproc.cycle_time.log import read_log
 
-    assert planner is not None
     read, found = read_log(log, machine.axis_names)
     if read is None:
         return None, {}, found

@@ -143,13 +143,12 @@ def _where(body: Body) -> str:
 def _solid(given: Given, where: Placement, folder: Path, units: LengthUnit,
            key: str) -> tuple[TriangleSolid | None, list[Diagnostic]]:
     """A mesh or box in the table frame."""
-    if given.file is not None:
-        mesh, found = load_mesh(folder / given.file, given.units or units, key)
-        return (None if mesh is None else solid(mesh, where)), found
-    import trimesh
+    if given.box is not None:
+        import trimesh
 
-    assert given.box is not None
-    return solid(trimesh.creation.box(bounds=[given.box.low, given.box.high]), where), []
+        return solid(trimesh.creation.box(bounds=[given.box.low, given.box.high]), where), []
+    mesh, found = load_mesh(folder / (given.file or ""), given.units or units, key)
+    return (None if mesh is None else solid(mesh, where)), found
 
 
 def touches(all_bodies: Scene, form: ToolForm, travel: Swept, cutting: Swept | None = None) -> list[Touch]:

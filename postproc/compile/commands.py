@@ -110,7 +110,7 @@ class _Writing:
             args = (name, 1.0) if self.restart else (name,)
             self.at(self._label(move)).append(Command("OPERATION_START", args, named.line))
             if self.restart and self.loaded is not None:
-                self._restate(self.at(int(self.path.begin[move])), move, named.line)
+                self._restate(self.loaded, self.at(int(self.path.begin[move])), move, named.line)
 
     def _label(self, move: int) -> int:
         """The block that an operation begins with: the travel home, where it leads there, so that a program
@@ -118,13 +118,12 @@ class _Writing:
         block = int(self.path.begin[move])
         return block - 1 if block > 0 and self.path.home[block - 1] else block
 
-    def _restate(self, out: list[Command], move: int, line: int) -> None:
+    def _restate(self, loaded: ToolChange, out: list[Command], move: int, line: int) -> None:
         """The tool in the spindle again, unless the operation changes it."""
-        assert self.loaded is not None
         row = int(self.moves.row[move])
         here = [e for e in self.at_row.get(row, ()) if e.line >= line]
         if not any((e.index, e.line) in self.changes for e in here):
-            out += self.state.change(replace(self.loaded, line=line), {e.word for e in here}, True)
+            out += self.state.change(replace(loaded, line=line), {e.word for e in here}, True)
             self._preload(out, line)
 
     def _preload(self, out: list[Command], line: int) -> None:

@@ -56,6 +56,7 @@ class CalibratedModel:
     """
 
     model: CycleTimeModel
+    calibration: CalibrationRecord
     measured: Floats
     modelled: Floats
     values: dict[str, tuple[float, float]]
@@ -165,7 +166,7 @@ def _fit(model: CycleTimeModel, fitted: CycleTimeModel, covariance: Floats, free
     result = fitted.model_copy(update={"calibration": calibration, "assumed": (*hidden, *others),
                                        "description": f"{model.description}, calibrated"})
     values = {PARAMETERS[k]: (float(getattr(result, PARAMETERS[k])), float(sigma[k])) for k in free}
-    return CalibratedModel(result, measured, after, values)
+    return CalibratedModel(result, calibration, measured, after, values)
 
 
 def _rms(values: Floats) -> float:
@@ -185,11 +186,10 @@ def _relative(measured: Floats, modelled: Floats) -> float:
 
 
 def _warnings(fit: CalibratedModel, file: str) -> list[Diagnostic]:
-    calibration = fit.model.calibration
-    assert calibration is not None
-    if calibration.relative <= 0.1:
+    relative = fit.calibration.relative
+    if relative <= 0.1:
         return []
-    return [warning("log.fit", f"the model is {100 * calibration.relative:.0f} % off in parts of the run", file=file,
+    return [warning("log.fit", f"the model is {100 * relative:.0f} % off in parts of the run", file=file,
                     hint="is it this program, this machine, without a feed hold?")]
 
 
@@ -216,8 +216,7 @@ def _toml(value: object) -> str:
 
 def as_dict(fit: CalibratedModel) -> dict[str, object]:
     """The figures of a calibration."""
-    c = fit.model.calibration
-    assert c is not None
+    c = fit.calibration
     return {"parameters": {name: {"value": value, "relative_sigma": sigma} for name, (value, sigma) in fit.values.items()},
             "sections": len(fit.measured), "rms_before_s": c.rms_before, "rms_after_s": c.rms_after,
             "relative": c.relative, "not_identifiable": list(c.not_identifiable)}

@@ -10,7 +10,7 @@ from postproc.cycle_time.model import load_model, model_name
 from postproc.cycle_time.report import as_dict, clock
 from postproc.cycle_time.source import from_conversion
 from postproc.pipeline.result import PostResult
-from toolpaths.diagnostics import require
+from toolpaths.diagnostics import read_value
 
 BAND_UP_TO = 20_000
 """blocks up to which a conversion also gives the band, which takes some ten estimates"""
@@ -20,9 +20,7 @@ def estimate_of(result: PostResult) -> Estimate | None:
     """The estimate under the model of the controller; None where nothing is written."""
     if not result.ok:
         return None
-    model, found = load_model(model_name(result.controller_name, result.controller.writer))
-    require(found)
-    assert model is not None
+    model = read_value(load_model(model_name(result.controller_name, result.controller.writer)))
     give_back()
     blocks = from_conversion(result)
     give_back()

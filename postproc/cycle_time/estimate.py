@@ -16,10 +16,15 @@ from postproc.cycle_time.lookahead import lookahead
 from postproc.cycle_time.model import ASSUMED, PARAMETERS, CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes
 from toolpaths.arrays import Floats
+from toolpaths.units import DEG
 
 COVERAGE = 1.96
 """standard deviations on both sides that hold 95 % of a normal distribution"""
 _LIMITS: tuple[MotionOrder, ...] = get_args(MotionOrder)
+_WORD = "assumed "
+"""what the uncertainties of assumed values begin with"""
+_ORDERS = {"velocity": "", "acceleration": "2", "jerk": "3"}
+_UNITS = {"corner_tolerance": " mm", "block_time": " s", "stop_time": " s", "spindle_time": " s"}
 _TIMING = {"tool_change": Cause.TOOL_CHANGE, "clamp": Cause.INDEXING, "unclamp": Cause.INDEXING}
 
 
@@ -39,6 +44,21 @@ class Estimate:
     lower_bound: float
     band: tuple[float, float]
     uncertainties: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """An assumed value, and what it does to the time.
+
+    Attributes:
+        value: "A.acceleration", "tool_change", "corner_tolerance"
+        assumed: with its unit
+        seconds: standard deviation of the time that it alone gives
+    """
+
+    value: str
+    assumed: str
+    seconds: float
 
 
 def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
@@ -93,6 +113,41 @@ def _uncertainties(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel
     return float(np.sqrt(low)), float(np.sqrt(high)), uncertainties
 
 
+def measure_first(e: Estimate, machine: Machine) -> Uncertain | None:
+    """The one assumed value that widens the band most: limits axis by axis, timing and parameters of the control alone; None
+    where nothing is assumed.
+
+    All axes slower take no less than one of them, so limits are moved axis by axis only while all of them together move the
+    time by more than the worst value so far.
+    """
+    known = {name.removeprefix(_WORD): s for name, s in e.uncertainties.items() if name.startswith(_WORD)}
+    alone = {name: s for name, s in known.items() if name not in _LIMITS}
+    begin = total(e.blocks, timed(e.blocks, e.model))
+    for limit in sorted(known.keys() & set(_LIMITS), key=lambda name: -known[name]):
+        if alone and max(alone.values()) >= known[limit]:
+            break
+        for axis, name in enumerate(machine.axis_names):
+            if f"{name}.{limit}" in machine.limits.assumed:
+                which = np.arange(len(machine.axis_names)) == axis
+                changed = [_scaled(e.blocks, limit, which, sign) for sign in (-1, 1)]
+                moved = sorted(total(b, timed(b, e.model)) - begin for b in changed)
+                alone[f"{name}.{limit}"] = (moved[-1] - moved[0]) / 2.0
+    worst = max(alone, key=lambda name: alone[name], default="")
+    return Uncertain(worst, _assumed_value(worst, machine, e.model), alone[worst]) if worst and alone[worst] > 0.0 else None
+
+
+def _assumed_value(name: str, machine: Machine, model: CycleTimeModel) -> str:
+    """The value as it stands in its file, with its unit."""
+    axis, _, limit = name.partition(".")
+    if limit:
+        j = machine.axis_names.index(axis)
+        value = float(getattr(machine.limits, limit)[j]) / (DEG if machine.rotary[j] else 1.0)
+        return f"{value:.6g} {'deg' if machine.rotary[j] else 'mm'}/s{_ORDERS[limit]}"
+    if name in _TIMING:
+        return f"{getattr(machine.timing, name):g} s"
+    return f"{getattr(model, name):g}{_UNITS.get(name, '')}"
+
+
 Change = tuple[MotionBlocks, CycleTimeModel]
 
 
@@ -103,12 +158,12 @@ def _changes(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel) -> l
         if (limit != "jerk" or (model.kind != "linuxcnc" and model.jerk)) and not model.calibration:
             which = np.array([f"{name}.{limit}" in machine.limits.assumed for name in machine.axis_names])
             if which.any():
-                result.append((f"assumed {limit}", [(_scaled(blocks, limit, which, sign), model) for sign in (-1, 1)]))
+                result.append((f"{_WORD}{limit}", [(_scaled(blocks, limit, which, sign), model) for sign in (-1, 1)]))
     for name, cause in _TIMING.items():
         here = (blocks.pauses.cause == cause) & (blocks.pauses.seconds > 0.0)
         if name in machine.timing.assumed and here.any():
             own = getattr(machine.timing, name)
-            result.append((f"assumed {name}", [(_longer(blocks, here, own * sign * ASSUMED[name]), model)
+            result.append((f"{_WORD}{name}", [(_longer(blocks, here, own * sign * ASSUMED[name]), model)
                                                for sign in (-1, 1)]))
     return result + _parameter_changes(blocks, model)
 
@@ -116,7 +171,7 @@ def _changes(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel) -> l
 def _parameter_changes(blocks: MotionBlocks, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
     """The model's own parameters: assumed ones alone, fitted ones along the principal axes of their covariance."""
     alone = [name for name in model.assumed if model.calibration is None or name not in PARAMETERS]
-    result = [(f"assumed {name}", [(blocks, with_values(model, {name: sign * ASSUMED[name]})) for sign in (-1, 1)])
+    result = [(f"{_WORD}{name}", [(blocks, with_values(model, {name: sign * ASSUMED[name]})) for sign in (-1, 1)])
               for name in alone]
     if model.calibration is None:
         return result

@@ -15,7 +15,7 @@ from postproc.planning.planned import PlannedMotion
 from postproc.planning.planned_errors import planned_correction
 from postproc.planning.planned_source import source_of
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
 
 
@@ -38,7 +38,7 @@ def planned_times(result: PostResult, blocks: MotionBlocks, model: CycleTimeMode
     except DiagnosticError as fault:
         return times, [warning("time.plan", f"the motion cannot be planned, times of passes are the model's: {fault}",
                                file=job.toolpath.file, hint="--model lookahead")]
-    return with_seconds(times, _of_passes(blocks, times, spans)), _unsolved(motion, moves, job.toolpath.file)
+    return with_seconds(times, _of_passes(blocks, blocks.move, times, spans)), _unsolved(motion, moves, job.toolpath.file)
 
 
 def _unsolved(motion: PlannedMotion, moves: Moves, file: str) -> list[Diagnostic]:
@@ -50,13 +50,12 @@ def _unsolved(motion: PlannedMotion, moves: Moves, file: str) -> list[Diagnostic
                     "within all limits", file=file, lines=lines[:6], count=len(lines), hint="--model lookahead")]
 
 
-def _of_passes(blocks: MotionBlocks, times: BlockTimes, spans: list[tuple[int, int, float]]) -> Floats:
+def _of_passes(blocks: MotionBlocks, move: Ints, times: BlockTimes, spans: list[tuple[int, int, float]]) -> Floats:
     """(E,) s of each block: in passes the plan's time, shared out as the model has it."""
-    assert blocks.move is not None
     seconds = times.seconds.copy()
     cutting = ~blocks.rapid
     for first, last, planned in spans:
-        rows = np.flatnonzero(cutting & (blocks.move >= first) & (blocks.move <= last))
+        rows = np.flatnonzero(cutting & (move >= first) & (move <= last))
         own = seconds[rows].sum()
         if own > 0.0:
             seconds[rows] *= planned / own

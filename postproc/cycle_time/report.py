@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
-from postproc.cycle_time.estimate import Estimate
+from postproc.cycle_time.estimate import Estimate, Uncertain
 from postproc.cycle_time.shares import TimeShares, most_expensive, operations, shares
 from toolpaths.table_text import table_text
 
@@ -12,8 +13,8 @@ COVERS = ("95 % of runs on a machine as the files describe it: the model's own d
           "limits of the machine that no document states")
 
 
-def as_dict(e: Estimate) -> dict[str, Any]:
-    """The keys of `time --json`; s."""
+def as_dict(e: Estimate, first: Uncertain | None = None) -> dict[str, Any]:
+    """The keys of `time --json`; s. `first` is the assumed value that widens the band most."""
     s = shares(e)
     cause = {f"{name}_s": float(values.sum()) for name, values in s.by_cause.items()}
     return {
@@ -25,6 +26,7 @@ def as_dict(e: Estimate) -> dict[str, Any]:
         "model_description": e.model.description,
         "assumed": list(e.model.assumed),
         "doubts_s": e.uncertainties,
+        "measure_first": asdict(first) if first is not None else None,
         "blocks": len(e.blocks),
         "cutting_s": _cutting(cause),
         "rapids_s": cause["rapids_s"],
@@ -42,7 +44,7 @@ def _cutting(cause: dict[str, Any]) -> float:
     return float(sum(cause[f"{name}_s"] for name in ("feed", "limits", "corners", "stops")))
 
 
-def as_text(e: Estimate, name: str, override: float = 1.0) -> str:
+def as_text(e: Estimate, name: str, override: float = 1.0, first: Uncertain | None = None) -> str:
     """The same for people; `override` is the feed override that the blocks were made with."""
     d, s = as_dict(e), shares(e)
     lines = [f"{name}: {clock(e.seconds)} ({e.seconds:.2f} s), 95 % between {clock(e.band[0])} and {clock(e.band[1])}; "
@@ -54,6 +56,9 @@ def as_text(e: Estimate, name: str, override: float = 1.0) -> str:
         lines.append(f"feed override {100.0 * override:g} %: of feeds, not of rapids, taps and dwells")
     if e.model.assumed:
         lines.append(f"assumed, not documented: {', '.join(e.model.assumed)}")
+    if first is not None:
+        lines.append(f"measure this first: {first.value}, assumed {first.assumed}: it widens the band most, one standard "
+                     f"deviation of it is {first.seconds:.2f} s")
     lines.append("time by activity: " + ", ".join(f"{key.removesuffix('_s').replace('_', ' ')} {value:.2f} s"
                                          for key, value in d["causes"].items() if value >= 0.005))
     lines += _limits(s, d["feed_s"])

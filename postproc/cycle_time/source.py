@@ -31,14 +31,15 @@ def from_conversion(result: PostResult, override: float = 1.0) -> MotionBlocks:
 
     `override` as of `blocks_of`.
     """
-    assert result.job is not None and result.comparison is not None and result.comparison.executed is not None and result.ok
-    job = result.job
-    code, motion = result.comparison.executed
-    moves, path = result.comparison.moves.without_pecks(), job.toolpath
-    owner = np.clip(result.comparison.owner, 0, len(moves) - 1)
+    job, found = result.job, result.comparison
+    if job is None or found is None or not result.ok:
+        raise ValueError("a conversion that has failed has no blocks")
+    code, motion = found.executed
+    moves, path = found.moves.without_pecks(), job.toolpath
+    owner = np.clip(found.owner, 0, len(moves) - 1)
     names = tuple(op.name or f"operation {k + 1}" for k, op in enumerate(path.operations))
-    inside = (result.comparison.owner >= 0) & (result.comparison.owner < len(moves))
-    kept = np.flatnonzero(result.comparison.moves.phase != Phase.PECK)
+    inside = (found.owner >= 0) & (found.owner < len(moves))
+    kept = np.flatnonzero(found.moves.phase != Phase.PECK)
     origin = BlockOrigin(path.operation[moves.row[owner]].astype(np.int64), names,
                          np.where(inside, moves.line[owner], -1).astype(np.int64), np.where(inside, kept[owner], -1))
     return _blocks(code, motion, result.machine, job.control, result.controller, origin, override)

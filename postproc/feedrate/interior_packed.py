@@ -1,4 +1,4 @@
-"""One linearisation of `interior.py` on compiled loops: values packed for `interior_kernel.py`."""
+"""One linearisation of `interior.py` on compiled loops: values packed for `kernels/interior.py`."""
 
 from __future__ import annotations
 

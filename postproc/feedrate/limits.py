@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -21,6 +21,14 @@ class ToolLimits:
     def __post_init__(self) -> None:
         if not min(self.tilt_rate, self.acceleration, self.jerk) > 0.0:
             raise ValueError(f"limits at the tool must be positive, found {self}")
+
+    def ratios(self, tool: Floats) -> Floats:
+        """(N, 3) how far a motion uses them, in velocity, acceleration and jerk: from its columns `rows.at_tool`."""
+        return np.asarray(tool / np.array([self.tilt_rate, self.acceleration, self.jerk]))
+
+
+TOOL_COLUMNS = len(fields(ToolLimits))
+"""of a motion, one for each limit at the tool"""
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.feedrate.feed import AllowedFeed
-from postproc.feedrate.limits import JointLimits
+from postproc.feedrate.limits import TOOL_COLUMNS, JointLimits
 from postproc.feedrate.paths import Eased
 from postproc.feedrate.profile import Places, Profile
-from postproc.feedrate.rows import tool
+from postproc.feedrate.rows import at_tool, tool
 from postproc.feedrate.shares import LimitShares
 from postproc.feedrate.trajectory import REST_PAD, JointTrajectory, Usage
 from toolpaths.arrays import Floats, Ints
@@ -193,11 +193,10 @@ class Plan:
         s = eased.parameter(at.sigma)
         found = eased.chained(at.sigma, s, eased.path.derivatives(eased.inside(s[0])))
         rates = _in_time((found.dq, found.d2q, found.d3q), at)
-        tooled = np.zeros((len(at.sigma), 3))
+        tooled = np.zeros((len(at.sigma), TOOL_COLUMNS))
         if self.limits.tool is not None:
             known = tool(eased, at.sigma, s)
-            tooled = np.column_stack((known.tilt * at.speed, *(np.linalg.norm(rate, axis=1)
-                                                                for rate in _in_time(known.tip[1:], at)[1:])))
+            tooled = at_tool(known, at.speed, _in_time(known.tip[1:], at))
         return s[0], found.q, *rates, s[1] * at.speed, self.feed(s[0]), tooled
 
 

@@ -80,6 +80,12 @@ def tool(eased: Eased, sigma: Floats, s: Floats) -> ToolMotion:
     return ToolMotion(eased.chained(sigma, s, inner), (tangent, normal, np.cross(tangent, normal)), tilt)
 
 
+def at_tool(found: ToolMotion, speed: Floats, rates: tuple[Floats, Floats, Floats]) -> Floats:
+    """(N, 3) what each limit at the tool is of: rate of its axis, acceleration and jerk of the tip; `speed` (N,) along
+    sigma, `rates` (N, 3) of the tip in time."""
+    return np.column_stack((found.tilt * speed, *(np.linalg.norm(rate, axis=1) for rate in rates[1:])))
+
+
 def steady_tool_speed(eased: Eased, sigma: Floats, limits: ToolLimits) -> Floats:
     """Largest constant sigma_dot (N,) under the limits at the tool."""
     found = tool(eased, sigma, eased.parameter(sigma))

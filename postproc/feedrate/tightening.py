@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from postproc.feedrate.kernels.tightening import worst
 from postproc.feedrate.limits import JointLimits
@@ -47,17 +48,15 @@ def tightened(grid: MotionKnots, profile: Profile, split_from: float,
     np.maximum(tight[:, 1:], excess, out=tight[:, 1:])
     if grid.tight is not None:
         tight *= grid.tight
-    return slower, _split(replace(grid, tight=tight), split) if split.any() else replace(grid, tight=tight)
+    return slower, _split(grid, tight, split) if split.any() else replace(grid, tight=tight)
 
 
-def _split(grid: MotionKnots, split: Bools) -> MotionKnots:
-    """Intervals `split` (K - 1,) and their neighbours halved; no tightening at the new knots."""
+def _split(grid: MotionKnots, tight: npt.NDArray[np.float32], split: Bools) -> MotionKnots:
+    """Intervals `split` (K - 1,) and their neighbours halved, tightened by `tight`, and not at the new knots."""
     wide = np.convolve(split, np.ones(3), mode="same") > 0.0
     where = np.flatnonzero(wide)
-    assert grid.tight is not None
     middle = 0.5 * (grid.sigma[where] + grid.sigma[where + 1])
-    sigma, tight = np.insert(grid.sigma, where + 1, middle), np.insert(grid.tight, where + 1, 1.0, axis=1)
-    return replace(grid, sigma=sigma, tight=tight)
+    return replace(grid, sigma=np.insert(grid.sigma, where + 1, middle), tight=np.insert(tight, where + 1, 1.0, axis=1))
 
 
 def _ratios(grid: MotionKnots, profile: Profile, k: Ints, kernel: bool) -> Floats:

@@ -8,7 +8,7 @@ from typing import NamedTuple, get_args
 import numpy as np
 
 from machines.choices import MotionOrder
-from postproc.feedrate.limits import JointLimits, ToolLimits
+from postproc.feedrate.limits import JointLimits
 from toolpaths.arrays import Floats, Ints
 from toolpaths.shapes import arrays
 
@@ -56,7 +56,7 @@ class Binding(NamedTuple):
 
 
 @dataclass(frozen=True)
-@arrays(t="N", s="N", q="N J", qd="N J", qdd="N J", qddd="N J", sd="N", feed="N", tool="N 3")
+@arrays(t="N", s="N", q="N J", qd="N J", qdd="N J", qddd="N J", sd="N", feed="N", tool="N T")
 class JointTrajectory:
     """Samples at equal times (by `Plan.at` at given places), by default from rest to rest.
 
@@ -66,7 +66,7 @@ class JointTrajectory:
         q, qd, qdd, qddd: (N, J) joints and time derivatives, from the path's exact derivatives
         sd: (N,) ds/dt
         feed: (N,) largest ds/dt that the program allows, inf where none
-        tool: (N, 3) rate of the tool axis, acceleration and jerk of the tip; zeros where nothing limits them
+        tool: (N, T) what is limited at the tool (`rows.at_tool`); zeros or None where nothing limits it
     """
 
     t: Floats
@@ -78,10 +78,6 @@ class JointTrajectory:
     sd: Floats
     feed: Floats
     tool: Floats | None = None
-
-    def __post_init__(self) -> None:
-        if self.tool is None:
-            object.__setattr__(self, "tool", np.zeros((len(self.q), 3)))
 
     @property
     def step(self) -> float:
@@ -135,10 +131,10 @@ class JointTrajectory:
                 for name, values in zip(ORDERS, (self.qd, self.qdd, self.qddd), strict=True)]
 
     def _tool(self, limits: JointLimits) -> Floats:
-        """(N, 3) ratios of the tool."""
-        assert self.tool is not None
-        most = limits.tool or ToolLimits()
-        return np.asarray(self.tool / np.array([most.tilt_rate, most.acceleration, most.jerk]))
+        """(N, 3) ratios of the tool, by order."""
+        if self.tool is None or limits.tool is None:
+            return np.zeros((len(self.q), len(ORDERS)))
+        return limits.tool.ratios(self.tool)
 
     def _differences(self, limits: JointLimits) -> list[Floats]:
         """Ratios of first, second, third differences of q, padded with rest; (N + 2 REST_PAD - order, J)."""

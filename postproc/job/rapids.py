@@ -23,7 +23,7 @@ from postproc.path.blocks import rapid_codes
 from postproc.path.links import MARGINS, SafeSpace
 from postproc.reference.moves import Moves
 from postproc.reference.split_rapids import CORNER, along, splittable, with_corners
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, box_corners
 from toolpaths.rotations import angle_between
 
 STILL = 1e-6
@@ -43,8 +43,10 @@ def safe_rapids(moves: Moves, modes: OutputModes, kinematics: Callable[[int], Ki
     control = modes.control
     if control.rapids != "dog-leg" or control.law == "tcp":
         return moves
-    corners = space.corners if stock is None else np.concatenate([space.corners, stock])
-    parts = [_split(moves, rows, control, kinematics(tool), _with_box(space, corners), tolerances)
+    if stock is not None:
+        every = np.concatenate([space.corners, stock])
+        space = replace(space, corners=box_corners(every.min(axis=0), every.max(axis=0)))
+    parts = [_split(moves, rows, control, kinematics(tool), space, tolerances)
              for tool, rows in _by_tool(moves, _bendable(moves, modes, operation, tolerances[1]))]
     parts = [part for part in parts if len(part[0])]
     if not parts:
@@ -54,13 +56,6 @@ def safe_rapids(moves: Moves, modes: OutputModes, kinematics: Callable[[int], Ki
     rows, level = rows[order], level[order]
     rise, fall = (level - along(moves.tip[k], moves.axis[rows]) for k in (rows - 1, rows))
     return with_corners(moves, rows, level, rise > CORNER, fall > CORNER)
-
-
-def _with_box(space: SafeSpace, corners: Floats) -> SafeSpace:
-    """The safe space with the box round all of `corners` (K, 3)."""
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    pick = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
-    return replace(space, corners=np.where(pick == 0, low, high))
 
 
 def _bendable(moves: Moves, modes: OutputModes, operation: Ints, axis_tolerance: float) -> Ints:

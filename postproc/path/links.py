@@ -18,7 +18,7 @@ from postproc.joints.joint_path import TRAVEL_SLACK, nearest_solution
 from postproc.path.linearise import linearise
 from postproc.reference.moves import Moves
 from postproc.setup.model import Placement, SetupFile
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, box_corners
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -78,10 +78,8 @@ def safe_space(moves: Moves, setup: SetupFile, placement: Placement) -> SafeSpac
     centre = 0.5 * (low + high)
     if setup.clearance.centre is not None:
         centre = placement.points(np.array([setup.clearance.centre]))[0]
-    pick = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
-    corners = np.where(pick == 0, low, high)
     radius = float(np.sqrt(((tips - centre) ** 2).sum(axis=1).max()))
-    return SafeSpace(centre, radius, corners, setup.clearance.distance, setup.clearance.margin)
+    return SafeSpace(centre, radius, box_corners(low, high), setup.clearance.distance, setup.clearance.margin)
 
 
 def _outermost(curves: Curves) -> Floats:
@@ -146,15 +144,13 @@ def plan_link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeS
     """
     if turning is None:
         turning = before is None or after is None or bool(angle_between(before.axis, after.axis) > 1e-9)
-    first: Link | None = None
+    links = []
     for share in MARGINS if space.distance is None else (1.0,):
-        link = _link(control, kin0, kin1, space, before, after, by_home, turning, share)
-        if first is None:
-            first = link
+        links.append(link := _link(control, kin0, kin1, space, before, after, by_home, turning, share))
         q = np.concatenate([link.retract, link.index, link.approach])
         if link.clear and np.isfinite(q).all() and _inside(q, control.machine):
             return link
-    assert first is not None
+    first = links[0]
     reached = np.concatenate([first.retract, first.index, first.approach])
     if np.isfinite(reached).all() and not _inside(reached, control.machine):
         return replace(first, clear=True)

@@ -18,7 +18,7 @@ from postproc.joints.plan import JointPreferences
 from postproc.joints.run_plan import RunOptions
 from postproc.path.links import Link, Pose, SafeSpace, plan_link
 from postproc.setup.model import Placement, RewindSettings, SetupFile
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, box_corners
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
@@ -71,7 +71,7 @@ def drawing_of(setup: SetupFile, placement: Placement, space: SafeSpace, machine
     preferences = JointPreferences({index(k): 1 if v == "positive" else -1 for k, v in joints.side.items()},
                                    {index(k): v * DEG for k, v in joints.start.items()})
     if rewind.stock is not None:
-        space = _with_stock(space, placement.points(_box(np.array(rewind.stock.low), np.array(rewind.stock.high))))
+        space = _with_stock(space, placement.points(box_corners(np.array(rewind.stock.low), np.array(rewind.stock.high))))
     return RetractPlan(space, rewind, preferences), []
 
 
@@ -83,12 +83,6 @@ def _with_stock(space: SafeSpace, corners: Floats) -> SafeSpace:
     """The box, along the table's axes, round the stock and what is cut, with the sphere about it."""
     every = np.concatenate([corners, space.corners])
     low, high = every.min(axis=0), every.max(axis=0)
-    box, centre = _box(low, high), 0.5 * (low + high)
+    box, centre = box_corners(low, high), 0.5 * (low + high)
     return replace(space, centre=centre, corners=box, radius=float(np.linalg.norm(box - centre, axis=1).max()),
                    distance=None)
-
-
-def _box(low: Floats, high: Floats) -> Floats:
-    """(8, 3) corners."""
-    pick = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, 8).T
-    return np.where(pick == 0, low, high)

@@ -11,8 +11,10 @@ import numpy as np
 import toolpaths
 from postproc.base.options import OutputMode
 from postproc.job.job import Job
+from postproc.path.model import JointPath
 from postproc.pipeline.convert import convert
 from postproc.pipeline.result import PostResult
+from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import DiagnosticError, Severity, error
@@ -56,7 +58,8 @@ def check_program(made: PostResult, controller: str | Path, name: str) -> PostRe
         DiagnosticError: where the machine has no rotary axes, or no five poses are within its travel.
     """
     job = made.job
-    assert job is not None and made.ok
+    if job is None or not made.ok:
+        raise ValueError("a conversion that has failed has no check program")
     if not len(job.control.rotary):
         raise DiagnosticError([error("check.no_rotary", f"{made.machine.name} has no rotary axis: there are no pivots to "
                                      "check", file=made.toolpath.file, hint="convert without --check-program")])
@@ -65,10 +68,10 @@ def check_program(made: PostResult, controller: str | Path, name: str) -> PostRe
         axes = _poses(job, point := _point(job, height), lean)
         if axes is None:
             continue
-        check = _Check(point, axes, max(job.number_of(int(job.moves.tool[0])), 1), _output(made))
-        first = _converted(made, controller, name, check, [""] * POSES)
-        if first.ok:
-            return _converted(made, controller, name, check, _readings(first))
+        check = _Check(point, axes, max(job.number_of(int(job.moves.tool[0])), 1), _output(job))
+        first = _converted(made, job, controller, name, check, [""] * POSES)
+        if first.ok and first.job is not None and first.path is not None and first.moves is not None:
+            return _converted(made, job, controller, name, check, _readings(first.job, first.path, first.moves))
         why = next(d.message for d in first.diagnostics if d.severity is Severity.ERROR)
     raise DiagnosticError([error("check.poses", f"no five poses at ({', '.join(f'{v:.3f}' for v in point)}) mm of the table "
                                  f"frame: {why}", file=made.toolpath.file,
@@ -114,17 +117,16 @@ def _poses(job: Job, point: Floats, lean: float) -> Floats | None:
     return axes[found[:POSES]] if len(found) >= POSES else None
 
 
-def _output(made: PostResult) -> OutputMode:
+def _output(job: Job) -> OutputMode:
     """The mode in which the control uses its pivots, where it has one."""
-    modes, job = made.controller.modes, made.job
-    if job is None or job.control.base == "tcp":
-        return "auto"
-    return "tcp" if modes.tcp is not None and job.control.has_tip_modes else "auto"
+    had = job.control.base != "tcp" and job.controller.modes.tcp is not None and job.control.has_tip_modes
+    return "tcp" if had else "auto"
 
 
-def _converted(made: PostResult, controller: str | Path, name: str, check: _Check, readings: list[str]) -> PostResult:
+def _converted(made: PostResult, job: Job, controller: str | Path, name: str, check: _Check,
+               readings: list[str]) -> PostResult:
     """The conversion of the poses under what was converted, but for what belongs to its operations."""
-    path, found = toolpaths.read_bytes(_text(made, check, readings), file=f"{name}.cls")
+    path, found = toolpaths.read_bytes(_text(job, check, readings), file=f"{name}.cls")
     output = made.setup.output.model_copy(update={
         "default": "auto", "operations": {}, "smoothing": {}, "restart": False, "subprograms": False, "files": False,
         "longest": 0, "spindle": None, "coolant": None, "program_name": None})
@@ -137,10 +139,9 @@ def _converted(made: PostResult, controller: str | Path, name: str, check: _Chec
     return convert(path, made.machine, controller, SetupFile.model_validate(setup.model_dump()), options, found)
 
 
-def _text(made: PostResult, check: _Check, readings: list[str]) -> str:
+def _text(job: Job, check: _Check, readings: list[str]) -> str:
     """The poses as a CL file in the system that is the work offset; three positions each, the second is the pose."""
-    assert made.job is not None
-    frame, placement = made.job.work_system, made.job.placement.inverse()
+    frame, placement = job.work_system, job.placement.inverse()
     origin, rotation = np.array(frame.origin), np.array(frame.rotation)
 
     def local(points: Floats, directions: bool) -> Floats:
@@ -150,7 +151,7 @@ def _text(made: PostResult, check: _Check, readings: list[str]) -> str:
     system = np.concatenate([origin, *rotation.T[:2]])
     lines = ["UNITS/MM", "TOOL PATH/CHECK OF PIVOTS,TOOL,CHECK", f"MSYS/{_numbers(system)}", f"LOAD/TOOL,{check.tool}"]
     axes, point = local(check.axes, True), local(check.point[None], False)[0]
-    said = made.controller.lengths
+    said = job.controller.lengths
     place = " ".join(f"{letter}{said.plain(v + 0.0)}" for letter, v in zip("XYZ", point.round(4).tolist(), strict=True))
     lines += ["PPRINT/BALL OR PROBE, ITS LENGTH TO THE CENTRE, SPINDLE STANDING, RAPIDS SLOWED DOWN BY HAND",
               f"PPRINT/INDICATOR ON THE TABLE AT {place} OF THE WORK OFFSET"]
@@ -164,10 +165,8 @@ def _numbers(values: Floats) -> str:
     return ",".join(f"{v + 0.0:.9f}" for v in values)
 
 
-def _readings(first: PostResult) -> list[str]:
+def _readings(job: Job, path: JointPath, moves: Moves) -> list[str]:
     """What must be read in each pose: machine position of the axes, and the indicator."""
-    path, moves, job = first.path, first.moves, first.job
-    assert path is not None and moves is not None and job is not None
     rows = [3 * k + 1 for k in range(POSES)]
     blocks = [int(path.begin[int(np.searchsorted(moves.row, row)) + 1]) - 1 for row in rows]
     q = (path.q[blocks] * job.control.unit).round(4) + 0.0

@@ -32,7 +32,7 @@ from postproc.verification.tool_table import (
     with_allowed,
     with_measured,
 )
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors, require
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors, read_value
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import Toolpath
 
@@ -61,15 +61,12 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
 def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup: SetupFile | str | FilePath | None,
             options: Options) -> tuple[ControllerFile, Machine, SetupFile, Options]:
     """Controller, machine and set-up from their files; the options with the name of the set-up's."""
-    spec, found = load_controller(controller)
-    require(found)
+    spec = read_value(load_controller(controller))
     machine = machine if isinstance(machine, Machine) else load_machine(machine)
     if not isinstance(setup, SetupFile):
         if setup is not None:
             options = replace(options, setup=str(setup))
-        setup, more = load_setup(options.setup or None)
-        require(more)
-    assert spec is not None and setup is not None
+        setup = read_value(load_setup(options.setup or None))
     given = bool(options.setup) or setup != SetupFile()
     options = replace(options, setup_mark=fingerprint(setup, options.setup) if given else "")
     return with_shop(spec.divided(setup.output.files), machine, setup), machine, setup, options

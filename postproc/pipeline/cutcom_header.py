@@ -1,4 +1,4 @@
-"""What the radius registers of a program must hold, tool by tool, for its head."""
+"""What the radius registers of a program must hold, tool by tool, for its header."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ import numpy as np
 from postproc.control.control import MODE_NAMES, InterpolationMode
 from postproc.control.modes import ASKED, OutputModes, Refused
 from postproc.job.job import Job
+from postproc.path.model import JointPath
 from postproc.pipeline.result import PostResult
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, warning
@@ -31,32 +32,31 @@ def with_next_modes(result: PostResult, staged: StagedAgain) -> PostResult:
     """A conversion; where an error stands against it, again with the next mode of the operations that it names, then of all,
     then with each mode alone: what one mode converts "auto" does. The first failure where none does."""
     first = made = staged(result)
-    if made.ok or not _depends(made):
-        return with_remedies(made)
-    refused, why, tried = Refused(), dict[tuple[int, InterpolationMode], Diagnostic](), {_assigned(made)}
+    job = first.job
+    if first.ok or job is None or not _depends(first, job.modes):
+        return with_remedies(first)
+    modes, why, tried = job.modes, dict[tuple[int, InterpolationMode], Diagnostic](), {_assigned(job.modes)}
     for turn in range(TURNS + len(_LAWS)):
-        more = _refusals(made, turn)
-        if not more or not _depends(made):
+        if made.job is None or not _depends(made, modes) or not (more := _refusals(made, made.job, modes, turn)):
             break
-        why |= _reasons(made, more)
-        refused |= more
-        made = staged(replace(result, refused=refused))
-        tried.add(_assigned(made))
+        why |= _reasons(made, made.job, modes, more)
+        modes = replace(modes, refused=modes.refused | more)
+        made = staged(replace(result, refused=modes.refused))
+        tried.add(_assigned(modes))
         if made.ok:
-            return _said(first, made, why)
-    for alone in _each_alone(first):
-        begun = replace(result, refused=alone)
-        if _assigned(first, alone) in tried:
+            return _said(first, made, job, modes, why)
+    for alone in _each_alone(job.modes):
+        if _assigned(alone) in tried:
             continue
-        made = staged(begun)
+        made = staged(replace(result, refused=alone.refused))
         if made.ok:
-            return _said(first, made, why)
+            return _said(first, made, job, alone, why)
     return with_remedies(first)
 
 
-def _depends(made: PostResult) -> bool:
+def _depends(made: PostResult, modes: OutputModes) -> bool:
     """True where another output mode may do better; not where the two readings of a program differ, a fault of ours."""
-    if made.job is None or not _auto(made.job.modes):
+    if not _auto(modes):
         return False
     errors = _errors(made)
     return not any(d.code.startswith("witness.") for d in errors) and any(d.code not in SAME_IN_ALL for d in errors)
@@ -69,20 +69,16 @@ def _auto(modes: OutputModes) -> list[int]:
     return np.flatnonzero(modes.asked == ASKED.index("auto")).tolist()
 
 
-def _assigned(made: PostResult, refused: Refused | None = None) -> tuple[tuple[InterpolationMode, ...], ...]:
+def _assigned(modes: OutputModes) -> tuple[tuple[InterpolationMode, ...], ...]:
     """The mode of each operation where the tool axis stands still, and where it turns."""
-    assert made.job is not None
-    modes = made.job.modes if refused is None else replace(made.job.modes, refused=refused)
     return tuple(tuple(modes.law(k, constant) for k in range(len(modes.asked))) for constant in (True, False))
 
 
-def _refusals(made: PostResult, turn: int) -> frozenset[tuple[int, InterpolationMode]]:
+def _refusals(made: PostResult, job: Job, modes: OutputModes, turn: int) -> Refused:
     """The modes that are to be passed over next: those that the errors name, else the first of all that are in use."""
-    assert made.job is not None
-    modes = made.job.modes
     free = {(k, some[0]) for k in _auto(modes) for constant in (True, False)
             if len(some := modes.possible(k, constant)) > 1}
-    named = free & set(_named(made, made.job, {line for d in _errors(made) for line in d.lines}))
+    named = free & set(_named(made, job, modes, {line for d in _errors(made) for line in d.lines}))
     if named and turn < TURNS:
         return frozenset(named)
     laws = {law for _, law in named or free}
@@ -90,7 +86,7 @@ def _refusals(made: PostResult, turn: int) -> frozenset[tuple[int, Interpolation
     return frozenset((k, law) for k, law in free if law == worst)
 
 
-def _named(made: PostResult, job: Job, of: set[int]) -> Iterator[tuple[int, InterpolationMode]]:
+def _named(made: PostResult, job: Job, modes: OutputModes, of: set[int]) -> Iterator[tuple[int, InterpolationMode]]:
     """(operation, mode) of the blocks that errors name, by their lines `of` the CL file."""
     lines = np.array(sorted(of), dtype=np.int64)
     path = made.path
@@ -101,39 +97,38 @@ def _named(made: PostResult, job: Job, of: set[int]) -> Iterator[tuple[int, Inte
             yield k, _LAWS[law]
     elif len(lines):
         for k in np.unique(job.operation[np.isin(job.moves.line, lines)]).tolist():
-            yield from ((k, job.modes.law(k, constant)) for constant in (True, False))
+            yield from ((k, modes.law(k, constant)) for constant in (True, False))
 
 
 def _errors(made: PostResult) -> list[Diagnostic]:
     return [d for d in made.diagnostics if d.severity is Severity.ERROR]
 
 
-def _reasons(made: PostResult, modes: Refused) -> dict[tuple[int, InterpolationMode], Diagnostic]:
+def _reasons(made: PostResult, job: Job, modes: OutputModes,
+             of: Refused) -> dict[tuple[int, InterpolationMode], Diagnostic]:
     """Why each (operation, mode) is passed over: the first error that names a block of it, else the first of all."""
-    assert made.job is not None
     errors, found = _errors(made), dict[tuple[int, InterpolationMode], Diagnostic]()
     for one in reversed(errors):
-        found |= dict.fromkeys(_named(made, made.job, set(one.lines)), one)
-    return {mode: found.get(mode, errors[0]) for mode in modes}
+        found |= dict.fromkeys(_named(made, job, modes, set(one.lines)), one)
+    return {mode: found.get(mode, errors[0]) for mode in of}
 
 
-def _each_alone(made: PostResult) -> Iterator[Refused]:
-    """What is refused where all operations take one mode."""
-    assert made.job is not None
-    modes = made.job.modes
+def _each_alone(modes: OutputModes) -> Iterator[OutputModes]:
+    """The modes where all operations take one and the same."""
     for law in ("axes", "tcp", "tilted"):
         if not modes.lacking[law]:
-            yield frozenset((k, other) for k in _auto(modes) for other in _LAWS if other != law)
+            others = frozenset((k, other) for k in _auto(modes) for other in _LAWS if other != law)
+            yield replace(modes, refused=others)
 
 
-def _said(first: PostResult, made: PostResult,
+def _said(first: PostResult, made: PostResult, job: Job, modes: OutputModes,
           why: dict[tuple[int, InterpolationMode], Diagnostic]) -> PostResult:
     """With a warning for each mode that another was taken for and each kind of reason: operations, both modes, reason."""
-    assert first.job is not None and made.job is not None
     path, groups = made.toolpath, dict[tuple[InterpolationMode, InterpolationMode, str], list[int]]()
-    used, found = _in_use(made), []
-    why = _reasons(first, frozenset((k, law) for modes in _assigned(first) for k, law in enumerate(modes))) | why
-    for before, after in zip(_assigned(first), _assigned(made), strict=True):
+    used, found = set() if made.path is None or made.job is None else _in_use(made.path, made.job), []
+    had = _assigned(job.modes)
+    why = _reasons(first, job, job.modes, frozenset((k, law) for laws in had for k, law in enumerate(laws))) | why
+    for before, after in zip(had, _assigned(modes), strict=True):
         for k, (old, new) in enumerate(zip(before, after, strict=True)):
             if old != new and (k, new) in used and k not in groups.setdefault((old, new, why[k, old].code), []):
                 groups[old, new, why[k, old].code].append(k)
@@ -148,13 +143,11 @@ def _said(first: PostResult, made: PostResult,
     return made.with_found(found)
 
 
-def _in_use(made: PostResult) -> set[tuple[int, InterpolationMode]]:
+def _in_use(path: JointPath, job: Job) -> set[tuple[int, InterpolationMode]]:
     """(operation, mode) of all blocks that are on the path."""
-    assert made.path is not None and made.job is not None
-    path = made.path
     laws: Ints = np.array([_LAWS.index(frame.control.law) for frame in path.frames])[path.frame]
     own = np.isfinite(path.u)
-    pairs = np.unique(np.stack([made.job.operation[path.move[own]], laws[own]]), axis=1).T.tolist()
+    pairs = np.unique(np.stack([job.operation[path.move[own]], laws[own]]), axis=1).T.tolist()
     return {(k, _LAWS[law]) for k, law in pairs}
 
 

@@ -1,4 +1,4 @@
-"""The pivots that a proof stands on, as numbers that an operator can compare with the control's, for its head."""
+"""The pivots that a proof stands on, as numbers that an operator can compare with the control's, for its header."""
 
 from __future__ import annotations
 

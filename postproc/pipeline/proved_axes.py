@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.base.options import Orientation
+from postproc.job.job import Job
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.choice import OrientationChoice, PlanProof
 from postproc.orientation.plans.plans import OrientationPlan, plans_of
 from postproc.pipeline.result import PostResult
+from postproc.readback.comparison.compare import Comparison
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 
@@ -125,20 +127,18 @@ def _blame(choice: OrientationChoice, program: PostResult) -> _Blame:
     """Where a program was refused: by bodies wherever they are touched, else by the lines of its errors."""
     errors = [d for d in program.diagnostics if d.severity is Severity.ERROR]
     bodies = [d for d in errors if d.code.startswith(_OF_BODIES)]
-    if bodies and program.comparison is not None and program.comparison.executed is not None:
-        return _touched(choice.work, program)
+    if bodies and program.job is not None and program.comparison is not None:
+        return _touched(choice.work, program.job, program.comparison)
     rows = [int(row) for d in errors for row in np.flatnonzero(np.isin(choice.work.moves.line, d.lines))[:1]]
     links, passes = _split(_parts(choice.work, choice.work.moves.row[rows]))
     return _Blame(links, passes, errors[0])
 
 
-def _touched(work: PassContext, program: PostResult) -> _Blame:
+def _touched(work: PassContext, job: Job, comparison: Comparison) -> _Blame:
     """Every path and pass on which a tool touches something."""
     from postproc.collision.program import touching_parts
     from postproc.readback.execution.poses import BlockPoses, poses_before
 
-    job, comparison = program.job, program.comparison
-    assert job is not None and comparison is not None and comparison.executed is not None
     motion, moves = comparison.executed[1], comparison.moves.without_pecks()
     executed = BlockPoses(job.control, job.kinematics_of, job.register_lengths(),
                           poses_before(motion, job.control))

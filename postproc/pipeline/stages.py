@@ -83,13 +83,21 @@ def staged(result: PostResult, progress: Progress | None = None,
     made: Any = BegunStage(result.options, result.machine, result.controller, result.controller_name, result.setup,
                            result.diagnostics, result.toolpath, result.choice, result.source, result.asked, left,
                            result.refused)
-    for stage in STAGES:
-        made, found = stage.run(made, progress)
+    for number, stage in enumerate(STAGES):
+        made, found = stage.run(made, _named(progress, stage.name, number))
         result = replace(_recorded(result, made, found), reached=stage.name)
         if not result.ok:
             return result
         made = replace(made, diagnostics=result.diagnostics)
     return replace(result, text=made.text, files=made.files)
+
+
+def _named(progress: Progress | None, name: StageName, number: int) -> Progress | None:
+    """What a stage reports its progress to, by its own name; it begins."""
+    if progress is None:
+        return None
+    progress(name, number, len(STAGES))
+    return lambda part, at, total: progress(name, at, total)
 
 
 def _recorded(result: PostResult, made: BegunStage, found: DiagnosticList) -> PostResult:

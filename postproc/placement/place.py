@@ -23,7 +23,7 @@ from postproc.placement.search import FoundPlaces, PlaceSearch
 from postproc.placement.space import ANGLES, Space, space_of
 from postproc.setup.model import PartPlacement, SetupFile, part_placement
 from postproc.setup.system import standing
-from toolpaths.diagnostics import Diagnostic, error, has_errors, info, require, warning
+from toolpaths.diagnostics import Diagnostic, error, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
@@ -135,9 +135,7 @@ def _lifted(space: Space, best: TimedPlace, file: str) -> list[Diagnostic]:
 def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options,
            controller: str | Path) -> tuple[PassContext | None, Space | None, list[Diagnostic]]:
     """The passes with the part frame on the table frame, and the places that are allowed."""
-    spec, found = load_controller(controller)
-    require(found)
-    assert spec is not None
+    spec = read_value(load_controller(controller))
     now, found = part_placement(setup, options.setup)
     if now is None:
         return None, None, found

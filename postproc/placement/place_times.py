@@ -181,16 +181,15 @@ class Timer:
         bounds = [self._cuts[key].bound for key in keys]
         total = bound = float(sum(bounds))
         for k in np.argsort(-np.array(bounds), kind="stable").tolist():
-            cut = self._cuts[keys[k]]
-            if cut.planned is None:
+            planned = self._cuts[keys[k]].planned
+            if planned is None:
                 if total >= best * (1.0 - _WORTH):
                     return [], total, True
                 self.planned += 1
-                cut = self._cuts[keys[k]] = _Cut(cut.bound,
-                                                 (made[k].seconds, " ".join(made[k].limiting).strip()))
+                planned = made[k].seconds, " ".join(made[k].limiting).strip()
+                self._cuts[keys[k]] = _Cut(self._cuts[keys[k]].bound, planned)
                 self.unsolved |= set() if made[k].solved else {made[k].one.line}
-            assert cut.planned is not None
-            total += cut.planned[0] - bounds[k]
+            total += planned[0] - bounds[k]
         done = [self._cuts[key].planned for key in keys]
         return [one for one in done if one is not None], bound, False
 

@@ -9,15 +9,12 @@ from postproc.cycle_time.model import load_model
 from postproc.cycle_time.planned import planned_times
 from postproc.cycle_time.source import from_conversion
 from postproc.pipeline.result import PostResult
-from toolpaths.diagnostics import require
+from toolpaths.diagnostics import read_value
 
 
 def program_seconds(result: PostResult) -> float:
     """s, links and travel home as the program has them; NaN where nothing is written."""
     if not result.ok:
         return np.nan
-    model, found = load_model("ideal")
-    require(found)
-    assert model is not None
-    blocks = from_conversion(result)
+    model, blocks = read_value(load_model("ideal")), from_conversion(result)
     return float(estimate(blocks, result.machine, model, times=planned_times(result, blocks, model)[0]).seconds)

@@ -10,7 +10,7 @@ import numpy as np
 from postproc.placement.place import PlacementChoice
 from postproc.placement.place_times import TimedPlace
 from postproc.placement.space import ANGLES, NAMES
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, finite
 from toolpaths.table_text import table_text
 from toolpaths.units import DEG
 
@@ -24,23 +24,23 @@ def as_dict(choice: PlacementChoice) -> dict[str, Any]:
             "now": _place(choice, choice.found.now), "best": _place(choice, choice.best),
             "part": {"origin": list(choice.part.origin), "x_axis": list(choice.part.x_axis),
                      "y_axis": list(choice.part.y_axis)},
-            "gain": _finite(_gain(choice)),
-            "program_s": dict(zip(("now", "best"), map(_finite, choice.program), strict=True)),
+            "gain": finite(_gain(choice)),
+            "program_s": dict(zip(("now", "best"), map(finite, choice.program), strict=True)),
             "attitudes": choice.found.attitudes, "places_screened": choice.found.screened,
             "places_looked_at": choice.looked, "places_refused": choice.refused, "places_pruned": choice.pruned,
             "cuts_planned": choice.planned,
-            "turned": [_degrees(one.place[ANGLES:]) | {"time_s": _finite(one.seconds)} for one in _turned(choice)],
-            "without_place": [_degrees(angles) | {"lacks_mm": _finite(-margin), "reason": str(why)}
+            "turned": [_degrees(one.place[ANGLES:]) | {"time_s": finite(one.seconds)} for one in _turned(choice)],
+            "without_place": [_degrees(angles) | {"lacks_mm": finite(-margin), "reason": str(why)}
                               for angles, margin, why in choice.found.lacks]}
 
 
 def _place(choice: PlacementChoice, one: TimedPlace) -> dict[str, Any]:
     machine = choice.work.machine
     units = np.where(machine.rotary, 1.0 / DEG, 1.0)
-    margins = dict(zip(machine.axis_names, map(_finite, (one.margins(machine) * units).tolist()), strict=True))
+    margins = dict(zip(machine.axis_names, map(finite, (one.margins(machine) * units).tolist()), strict=True))
     return dict(zip(NAMES[:ANGLES], one.place[:ANGLES].tolist(), strict=True)) | _degrees(one.place[ANGLES:]) | {
-        "time_s": _finite(one.seconds), "cutting_s": _finite(one.cutting), "linking_s": _finite(one.linking),
-        "travel_margin": margins, "singular_distance": _finite(one.singular), "limiting_s": one.limiting,
+        "time_s": finite(one.seconds), "cutting_s": finite(one.cutting), "linking_s": finite(one.linking),
+        "travel_margin": margins, "singular_distance": finite(one.singular), "limiting_s": one.limiting,
         "refused": str(one.refused or "")}
 
 
@@ -102,7 +102,3 @@ def _margins(choice: PlacementChoice) -> list[str]:
     if math.isfinite(choice.best.singular):
         result.append(f"singular positions {choice.best.singular:.3f}")
     return result
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -78,7 +78,7 @@ class PlaceSearch:
         for start in self._starts(_STARTS, _DISTINCT):
             self._compass(self.timer.tried(start.place))
         if self.found.best is not None:
-            self.found.best = self._roomiest(_POLISH)
+            self.found.best = self._roomiest(self.found.best, _POLISH)
         return self.found
 
     def among(self, likely: list[TimedPlace]) -> FoundPlaces:
@@ -88,7 +88,7 @@ class PlaceSearch:
                 self._look(one.place)
         if self.found.best is not None:
             self._compass(self.found.best)
-            self.found.best = self._roomiest(0)
+            self.found.best = self._roomiest(self.found.best, 0)
         return self.found
 
     def _look(self, place: Floats) -> TimedPlace | None:
@@ -203,10 +203,8 @@ class PlaceSearch:
         finest = np.array([_FINEST[0]] * ANGLES + [_FINEST[1]] * ANGLES)
         return any(steps[k] >= finest[k] for k in self.space.free)
 
-    def _roomiest(self, left: int) -> TimedPlace:
+    def _roomiest(self, best: TimedPlace, left: int) -> TimedPlace:
         """Of the places that take as long as the best, that with most travel margin; so many more are looked at."""
-        best = self.found.best
-        assert best is not None
         machine, most = self.timer.machine, best.seconds * (1.0 + EQUAL)
         equal = [one for one in self.timer.known() if one.seconds <= most and self.space.holds(one.place)]
         at = max(equal, key=lambda one: (one.shares(machine), -one.seconds))

@@ -16,7 +16,7 @@ import numpy as np
 from postproc.placement.reasons import BeyondTable
 from postproc.setup.model import PartPlacement, Placement
 from postproc.setup.place import PlaceBox, PlacementLimits
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, box_corners
 from toolpaths.rotations import rotation
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
@@ -178,8 +178,7 @@ def space_of(limits: PlacementLimits, now: Placement, extent: tuple[Floats, Floa
     dims = [_dimension(name, limits, float(value)) for name, value in zip(NAMES, place, strict=True)]
     place[ANGLES:] = [one.wound(float(v)) for one, v in zip(dims[ANGLES:], place[ANGLES:], strict=True)]
     box = (np.array(limits.part.low), np.array(limits.part.high)) if limits.part else extent
-    pick = np.array(list(product((0, 1), repeat=3)))
-    return Space(tuple(dims), point, limits.table, np.where(pick == 0, *box), place)
+    return Space(tuple(dims), point, limits.table, box_corners(*box), place)
 
 
 def _dimension(name: PlaceName, limits: PlacementLimits, now: float) -> Dimension:

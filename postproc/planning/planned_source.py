@@ -9,6 +9,7 @@ from postproc.planning.pass_geometry import stops_of
 from postproc.planning.planned import Source, tool_limits
 from postproc.planning.planned_errors import PlannedCorrection
 from postproc.reference.moves import Moves
+from postproc.setup.model import TOOL_LIMITS
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.smoothing.smooth import Tolerance
 
@@ -31,6 +32,6 @@ def limits_not_kept(job: Job) -> list[Diagnostic]:
     numbers = sorted({job.number_of(k) for k in limits_by_tool(job)})
     if not numbers:
         return []
-    return [warning("setup.tool_limits", "tip_acceleration, tip_jerk and axis_rate of "
+    return [warning("setup.tool_limits", f"{', '.join(TOOL_LIMITS[:-1])} and {TOOL_LIMITS[-1]} of "
                     f"{', '.join(f'[tools.{n}]' for n in numbers)} are not kept: the feeds are those of the CL file",
                     file=job.options.setup or "", count=len(numbers), hint="convert with --feed planned")]

@@ -119,16 +119,18 @@ class ProofFile(_Model):
 
 def proof_text(result: PostResult, inputs: dict[ProofInput, Hashes], output: str) -> str:
     """The file of a conversion that is written to `output`; `inputs` as `input_hashes` gives them."""
-    assert result.comparison is not None and result.source is not None and result.toolpath is not None
-    cl = FileHash(Path(result.toolpath.file).name, sha256(result.source.data))
+    found, source = result.comparison, result.source
+    if found is None or source is None:
+        raise ValueError("a path that was not read from a file, or not compared, has no proof")
+    cl = FileHash(Path(result.toolpath.file).name, sha256(source.data))
     texts = {Path(output).name: result.text, **(result.files or {})}
     values: dict[str, Any] = {
         "schema_version": 1, "kind": "proof of a program", "postproc": VERSION,
-        "proved": not result.comparison.unbounded, "statement": statement(result.comparison, result.witness),
+        "proved": not found.unbounded, "statement": statement(found, result.witness),
         "inputs": {name: [vars(one) for one in found] for name, found in {"cl_file": (cl,), **inputs}.items()},
         "program": [{"file": name, "sha256": sha256(text.encode())} for name, text in texts.items()],
         "options": options_of(result), "records": asdict(result.toolpath.records),
-        "read_back": _read_back(result.comparison), "second_reading": _second(result)}
+        "read_back": _read_back(found), "second_reading": _second(result)}
     values[OWN] = digest(values)
     return json.dumps(values, indent=2, allow_nan=False) + "\n"
 

@@ -25,9 +25,9 @@ _LEAST = 1e-4
 _BEFORE, _AFTER, _BOUND = "#9aa0a6", "#1f6fb2", "#c2453a"
 
 
-def residual_figure(field: Residuals, title: str, ending: FigureEnding) -> bytes:
+def residual_figure(field: Residuals, ending: FigureEnding) -> bytes:
     """An image file of a field; `ending` ".png" or ".svg"."""
-    return image(_SIZE, title, lambda sheet: _fill(sheet, field), ending)
+    return image(_SIZE, field.title, lambda sheet: _fill(sheet, field), ending)
 
 
 def _fill(sheet: Figure, field: Residuals) -> None:

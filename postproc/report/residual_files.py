@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from postproc.pipeline.result import PostResult
-from postproc.report.residuals import as_csv, residuals, title
+from postproc.report.residuals import as_csv, residuals
 from toolpaths.choices import FieldEnding
 from toolpaths.diagnostics import Diagnostic, error
 
@@ -15,7 +15,7 @@ def contents(result: PostResult, endings: list[FieldEnding]) -> tuple[list[str |
         return [], [no_field(result.options.error_model)] if result.ok else []
     from postproc.report.residual_figure import residual_figure
 
-    return [as_csv(found, result) if ending == ".csv" else residual_figure(found, title(result), ending)
+    return [as_csv(found, result) if ending == ".csv" else residual_figure(found, ending)
             for ending in endings], []
 
 

@@ -42,28 +42,29 @@ class Residuals:
     after: Floats
     tip_bound: float
     axis_bound: float
+    title: str
 
 
 def residuals(result: PostResult) -> Residuals | None:
     """The field of a conversion; None of one whose errors were not corrected here, or that is not proved."""
     found, job, nominal = result.after_formatting, result.job, result.nominal
-    if found is None or job is None or nominal is None or result.moves is None or result.comparison is None:
+    if (found is None or job is None or job.errors is None or nominal is None or result.moves is None
+            or result.comparison is None):
         return None
-    moves, move = planned_moves(result), np.flatnonzero(result.moves.phase != Phase.PECK)[found.points]
+    moves, move = planned_moves(job, result.moves, nominal), np.flatnonzero(result.moves.phase != Phase.PECK)[found.points]
     block, here = last_blocks(nominal, len(result.moves))[move], found.points
     q, travel = nominal.q[block], approach(_steady(nominal.q))[block]
     before = np.empty((len(q), 6))
     for k in groups(moves.tool[here]):
         kinematics = job.kinematics(int(moves.tool[here[k[0]]]))
-        assert job.errors is not None
         actual, wanted = job.errors.on(kinematics), np.concatenate(kinematics.forward(q[k]), axis=1)
         before[k] = np.concatenate(actual.aim(actual.coordinates(q[k], wanted), travel[k]), axis=1) - wanted
     there = result.comparison
     after = np.concatenate([there.tip[found.blocks] - moves.tip[here], there.axis[found.blocks] - moves.axis[here]], axis=1)
-    part = job.placement.inverse()
+    part, name = job.placement.inverse(), result.toolpath.name or Path(result.toolpath.file).stem
     before, after = (np.concatenate([part.directions(x[:, :3]), part.directions(x[:, 3:])], axis=1) for x in (before, after))
     return Residuals(moves.line[here], part.points(moves.tip[here]), part.directions(moves.axis[here]), q, before, after,
-                     found.tip_bound, found.axis_bound)
+                     found.tip_bound, found.axis_bound, f"{name} on {result.machine.name}, errors of {job.errors.name}")
 
 
 def _steady(q: Floats) -> Floats:
@@ -72,15 +73,8 @@ def _steady(q: Floats) -> Floats:
     return result
 
 
-def title(result: PostResult) -> str:
-    """What a field is of."""
-    assert result.job is not None and result.job.errors is not None
-    name = result.toolpath.name or Path(result.toolpath.file).stem
-    return f"{name} on {result.machine.name}, errors of {result.job.errors.name}"
-
-
 def as_csv(found: Residuals, result: PostResult) -> str:
-    """A table of the field, a row for each CL point; units in its head."""
+    """A table of the field, a row for each CL point; units in its header."""
     turns = np.array(result.machine.rotary)
     joints = [f"{letter} [{'deg' if turning else 'mm'}]" for letter, turning in
               zip(result.machine.axis_names, turns, strict=True)]
@@ -90,6 +84,6 @@ def as_csv(found: Residuals, result: PostResult) -> str:
     values = np.column_stack([found.line, found.tip, found.axis, found.q / np.where(turns, DEG, 1.0), found.before / units,
                               found.after / units]) + 0.0
     form = ",".join(["%d", *["%.6f"] * (6 + len(joints)), *["%.4f"] * 12])
-    notes = [f"# {title(result)}", "# x y z, i j k and differences (actual less wanted) along the axes of the part frame; "
+    notes = [f"# {found.title}", "# x y z, i j k and differences (actual less wanted) along the axes of the part frame; "
              "joints nominal", "# before: nominal joints commanded; after: the program as it is read back"]
     return "\n".join([*notes, ",".join(head), *(form % tuple(row) for row in values.tolist()), ""])

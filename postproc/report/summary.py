@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ from postproc.reference.events import cutting, spindle_states
 from postproc.report.unwinding import unwinding, unwinding_lines
 from postproc.verification.proof_text import statement
 from postproc.witness.evidence import Testimony
+from toolpaths.arrays import finite
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
 from toolpaths.toolpath import Toolpath
@@ -68,10 +68,10 @@ def points_in(toolpath: Toolpath) -> int:
 
 def deviations(c: Comparison | None) -> dict[str, Any]:
     """Bounds of the deviation of all blocks, what was seen at places of them, and how many have no bound."""
-    return {"worst_tip_deviation_mm": _number(c.tip_bound) if c else None,
-            "worst_axis_deviation_deg": _number(c.axis_bound / DEG) if c else None,
-            "sampled_tip_deviation_mm": _number(c.worst_tip) if c else None,
-            "sampled_axis_deviation_deg": _number(c.worst_axis / DEG) if c else None,
+    return {"worst_tip_deviation_mm": finite(c.tip_bound) if c else None,
+            "worst_axis_deviation_deg": finite(c.axis_bound / DEG) if c else None,
+            "sampled_tip_deviation_mm": finite(c.worst_tip) if c else None,
+            "sampled_axis_deviation_deg": finite(c.worst_axis / DEG) if c else None,
             "blocks_without_bound": c.unbounded if c else None,
             "cuts": c.cuts if c else None, "cuts_bounded": c.bounded_cuts if c else None}
 
@@ -123,8 +123,8 @@ def witness_dict(said: Testimony | None) -> dict[str, Any] | None:
     """What the second witness compared; None where it was not asked, because the read-back had found errors."""
     return None if said is None else {"agrees": not said.findings, "compared": [str(one) for one in said.compared],
                                       "not_compared": [str(one) for one in said.not_compared], "points": said.points,
-                                      "worst_tip_mm": _number(said.worst_tip),
-                                      "worst_axis_deg": _number(said.worst_axis / DEG), "seconds": said.seconds}
+                                      "worst_tip_mm": finite(said.worst_tip),
+                                      "worst_axis_deg": finite(said.worst_axis / DEG), "seconds": said.seconds}
 
 
 def witness_lines(said: Testimony | None) -> list[str]:
@@ -132,10 +132,6 @@ def witness_lines(said: Testimony | None) -> list[str]:
     if said is None or not said.compared or said.findings:
         return []
     return [f"second witness agrees: {', '.join(map(str, said.compared))}"]
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _seconds(value: float | None) -> str:
@@ -188,8 +184,8 @@ def _length_margin(result: PostResult, number: int) -> dict[str, Any] | None:
     """By how much a tool may differ from its gauge length (null: more than is looked for), and what ends that."""
     one = next((one for one in (result.comparison.lengths if result.comparison else ()) if one.number == number), None)
     return None if one is None else {
-        "shorter": _number(one.shorter), "ends_shorter": one.ends_shorter,
-        "longer": _number(one.longer), "ends_longer": one.ends_longer}
+        "shorter": finite(one.shorter), "ends_shorter": one.ends_shorter,
+        "longer": finite(one.longer), "ends_longer": one.ends_longer}
 
 
 def tool_lines(result: PostResult) -> list[str]:
@@ -273,7 +269,7 @@ def verify_dict(result: VerifyResult) -> dict[str, Any]:
         "witness": witness_dict(result.witness),
         "tool_table": [{"number": one.number, "register": one.register, "gauge_length_mm": one.gauge,
                         "measured_mm": one.measured, "allowed_mm": None if one.allowed is None else
-                        [_number(-one.allowed.shorter), _number(one.allowed.longer)], "fails": one.beyond or None}
+                        [finite(-one.allowed.shorter), finite(one.allowed.longer)], "fails": one.beyond or None}
                        for one in result.measured],
         "diagnostics": [d.as_dict() for d in result.diagnostics],
     }

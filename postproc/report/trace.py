@@ -10,19 +10,21 @@ import numpy as np
 
 from postproc.base.options import Orientation
 from postproc.control.word_arcs import PLANE_AXIS
+from postproc.job.job import Job
 from postproc.pipeline.result import PostResult
 from postproc.pipeline.stages import STAGES
 from postproc.readback.comparison.compare import Comparison
 from postproc.readback.text.canonical import in_files
 from postproc.reference.coolant import coolant_states, label
 from postproc.reference.events import spindle_states
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Floats, Ints, finite
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import check_input
 from toolpaths.toolpath import Kind, Role
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
+    from postproc.compile.program import Program
     from postproc.orientation.plans.choice import OrientationChoice
 
 
@@ -67,23 +69,22 @@ def _point(result: PostResult, row: int) -> dict[str, Any]:
                      "operation": operation.name, "pass": int(toolpath.pass_[row])}}
     if result.choice is not None:
         point["orientation"] = _turned(result.choice, result.options.orient, row)
-    if result.job is None:
+    if (job := result.job) is None:
         return point
-    moves = result.job.moves
-    point |= _running(result, row)
-    point["moves"] = [_move(result, int(m)) for m in np.flatnonzero(moves.row == row)]
+    moves = job.moves
+    point |= _running(job, row)
+    point["moves"] = [_move(result, job, int(m)) for m in np.flatnonzero(moves.row == row)]
     return point
 
 
-def _running(result: PostResult, row: int) -> dict[str, Any]:
+def _running(job: Job, row: int) -> dict[str, Any]:
     """Tool, spindle and coolant at a point, those of the set-up where the CL file states none."""
-    assert result.job is not None
-    path = result.job.toolpath
+    path = job.toolpath
     direction, rpm = spindle_states(path)
-    return {"tool": result.job.number_of(int(path.tool[row])),
-            "gauge_length_mm": result.job.gauge_length(int(path.tool[row])) or None,
-            "spindle_rpm": _finite(float(direction[row] * rpm[row])) if direction[row] else 0.0,
-            "coolant": label(int(coolant_states(path, result.controller.codes)[row]))}
+    return {"tool": job.number_of(int(path.tool[row])),
+            "gauge_length_mm": job.gauge_length(int(path.tool[row])) or None,
+            "spindle_rpm": finite(float(direction[row] * rpm[row])) if direction[row] else 0.0,
+            "coolant": label(int(coolant_states(path, job.controller.codes)[row]))}
 
 
 def _turned(choice: OrientationChoice, plan: Orientation, row: int) -> dict[str, Any]:
@@ -93,19 +94,17 @@ def _turned(choice: OrientationChoice, plan: Orientation, row: int) -> dict[str,
     k = int(np.searchsorted([one.rows[0] for one in work.passes], move, side="right")) - 1
     made, before = choice.plans[plan].picked[k], choice.tried[k].own
     return {"tip_mm": work.toolpath.tip[row].tolist(), "axis": work.toolpath.axis[row].tolist(), "pass": k,
-            "fixed": made.one.fixed, "orientation_deg": made.rotary(), "time_s": _finite(made.seconds),
-            "reference_time_s": _finite(before.seconds)}
+            "fixed": made.one.fixed, "orientation_deg": made.rotary(), "time_s": finite(made.seconds),
+            "reference_time_s": finite(before.seconds)}
 
 
-def _move(result: PostResult, m: int) -> dict[str, Any]:
-    job = result.job
-    assert job is not None
+def _move(result: PostResult, job: Job, m: int) -> dict[str, Any]:
     moves, unit = job.moves, job.control.unit
     kin = job.kinematics(int(moves.tool[m]))
     branches = kin.inverse(moves.tip[m:m + 1], moves.axis[m:m + 1])[:, 0] * unit
     entry: dict[str, Any] = {
         "table_frame": {"tip_mm": moves.tip[m].tolist(), "axis": moves.axis[m].tolist()},
-        "linked": bool(moves.link[m]), "feed_mm_per_min": _finite(moves.feed[m] * 60.0),
+        "linked": bool(moves.link[m]), "feed_mm_per_min": finite(moves.feed[m] * 60.0),
         "branches": [_named(result, b) for b in branches]}
     if result.path is None or result.program is None:
         return entry
@@ -115,7 +114,7 @@ def _move(result: PostResult, m: int) -> dict[str, Any]:
     if result.nominal is not None:
         entry["nominal_joints"] = [_named(result, q * unit) for q in result.nominal.q[result.nominal.move == m]]
     written = np.flatnonzero(result.program.row == moves.row[m])
-    entry["blocks"] = _texts(result, written)
+    entry["blocks"] = _texts(result.program, written)
     c = result.comparison
     if c is not None:
         keep = np.cumsum(moves.phase != 4) - 1
@@ -131,8 +130,6 @@ def _move(result: PostResult, m: int) -> dict[str, Any]:
 
 def _program_line(c: Comparison, match: int) -> dict[str, Any]:
     """Where the program comes there: line, and file where it is of a subprogram's."""
-    if c.executed is None:
-        return {}
     code, motion = c.executed
     line = motion.line[match:match + 1]
     k = int(np.searchsorted([n for _, n in code.files], line[0])) - 1 if code.files else 0
@@ -140,17 +137,11 @@ def _program_line(c: Comparison, match: int) -> dict[str, Any]:
 
 
 def _named(result: PostResult, values: Floats) -> dict[str, float | None]:
-    return {k: _finite(v) for k, v in zip(result.machine.axis_names, values.tolist(), strict=True)}
+    return {k: finite(v) for k, v in zip(result.machine.axis_names, values.tolist(), strict=True)}
 
 
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def _texts(result: PostResult, blocks: Ints) -> list[str]:
+def _texts(program: Program, blocks: Ints) -> list[str]:
     """The words of blocks, each stated in full, whatever the controller makes of them."""
-    program = result.program
-    assert program is not None
     texts = []
     for k in blocks.tolist():
         head = ("traverse", "feed", "arc")[int(program.code[k])]

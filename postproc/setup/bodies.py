@@ -82,10 +82,9 @@ class HolderSection(UserModel):
     @property
     def radii(self) -> tuple[float, float]:
         """mm, at the end towards the tip and at that towards the spindle"""
-        low = self.diameter if self.lower is None else self.lower
-        high = self.diameter if self.upper is None else self.upper
-        assert low is not None and high is not None
-        return 0.5 * low, 0.5 * high
+        if self.lower is None or self.upper is None:
+            return (0.5 * (self.diameter or 0.0),) * 2
+        return 0.5 * self.lower, 0.5 * self.upper
 
 
 class ToolBody(UserModel):

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from postproc.setup.files import file_keys, value_at
-from postproc.setup.model import SetupFile
+from postproc.setup.model import TOOL_LIMITS, SetupFile
 from toolpaths.input_files import read_input
 
 DIGITS = 8
@@ -18,7 +18,7 @@ _LATER: tuple[tuple[str, ...], ...] = (
     ("hooks",), ("output", "stop_between_tools"), ("output", "program_number"), ("output", "program_name"),
     ("clearance", "index"), ("output", "units"), ("output", "smoothing"), ("output", "rapids_as_feed"))
 """keys that set-ups have not always had: at their defaults they are left out, so that programs keep their fingerprint"""
-_LATER_OF_TOOLS = ("tip_acceleration", "tip_jerk", "axis_rate", "compensation", "contour", "called")
+_LATER_OF_TOOLS = (*TOOL_LIMITS, "compensation", "contour", "called")
 """likewise, of each tool"""
 
 

@@ -57,6 +57,10 @@ class LinkClearance(UserModel):
     default: as the controller file has it ([links] index)"""
 
 
+TOOL_LIMITS = ("tip_acceleration", "tip_jerk", "axis_rate")
+"""keys of a tool that --feed planned keeps"""
+
+
 class ToolSetup(ToolBody):
     """One tool in the machine."""
 
@@ -84,7 +88,7 @@ class ToolSetup(ToolBody):
     @property
     def limited(self) -> bool:
         """True where the tool has a limit of its own."""
-        return (self.tip_acceleration, self.tip_jerk, self.axis_rate) != (None, None, None)
+        return any(getattr(self, name) is not None for name in TOOL_LIMITS)
 
     @property
     def length(self) -> float:

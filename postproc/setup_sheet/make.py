@@ -17,7 +17,7 @@ from postproc.setup_sheet.facts import NumberedTool, SheetFacts, facts_of, named
 from postproc.setup_sheet.place import Fit, fitted
 from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, number_questions, questions_of
 from postproc.setup_sheet.text import TOOL_NUMBERS, SheetHeader, sheet_text, sheet_values
-from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, require, warning
+from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
 
 
@@ -55,9 +55,7 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
         found: what reading the file found
         code: register of the work offset
     """
-    spec, faults = load_controller(controller)
-    require(faults)
-    assert spec is not None
+    spec = read_value(load_controller(controller))
     known = [*found, *(d for d in toolpath.faults if d not in found)]
     if has_errors(known):
         return SetupSheet("", tuple(known))

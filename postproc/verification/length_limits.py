@@ -41,6 +41,7 @@ NEAR = 1.02
 FIRST = 0.02
 """by how much less is tried where that is not proved"""
 _ROUNDS, _CLOSE, _PROOFS = 60, 1e-5, 12
+_FEW, _FARTHER = 16, 4.0
 _SIGNS = -1.0, 1.0
 
 
@@ -64,6 +65,43 @@ class LengthTrial:
         return motion, executed_poses(job, motion, held)
 
 
+_Room = Callable[[Ints, Floats], Floats]
+"""What is left of a tolerance or a clearance at places (K,) with tools longer by mm (K,), no faster than they move."""
+
+
+def _nearest(tool: Ints, sure: Floats) -> Ints:
+    """The few places of every tool that are nearest to their tolerance."""
+    order = np.lexsort((sure, tool))
+    rank = np.arange(len(order)) - np.searchsorted(tool[order], tool[order])
+    return np.asarray(order[rank < _FEW])
+
+
+def _first_zero(room: _Room, places: Ints, direction: float, ends: tuple[Floats, Floats], left: tuple[Floats, Floats],
+                tool: Ints) -> Floats:
+    """(K,) mm, between `ends` (K,) and close to where the room of places (K,) ends, that leave some; `left` (K,) at `ends`.
+
+    False position (Illinois); places that are not the first of their tool are not followed to the end.
+    """
+    (low, high), (f_low, f_high) = (np.array(ends[0]), np.array(ends[1])), (np.array(left[0]), np.array(left[1]))
+    side, first = np.zeros(len(low)), np.full(tool.max() + 1, np.inf)
+    for _ in range(_ROUNDS):
+        np.minimum.at(first, tool, high)
+        k = np.flatnonzero((high - low > _CLOSE * high) & (low < first[tool]))
+        if not len(k):
+            break
+        share = np.clip(f_low[k] / (f_low[k] - f_high[k]), 0.5 * _CLOSE, 0.9)
+        x = np.minimum(low[k] + share * (high[k] - low[k]), _FARTHER * low[k] + _FARTHER * LEAST)
+        x = np.where(x < high[k], x, 0.5 * (low[k] + high[k]))
+        at = room(places[k], direction * x)
+        inside = at > 0.0
+        f_high[k[inside & (side[k] > 0.0)]] *= 0.5
+        f_low[k[~inside & (side[k] < 0.0)]] *= 0.5
+        low[k[inside]], f_low[k[inside]] = x[inside], at[inside]
+        high[k[~inside]], f_high[k[~inside]] = x[~inside], at[~inside]
+        side[k] = np.where(inside, 1.0, -1.0)
+    return low
+
+
 @dataclass
 class _Ends:
     """The least length found so far: mm (T, 2) by tool and sign, and what fails there."""
@@ -83,9 +121,8 @@ class _Ends:
             if least < self.mm[t, sign]:
                 self.mm[t, sign], self.what[t][sign] = max(least, 0.0), what
 
-    def follow(self, tool: Ints, speed: Floats, room: Callable[[Ints, Floats], Floats], what: str) -> None:
-        """Places (N,) with a speed (N,) mm or rad per mm; `room` gives what is left of some of them with tools longer by
-        (K,) mm, and changes no faster than they move."""
+    def follow(self, tool: Ints, speed: Floats, room: _Room, what: str) -> None:
+        """Places (N,) with a speed (N,) mm or rad per mm, of a clearance: as far as is left, again and again."""
         goes = np.flatnonzero(speed > LEAST)
         for sign, direction in enumerate(_SIGNS):
             x, k = np.zeros(len(goes)), np.arange(len(goes))
@@ -97,6 +134,24 @@ class _Ends:
                 if not len(k):
                     break
             self.add(tool[goes], sign, x, what)
+
+    def leave(self, tool: Ints, speed: Floats, room: _Room, what: str) -> None:
+        """Places (N,) of a tolerance, as above: a tip on a line is never farther from its path than at the ends
+        of the line, so a place that keeps the tolerance at a length keeps it at all lengths between."""
+        goes = np.flatnonzero(speed > LEAST)
+        if not len(goes):
+            return
+        speed, tool, left = speed[goes], tool[goes], np.maximum(room(goes, np.zeros(len(goes))), 0.0)
+        sure = left / speed
+        for sign, direction in enumerate(_SIGNS):
+            for k in (_nearest(tool, sure), np.arange(len(goes))):
+                most = self.mm[tool[k], sign]
+                k, most = k[sure[k] < most], most[sure[k] < most]
+                beyond = room(goes[k], direction * most) if len(k) else most
+                k, most, beyond = k[beyond < 0.0], most[beyond < 0.0], beyond[beyond < 0.0]
+                if len(k):
+                    mm = _first_zero(room, goes[k], direction, (sure[k], most), (left[k], beyond), tool[k])
+                    self.add(tool[k], sign, mm, what)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,8 +270,8 @@ class _Look:
         def left_of_axis(k: Ints, x: Floats) -> Floats:
             return np.asarray(self.job.axis_tolerance - curves.take(k).deviation(*places.at(k, x), guess[k], tolerance)[1])
 
-        self.ends.follow(tool, speed, left, "tolerance")
-        self.ends.follow(tool, turn, left_of_axis, "axis tolerance")
+        self.ends.leave(tool, speed, left, "tolerance")
+        self.ends.leave(tool, turn, left_of_axis, "axis tolerance")
 
     def _link(self, rows: Ints, t: float | Floats, places: _Places) -> None:
         near = self.job.options.tolerance + self.executed.corrected_between(self.motion, rows)
@@ -240,7 +295,7 @@ class _Look:
             def left(k: Ints, x: Floats, places: _Places = places, to: Floats = to) -> Floats:
                 return np.asarray(tolerance - lengths(places.at(k, x)[0] - to[k]))
 
-            self.ends.follow(self._tool(rows[part]), lengths(places.d_tip), left, "tolerance")
+            self.ends.leave(self._tool(rows[part]), lengths(places.d_tip), left, "tolerance")
 
     def travel(self) -> None:
         """Travel of all axes, at the places of `check_travel`."""

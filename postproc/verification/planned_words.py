@@ -45,8 +45,6 @@ def check_planned(path: JointPath, moves: Moves, needed: Floats, merge: float, c
         path, moves: as they were written; needed (K,): least seconds of each block by the plan
         merge: part by which feeds may have been lowered to be alike
     """
-    if comparison.executed is None or comparison.poses is None:
-        return []
     motion, reference = comparison.executed[1], comparison.moves.without_pecks()
     written, faults = WrittenBlocks.of(path, moves, needed), Faults(job.toolpath.file, gcode)
     count = len(reference)

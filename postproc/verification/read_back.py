@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -36,6 +37,9 @@ from postproc.verification.length_limits import LengthTrial, length_margins
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
+
+if TYPE_CHECKING:
+    from machines.geometric_error.actual.model import ErrorModel
 
 CAUSES = frozenset({"verify.start", "verify.tool", "verify.tool_change", "verify.state", "verify.tap", "verify.hole"})
 """reported first: a path that is off follows from them"""
@@ -112,7 +116,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     with np.errstate(invalid="ignore"):
         called = {name: others[name] for name, _ in code.files[1:]} if others else {}
         planned, changed = planned_feeds(as_bytes(data), called, gcode or job.toolpath.file)
-        comparison = compare(motion, job, executed, gcode, planned)
+        comparison = compare(code, motion, job, executed, gcode, planned)
     job = job.with_moves(comparison.moves)
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
@@ -121,12 +125,12 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
                *check_hooks(data, code, motion, job, comparison.owner, faults),
                *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
-    if gcode and job.corrects:
-        noted = [*(_of_model(header, job, gcode, has_errors(noted)) if header.corrected is not None else
+    if gcode and job.corrects and job.errors is not None:
+        noted = [*(_of_model(header, job.errors, gcode, has_errors(noted)) if header.corrected is not None else
                    _uncorrected(header, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
-    return replace(comparison, executed=(code, motion), poses=executed, planned=planned,
-                   lengths=_margins(motion, executed, LengthTrial(whole, offsets, job), comparison)), [*diagnostics, *noted]
+    margins = _margins(motion, executed, LengthTrial(whole, offsets, job), comparison)
+    return replace(comparison, lengths=margins), [*diagnostics, *noted]
 
 
 def _margins(motion: Motion, executed: BlockPoses, trial: LengthTrial, c: Comparison) -> tuple[LengthMargin, ...]:
@@ -166,24 +170,23 @@ def _uncorrected(header: ProgramHeader, job: Job, motion: Motion, executed: Bloc
                   hint="verify without --error-model, or convert with it")]
 
 
-def _of_model(header: ProgramHeader, job: Job, gcode: str, off: bool) -> list[Diagnostic]:
+def _of_model(header: ProgramHeader, errors: ErrorModel, gcode: str, off: bool) -> list[Diagnostic]:
     """What its header says of the model that a program corrects, its name and fingerprint, where that is not
     the one that it is verified with; `off`: the program fails. Programs without a fingerprint have only the name."""
     from machines.geometric_error.files.fingerprint import fingerprint
 
-    assert job.errors is not None
-    name, then, now = header.corrected, header.model, fingerprint(job.errors)
-    same = not name or same_name(name, job.errors.name)
+    name, then, now = header.corrected, header.model, fingerprint(errors)
+    same = not name or same_name(name, errors.name)
     if then == now or (not then and (same or not off)):
         return []
     marks = f" (fingerprint {then} then, {now} now)" if then else ""
     if same:
-        return [warning("verify.error_model_changed", f"the error model {job.errors.name} has changed since the program was "
+        return [warning("verify.error_model_changed", f"the error model {errors.name} has changed since the program was "
                         f"written{marks}: the program corrects the errors as they were", file=gcode,
                         hint="convert again, or verify with the model as it was")]
     note, so = (error, "what is off may follow from that alone") if off else (warning, "the program corrects other errors")
     return [note("verify.error_model", f"the header of the program names the error model {name}, it is verified with "
-                 f"{job.errors.name}{marks}: {so}", file=gcode,
+                 f"{errors.name}{marks}: {so}", file=gcode,
                  hint="verify with the model that the program was written with")]
 
 

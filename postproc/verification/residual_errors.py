@@ -66,10 +66,11 @@ def after_formatting(result: CorrectedConversion) -> AfterFormatting | None:
     turn one back by that much, within its play.
     """
     found, comparison, job = result.compensation, result.comparison, result.job
-    if found is None or comparison is None or job is None or job.errors is None or result.moves is None:
+    path, nominal = result.path, result.nominal
+    if found is None or comparison is None or job is None or result.moves is None or path is None or nominal is None:
         return None
-    moves = planned_moves(result)
-    tip_play, axis_play = _play(result)
+    moves = planned_moves(job, result.moves, nominal)
+    tip_play, axis_play = _play(job, path)
     bounds = found.tip_after + job.rounding.tip + tip_play, found.axis_after + job.rounding.axis + axis_play
     block = _nearest(comparison, moves, (bounds[0] + SLACK[0], bounds[1] + SLACK[1]))
     points = np.flatnonzero(_cl_points(moves) & (block >= 0))
@@ -78,10 +79,8 @@ def after_formatting(result: CorrectedConversion) -> AfterFormatting | None:
     return AfterFormatting(tip, axis, points, block[points], *bounds)
 
 
-def planned_moves(result: CorrectedConversion) -> Moves:
+def planned_moves(job: Job, moves: Moves, path: JointPath) -> Moves:
     """The moves without pecks, ending at tip and axis (M, 3) of the path before correction."""
-    job, moves, path = result.job, result.moves, result.nominal
-    assert job is not None and moves is not None and path is not None
     block = last_blocks(path, len(moves))
     move, tip, axis = np.flatnonzero(block >= 0), np.array(moves.tip), np.array(moves.axis)
     for k in groups(moves.tool[move]):
@@ -116,11 +115,9 @@ def beyond_bound(found: AfterFormatting | None, job: Job) -> list[Diagnostic]:
                     + "more decimals in the controller's [format] help")]
 
 
-def _play(result: CorrectedConversion) -> tuple[float, float]:
+def _play(job: Job, path: JointPath) -> tuple[float, float]:
     """(mm, rad) that a last decimal of the words of joints with lost motion comes to, at up to LOOKS blocks."""
-    job, path = result.job, result.path
-    assert job is not None and job.errors is not None and path is not None
-    joints = job.errors.axes.bidirectional(job.machine.axis_names)
+    joints = job.bidirectional
     rows = np.flatnonzero(~path.home)
     if not joints or not len(rows):
         return 0.0, 0.0

@@ -59,7 +59,6 @@ def limits_as_used(machine: Machine) -> Floats:
 
 def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlocks:
     """The motion of a program, read back, as plain arrays."""
-    assert comparison.executed is not None
     motion, control = comparison.executed[1], job.control
     every = np.arange(len(motion))
     degrees = _units(job.machine.axis_names)
@@ -140,7 +139,7 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
         setup: as the shop wrote it, [part] by whatever it names
         program: its text, which is looked at where the machine has modulo axes
     """
-    if source is None or comparison.executed is None or comparison.poses is None:
+    if source is None:
         return Testimony((), (NotCompared("all", "the path is not as it was read from a file"),)), []
     control, words = job.control, job.controller.codes
     errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})

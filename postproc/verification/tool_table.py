@@ -4,7 +4,7 @@ LinuxCNC: the tool table itself (`T1 P1 Z120.03 D6 ; remark`). Fanuc and Haas: G
 with P and R (B-63944EN 14.2; Haas "G10 Set Offsets"), in mm or, behind G20, in inches. Haas besides: the file of offsets
 that the control saves (.OFS; no manual shows it, a shop's guide to the HTS400 presetter does): LENGTH_GEOMETRY and
 LENGTH_WEAR of each TOOL1, TOOL2 ...; it states no units, mm are taken. Siemens: $TC_DP3 (length 1), $TC_DP12 (wear) and
-$TC_DP21 (adapter) of edge 1 of a tool archive. Heidenhain: TOOL.T, columns T, L and DL below the names in its head line.
+$TC_DP21 (adapter) of edge 1 of a tool archive. Heidenhain: TOOL.T, columns T, L and DL below the names in its header line.
 Any control: a table of text with the columns `register` or `tool`, `length` and, where there is any, `wear`, mm.
 """
 

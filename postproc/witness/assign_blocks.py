@@ -16,7 +16,7 @@ _compiled: list[Callable[..., Any]] = []
 
 
 def walk(tip: Array, axis: Array, sweep: Array, targets: Array, directions: Array, arc: Array, around: Array,
-         skipped: Array, within: tuple[float, float]) -> Array:
+         skipped: Array, least: Array, within: tuple[float, float]) -> Array:
     """(M,) block that ends at each target, -1 from the first on that none ends at.
 
     Args:
@@ -25,10 +25,11 @@ def walk(tip: Array, axis: Array, sweep: Array, targets: Array, directions: Arra
         arc (M,): rad that the tool turns about `around` (M, 6), centre and axis, on its path there; 0 for no arc
         skipped (M,): positions that nobody knows stand before it, so that the tool leaves, though it may come
             back to where it stood
+        least (M,): mm that the tool goes at least on its path there (a spline may come back to where it begins)
         within: mm and rad
     """
     run = _walk if len(tip) < COMPILED_FROM else _fast()
-    return np.asarray(run(tip, axis, sweep, targets, directions, arc, around, skipped, *within))
+    return np.asarray(run(tip, axis, sweep, targets, directions, arc, around, skipped, least, *within))
 
 
 def _fast() -> Callable[..., Any]:
@@ -37,7 +38,7 @@ def _fast() -> Callable[..., Any]:
 
         rows, numbers = (types.Array(types.float64, n, "A", readonly=True) for n in (2, 1))
         flags = types.Array(types.boolean, 1, "A", readonly=True)
-        signature = (rows, rows, rows, rows, rows, numbers, rows, flags, types.float64, types.float64)
+        signature = (rows, rows, rows, rows, rows, numbers, rows, flags, numbers, types.float64, types.float64)
         own = dict(globals())  # of the compiled functions: those of the module stay interpreted
 
         def made(name: str, signature: Any = None) -> Callable[..., Any]:
@@ -71,20 +72,22 @@ def _turned(a: Any, b: Any, c: Any) -> Any:
 
 
 def _walk(tip: Any, axis: Any, sweep: Any, targets: Any, directions: Any, arc: Any, around: Any,
-          skipped: Any, tol: float, axis_tol: float) -> Any:
+          skipped: Any, least: Any, tol: float, axis_tol: float) -> Any:
     count = len(tip)
     match = np.full(len(targets), -1, np.int64)
     j = -1
     for i in range(len(targets)):
         goal, along, whole = targets[i], directions[i], arc[i]
-        stands = j >= 0 and not skipped[i] and abs(whole) < math.pi
+        stands = j >= 0 and not skipped[i] and abs(whole) < math.pi and least[i] == 0.0
         if stands and _near(_apart(tip[j], goal), _apart(axis[j], along), 2e-3, 1e-5):
             after = j + 1 < count and _near(_apart(tip[j + 1], goal), _apart(axis[j + 1], along), 2e-3, 1e-5)
             if not after:
                 match[i] = j
                 continue
-        k, turned, found = j + 1, 0.0, False
+        k, turned, gone, found = j + 1, 0.0, 0.0, False
         while k < count:
+            if least[i] > 0.0 and k > 0:
+                gone += _apart(tip[k - 1], tip[k])
             if whole != 0.0:
                 step = _turned(tip[k - 1] if k > 0 else tip[k], tip[k], around[i])
                 size = sweep[k, 0] * around[i, 3] + sweep[k, 1] * around[i, 4] + sweep[k, 2] * around[i, 5]
@@ -92,12 +95,13 @@ def _walk(tip: Any, axis: Any, sweep: Any, targets: Any, directions: Any, arc: A
                     step += 2.0 * math.pi * math.floor((size - step) / (2.0 * math.pi) + 0.5)
                 turned += step
             if _near(_apart(tip[k], goal), _apart(axis[k], along), tol, axis_tol) and (
-                    abs(whole) < math.pi or abs(turned) > 0.5 * abs(whole)):
+                    abs(whole) < math.pi or abs(turned) > 0.5 * abs(whole)) and gone >= least[i]:
                 found = True
                 break
             k += 1
         if not found:
-            if j >= 0 and _near(_apart(tip[j], goal), _apart(axis[j], along), tol, axis_tol) and abs(whole) < math.pi:
+            if j >= 0 and abs(whole) < math.pi and least[i] == 0.0 and _near(
+                    _apart(tip[j], goal), _apart(axis[j], along), tol, axis_tol):
                 match[i] = j
                 continue
             return match

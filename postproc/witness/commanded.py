@@ -54,6 +54,7 @@ class Commanded:
         feed (N,): mm/min, or mm per turn where `per_turn` (N,), or 1/min where `inverse` (N,); NaN: none
         arc (N,): index into centre, normal (K, 3), sweep (K,) rad; -1
         cycle (N,): index into cycles, -1; tool, spindle, coolant (N,): number; -1, 0, 1; "" to words; UNKNOWN
+        splines: by row, points (P, 3) of the curve there
         side (N,): 40, 41 or 42 as CUTCOM says it: off, left, right of the path
         register (N,): length register, OWN where no record names one
         rpm (N,): NaN where not stated; turned, flowed (N,): row of the last SPINDL and COOLNT record; name (N,): into names
@@ -94,6 +95,7 @@ class Commanded:
     ball: Array
     rests: tuple[Pause, ...]
     stops: tuple[Pause, ...]
+    splines: dict[int, Array] = field(default_factory=dict)
     unread: dict[str, int] = field(default_factory=dict)
 
     def __len__(self) -> int:

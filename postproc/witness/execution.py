@@ -66,6 +66,8 @@ class Execution:
         self.rests, self.stops = list[Pause](), list[Pause]()
         self.arcs: dict[int, arcs.Given] = {}
         self.toward: tuple[float, ...] | None = None
+        self.spline: tuple[list[float], list[tuple[float, ...]]] = ([], [])
+        self.spline_line, self.splines = 0, dict[int, tuple[list[float], Array]]()
         self.inside = HeldValues(0)
         self.shifted = False
         self.height: float | None = None

@@ -161,8 +161,9 @@ class Cut:
 
 def cut_of(case: Case, c: Commanded, tip: Array, axis: Array, centre: Array, normal: Array,
            place: tuple[Array, Array]) -> Cut | None:
-    """What the CL file cuts; tips, axes, centres and normals in the table frame. None where it cuts nothing."""
-    points = [tip[c.known & ((c.kind == LINE) | (c.kind == ARC))]]
+    """What the CL file cuts; tips (and behind them points of splines), axes, centres and normals in the table frame.
+    None where it cuts nothing."""
+    points = [tip[:len(c)][c.known & ((c.kind == LINE) | (c.kind == ARC))], tip[len(c):]]
     holes = np.flatnonzero(c.known & (c.kind == HOLE))
     if len(holes):
         depth = np.array([x.depth for x in c.cycles])[c.cycle[holes]]

@@ -7,6 +7,7 @@ import numpy as np
 import postproc.witness.arcs as arcs
 from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded, unit
 from postproc.witness.execution import Execution, HeldValues, Z
+from postproc.witness.splines import points_of
 from postproc.witness.text import Array
 
 _CHUNK = 100_000
@@ -62,7 +63,17 @@ def assembled(e: Execution) -> Commanded:
                      e.name.column(n, np.int64), tuple(e.names),
                      spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64),
                      np.array(e.coolant.rows, np.int64)[_index(e.coolant, n)], e.systems, _first_system(e, place),
-                     e.radius.column(n, np.float64), e.ball.column(n, np.float64), tuple(e.rests), tuple(e.stops), e.unread)
+                     e.radius.column(n, np.float64), e.ball.column(n, np.float64), tuple(e.rests), tuple(e.stops),
+                     _splines(e, tip, place, common), e.unread)
+
+
+def _splines(e: Execution, tip: Array, place: Array, common: Array) -> dict[int, Array]:
+    """Points of every spline by its row, from the position before."""
+    result = {}
+    for row, (knots, control) in e.splines.items():
+        matrix, origin = e.frames[0 if common[row] else place[row]]
+        result[row] = points_of(np.vstack([tip[row - 1], e.scale * control @ matrix.T + origin]), knots)
+    return result
 
 
 def _first_system(e: Execution, place: Array) -> str | None:

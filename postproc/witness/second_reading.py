@@ -92,10 +92,11 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     tip = c.tip if same and not origin.any() else c.tip @ rotation.T + origin
     axis = c.axis if same else c.axis @ rotation.T
     centre, normal = c.centre @ rotation.T + origin, c.normal @ rotation.T
-    targets = targets_of(c, tip, axis, centre, normal)
+    splines = {row: points @ rotation.T + origin for row, points in c.splines.items()}
+    targets = targets_of(c, tip, axis, centre, normal, splines)
     if not len(targets):
         return [], (0.0, 0.0), {}, []
-    cut = cut_of(case, c, tip, axis, centre, normal, place)
+    cut = cut_of(case, c, np.concatenate([tip, *splines.values()]) if splines else tip, axis, centre, normal, place)
     there, along = poses.at(np.arange(len(executed)), 1.0)
     turns = turns_of(poses)
     match, owner = matched(targets, there, along, turns, case.tolerance + 1e-6, case.axis_tolerance + 1e-6)

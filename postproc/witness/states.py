@@ -13,6 +13,7 @@ from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN
 from postproc.witness.evidence import Aspect, Case, Finding, FindingCode, NotCompared
 from postproc.witness.machine import largest_feed, limits_of, register_beyond
 from postproc.witness.motion import CHUNK, Walked
+from postproc.witness.splines import length_of
 from postproc.witness.stretches import BOTTOM
 from postproc.witness.text import Array
 
@@ -85,6 +86,7 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], matc
     rise = np.einsum("ni,ni->n", t.tip - t.start, t.normal)
     radius = np.sqrt(np.maximum((flat * flat).sum(axis=1) - np.einsum("ni,ni->n", flat, t.normal) ** 2, 0.0))
     length = np.where(round_, np.hypot(radius * np.abs(t.sweep), rise), length)
+    length[list(t.splines)] = [length_of(points) for points in t.splines.values()]
     most = largest_feed(table)
     feed = feeds_of(c, case.setup, most)[t.row]
     inverse = c.inverse[t.row] & (t.kind != BOTTOM)

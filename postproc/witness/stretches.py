@@ -9,6 +9,7 @@ import numpy as np
 from postproc.witness.assign_blocks import walk
 from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded
 from postproc.witness.place import Poses
+from postproc.witness.splines import length_of, off_chords
 from postproc.witness.text import Array
 
 ENTER, BOTTOM = 5, 6
@@ -24,6 +25,7 @@ class Targets:
         start (M, 3), start_axis: where the path there begins; free (M,): that is wherever the tool stands
         gap (M,): the path there is not known; skipped (M,): by positions that are not known
         centre, normal (M, 3), sweep (M,): of arcs, 0 for others
+        splines: by target, points (P, 3) of the curve there
         out (M,): of bottoms, mm above them to which the tool leaves the hole; NaN where no number says so
     """
 
@@ -40,13 +42,14 @@ class Targets:
     normal: Array
     sweep: Array
     out: Array
+    splines: dict[int, Array]
 
     def __len__(self) -> int:
         return len(self.row)
 
 
-def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Array) -> Targets:
-    """The targets of a CL file; `tip`, `axis`, `centre`, `normal` are its own in the table frame."""
+def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Array, splines: dict[int, Array]) -> Targets:
+    """The targets of a CL file; `tip`, `axis`, `centre`, `normal`, `splines` are its own in the table frame."""
     depth = np.array([x.depth for x in c.cycles] + [0.0])[c.cycle]
     above = np.array([x.clearance for x in c.cycles] + [0.0])[c.cycle]
     hole = c.kind == HOLE
@@ -83,14 +86,17 @@ def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Arr
     skipped &= ~second
     gap = c.gap[row] | skipped
     return Targets(there, axis[row], kind, row, start, start_axis, free, gap, skipped, mid, about, np.where(gap, 0.0, sweep),
-                   np.where(second, depth[row] + out[row], np.nan))
+                   np.where(second, depth[row] + out[row], np.nan),
+                   {int(k): splines[int(row[k])] for k in np.flatnonzero(np.isin(row, list(splines)))} if splines else {})
 
 
 def matched(targets: Targets, tip: Array, axis: Array, turns: Array, tolerance: float,
             axis_tolerance: float) -> tuple[Array, Array]:
     """(block (M,) that ends at each target, -1; target (E,) that each block serves, M behind the last)."""
     around = np.concatenate([targets.centre, targets.normal], axis=1)
-    match = walk(tip, axis, turns, targets.tip, targets.axis, targets.sweep, around, targets.skipped,
+    least = np.zeros(len(targets))
+    least[list(targets.splines)] = [0.5 * length_of(points) for points in targets.splines.values()]
+    match = walk(tip, axis, turns, targets.tip, targets.axis, targets.sweep, around, targets.skipped, least,
                  (tolerance, axis_tolerance))
     reached = match[:int(np.argmax(match < 0))] if (match < 0).any() else match
     return match, np.searchsorted(reached, np.arange(len(tip)), side="left")
@@ -131,6 +137,9 @@ def off(targets: Targets, i: Array, tip: Array, axis: Array, start: Array, start
         k = i[round_]
         away[round_] = _from_arc(tip[round_], start[round_], targets.tip[k], targets.centre[k], targets.normal[k],
                                  targets.sweep[k])
+    for target in np.unique(i).tolist() if targets.splines else ():
+        if target in targets.splines:
+            away[i == target] = off_chords(tip[i == target], targets.splines[target])
     return away, _from_circle(axis, start_axis, targets.axis[i])
 
 

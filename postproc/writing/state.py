@@ -195,7 +195,8 @@ class WriterState:
     def cycle_of(self, hole: Hole) -> CannedCycle:
         """The controller's cycle for a hole."""
         spec = cycle_spec(self.controller, self.cycles[hole.cycle], hole.key)
-        assert spec is not None  # `holes_of` has taken no other
+        if spec is None:
+            raise ValueError(f"the controller has no cycle {hole.key}, `holes_of` takes none without")
         return spec
 
     def cycle_values(self, hole: Hole) -> dict[str, float]:

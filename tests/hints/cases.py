@@ -8,7 +8,8 @@ from tests.hints.convert_cases import CONVERT
 from tests.hints.error_cases import ERRORS
 from tests.hints.file_cases import FILE
 from tests.hints.gcode_cases import GCODE
+from tests.hints.import_cases import IMPORTS
 from tests.hints.machine_cases import MACHINE
 from tests.hints.tool_cases import TOOLS
 
-CASES = [*CL, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE]
+CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE]

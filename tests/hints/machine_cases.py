@@ -250,6 +250,10 @@ MACHINE = [
     ),
     _case("file.unknown-key", "did you mean '(velocity)'", MILL, "velocity = 500", "velocty = 500", ("velocty", r"\1")),
     _case("file.syntax", "text in quotes", MILL, 'retract_axis = "Z"', "retract_axis = Z", ("= Z", '= "Z"')),
+    _case("machine.source", r"add (\[sources\.lost\]) with (document) and (by)", "haas-umc-750", 'source.travel = "list: ',
+          'source.travel = "lost: ', ("[sources.list]", r'\1\n\2 = "our sheet"\n\3 = "maker"\n\n[sources.list]')),
+    _case("machine.source", "take it out of `(assumed)`", "haas-umc-750", 'assumed = ["acceleration", ',
+          'assumed = ["travel", "acceleration", ', ('["travel", ', "[")),
     HintCase(
         "file.encoding",
         CHECK,

@@ -241,8 +241,6 @@ END-OF-PATH""")
 SIDE = MILLED.replace("GOTO/-20,14,-3\n", "CUTCOM/LEFT,7\nGOTO/-20,14,-3\n").replace(
     "RAPID\nGOTO/-30,30,50", "CUTCOM/OFF\nGOTO/-34,34,-3\nRAPID\nGOTO/-30,30,50")
 COOLED = NX.replace("COOLNT/FLOOD", "COOLNT/THRU").replace("COOLNT/MIST", "COOLNT/AIR")
-SPLINE = MILLED.replace("GODLTA/-6,3,0\n", "NURBS\nKNOT/0.5,1.0\nCNTRL/-22,16,-3\nCNTRL/-24,20,-3\nCNTRL/-26,17,-3\n"
-                        "CNTRL/-26,17,-3\n")
 BALLS = """UNITS/MM
 CUTTER/10,5
 LOADTL/1
@@ -274,6 +272,16 @@ ROUND = FAST[:FAST.index("GOTO/20,5,2")] + "".join(
 GOTO/10,3,40,0,0,1
 FINI
 """
+CURVE = HEAD + """NURBS/
+KNOT/0.1,0.4,0.5,0.8,1.0
+CNTRL/14,12,-3
+CNTRL/-5,25,-3
+CNTRL/-30,14,-3
+CNTRL/-34,-20,-3
+CNTRL/-4,-40,-3
+CNTRL/25,-24,-3
+CNTRL/-30,30,-3
+""" + AWAY + "END-OF-PATH\n"
 TALL = """UNITS/MM
 LOADTL/1
 SPINDL/RPM,3000,CLW
@@ -326,7 +334,6 @@ CASES: dict[str, Case] = {
     **{f"rests {name}": Case(RESTS, "mill-3axis", c) for name, c in SIX.items()},
     **{f"side {name}": Case(SIDE, "mill-3axis", c) for name, c in SIX.items()},
     **{f"cooled {name}": Case(COOLED, "mill-3axis", SIX[name]) for name in ("haas", "siemens", "linuxcnc")},
-    "spline": Case(SPLINE, "mill-3axis", "linuxcnc"),
     "chosen axes": Case(BALLS, "mikron-ucp710", "fanuc-30i", options={"orient": "auto"}),
     "measured": Case(MILLED, "mikron-ucp710", "linuxcnc", {**TURNED, "output": {"tool_call": False}}),
     "offset": Case(NX, "mill-3axis", "fanuc-30i", {**TURNED, "work_offset_code": "G56"}),
@@ -366,6 +373,7 @@ CASES: dict[str, Case] = {
     "fast": Case(FAST, "mikron-ucp710", "linuxcnc"),
     "fast planned": Case(FAST, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "round planned": Case(ROUND, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
+    "spline": Case(CURVE, "mill-3axis", "linuxcnc", TURNED),
     "loose": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"tolerance": 0.5}),
     "whole circle": Case(HELIX.replace("GOTO/-40,30,-8\n", ""), "mill-3axis", "linuxcnc"),
     "kept spindle": Case(FACES.replace("SPINDL/RPM,2000,CLW\n", ""), "trunnion-bc", "linuxcnc"),

@@ -19,8 +19,8 @@ FAULTS = (
     Fault("inverse: rotary axis off by 0.1 degrees", "kinematics", "Serial._angles",
           "yield np.where(free, value, turned), tilt", "yield np.where(free, value, turned) + 0.00175, tilt"),
     Fault("pose: axis not carried by the second rotary axis", "kinematics", "Serial._sweep",
-          "vectors = [columns.turn(joint.direction, cos, sin, v) for v in vectors]",
-          "vectors = [columns.turn(joint.direction, cos, sin, v) for v in vectors] if joint.name "
+          "vectors = [columns.turned(joint.along, cos, sin, v) for v in vectors]",
+          "vectors = [columns.turned(joint.along, cos, sin, v) for v in vectors] if joint.name "
           "!= 'C' else vectors"),
     Fault("slides exchanged", "kinematics", "Serial._slides_to", "for row in self._from_slides]",
           "for row in self._from_slides[[1, 0, 2]]]"),

@@ -166,6 +166,7 @@ class ToolpathBuilder:
         self.here: Map = (np.eye(3), np.zeros(3))
         self.shift: Floats = np.zeros(3)
         self.toward: Triple | None = None
+        self.splines = 0
         self.contacts: list[int] = []
         self.axis_system: list[list[float]] | None = None
         self.name = ""

@@ -8,14 +8,19 @@ import re
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.cl.biarcs import DENSER, biarcs, plane_of
 from toolpaths.cl.build import ToolpathBuilder, Triple
 from toolpaths.cl.text.statements import COMMENT, TEXT, Statement, Word, words_of
 from toolpaths.toolpath import Role
 
 SPLINE_CHORD = 0.001
-"""mm: a spline is followed by chords no further from it than this"""
+"""mm: a spline is followed by arcs, or chords, no further from it than this"""
 _DEGREE = 3
 _MOST_CHORDS = 10000
+_LEAST_PLACES = 8
+"""of a span, that arcs are compared at"""
+_STANDS = 1e-6
+"""of the largest speed along a spline: where it is less, its direction is not known"""
 _GEOMETRY = re.compile(r"\b(CIRCLE|LINE|CYLNDR|POINT|PLANE)\s*/([^()]*)", re.IGNORECASE)
 _TANGENT = re.compile(r"\)\s*,\s*TANTO\b", re.IGNORECASE)
 
@@ -169,9 +174,17 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
         b.log.error("cl.nurbs", "the knots of the spline do not rise from 0", b.line,
                     "have the CAM system write the curve as points (GOTO)")
         return
-    points = spline_points(np.array([start, *control]), inner, SPLINE_CHORD / b.scale).tolist()
-    for x, y, z in points[:-1]:
-        b.add_point((x, y, z), role=Role.SPLINE)
+    curve = np.array([start, *control])
+    chords = spline_points(curve, inner, SPLINE_CHORD / b.scale)
+    arcs = spline_arcs(curve, inner, SPLINE_CHORD / b.scale, b.splines)
+    b.splines += 1
+    pieces = arcs if 0 < len(arcs) < len(chords) else [(x, y, z, ()) for x, y, z in chords.tolist()]
+    for n, (x, y, z, arc) in enumerate(pieces, 1):
+        if arc:
+            b.arcs.toward[len(b.arcs.row)] = arc[7:]
+            b.arcs.add(b.row, arc[:6], b.line, arc[6])
+        if n < len(pieces):
+            b.add_point((x, y, z), role=Role.SPLINE)
     b.add_point(control[-1])
 
 
@@ -201,6 +214,39 @@ def _gather(b: ToolpathBuilder) -> tuple[list[float], list[Triple]]:
     return knots, control
 
 
+def spline_arcs(control: Floats, inner: Floats, chord: float,
+                before: int = 0) -> list[tuple[float, float, float, tuple[float, ...]]]:
+    """Ends of arcs and lines within `chord` of a clamped cubic in a plane (`spline_points`), each with its arc: centre,
+    axis, radius, direction in which it begins, or () for a line; [] where it lies in no plane, has a corner or turns
+    back. `before`: splines of the file so far."""
+    plane = plane_of(control)
+    knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.ones(_DEGREE)])
+    if plane is None or (np.unique(inner[:-1], return_counts=True)[1] >= _DEGREE).any():
+        return []
+    u, v, normal = plane
+    flat = (control - control[0]) @ np.stack([u, v], axis=1)
+    at = _places(control, knots, chord / DENSER**2, _LEAST_PLACES)
+    points = np.concatenate([flat[:1], de_boor(flat, knots, at, _DEGREE)])
+    slope = _DEGREE * np.diff(flat, axis=0) / _width(knots, len(flat), _DEGREE)[:, None]
+    tangent = de_boor(slope, knots[1:-1], np.append(0.0, at), _DEGREE - 1)
+    size = np.linalg.norm(tangent, axis=1)
+    if not size.min() > _STANDS * size.max():
+        return []
+    result: list[tuple[float, float, float, tuple[float, ...]]] = []
+    begin, direction = np.zeros(2), tangent[0] / size[0]
+    for x, y, cx, cy, turn in biarcs(points, tangent / size[:, None], chord, before).tolist():
+        end = control[0] + x * u + y * v
+        arc: tuple[float, ...] = ()
+        if turn:
+            arc = (*(control[0] + cx * u + cy * v).tolist(), *normal.tolist(), math.hypot(cx - begin[0], cy - begin[1]),
+                   *(direction[0] * u + direction[1] * v).tolist())
+        result.append((*end.tolist(), arc))
+        c, s = math.cos(turn), math.sin(turn)
+        begin = np.array([x, y])
+        direction = np.array([c * direction[0] - s * direction[1], s * direction[0] + c * direction[1]])
+    return result
+
+
 def spline_points(control: Floats, inner: Floats, chord: float) -> Floats:
     """Points (M, 3) after the first of a clamped cubic on [0, 1] whose chords keep within `chord` of it.
 
@@ -208,20 +254,29 @@ def spline_points(control: Floats, inner: Floats, chord: float) -> Floats:
     h sqrt(max |C''| / (8 chord)), the bound of linear interpolation.
     """
     knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.ones(_DEGREE)])
+    return de_boor(control, knots, _places(control, knots, chord), _DEGREE)
+
+
+def _places(control: Floats, knots: Floats, chord: float, least: int = 1) -> Floats:
+    """(M,) parameters after the first between which chords keep within `chord`, at least so many to a span."""
     breaks = np.unique(knots)
     bend = _second_derivatives(control, knots, breaks)
     steps = np.ceil(np.diff(breaks) * np.sqrt(bend / (8.0 * chord)))
-    counts = np.clip(steps, 1, _MOST_CHORDS).astype(int)
-    at = np.concatenate([np.linspace(a, c, n + 1)[1:] for a, c, n in zip(breaks, breaks[1:], counts, strict=False)])
-    return de_boor(control, knots, at, _DEGREE)
+    counts = np.clip(steps, least, _MOST_CHORDS).astype(int)
+    return np.concatenate([np.linspace(a, c, n + 1)[1:] for a, c, n in zip(breaks, breaks[1:], counts, strict=False)])
+
+
+def _width(knots: Floats, count: int, degree: int) -> Floats:
+    """(count - 1,) widths that differences of control points are divided by; 1 where knots coincide."""
+    width = knots[degree + 1:degree + count] - knots[1:count]
+    return np.where(width > 0.0, width, 1.0)
 
 
 def _second_derivatives(control: Floats, knots: Floats, breaks: Floats) -> Floats:
     """Greatest |C''| in each span between breaks: C'' is linear there, so that its ends decide."""
     points, degree = control, _DEGREE
     for _ in range(2):
-        width = knots[degree + 1:degree + len(points)] - knots[1:len(points)]
-        points = degree * np.diff(points, axis=0) / np.where(width > 0.0, width, 1.0)[:, None]
+        points = degree * np.diff(points, axis=0) / _width(knots, len(points), degree)[:, None]
         knots, degree = knots[1:-1], degree - 1
     inside = np.concatenate([breaks[:-1], breaks[:-1] + (1.0 - 1e-9) * np.diff(breaks)])
     size = np.linalg.norm(de_boor(points, knots, inside, degree), axis=1).reshape(2, -1)

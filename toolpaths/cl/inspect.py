@@ -157,7 +157,7 @@ def summary(result: ReadResult) -> str:
     if found["normals"]:
         lines.append(f"  surface normals at {found['normals']} points")
     if len(p.arcs):
-        lines.append(f"  arc direction: {found['arcs_over_180_deg']} of {len(p.arcs)} arcs sweep more than 180 degrees")
+        lines.append(f"  arc direction: {found['arcs_over_180_deg']} of {found['arcs']} arcs sweep more than 180 degrees")
     lines += [f"  {name} {low:.3f} to {high:.3f} mm" for name, (low, high) in extents(p).items()]
     lines += [f"  system {f.name}: {stands(f)}" for f in p.frames]
     lines += [f"  operation {op.name or i + 1}{' (turning)' if op.turning else ''}: "

@@ -173,7 +173,7 @@ class _Turns:
         return self._turns(along, rows)
 
     def near_pole(self, difference: Floats, tolerance: float) -> Floats:
-        """The turns (N, R) along the weak directions: see the head of this file."""
+        """The turns (N, R) along the weak directions: see the top of this file."""
         rate = np.where(self.rate > BLIND, self.rate, np.inf)
         error = np.where(self.weak, self._parts(difference, slice(None)) / rate, 0.0)
         size = np.where(error != 0.0, np.abs(error), 1.0)

@@ -196,6 +196,7 @@ class MadeMap:
     """A map of a model: inside its lattice, the other joints as fixed, it loses `inside`; over the work volume `volume`."""
 
     model: ErrorModel
+    lattice: ErrorMap
     inside: MapLoss
     volume: MapLoss | None
     uncertainty_lost: bool
@@ -286,9 +287,9 @@ def to_map(model: ErrorModel, machine: Machine, lattice: ErrorMap, fixed: Floats
     volume = volume[~result.on(kinematics).outside(volume).any(axis=1)]
     lost = map_loss(result.on(kinematics), actual, volume) if len(volume) else None
     if model.covariance is None or made.table.size > MOST_UNCERTAINTY:
-        return MadeMap(result, inside, lost, model.covariance is not None)
+        return MadeMap(result, made, inside, lost, model.covariance is not None)
     rows = _rows(ActualByMap(nominal, made), actual, fixed)
-    return MadeMap(replace(result, covariance=rows @ model.covariance @ rows.T), inside, lost, False)
+    return MadeMap(replace(result, covariance=rows @ model.covariance @ rows.T), made, inside, lost, False)
 
 
 def _measured(actual: Actual, w: Floats) -> None:

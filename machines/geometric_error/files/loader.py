@@ -25,7 +25,7 @@ from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
 from machines.user_file import UserFile, nearest, read_toml, schema, validate
 from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic, Severity, has_errors, require, warning
+from toolpaths.diagnostics import Diagnostic, Severity, has_errors, read_value, warning
 from toolpaths.units import DEG
 
 KIND = "error model"
@@ -37,10 +37,7 @@ def load(source: str | Path, machine: Machine) -> ErrorModel:
     Raises:
         DiagnosticError: where the file has errors or is not for this machine; carries all of them.
     """
-    model, diagnostics = load_checked(source, machine)
-    require(diagnostics)
-    assert model is not None
-    return model
+    return read_value(load_checked(source, machine))
 
 
 def load_checked(source: str | Path, machine: Machine) -> tuple[ErrorModel | None, list[Diagnostic]]:

@@ -102,7 +102,8 @@ def _axes(one: Pass, tilt: Floats, azimuth: Floats) -> Floats:
 def _reach(one: Pass, machine: Machine, direction: Floats, tilt: Floats, azimuth: Floats) -> Floats:
     """Reach (N,) in the middle of the pass, the best of the branches; -1 where there is none."""
     stretch, axes = one.longest, _axes(one, tilt, azimuth)
-    assert stretch is not None
+    if stretch is None:
+        return np.full(len(axes), -1.0)
     tip = stretch.tip[len(stretch.tip) // 2] + one.radius * (one.axis - axes)
     pose = np.hstack((tip, axes))
     found = [held_axis_polytope(one.kin, q, sharpest(machine), pose).reach(direction)

@@ -14,6 +14,7 @@ from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan
 from postproc.orientation.plans.shares import shares_of
+from toolpaths.arrays import finite
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -58,11 +59,6 @@ def slower(choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
 def gain(made: float, before: float) -> float | None:
     """Percent of `before` saved; None where one of them is no time."""
     return 100.0 * (1.0 - made / before) if math.isfinite(made) and math.isfinite(before) and before > 0.0 else None
-
-
-def finite(value: float) -> float | None:
-    """None for inf and NaN."""
-    return float(value) if math.isfinite(value) else None
 
 
 def angles(made: Candidate) -> dict[str, float | None]:

@@ -74,17 +74,17 @@ class Comparison:
     tip_bound: float
     axis_bound: float
     unbounded: int
-    cuts: int = 0
-    bounded_cuts: int = 0
-    executed: tuple[Canonical, Motion] | None = None
-    poses: BlockPoses | None = None
-    planned: bool = False
+    cuts: int
+    bounded_cuts: int
+    executed: tuple[Canonical, Motion]
+    poses: BlockPoses
+    planned: bool
     """the feeds of the program were planned"""
     lengths: tuple[LengthMargin, ...] = ()
     """how much tools may differ from their gauge lengths, where that is not taken up by a register alone"""
 
 
-def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
+def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
             planned: bool = False) -> Comparison:
     """Every block on its stretch of the reference, every move done, in order, as the CL file has it, inside travel.
 
@@ -135,7 +135,8 @@ def compare(motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",
     diagnostics += check_reach_bounds(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
     return Comparison(job.moves, worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics),
-                      max(bound.tip, worst_tip), max(bound.axis, worst_axis), bound.unbounded, *_cuts(moves, owner, bound))
+                      max(bound.tip, worst_tip), max(bound.axis, worst_axis), bound.unbounded, *_cuts(moves, owner, bound),
+                      (code, motion), executed, planned)
 
 
 def _cuts(moves: Moves, owner: Ints, bound: DeviationBound) -> tuple[int, int]:

@@ -113,11 +113,10 @@ class FanucReader(IsoReader):
         """Lengths without a decimal point, whose meaning is a parameter of the control; whole numbers with one."""
         if words.point is None:
             return []
-        return self._bare(words, line, file) + self._pointed(words, line, file)
+        return self._bare(words, words.point, line, file) + self._pointed(words, words.point, line, file)
 
-    def _pointed(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
-        assert words.point is not None
-        bad = words.point & np.isin(words.letter, [ord(a) for a in "STHD"])
+    def _pointed(self, words: Words, point: Bools, line: Ints, file: str) -> list[Diagnostic]:
+        bad = point & np.isin(words.letter, [ord(a) for a in "STHD"])
         blocks = words.line[bad]
         if not len(blocks):
             return []
@@ -125,10 +124,9 @@ class FanucReader(IsoReader):
         return [error("gcode.decimal_point", f"{letter} with a decimal point: the control stops there", file=file,
                       lines=line[blocks][:6].tolist(), count=len(blocks), hint="write a whole number")]
 
-    def _bare(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
-        assert words.point is not None
+    def _bare(self, words: Words, point: Bools, line: Ints, file: str) -> list[Diagnostic]:
         meant = "".join(self.axes) + "IJKRQ"
-        bare = ~words.point & (words.value != 0.0) & np.isin(words.letter,
+        bare = ~point & (words.value != 0.0) & np.isin(words.letter,
                                                              [ord(a) for a in meant + meant.lower()])
         blocks = words.line[bare]
         if not len(blocks):

@@ -155,23 +155,22 @@ def frame_of(law: WordMeaning, control: Control | None, length: float, position:
     q = position / control.unit
     rotation = tool_frame(kin, q) if law.rotation is None else law.rotation
     if checked and law.rotation is not None:
-        found += _wrong_pose(law, control, kin, q, file, line)
+        found += _wrong_pose(law, rotation, control, kin, q, file, line)
     return ExecutionFrame("tilted", control, kin, rotation, control.origin + law.shift)
 
 
-def _wrong_pose(law: WordMeaning, control: Control, kin: Kinematics, q: Floats, file: str,
+def _wrong_pose(law: WordMeaning, rotation: Floats, control: Control, kin: Kinematics, q: Floats, file: str,
                 line: int) -> list[Diagnostic]:
     """The rotary positions that the control picks for the plane against those in force."""
-    assert law.rotation is not None
     names = control.machine.axis_names
     stands = q[control.rotary] / DEG
-    picked = _picked(law, control, kin, q)
+    picked = _picked(rotation, law.choice, control, kin, q)
     if picked is None:
         return [error("gcode.plane", f"{law.code}: no position of {', '.join(names[j] for j in control.rotary)} brings the "
                       "tool square to the plane", file=file, lines=[line], hint="the machine cannot take this plane")]
     if (np.abs(picked - stands) > ANGLE_SLACK).any():
         return [_pose_error(law, control, stands, picked, file, line)]
-    spin = angle_between(tool_frame(kin, q)[:, :1].T, law.rotation[:, :1].T)[0] / DEG
+    spin = angle_between(tool_frame(kin, q)[:, :1].T, rotation[:, :1].T)[0] / DEG
     if bool(kin.singular(q[None, :])[0]) and spin > ANGLE_SLACK:
         return [error("gcode.plane_pose", f"{law.code}: the plane's X stands {spin:.4f} degrees off the machine's at the "
                       "rotary position in force, where the tool lies along a rotary axis", file=file, lines=[line],
@@ -203,11 +202,10 @@ def _two_frames(law: WordMeaning, control: Control, position: Floats, file: str,
                  'both the control has: [modes.tcp] frame = "table" or "entry" in the controller file')
 
 
-def _picked(law: WordMeaning, control: Control, kin: Kinematics, q: Floats) -> Floats | None:
+def _picked(rotation: Floats, choice: str, control: Control, kin: Kinematics, q: Floats) -> Floats | None:
     """Rotary positions (R,), degrees, that the control takes for the plane's Z; None where there are none."""
-    assert law.rotation is not None
     tip, _ = kin.forward(q[None, :])
-    branches = kin.inverse(tip, law.rotation[:, 2][None, :], near=q[None, :])[:, 0][:, control.rotary] / DEG
+    branches = kin.inverse(tip, rotation[:, 2][None, :], near=q[None, :])[:, 0][:, control.rotary] / DEG
     branches = branches[np.isfinite(branches).all(axis=1)]
     here = q[control.rotary] / DEG
     branches = branches + whole_turns(here - branches, _TURN)
@@ -216,9 +214,9 @@ def _picked(law: WordMeaning, control: Control, kin: Kinematics, q: Floats) -> F
     branches = branches + _TURN * ((branches < lower) & (branches + _TURN <= upper))
     branches = branches - _TURN * ((branches > upper) & (branches - _TURN >= lower))
     inside = branches[((branches >= lower) & (branches <= upper)).all(axis=1)]
-    if law.choice in ("+", "-") and len(inside) > 1:
+    if choice in ("+", "-") and len(inside) > 1:
         lead = _lead(control)
-        sign = 1.0 if law.choice == "+" else -1.0
+        sign = 1.0 if choice == "+" else -1.0
         asked = inside[sign * inside[:, lead] >= -ANGLE_SLACK]
         inside = asked if len(asked) else inside
     if not len(inside):

@@ -10,6 +10,7 @@ import pytest
 import typer
 
 from postproc.cli.app import app
+from postproc.pipeline.stages import STAGES
 from postproc.setup.job_file import JobFile
 from tests.postproc.cli.test_cli import run
 from tests.postproc.kit import HEAD
@@ -111,8 +112,8 @@ def test_quiet_and_verbose(part: Path, tmp_path: Path) -> None:
         assert found.startswith(f"{tmp_path}/job/postproc.toml: "), "where the values come from stands before what is wrong"
         assert ("machine mill-3axis" in found.splitlines()[0]) == (len(words) == 1 and "mmill" not in words[0]), words
     stages = run("convert", part, "-o", out, "-v").stderr.splitlines()
-    assert {"blocks", "read back"} <= set(stages)
-    assert "blocks" not in run("convert", part, "-o", out).stderr.splitlines(), "the option is for one command"
+    assert [line for line in stages if ":" not in line] == ["reading", *(stage.name for stage in STAGES)]
+    assert "verify" not in run("convert", part, "-o", out).stderr.splitlines(), "the option is for one command"
 
 
 @pytest.mark.parametrize("stated", ["UNITS/INCHES\n", "FEDRAT/10,IPM\n"])

@@ -52,10 +52,11 @@ def refusing(monkeypatch: pytest.MonkeyPatch, bad: Callable[[frames.Law, np.ndar
     """The read-back refuses the tilted planes that `bad` names by their law and the joints that they are entered at."""
     whole = frames._wrong_pose
 
-    def wrong(law, control, kin, q, file, line):
+    def wrong(law, rotation, *rest):
+        _, _, q, file, line = rest
         if bad(law, q):
             return [error("gcode.plane_pose", "planted", file=file, lines=[line])]
-        return whole(law, control, kin, q, file, line)
+        return whole(law, rotation, *rest)
     monkeypatch.setattr(frames, "_wrong_pose", wrong)
 
 
@@ -109,11 +110,12 @@ def test_one_operation_takes_the_next_mode_and_the_warning_names_it(controller: 
 def test_each_operation_is_named_with_its_own_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     whole, planted = frames._wrong_pose, list[int]()
 
-    def wrong(law, control, kin, q, file, line):
-        if law.rotation is not None and law.rotation[2, 2] < -0.999:
+    def wrong(law, rotation, *rest):
+        *_, file, line = rest
+        if rotation[2, 2] < -0.999:
             planted.append(line)
             return [error(f"planted.{len(planted)}", f"planted in block {line}", file=file, lines=[line])]
-        return whole(law, control, kin, q, file, line)
+        return whole(law, rotation, *rest)
     monkeypatch.setattr(frames, "_wrong_pose", wrong)
     result = casting("siemens-840d")
     assert result.ok, errors_of(result)

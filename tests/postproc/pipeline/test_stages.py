@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import typing
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from postproc.pipeline.convert import convert
 from postproc.pipeline.stage_values import BegunStage, VerifiedStage
 from postproc.pipeline.stages import STAGES, Stage
 from postproc.report.trace import as_text, trace_line
+from tests.source import ROOT, nodes, product
 from toolpaths.diagnostics import error
 
 README = Path(postproc.__file__).parent / "README.md"
@@ -36,6 +39,27 @@ def test_each_stage_takes_what_the_one_before_hands_on() -> None:
         assert takes is given and hands_on <= {takes, given := max(hands_on, key=lambda kind: len(kind.__mro__))}
         assert issubclass(given, takes)
     assert given is VerifiedStage
+
+
+ROAD = ("alignment", "cli", "collision", "compile", "correction", "cycle_time", "job", "path", "pipeline", "placement",
+        "planning", "proof", "report", "setup", "setup_sheet", "verification")
+"""rooms that hand a conversion on, or take what it comes to"""
+
+
+def asserted(found: Iterable[ast.AST]) -> Iterator[str]:
+    """What is said to be there instead of being handed on by a type that holds it."""
+    return (ast.unparse(node) for node in found if isinstance(node, ast.Assert) and "is not None" in ast.unparse(node.test))
+
+
+def test_no_stage_asserts_that_a_value_is_there() -> None:
+    top = ROOT / "postproc"
+    rooms = {path: path.relative_to(top).parts[0] for path in product() if path.is_relative_to(top)}
+    assert set(ROAD) <= set(rooms.values())
+    assert [f"{path}: {text}" for path, room in rooms.items() if room in ROAD for text in asserted(nodes(path))] == []
+
+
+def test_an_asserted_value_is_noticed() -> None:
+    assert list(asserted(ast.walk(ast.parse("def f(made):\n    assert made.job is not None and made.ok\n"))))
 
 
 @pytest.mark.parametrize("at", range(len(STAGES)), ids=[stage.name for stage in STAGES])

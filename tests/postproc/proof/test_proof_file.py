@@ -159,6 +159,18 @@ def test_the_hint_of_a_changed_input_is_followed(shop: Path, tmp_path: Path) -> 
     assert named.exit_code == 0 and "are those of the proof" in named.stdout
 
 
+def test_the_proof_of_a_program_beyond_the_measured_range_is_repeated(shop: Path, tmp_path: Path) -> None:
+    """`verify with those of the proof to repeat it`: with --error-model-beyond as it was converted, not without it."""
+    folder = tmp_path / "copy"
+    shutil.copytree(shop, folder)
+    (folder / "x.csv").write_text("X [mm],EXX [um]\n-300,0\n0,3\n10,8\n")
+    beyond = [*options(folder), "--error-model-beyond"]
+    assert run("convert", folder / "part.apt", *beyond, "-o", folder / "p.ngc", "--proof").exit_code == 0
+    without, again = (run("verify", folder / "p.ngc", folder / "part.apt", *some) for some in (options(folder), beyond))
+    assert "error_model_beyond was True, is False" in without.stderr and "[proof.options]" in without.stderr
+    assert again.exit_code == 0 and "proof." not in again.stderr and "are those of the proof" in again.stdout
+
+
 def test_a_program_that_fails_and_whose_input_changed_is_an_error_that_names_it(shop: Path, tmp_path: Path) -> None:
     folder = tmp_path / "copy"
     shutil.copytree(shop, folder)

@@ -95,7 +95,7 @@ def test_the_machine_with_its_errors_is_bounded(which):
 
 def test_places_looked_at_together_are_those_looked_at_few_at_a_time(monkeypatch):
     together = good(corrected(*ERRORS[1])).comparison
-    monkeypatch.setattr(actual_module, "AT_ONCE", 29)
+    monkeypatch.setattr(actual_module, "AT_ONCE", 150)
     apart = good(corrected.__wrapped__(*ERRORS[1])).comparison
     assert (together.tip_bound, together.axis_bound) == pytest.approx((apart.tip_bound, apart.axis_bound), rel=1e-12)
     assert (together.worst_tip, together.worst_axis) == pytest.approx((apart.worst_tip, apart.worst_axis), rel=1e-12)

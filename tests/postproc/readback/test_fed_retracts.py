@@ -70,9 +70,9 @@ def parts(result: PostResult) -> tuple[Motion, Comparison, Bools, Bools]:
 
 def again(result: PostResult, motion: Motion) -> Comparison:
     """The comparison of a motion that was changed."""
-    assert result.job is not None and result.comparison is not None and result.comparison.poses is not None
+    assert result.job is not None and result.comparison is not None
     with np.errstate(all="ignore"):
-        return compare(motion, result.job, result.comparison.poses)
+        return compare(result.comparison.executed[0], motion, result.job, result.comparison.poses)
 
 
 @pytest.mark.covering

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,12 @@ def turned(name: str) -> SetupFile:
                                                                          "y_axis": (-1.0, 0.0, 0.0)})})
 
 
+@cache
+def plate() -> tuple[PostResult, Residuals]:
+    """A sample on a parallel machine, turned."""
+    return field("inch_plate.apt", "uranesx", turned("delta"))
+
+
 def field(sample: str, machine: str, setup: SetupFile, **options: object) -> tuple[PostResult, Residuals]:
     path, found = toolpaths.read(f"samples/{sample}")
     result = postproc.convert(path, machine, "linuxcnc", setup=setup, diagnostics=found,
@@ -52,7 +59,7 @@ def deviation(result: PostResult, q: Floats, machine: str, length: float) -> Flo
 
 
 def test_the_field_is_that_of_the_machine_in_the_frame_of_the_part() -> None:
-    result, noted = field("inch_plate.apt", "uranesx", turned("delta"))
+    result, noted = plate()
     lengths = {tool.gauge_length for tool in result.setup.tools.values()}
     off = np.min([np.abs(deviation(result, noted.q, "uranesx", float(x or 0.0)) - noted.before).max(axis=1)
                   for x in lengths], axis=0)
@@ -124,9 +131,7 @@ def test_a_residual_file_replaces_no_other(tmp_path: Path) -> None:
 
 
 def test_an_ending_that_is_none() -> None:
-    setup, _ = load_setup("samples/delta.setup.toml")
-    assert setup is not None
-    result, noted = field("inch_plate.apt", "uranesx", setup)
+    result, noted = plate()
     with pytest.raises(ValueError, match="figure format"):
         contents(result, [".pdf"])
     assert UM < noted.tip_bound * 10.0 < 10.0 * UM and noted.axis_bound > DEG / 3600.0

@@ -20,7 +20,7 @@ def test_compiled_and_interpreted_loops_agree(folder: bool, monkeypatch: pytest.
     tip = np.random.default_rng(1).uniform(-9.0, 9.0, (300, 3))
     axis, none = np.tile([0.0, 0.0, 1.0], (300, 1)), np.zeros((300, 3))
     given = (tip, axis, none, tip[::3], axis[::3], np.zeros(100), np.zeros((100, 6)), np.zeros(100, dtype=bool),
-             (1e-6, 1e-6))
+             np.zeros(100), (1e-6, 1e-6))
     plain = assign_blocks.walk(*given)
     monkeypatch.setattr(assign_blocks, "COMPILED_FROM", 0)
     assert plain.tolist() == list(range(0, 300, 3)) == assign_blocks.walk(*given).tolist()

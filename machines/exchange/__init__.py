@@ -1,0 +1,1 @@
+"""Machine files of others read as ours, and ours written for LinuxCNC (README.md)."""

@@ -1,0 +1,41 @@
+"""Which form a file has, and the machine that it describes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from machines.exchange.choices import GivenForm, MachineForm
+from machines.exchange.draft import Draft, finish
+from machines.exchange.linuxcnc_ini import read_linuxcnc
+from machines.machine import Machine
+from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.input_files import advice, read_input, reason
+
+_READERS: dict[MachineForm, Callable[[Path, str, Sequence[str]], tuple[Draft, dict[str, bool]]]] = {
+    "linuxcnc-ini": read_linuxcnc}
+
+
+def import_machine(path: Path, form: GivenForm, stated: Sequence[str]) -> tuple[str, Machine | None, list[Diagnostic]]:
+    """Text of a machine file and the machine of it; "" and None where there are errors.
+
+    Args:
+        path: the file of another system
+        form: what it is; "auto": by its text
+        stated: KEY=VALUE of what the file does not say, by the user
+    """
+    try:
+        text = read_input(path).decode("utf-8-sig", "replace")
+    except OSError as fault:
+        return "", None, [error("file.unreadable", reason(fault), file=str(path), hint=advice(fault))]
+    known = _form_of(text) if form == "auto" else form
+    if known is None:
+        return "", None, [error("import.format", "this is none of the files that are read: "
+                                f"{', '.join(_READERS)}", file=str(path), hint="name the form with --format")]
+    return finish(*_READERS[known](path, text, stated))
+
+
+def _form_of(text: str) -> MachineForm | None:
+    if "[KINS]" in text or "[TRAJ]" in text:
+        return "linuxcnc-ini"
+    return None

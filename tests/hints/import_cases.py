@@ -1,0 +1,40 @@
+"""Hints on machine files of other systems."""
+
+from __future__ import annotations
+
+from tests.hints.case import COMMAND, Edit, HintCase
+
+IMPORT = "machine import shop.ini -o shop.toml"
+HEADER = "[KINS]\nKINEMATICS = {kins}\nJOINTS = 4\n[TRAJ]\nCOORDINATES = XYZA\nLINEAR_UNITS = mm\n"
+JOINTS = "".join(f"[JOINT_{k}]\nMIN_LIMIT = -100\nMAX_LIMIT = 100\n" for k in range(4))
+XYZ = (HEADER.format(kins="trivkins coordinates=XYZ") + JOINTS).replace("XYZA", "XYZ")
+TRT = (HEADER.format(kins="xyzac-trt-kins") + JOINTS).replace("XYZA", "XYZAC")
+
+
+def _case(code: str, says: str, ini: str, *does: Edit, **files: str) -> HintCase:
+    more = {name.replace("_", "."): text for name, text in files.items()}
+    return HintCase(code, IMPORT, {"shop.ini": ini, **more}, says, does)
+
+
+IMPORTS = [
+    _case("import.unit", "write one of (mm),", XYZ.replace("UNITS = mm", "UNITS = elle"), Edit("shop.ini", "elle", r"\1")),
+    _case("import.geometry", r"STRUCTURE = (w A' b X Y Z \(C1\) t), POINT_A = (0 0 0)",
+          HEADER.format(kins="trivkins coordinates=XYZA") + JOINTS,
+          Edit("shop.ini", "", "[POSTPROC]\nSTRUCTURE = \\1\nPOINT_A = \\2\n")),
+    _case("import.number", "write a number", XYZ.replace("MAX_LIMIT = 100", "MAX_LIMIT = far", 1),
+          Edit("shop.ini", "= far", "= 250")),
+    _case("import.travel", "write MIN_LIMIT and (MAX_LIMIT)", XYZ.replace("MAX_LIMIT = 100\n", "", 1),
+          Edit("shop.ini", "MIN_LIMIT = -100\n[JOINT_1]", "MIN_LIMIT = -100\n\\1 = 100\n[JOINT_1]")),
+    _case("import.contradiction", "take out the line", XYZ.replace("UNITS = mm", "UNITS = mm\nLINEAR_UNITS = inch"),
+          Edit("shop.ini", "LINEAR_UNITS = inch\n", "")),
+    _case("import.pin", r"state it: (--set \S+)=VALUE", TRT + "[HAL]\nHALFILE = shop.hal\n", Edit(COMMAND, "shop.toml",
+          r"shop.toml \1=20"), shop_hal="net a gui.y => xyzac-trt-kins.y-offset\n"),
+    _case("import.file", "put the file where the INI names it", XYZ + "#INCLUDE more.inc\n", Edit("more.inc", "", "[A]\n")),
+    _case("import.format", "name the form with (--format)", "x = 1\n", Edit("shop.ini", "", XYZ), Edit(
+        COMMAND, "shop.toml", r"shop.toml \1 linuxcnc-ini")),
+    _case("import.assumed", "(--set) KEY=VALUE", XYZ, *(Edit(COMMAND, "-o shop.toml", f"-o shop.toml {given}") for given in (
+        " ".join(f"--set axes.{name}.{key}=90" for name in "XYZ" for key in ("velocity", "acceleration", "jerk", "home")),
+        "--set timing.tool_change=5 --set timing.clamp=0 --set timing.unclamp=0"))),
+    _case("import.kinematics", "or take (sparm) out", TRT.replace("trt-kins", "trt-kins sparm=identityfirst"),
+          Edit("shop.ini", " sparm=identityfirst", "")),
+]

@@ -1,0 +1,67 @@
+"""Splines of the CL file are followed by the second witness with its own eyes: path, feed, where they end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+import postproc
+from postproc.setup.model import SetupFile
+from postproc.witness.splines import CHORD, off_chords, points_of
+from toolpaths.cl.read import read_bytes
+
+FILE = """TOOL PATH/A,TOOL,MILL_10
+UNITS/MM
+TLDATA/MILL,10.0000,0.0000,80.0000,0.0000,0.0000
+MSYS/20.0,5.0,3.0,0.0,1.0,0.0,-1.0,0.0,0.0
+LOAD/TOOL,1
+SPINDL/RPM,3000,CLW
+COOLNT/FLOOD
+RAPID
+GOTO/10,0,50,0,0,1
+FEDRAT/MMPM,250
+GOTO/10,0,-3
+FEDRAT/MMPM,600
+NURBS/
+KNOT/0.1,0.4,0.5, $
+0.8,1.0
+CNTRL/14,12,-3
+CNTRL/-5,25,-3
+CNTRL/-30,14,-3
+$$ a remark
+CNTRL/-34,-20,-3
+CNTRL/-4,-40,-3
+CNTRL/25,-24,-3
+CNTRL/END,-3
+NURBS/
+KNOT/1
+CNTRL/20,5,-3
+CNTRL/25,10,-4
+CNTRL/30,0,-3
+RAPID
+GOTO/30,0,50
+END-OF-PATH
+"""
+ENDS = {"closed": "10,0", "open": "12,-9", "nearly closed": "10.005,0"}
+
+
+@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize(("machine", "control"), [("mill-3axis", "fanuc-30i"), ("mikron-ucp710", "heidenhain-tnc640")])
+def test_splines_are_compared(machine: str, control: str, end: str) -> None:
+    read = read_bytes(FILE.replace("END,-3", f"{ENDS[end]},-3"))
+    setup = {"tools": {"1": {"gauge_length": 120.0}}}
+    made = postproc.convert(read.toolpath, machine, control, SetupFile.model_validate(setup), diagnostics=read.diagnostics)
+    assert made.ok and made.witness is not None
+    assert not made.witness.not_compared
+    counts = {one.what: one.count for one in made.witness.compared}
+    assert counts["positions"] == 5 and counts["feeds"] == 3
+
+
+def test_points_are_those_of_scipy() -> None:
+    random = np.random.default_rng(4)
+    control, inner = random.normal(0.0, 20.0, (9, 3)), [0.1, 0.1, 0.3, 0.7, 0.8, 1.0]
+    points = points_of(control, inner)
+    true = BSpline(np.concatenate([np.zeros(4), inner, np.ones(3)]), control, 3)(np.linspace(0.0, 1.0, 5001))
+    assert off_chords(true, points).max() == 0.0
+    assert off_chords(true + np.array([0.0, 0.0, 0.01]), points).max() > 0.01 - 0.001 - 2.0 * CHORD
