@@ -21,7 +21,7 @@ from postproc.readback.dialects.base import as_bytes
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.poses import BlockPoses as Poses
 from postproc.readback.execution.poses import arc_sweeps, begins, coordinates
-from postproc.reference.coolant import COMMANDS, switching
+from postproc.readback.text.modal import codes
 from postproc.setup.model import SetupFile, at_places
 from postproc.witness.evidence import Case, ExecutedBlocks, NotCompared, Testimony, together
 from postproc.witness.machine import merged
@@ -46,10 +46,17 @@ def machine_tables(machine: Machine) -> list[dict[str, Any]]:
 def _limits_table(machine: Machine) -> dict[str, dict[str, Any]]:
     """Travel and velocity of each axis as a machine file states them."""
     limits, units = machine.limits, _units(machine.axis_names).tolist()
-    return {letter: {"velocity": v * unit,
+    return {letter: {"velocity": v * unit, "acceleration": a * unit, "jerk": j * unit,
                      "travel": [low * unit, high * unit] if math.isfinite(low) and math.isfinite(high) else "unlimited"}
-            for letter, unit, low, high, v in zip(machine.axis_names, units, limits.lower.tolist(), limits.upper.tolist(),
-                                                  limits.velocity.tolist(), strict=True)}
+            for letter, unit, low, high, v, a, j in zip(
+                machine.axis_names, units, limits.lower.tolist(), limits.upper.tolist(), limits.velocity.tolist(),
+                limits.acceleration.tolist(), limits.jerk.tolist(), strict=True)}
+
+
+def limits_as_used(machine: Machine) -> Floats:
+    """(J, 6) travel, velocity, acceleration, jerk and home of the axes: what the stages of a conversion have used."""
+    limits = machine.limits
+    return np.stack([limits.lower, limits.upper, limits.velocity, limits.acceleration, limits.jerk, machine.home], axis=1)
 
 
 def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlocks:
@@ -85,10 +92,17 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
     start = motion.start / degrees if control.base != "tcp" else job.machine.home
     return ExecutedBlocks(job.machine.axis_names, joints, start, motion.line, motion.code, np.asarray(straight),
                           arc_sweeps(motion, control), motion.feed, motion.inverse, motion.unit, by_tip, control.feed_rule,
-                          control.degree_is_inch,
-                          job.controller.feed.arc_inverse == "radius", motion.compensation, motion.tool,
-                          motion.spindle, motion.rpm, motion.coolant, motion.dwell, motion.pitch, motion.hole,
-                          motion.register, lengthless, steps, joints_at, poses_at, approach_at if job.corrects else None)
+                          control.degree_is_inch, job.controller.feed.arc_inverse == "radius", motion.compensation,
+                          motion.radius, stops_of(comparison), motion.tool, motion.spindle, motion.rpm, motion.coolant,
+                          motion.dwell, motion.pitch, motion.hole, motion.register, lengthless, steps, joints_at, poses_at,
+                          approach_at if job.corrects else None)
+
+
+def stops_of(comparison: Comparison) -> tuple[tuple[int, float], ...]:
+    """(row of the motion before which it stands, M number) of every stop of the program, in order."""
+    code, motion = comparison.executed
+    return tuple(sorted((int(row), number) for number in (0.0, 1.0)
+                        for row in np.searchsorted(motion.block, codes(code.words, "M", (number,))[0])))
 
 
 def error_tables(file: str | Path) -> tuple[dict[str, Any], dict[str, bytes]]:
@@ -126,9 +140,8 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
         setup: as the shop wrote it, [part] by whatever it names
         program: its text, which is looked at where the machine has modulo axes
     """
-    if options.orient != "keep" or source is None:
-        why = "the tool axes were chosen" if options.orient != "keep" else "the path is not as it was read from a file"
-        return Testimony((), (NotCompared("all", why),)), []
+    if source is None:
+        return Testimony((), (NotCompared("all", "the path is not as it was read from a file"),)), []
     found, said = list[Diagnostic](), list[Testimony]()
     executed, shops = executed_of(comparison, comparison.poses, job), at_places(setup)
     for k, place in enumerate(job.places):
@@ -163,14 +176,14 @@ def _rows_at(comparison: Comparison, job: Job, place: int) -> Ints:
 def _case(source: ClSource, setup: SetupFile, options: Options, job: Job, comparison: Comparison, program: bytes | str,
           place: int) -> Case:
     """What the witness is given of a program at one place."""
-    control, codes = job.control_at(place), job.controller.codes
+    control, words = job.control_at(place), job.controller.codes
     errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})
     return Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
-                *errors, named := "{register}" in codes.length_offset,
-                job.machine.length_register if named else 0,
-                sum(COMMANDS[kind] for kind, (on, _) in switching(codes).items() if on),
+                *errors, "{register}" in words.length_offset, "{register}" in words.compensation_left,
+                sum(bit for bit, code in ((1, words.flood), (2, words.mist), (4, words.through), (8, words.air)) if code),
                 program=as_bytes(program) if control.rolls or job.machine.clamp_codes else b"",
                 clamps={a: (c.clamp, c.unclamp) for a, c in job.machine.clamp_codes.items()} if program else {},
                 modulo={job.machine.axis_names[j]: roll.rule for j, roll in control.rolls.items()},
-                origin=control.origin, work_offset=offset_joints(control))
+                origin=control.origin, limits=limits_as_used(job.machine), work_offset=offset_joints(control),
+                chosen=job.toolpath.axis if options.orient != "keep" else None)

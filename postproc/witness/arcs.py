@@ -102,8 +102,7 @@ def stacked(frames: list[tuple[Array, Array]]) -> tuple[Array, Array]:
     return np.stack([m for m, _ in frames]), np.stack([o for _, o in frames])
 
 
-def _sweeps(u: Array, v: Array, normal: Array, own: list[Given],
-            dialect: WitnessDialect) -> tuple[Array, Array]:
+def _sweeps(u: Array, v: Array, normal: Array, own: list[Given], dialect: WitnessDialect) -> tuple[Array, Array]:
     """(angle (K,) from u to v about the normal with whole turns, True (K,) where nothing about it hangs on rounding)."""
     u = u - np.einsum("ni,ni->n", u, normal)[:, None] * normal
     v = v - np.einsum("ni,ni->n", v, normal)[:, None] * normal

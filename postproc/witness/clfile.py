@@ -20,19 +20,16 @@ _NAN3 = (math.nan,) * 3
 FEEDS = {"MMPM": (1.0, False), "IPM": (25.4, False), "FPM": (304.8, False), "MPM": (1000.0, False), "MMPS": (60.0, False),
          "IPS": (1524.0, False), "PERMIN": (None, False), "MMPR": (1.0, True), "IPR": (25.4, True), "FPR": (304.8, True),
          "PERREV": (None, True)}
-_NO_MOTION = frozenset((
-    "PARTNO", "PPRINT", "INSERT", "REMARK", "TPRINT", "LPRINT", "PPLABEL", "LETTER", "UNITS", "UNIT", "MULTAX", "FINI",
-    "END", "PAINT", "PPWORD", "PPFUN", "SYN", "OPFEATSTART", "OPFEATEND", "MOVE_ATTRIB", "BOX", "SETUP", "SWITCH",
-    "DISPLY", "AUTOPS", "PSIS", "INTOL", "OUTTOL", "TOLER", "LINTOL", "MACHIN", "ALIGN", "PLABEL", "CLPRNT", "NOPOST",
-    "PLOT", "CSI_SET_EXTENSION_LENGTH", "CSI_SET_FLUTE_LENGTH", "MCHTOL", "CUTTER", "TLDATA", "TOOLNO", "TRNTYP",
-    "SELECT", "DELAY", "DWELL", "STOP", "OPSTOP", "OPSKIP", "SEQNO", "MODE", "REWIND", "CLAMP", "BREAK",
-    "CHECK", "LEADER", "HEAD", "POD", "AIR", "SLOWDN", "UNLOAD", "SELCTL", "OFSTNO", "CLEARP", "CLRSRF", "RETRCT",
-    "END-OF-PATH", "START_OP", "END_OP", "TOOLPATH_TYPE", "ISN", "ARCSLP", "MCS2", "START", "OPERATION", "BEGIN",
-    "MATERL", "TCP", "CSI_PATH_TOLERANCE", "CSI_SET_PATH_PARAM", "SET", "ORIGIN", "SAFPOS", "COMMENT", "RTCP", "DELETE",
-    "OP_NAME", "SELECTL", "TDATA", "OPERTN", "SEQUENCE", "PART_OPE", "PROGRAM", "MACHINE", "CATPROCESS", "CATPRODUCT",
-    "OPTYPE", "DMIS", "MAXDPM", "MAXVEL", "POSMAP", "REGBRK", "PIVOTZ", "MATLNO", "HEADER", "PROGRM", "MDWRIT", "MDEND",
-    "MAGTAP", "INTCOD", "TMARK", "LIBRY", "REDEF", "CANON", "VERIFY", "PPLOT", "OVPLOT", "DRAFT", "OUTOL", "TOLTBL",
-    "PPTOL", "MCHFIN", "THICK"))
+_SILENT = """
+    PARTNO PPRINT INSERT REMARK TPRINT LPRINT PPLABEL LETTER UNITS UNIT KNOT MULTAX FINI PAINT PPWORD PPFUN SYN OPFEATSTART
+    OPFEATEND MOVE_ATTRIB BOX SETUP SWITCH DISPLY AUTOPS PSIS INTOL OUTTOL TOLER LINTOL MACHIN ALIGN PLABEL CLPRNT NOPOST
+    PLOT CSI_SET_EXTENSION_LENGTH CSI_SET_FLUTE_LENGTH MCHTOL TOOLNO TRNTYP SELECT OPSKIP SEQNO MODE REWIND
+    CLAMP BREAK CHECK LEADER HEAD POD AIR SLOWDN UNLOAD SELCTL OFSTNO CLEARP CLRSRF RETRCT END-OF-PATH START_OP END_OP
+    TOOLPATH_TYPE ISN ARCSLP MCS2 START OPERATION BEGIN MATERL TCP CSI_PATH_TOLERANCE CSI_SET_PATH_PARAM SET ORIGIN SAFPOS
+    COMMENT RTCP DELETE OP_NAME SELECTL TDATA OPERTN SEQUENCE PART_OPE PROGRAM MACHINE CATPROCESS CATPRODUCT OPTYPE DMIS
+    MAXDPM MAXVEL POSMAP REGBRK PIVOTZ MATLNO HEADER PROGRM MDWRIT MDEND MAGTAP INTCOD TMARK LIBRY REDEF CANON VERIFY
+    PPLOT OVPLOT END DRAFT OUTOL TOLTBL PPTOL MCHFIN THICK"""
+_NO_MOTION = frozenset(_SILENT.split())
 _UNREAD_MOTION = frozenset((
     "HELICAL", "TRACUT", "COPY", "MOVNRB", "THREAD", "CALL", "INDEX", "MACRO", "MCS", "MCSYS", "ZERO", "TLON", "PSIS",
     "INDIRP", "ROTHED"))
@@ -75,8 +72,6 @@ def _one(e: Execution, r: Record, line: int) -> None:
         e.lost(r.major.split(",")[0] or "lines of numbers", line)
         e.gap.add(e.row)
 
-
-# ---- positions ---------------------------------------------------------------------------------------------
 
 def _goto(e: Execution, r: Record, line: int) -> None:
     n = r.numbers
@@ -126,10 +121,6 @@ def _zsurf(e: Execution, r: Record, line: int) -> None:
     e.height = r.numbers[0] if len(r.words) == 1 and r.numbers else None
 
 
-def _multax(e: Execution, r: Record, line: int) -> None:
-    return None
-
-
 def _nurbs(e: Execution, r: Record, line: int) -> None:
     e.spline, e.spline_line = ([], []), line
 
@@ -153,8 +144,6 @@ def _end_spline(e: Execution) -> None:
         e.gap.update((e.row, e.row + 1))
     e.spline_line = 0
 
-
-# ---- systems -----------------------------------------------------------------------------------------------
 
 def _msys(e: Execution, r: Record, line: int) -> None:
     n = np.array(r.numbers)
@@ -214,21 +203,10 @@ def _sub_unknown(e: Execution, r: Record, line: int) -> None:
     e.gap.add(e.row)
 
 
-# ---- arcs --------------------------------------------------------------------------------------------------
-
 def _circle(e: Execution, r: Record, line: int) -> None:
-    found = arcs.circle(r, e.dialect)
+    found = arcs.circle(r, e.dialect) if r.major == "CIRCLE" else arcs.movarc(r)
     if found is None:
-        e.lost("CIRCLE of an unusual form", line)
-        e.gap.add(e.row)
-    else:
-        e.arcs[e.row] = found
-
-
-def _movarc(e: Execution, r: Record, line: int) -> None:
-    found = arcs.movarc(r)
-    if found is None:
-        e.lost("MOVARC", line)
+        e.lost("CIRCLE of an unusual form" if r.major == "CIRCLE" else r.major, line)
         e.gap.add(e.row)
     else:
         e.arcs[e.row] = found
@@ -247,12 +225,6 @@ def _tlon(e: Execution, r: Record, line: int) -> None:
         return
     e.arcs[e.row], end = found
     e.point(end, _NAN3, line)
-
-
-# ---- states ------------------------------------------------------------------------------------------------
-
-def _rapid(e: Execution, r: Record, line: int) -> None:
-    e.rapid.add(e.row)
 
 
 def _fedrat(e: Execution, r: Record, line: int) -> None:
@@ -285,8 +257,16 @@ def _load(e: Execution, r: Record, line: int) -> None:
     named = _register(r)
     if named or number != e.tool.now:
         e.register.set(e.row, named)
+    if number != e.tool.now and e.ball.rows[-1] != e.row:
+        e.ball.set(e.row, math.nan)
     e.tool.set(e.row, int(number))
     e.side.set(e.row, OFF)
+
+
+def _cutter(e: Execution, r: Record, line: int) -> None:
+    d, corner, aside, above = (*r.numbers[:4 if len(r.numbers) == 7 else 2], 0.0, 0.0, 0.0, 0.0)[:4]
+    ball = above == corner and not aside if aside or above else d == 2.0 * corner
+    e.ball.set(e.row, corner * e.scale if ball and corner > 0.0 and not r.has("DRILL", "TAP") else math.nan)
 
 
 def _register(r: Record) -> int:
@@ -303,6 +283,16 @@ def _cutcom(e: Execution, r: Record, line: int) -> None:
     side = next((SIDES[w] for w in r.words if isinstance(w, str) and w in SIDES), None)
     if side is not None:
         e.side.set(e.row, side)
+        e.radius.set(e.row, r.numbers[0] if len(r.numbers) == 1 and len(r.words) == 2 else math.nan)
+
+
+def _delay(e: Execution, r: Record, line: int) -> None:
+    per_second = e.spindle.now[1] / 60.0 if r.has("REV") else 1.0
+    e.rests.append((e.row, r.numbers[0] / per_second if r.numbers and per_second else math.nan, line))
+
+
+def _stop(e: Execution, r: Record, line: int) -> None:
+    e.stops.append((e.row, 0.0 if r.major == "STOP" else 1.0, line))
 
 
 def _named(e: Execution, name: str) -> None:
@@ -318,10 +308,6 @@ def _tool_path(e: Execution, r: Record, line: int) -> None:
         e.axes[e.row] = Z
     parts = r.body.rsplit(",TOOL,", 1) if ",TOOL," in r.body.upper() else [r.body]
     _named(e, parts[1] if len(parts) == 2 else "")
-
-
-def _tprint(e: Execution, r: Record, line: int) -> None:
-    _named(e, r.body.split(",")[0])
 
 
 def _spindl(e: Execution, r: Record, line: int) -> None:
@@ -361,7 +347,7 @@ def _cycle(e: Execution, r: Record, line: int) -> None:
         e.cycle.set(e.row, -1)
     elif r.words[:1] == ("ON",):
         if len(r.words) > 1 and e.armed >= 0:
-            e.cycles.append(cycles.changed(e.cycles[e.armed], r, e.dialect, e.scale, line))
+            e.cycles.append(cycles.stated(e.cycles[e.armed], r, e.dialect, e.scale, line))
             e.armed = len(e.cycles) - 1
         e.cycle.set(e.row, e.armed)
     else:
@@ -374,13 +360,13 @@ def _cycle(e: Execution, r: Record, line: int) -> None:
 
 
 HANDLERS: dict[str, Callable[[Execution, Record, int], None]] = {
-    "GOTO": _goto, "GODLTA": _godlta, "FROM": _from, "GOHOME": _gohome,
-    "TLAXIS": _tlaxis, "ZSURF": _zsurf, "MULTAX": _multax,
-    "NURBS": _nurbs, "CNTRL": _cntrl, "KNOT": _knot, "MSYS": _msys, "CSYS": _csys, "$$->CSYS": _csys, "CAMERA": _csys,
-    "CATIA0": _csys, "TRANS": _turned, "ROTATE": _turned, "ROTABL": _turned, "SUB-BEGIN": _sub, "SUB-END": _sub,
-    "SUB-UNKNOWN": _sub_unknown, "CIRCLE": _circle, "MOVARC": _movarc, "INDIRV": _indirv, "TLON,GOFWD": _tlon,
-    "RAPID": _rapid, "FEDRAT": _fedrat, "LOAD": _load, "LOADTL": _load, "TURRET": _load, "TOOL PATH": _tool_path,
-    "TPRINT": _tprint, "SPINDL": _spindl, "COOLNT": _coolnt, "AUXFUN": _by_code, "PREFUN": _by_code,
-    "INSERT": _by_code,
-    "CYCLE": _cycle, "CUTCOM": _cutcom,
+    "GOTO": _goto, "GODLTA": _godlta, "FROM": _from, "GOHOME": _gohome, "TLAXIS": _tlaxis, "ZSURF": _zsurf, "NURBS": _nurbs,
+    "KNOT": _knot, "CNTRL": _cntrl, "MSYS": _msys, "CSYS": _csys, "$$->CSYS": _csys, "CAMERA": _csys, "CATIA0": _csys,
+    "TRANS": _turned, "ROTATE": _turned, "ROTABL": _turned, "SUB-BEGIN": _sub, "SUB-END": _sub, "SUB-UNKNOWN": _sub_unknown,
+    "CIRCLE": _circle, "MOVARC": _circle, "INDIRV": _indirv, "TLON,GOFWD": _tlon,
+    "RAPID": lambda e, r, line: e.rapid.add(e.row), "FEDRAT": _fedrat, "LOAD": _load, "LOADTL": _load, "TURRET": _load,
+    "TOOL PATH": _tool_path, "TPRINT": lambda e, r, line: _named(e, r.body.split(",")[0]), "SPINDL": _spindl,
+    "COOLNT": _coolnt, "AUXFUN": _by_code, "PREFUN": _by_code, "INSERT": _by_code, "CUTTER": _cutter, "TLDATA": _cutter,
+    "$$->CUTTER": _cutter, "CYCLE": _cycle, "CUTCOM": _cutcom, "DELAY": _delay, "DWELL": _delay, "STOP": _stop,
+    "OPSTOP": _stop,
 }

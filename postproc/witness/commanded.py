@@ -17,17 +17,20 @@ UNFOLLOWED = -8
 
 KINDS = {"OFF": 0, "THRU": 12, "AIR": 13, "MIST": 11}
 """coolant by the word that says it, in this order; 1 is flood, 2 whatever flows"""
-BITS = {1: 1, 11: 2, 12: 4, 13: 8}
-"""what flows then, as the reader counts it"""
+BITS = {1: (1,), 11: (2, 1), 12: (4, 1), 13: (8, 2, 1)}
+"""what flows then, as the reader counts it; what comes next where the control has no code for it"""
 OFF, SIDES = 40, {"LEFT": 41, "RIGHT": 42, "OFF": 40}
 """of cutter compensation, and by the words of CUTCOM"""
 OWN = 0
 """of a length register: that of the tool's number"""
+Pause = tuple[int, float, int]
+"""a rest or stop: the position before which it stands, s or 0 for STOP and 1 for OPSTOP, its line"""
 
 
 @dataclass(frozen=True)
 class WitnessCycle:
-    """A drilling cycle, mm from the hole's top along the tool axis; `feed` mm/min or (per turn) mm; NaN: not stated."""
+    """A drilling cycle, mm from the hole's top along the tool axis; `feed` mm/min or (per turn) mm; `dwell` s, negative:
+    revolutions; NaN: not stated."""
 
     kind: str
     depth: float
@@ -57,6 +60,7 @@ class Commanded:
         rpm (N,): NaN where not stated; turned, flowed (N,): row of the last SPINDL and COOLNT record; name (N,): into names
         systems: rotation and origin of every system of the file by its name, in order; first: name of the one
             that the first position is in, "" for the absolute frame, None where that is not sure
+        radius (N,): register that CUTCOM names, NaN; ball (N,): mm, radius of a tool that ends in one, NaN for others
         unread: what was not understood, by its text
     """
 
@@ -87,6 +91,10 @@ class Commanded:
     flowed: Array
     systems: dict[str, tuple[Array, Array]]
     first: str | None
+    radius: Array
+    ball: Array
+    rests: tuple[Pause, ...]
+    stops: tuple[Pause, ...]
     splines: dict[int, Array] = field(default_factory=dict)
     unread: dict[str, int] = field(default_factory=dict)
 

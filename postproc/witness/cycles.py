@@ -19,24 +19,18 @@ _LABELS = {*_STEPS, "FEDTO", "DEPTH", "RAPTO", "CLEAR", "RTRCTO", "RETURN", "AUT
            "DIAMET", "TLANGL", "TIMES", "BACK", "REV", *_PER_MINUTE, *_PER_TURN}
 
 
-def cycle(r: Record, dialect: WitnessDialect, scale: float, feed: tuple[float, bool, bool],
-          line: int) -> WitnessCycle:
+def cycle(r: Record, dialect: WitnessDialect, scale: float, feed: tuple[float, bool, bool], line: int) -> WitnessCycle:
     """A CYCLE record; depth NaN where numbers without words would have to be guessed."""
     words = [w for w in r.words if isinstance(w, str) and w not in _LABELS]
     plain = next((w for w in words if w in _KINDS and w != "DRILL"), "DRILL")
     kind = next((_PECKED[w] for w in words if w in _PECKED), plain)
     kind = {"RIGID": "TAP", "SPOT": "DRILL"}.get(kind, kind)
     bare = WitnessCycle(kind, math.nan, math.nan, feed[0], feed[1], line=line)
-    return _stated(bare, r, dialect, scale, line)
+    return stated(bare, r, dialect, scale, line)
 
 
-def changed(before: WitnessCycle, r: Record, dialect: WitnessDialect, scale: float,
-            line: int) -> WitnessCycle:
-    """CYCLE/ON with parameters: the last cycle with those."""
-    return _stated(before, r, dialect, scale, line)
-
-
-def _stated(made: WitnessCycle, r: Record, dialect: WitnessDialect, scale: float, line: int) -> WitnessCycle:
+def stated(made: WitnessCycle, r: Record, dialect: WitnessDialect, scale: float, line: int) -> WitnessCycle:
+    """A cycle with what a record states, which is the last one for CYCLE/ON."""
     known = set(r.words) <= {*_LABELS, *_PECKED, *_KINDS, "ON", "NEXT", "SEC"} | {w for w in r.words if isinstance(w, float)}
     first = next((w for w in r.words if isinstance(w, float) or w in _LABELS), "")
     if isinstance(first, float) or not known:
@@ -50,7 +44,7 @@ def _stated(made: WitnessCycle, r: Record, dialect: WitnessDialect, scale: float
     made = replace(made, retract=out * scale if out is not None else math.inf if "AUTO" in r.words else made.retract)
     steps = tuple(v * scale for v in _steps(r) if v > 0.0)
     rest = r.after("DWELL") or 0.0
-    rest = math.nan if "REV" in r.words else rest
+    rest = -(r.after("REV") or rest or math.nan) if "REV" in r.words else rest
     return replace(_fed(made, r, scale), steps=steps or made.steps, dwell=rest, line=line)
 
 

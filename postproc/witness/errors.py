@@ -34,9 +34,6 @@ def _position(letter: str) -> float:
     return math.pi / 180.0 if letter in "ABC" else 1.0
 
 
-# ---- tables ------------------------------------------------------------------------------------------------
-
-
 def columns_of(data: bytes) -> dict[str, Array]:
     """Columns of a CSV table in mm and rad: name with its unit in brackets, or a row of units below."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -90,9 +87,6 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-# ---- component errors --------------------------------------------------------------------------------------
 
 
 def curve_of(name: str, given: dict[str, Any], unit: float, files: dict[str, bytes]) -> ComponentError:
@@ -164,9 +158,6 @@ def _between(x: Array, y: Array, bend: Array | None, there: Array) -> Array:
     h, b = x[k + 1] - x[k], (there - x[k]) / (x[k + 1] - x[k])
     a = 1.0 - b
     return np.asarray(a * y[k] + b * y[k + 1] + ((a**3 - a) * bend[k] + (b**3 - b) * bend[k + 1]) * h * h / 6.0)
-
-
-# ---- the machine -------------------------------------------------------------------------------------------
 
 
 def _displaced(parts: Array, about: Array) -> Array:

@@ -15,8 +15,18 @@ from postproc.witness.text import Array
 class Case:
     """A conversion: bytes of the CL file and how it is to be read, machine file over its bases, set-up, tolerances.
 
-    `machine` lists the parsed file, then its base and that one's; `other` says what the program corrects or chooses that
-    the CL file does not hold: each an aspect that is then not compared.
+    Attributes:
+        machine: the parsed file, then its base and that one's
+        errors: the program corrects geometric errors; error_model: the parsed file of them over its bases, empty where there
+            is none, its tables by the names that stand in `error_tables`
+        registers: False where the control has no length registers to be named; radius_named: its cutter compensation
+            names one; coolants: bits of the kinds that it has codes for: it gives the nearest of them for others
+        program: its text, where it is one file; clamps: codes that clamp and release, by letter of the axes
+        modulo: "shortest" or "sign" by letter of axes counted modulo 360 degrees: which path a word turns them
+        chosen (N, 3): tool axes in the file's absolute frame that were chosen in the place of its own; None: those are kept
+        limits (J, 6): of the joints as used, least, greatest, velocity, acceleration, jerk, home, mm, rad and s
+        origin (3,): zero of the work offset in the table frame as the program takes it; work_offset (J,): joints at which
+            the tip of a tool without length stands there, None where it has no such joints
     """
 
     cl: bytes
@@ -29,26 +39,18 @@ class Case:
     bent_rapids: bool = False
     planned: bool = False
     errors: bool = False
-    """True where the program corrects geometric errors of the machine"""
     error_model: dict[str, Any] = field(default_factory=dict)
-    """the parsed error model file over its bases, its tables named as in `error_tables`; empty where there is no file"""
     error_tables: dict[str, bytes] = field(default_factory=dict)
     registers: bool = True
-    """False: the control has no length registers to be named, a tool brings its own length along"""
-    register_beyond: int = 0
-    """what the length register of a tool is more than its number where the file names none"""
+    radius_named: bool = False
     coolants: int = 15
-    """bits of the kinds of coolant that the control has codes for: it gives the nearest of them for others"""
     program: bytes = b""
-    """the text of the program, where it is one file"""
     modulo: dict[str, Literal["shortest", "sign"]] = field(default_factory=dict)
-    """"shortest" or "sign" by letter of axes that the control counts modulo 360 degrees: which path a word turns them"""
     clamps: dict[str, tuple[str, str]] = field(default_factory=dict)
-    """codes that clamp and release, by letter of the axes whose clamps the program works"""
     origin: Array | None = None
-    """(3,) the zero of the work offset in the table frame, as the program takes it"""
+    limits: Array | None = None
     work_offset: Array | None = None
-    """(J,) joints, mm and rad, at which the tip of a tool without length stands there; None where it has no such joints"""
+    chosen: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,8 @@ class ExecutedBlocks:
         steps: words (K, J) of blocks less those where they begin, mm and degrees; by_tip (E,): X, Y, Z are the tip
         rule: what a feed per minute refers to ("xyz-first", "geometry", "all"); degree_is_inch: with all axes in
             inches, degrees count as such, else as mm; by_angle: inverse time of arcs counts rad
-        side (E,): cutter compensation, 40 off, 41 left, 42 right
+        side (E,): cutter compensation, 40 off, 41 left, 42 right; radius (E,): its register
+        stops: (block before which it stands, M number) of each
         tool, spindle, rpm, coolant, dwell, pitch, hole (E,): as in force; pitch NaN outside taps, hole True in cycles
         register (E,): length register in force, -1 for none; lengthless (E,): True where none may be, since
             the joints hold the tool's length already
@@ -89,6 +92,8 @@ class ExecutedBlocks:
     degree_is_inch: bool
     by_angle: bool
     side: Array
+    radius: Array
+    stops: tuple[tuple[int, float], ...]
     tool: Array
     spindle: Array
     rpm: Array
@@ -118,17 +123,18 @@ class ExecutedBlocks:
         columns = {f.name: getattr(self, f.name)[rows] for f in fields(self)
                    if f.name not in ("start", "begins") and isinstance(getattr(self, f.name), np.ndarray)}
         approach = self.approach_at
-        return replace(self, **columns, begins=self.before(rows), steps=lambda some: self.steps(rows[some]),
+        stops = tuple((int(np.searchsorted(rows, at)), number) for at, number in self.stops)
+        return replace(self, **columns, stops=stops, begins=self.before(rows), steps=lambda some: self.steps(rows[some]),
                        joints_at=lambda some, t: self.joints_at(rows[some], t),
                        poses_at=lambda some, t: self.poses_at(rows[some], t),
                        approach_at=None if approach is None else lambda some, t: approach(rows[some], t))
 
 
 FindingCode = Literal["position", "path", "kind", "clearance", "arc", "hole", "feed", "velocity", "tool", "length",
-                      "spindle", "coolant", "compensation", "offset", "turning", "clamp", "errors", "rods"]
+                      "spindle", "coolant", "compensation", "rest", "limits", "offset", "turning", "clamp", "errors", "rods"]
 """what is found to differ; `witness.` with it is the code of the error"""
 Aspect = Literal["positions", "arcs", "holes", "feeds", "length registers", "tools", "spindle states", "coolant states",
-                 "cutter compensation", "work offset", "turns of modulo axes", "clamps"]
+                 "cutter compensation", "rests and stops", "work offset", "turns of modulo axes", "clamps"]
 
 
 @dataclass(frozen=True)
@@ -158,7 +164,7 @@ class NotCompared:
     """What was not compared, and why: everything, the machine's kinematics (poses are then those of the read-back), the
     spindle, or a record of the CL file by its text. `line` of the CL file, 0 for none."""
 
-    what: Literal["all", "kinematics", "spindle", "record"]
+    what: Literal["all", "kinematics", "spindle", "record", "choice of tool axes"]
     why: str
     line: int = 0
 

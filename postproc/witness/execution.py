@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import postproc.witness.arcs as arcs
-from postproc.witness.commanded import OFF, OWN, UNKNOWN, WitnessCycle
+from postproc.witness.commanded import OFF, OWN, UNKNOWN, Pause, WitnessCycle
 from postproc.witness.dialect import WitnessDialect
 from postproc.witness.text import Array, ClText
 
@@ -62,6 +62,8 @@ class Execution:
         self.last_direction = 1
         self.coolant, self.cycle, self.cycles = HeldValues(UNKNOWN), HeldValues(-1), list[WitnessCycle]()
         self.armed = -1
+        self.ball, self.radius = HeldValues(math.nan), HeldValues(math.nan)
+        self.rests, self.stops = list[Pause](), list[Pause]()
         self.arcs: dict[int, arcs.Given] = {}
         self.toward: tuple[float, ...] | None = None
         self.spline: tuple[list[float], list[tuple[float, ...]]] = ([], [])

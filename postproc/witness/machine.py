@@ -14,6 +14,7 @@ from postproc.witness.text import Array
 
 _ALONG = {"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1), "U": (1, 0, 0), "V": (0, 1, 0), "W": (0, 0, 1),
           "A": (1, 0, 0), "B": (0, 1, 0), "C": (0, 0, 1)}
+LIMITS = ("least", "greatest", "velocity", "acceleration", "jerk", "home")
 ROD = 1e-4
 """mm by which a rod may miss its length"""
 
@@ -21,6 +22,11 @@ ROD = 1e-4
 def largest_feed(table: dict[str, Any]) -> float:
     """mm/min of the largest cutting feed; infinite where the machine file states none."""
     return float((table.get("control") or {}).get("largest_feed") or math.inf)
+
+
+def register_beyond(tables: list[dict[str, Any]]) -> int:
+    """What the length register of a tool is more than its number where the CL file names none: 20 of "T + 20"."""
+    return int(str((merged(tables).get("control") or {}).get("length_register", "T")).partition("+")[2] or 0)
 
 
 def merged(tables: list[dict[str, Any]]) -> dict[str, Any]:
@@ -170,3 +176,16 @@ def limits_of(table: dict[str, Any], letters: tuple[str, ...]) -> tuple[Array, A
         travel.append((-math.inf, math.inf) if isinstance(found, str) else found)
         speed.append(min(axis.get("velocity", math.inf), axis.get("cutting_velocity", math.inf)))
     return np.array(travel, np.float64) * unit_of[:, None], np.array(speed, np.float64) * unit_of
+
+
+def other_limits(table: dict[str, Any], letters: tuple[str, ...], given: Array) -> list[str]:
+    """The limits (J, 6) that are not those of the machine file, in words."""
+    found = []
+    for name, values in zip(letters, given.tolist(), strict=True):
+        axis, scale = table.get("axes", {}).get(name, {}), math.pi / 180.0 if name in "ABC" else 1.0
+        travel = (-math.inf, math.inf) if axis.get("travel") == "unlimited" else axis.get("travel") or (None, None)
+        stated = [*travel, *(axis.get(key) for key in LIMITS[2:])]
+        found += [f"the {what} of {name} is {value / scale:g} here, {own:g} in the machine file"
+                  for what, own, value in zip(LIMITS, stated, values, strict=True)
+                  if own is not None and not math.isclose(own * scale, value, rel_tol=1e-9, abs_tol=1e-9)]
+    return found

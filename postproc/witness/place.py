@@ -189,8 +189,7 @@ def _box(low: Array, high: Array) -> Array:
     return np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(8, 3)
 
 
-def on_arc(start: Array, end: Array, centre: Array, normal: Array, sweep: Array,
-           share: float | Array) -> Array:
+def on_arc(start: Array, end: Array, centre: Array, normal: Array, sweep: Array, share: float | Array) -> Array:
     """(N, 3) places on arcs and helices from `start` about (centre, normal) by `sweep`, at a share of each."""
     share = np.broadcast_to(share, sweep.shape)
     offset = start - centre

@@ -63,6 +63,7 @@ def assembled(e: Execution) -> Commanded:
                      e.name.column(n, np.int64), tuple(e.names),
                      spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64),
                      np.array(e.coolant.rows, np.int64)[_index(e.coolant, n)], e.systems, _first_system(e, place),
+                     e.radius.column(n, np.float64), e.ball.column(n, np.float64), tuple(e.rests), tuple(e.stops),
                      _splines(e, tip, place, common), e.unread)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from time import process_time
 
 import numpy as np
@@ -13,9 +14,10 @@ from postproc.witness.clfile import commanded
 from postproc.witness.commanded import ARC, LINE, Commanded
 from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Finding, NotCompared, Testimony
-from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
+from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged, other_limits
 from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
+from postproc.witness.rests import check_rests
 from postproc.witness.sides import check_sides
 from postproc.witness.states import (
     check_feeds,
@@ -39,9 +41,13 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
     try:
         c = with_spindle(commanded(case.cl, case.units, case.dialect), case.setup)
         place = placement(case.setup, c)
+        c = c if case.chosen is None else _reoriented(c, case.chosen)
     except Unplaced as fault:
         return _nothing(f"system {fault} was not found", began)
+    except ValueError:
+        return _nothing("the tool axes were chosen, and the file has more or fewer positions for this reading", began)
     missing = [NotCompared("record", what, line) for what, line in c.unread.items()]
+    missing += [] if case.chosen is None else [NotCompared("choice of tool axes", "--orient")]
     if not len(c) or not c.known.any():
         return _nothing("no position was understood", began, missing)
     table = merged(case.machine)
@@ -56,6 +62,16 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
     compared = tuple(Compared(what, n) for what, n in counts.items() if n)
     return Testimony(compared, (*missing, *silent), tuple(found), int(c.known.sum()), *worst,
                      process_time() - began)
+
+
+def _reoriented(c: Commanded, axes: Array) -> Commanded:
+    """With other tool axes: balls, and arcs, stay where they are; a tool that is turned and no ball is not known."""
+    turned = np.abs(axes - c.axis).max(axis=1) > 1e-12
+    move = np.where(turned[:, None], c.ball[:, None] * (c.axis - axes), 0.0)
+    centre, arcs = c.centre.copy(), np.flatnonzero(c.arc >= 0)
+    centre[c.arc[arcs]] += move[arcs]
+    return replace(c, tip=c.tip + move, axis=np.where(turned[:, None], axes, c.axis), centre=centre,
+                   known=c.known & np.isfinite(move).all(axis=1))
 
 
 def _machine(case: Case, table: dict[str, object]) -> Chain | ErrorChain | Rods | None:
@@ -100,6 +116,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
         found += check_path(w, c.line, cut, margin, link_angle, case.bent_rapids, table,
                             bool((case.setup.get("output") or {}).get("rapids_as_feed")))
         found += check_arcs(w, turns, c.line)
+    faults, rests = check_rests(w, c, match) if not len(lost) else ([], 0)
+    found += faults
     faults, holes = check_holes(w, c, case, match, largest_feed(table))
     found += faults
     faults, feeds = check_feeds(w, c, case, table, match)
@@ -116,13 +134,15 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     faults, clamped = check_clamps(case, executed,
                                    w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
     found += faults
+    if case.limits is not None:
+        found += [Finding("limits", what, 0, 0) for what in other_limits(table, executed.letters, case.limits)]
     faults, zeros = _zero(case, c, place, poses)
     found += faults
     good = w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM))
     worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
     counts: dict[Aspect, int] = {
-        "positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()),
-        "holes": holes, "feeds": feeds, **states, "cutter compensation": sides, "work offset": zeros,
+        "positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()), "holes": holes, "feeds": feeds,
+        **states, "cutter compensation": sides, "rests and stops": rests, "work offset": zeros,
         "turns of modulo axes": turned, "clamps": clamped}
     return found, worst, counts, silent
 

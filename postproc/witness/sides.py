@@ -31,6 +31,13 @@ def check_sides(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], int
     good = np.any([wanted[k] == given for k in near], axis=0) | ~known[row]
     bad = np.flatnonzero(~good)
     compared = int(known[row].sum())
+    named, used = c.radius[row], e.radius[rows]
+    other = np.flatnonzero(case.radius_named & good & (given != OFF) & np.isfinite(named) & (used != named)
+                           & (named != tools_of(c, case.setup)[row]))
+    if len(other) and not len(bad):
+        k = int(other[0])
+        return [Finding("compensation", f"the register of cutter compensation is {used[k]:g}, CUTCOM names {named[k]:g}",
+                        int(c.line[row[k]]), int(e.line[rows[k]]), len(other))], compared
     if not len(bad):
         return [], compared
     k = int(bad[0])

@@ -4,30 +4,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 
 from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, WitnessCycle
 from postproc.witness.evidence import Aspect, Case, Finding, FindingCode, NotCompared
-from postproc.witness.machine import largest_feed, limits_of
+from postproc.witness.machine import largest_feed, limits_of, register_beyond
 from postproc.witness.motion import CHUNK, Walked
 from postproc.witness.splines import length_of
 from postproc.witness.stretches import BOTTOM
 from postproc.witness.text import Array
 
-ALLOWED = 1.005
-"""share by which a feed may be off besides what the rounding of words may cost, in each move and in all of one feed"""
-VELOCITY = 1.02
-"""share of the velocity of an axis that rounded words may ask for"""
+ALLOWED, VELOCITY = 1.005, 1.02
+"""shares: of a feed, in each move and in all of one feed, besides rounding; of an axis's velocity, by rounded words"""
 _RETRACT = 12
 """blocks behind the bottom of a hole in which the tool comes to its retract plane"""
 _State = Literal["length", "tool", "spindle", "speed", "coolant"]
 _STATES: dict[_State, tuple[FindingCode, Aspect]] = {
     "length": ("length", "length registers"), "tool": ("tool", "tools"), "spindle": ("spindle", "spindle states"),
     "speed": ("spindle", "spindle states"), "coolant": ("coolant", "coolant states")}
-_PECKED = ("DEEP", "BRKCHP")
-_FEED_OUT = ("BORE", "REAM", "TAP")
+_PECKED, _FEED_OUT = ("DEEP", "BRKCHP"), ("BORE", "REAM", "TAP")
 
 
 def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
@@ -60,8 +58,7 @@ def _loads(tool: Array) -> Array:
 
 
 def feeds_of(c: Commanded, setup: dict[str, Any], most: float) -> Array:
-    """(N,) mm/min that the CL file asks for at every position, holes by their cycle, but taps no more than `most`; NaN where
-    it does not say."""
+    """(N,) mm/min that the CL file asks for at every position, but taps no more than `most`; NaN where it does not say."""
     own = np.array([(x.feed, x.per_turn) for x in c.cycles] + [(math.nan, 0.0)], np.float64)
     hole = c.cycle >= 0
     feed = np.where(hole, own[c.cycle, 0], c.feed)
@@ -75,8 +72,7 @@ def feeds_of(c: Commanded, setup: dict[str, Any], most: float) -> Array:
     return np.asarray(np.where(feed > np.where(tap, math.inf, most), most, feed))
 
 
-def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any],
-                match: Array) -> tuple[list[Finding], int]:
+def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], match: Array) -> tuple[list[Finding], int]:
     """Cuts that are faster than programmed, or slower and no axis explains it; the number of cuts that were compared."""
     t = w.targets
     rows = np.flatnonzero(w.inside & (w.code > 0) & ~w.gap & ~w.returns & ((w.kind == LINE) | (w.kind == ARC)) & w.on_path())
@@ -112,10 +108,13 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any],
 
 
 def _fast_blocks(w: Walked, rows: Array, pace: Array, tolerance: float) -> Array:
-    """(K,) True for blocks of cuts that take the tip farther than their time, at `pace` (M,) s/mm, allows."""
+    """(K,) True for blocks of cuts whose F word, or whose time, takes the tip farther than `pace` (M,), s/mm, allows."""
     step = w.tip[rows] - w.tip[np.maximum(rows - 1, 0)]
     length = np.sqrt((step * step).sum(axis=1))
-    return np.asarray((length - 0.002 - 2.0 * tolerance) * pace[w.owner[rows]] > ALLOWED * w.seconds[rows])
+    e, pace = w.poses.executed, pace[w.owner[rows]]
+    straight = ~e.inverse[rows] & (np.abs(w.length[rows] - length) < 1e-4 * length) & (length > 1.0)
+    by_word = straight & ((e.feed[rows] - 0.1) * e.unit[rows] * pace > 60.0 * ALLOWED)
+    return np.asarray(((length - 0.002 - 2.0 * tolerance) * pace > ALLOWED * w.seconds[rows]) | by_word)
 
 
 def _groups(check: Array, feed: Array) -> Array:
@@ -187,7 +186,7 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     rows = np.flatnonzero(w.inside & (w.code > 0) & cuts & (w.on_path() | w.gap | w.returns))
     row = w.targets.row[w.owner[rows] - w.returns[rows]]
     tool, coolant = tools_of(c, case.setup)[row], _coolants(c, case.setup)[row]
-    own = np.where(tool >= 0, tool + case.register_beyond, tool)
+    own = np.where(tool >= 0, tool + (register_beyond(case.machine) if case.registers else 0), tool)
     register = np.where((c.register[row] == OWN) | (c.register[row] == tool) | (not case.registers), own,
                         c.register[row])
     register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)),
@@ -201,8 +200,9 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     speed = stated & (direction != 0) & np.isfinite(rpm) & ~tap
     some = any(_stated_coolant(case.setup))
     wet = np.where(coolant == UNKNOWN, some | (flow == 0), np.where(coolant == 0, flow == 0, flow > 0))
-    for kind, bit in BITS.items():
-        wet &= (coolant != kind) | ((flow & bit) > 0) | (not case.coolants & bit)
+    for kind, bits in BITS.items():
+        bit = next((b for b in bits if case.coolants & b), 0)
+        wet &= (coolant != kind) | ((flow & bit) > 0) | (not bit)
     checks: tuple[tuple[_State, str, Array, Array, Array, Array], ...] = (
               ("length", "the length register is {0}, by the CL file it is {1}", tool != UNKNOWN, e.register[rows],
                register, e.register[rows] == register),
@@ -298,13 +298,13 @@ def check_holes(w: Walked, c: Commanded, case: Case, match: Array, most: float) 
 
 
 def _limited(cycle: WitnessCycle, rpm: float, most: float) -> WitnessCycle:
-    """The cycle at no more than the largest cutting feed, mm/min; taps keep their thread."""
+    """The cycle at no more than the largest cutting feed, mm/min, rests in s; taps keep their thread."""
+    cycle = replace(cycle, dwell=-60.0 * cycle.dwell / (rpm or math.nan)) if cycle.dwell < 0.0 else cycle
     feed = cycle.feed * rpm if cycle.per_turn else cycle.feed
     return cycle if cycle.kind == "TAP" or not feed > most else replace(cycle, feed=most, per_turn=False)
 
 
-def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: float,
-                 tolerance: float) -> list[str]:
+def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: float, tolerance: float) -> list[str]:
     t, e = w.targets, w.poses.executed
     depth = (t.tip[i] - w.tip[blocks]) @ t.axis[i]
     total, found = cycle.depth + cycle.clearance, []
@@ -321,6 +321,9 @@ def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: flo
     allowed = [max(cycle.steps[min(k, len(cycle.steps) - 1):], default=np.inf) for k in range(len(steps))]
     if cycle.kind in _PECKED and (steps > np.array(allowed) + 0.01).any():
         found.append("the hole is drilled in deeper pecks than the CL file says")
+    lifts = [depth[k:n].min() <= 0.01 - total for k, n in pairwise(np.flatnonzero(fed & (depth >= deepest - 0.01) & back))]
+    if cycle.kind in _PECKED and cycle.steps and lifts and (any(lifts) if cycle.kind == "BRKCHP" else not all(lifts)):
+        found.append("between pecks the tool does not leave the hole, or leaves it, as the CL file says")
     if not cycle.steps and len(blocks) > 1 and (np.diff(depth) < -0.01).any():
         found.append("the hole is drilled in pecks, the CL file has none")
     rest = float(e.dwell[blocks].sum())
@@ -392,6 +395,6 @@ def _feed_fault(w: Walked, blocks: Array, cycle: WitnessCycle, rpm: float) -> li
     if not math.isfinite(feed) or not long.any():
         return []
     ratio = 60.0 * length[long] / w.seconds[blocks[long]] / feed
-    slack = 0.01 / length[long]
+    slack = 0.002 / length[long]
     wrong = (ratio > ALLOWED + slack) | (ratio < 1.0 / ALLOWED - slack)
     return [f"the hole is drilled at {ratio[int(wrong.argmax())]:.3f} times the feed of the CL file"] if wrong.any() else []

@@ -128,8 +128,7 @@ def _pose_of(poses: Poses, rows: Array, q: Array, t: Array) -> Array:
     return poses.executed.poses_at(rows, t)[0]
 
 
-def off(targets: Targets, i: Array, tip: Array, axis: Array, start: Array,
-        start_axis: Array) -> tuple[Array, Array]:
+def off(targets: Targets, i: Array, tip: Array, axis: Array, start: Array, start_axis: Array) -> tuple[Array, Array]:
     """(mm, rad) (K,) by which poses are off the path to the targets `i` (K,) from `start`: a line or an arc,
     and the great circle of the axes."""
     away = from_line(tip, start, targets.tip[i])

@@ -33,7 +33,7 @@ IMPORTS = [
     _case("import.format", "name the form with (--format)", "x = 1\n", Edit("shop.ini", "", XYZ), Edit(
         COMMAND, "shop.toml", r"shop.toml \1 linuxcnc-ini")),
     _case("import.assumed", "(--set) KEY=VALUE", XYZ, *(Edit(COMMAND, "-o shop.toml", f"-o shop.toml {given}") for given in (
-        " ".join(f"--set axes.{letter}.{key}=90" for letter in "XYZ" for key in ("velocity", "acceleration", "jerk", "home")),
+        " ".join(f"--set axes.{axis}.{key}=90" for axis in "XYZ" for key in ("velocity", "acceleration", "jerk", "home")),
         "--set timing.tool_change=5 --set timing.clamp=0 --set timing.unclamp=0"))),
     _case("import.kinematics", "or take (sparm) out", TRT.replace("trt-kins", "trt-kins sparm=identityfirst"),
           Edit("shop.ini", " sparm=identityfirst", "")),

@@ -217,6 +217,57 @@ GOTO/0,5,40
 FINI
 """
 BARE = MILLED.replace("SPINDL/RPM,3000,CLW\n", "").replace("COOLNT/FLOOD\n", "").replace("FEDRAT/MMPM,250\n", "")
+RESTS = MILLED.replace("GOTO/-30,30,-3\n", """GOTO/-30,30,-3
+DELAY/1.5
+GOTO/-34,30,-3
+DELAY/20,REV
+STOP
+GOTO/-34,40,-3
+OPSTOP
+GOTO/-30,40,-3
+""").replace("END-OF-PATH", """SPINDL/RPM,1200,CCLW
+CYCLE/TAP,FEDTO,-9,RAPTO,3,RTRCTO,20,MMPR,1.25
+GOTO/30,5,0
+CYCLE/OFF
+CYCLE/BRKCHP,FEDTO,-12,RAPTO,3,RTRCTO,20,STEP,4,MMPM,120
+GOTO/20,25,0
+CYCLE/OFF
+CYCLE/BORE,FEDTO,-6,RAPTO,3,RTRCTO,20,MMPM,120,DWELL,REV,10
+GOTO/10,25,0
+CYCLE/OFF
+RAPID
+GOTO/10,25,50
+END-OF-PATH""")
+SIDE = MILLED.replace("GOTO/-20,14,-3\n", "CUTCOM/LEFT,7\nGOTO/-20,14,-3\n").replace(
+    "RAPID\nGOTO/-30,30,50", "CUTCOM/OFF\nGOTO/-34,34,-3\nRAPID\nGOTO/-30,30,50")
+COOLED = NX.replace("COOLNT/FLOOD", "COOLNT/THRU").replace("COOLNT/MIST", "COOLNT/AIR")
+SPLINE = MILLED.replace("GODLTA/-6,3,0\n", "NURBS\nKNOT/0.5,1.0\nCNTRL/-22,16,-3\nCNTRL/-24,20,-3\nCNTRL/-26,17,-3\n"
+                        "CNTRL/-26,17,-3\n")
+BALLS = """UNITS/MM
+CUTTER/10,5
+LOADTL/1
+SPINDL/RPM,3000,CLW
+COOLNT/ON
+RAPID
+GOTO/0,0,60,0.2955202,0,0.9553365
+FEDRAT/400,MMPM
+GOTO/0,0,0
+GOTO/20,0,0
+GOTO/40,30,0
+RAPID
+GOTO/40,30,60
+CUTTER/6,3
+LOADTL/2
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/0,50,60,0,0.5,0.8660254
+FEDRAT/300,MMPM
+GOTO/0,50,0
+GOTO/30,50,3
+RAPID
+GOTO/30,50,60
+FINI
+"""
 FAST = FIVE.replace("FEDRAT/400", "FEDRAT/20000").replace("FEDRAT/600", "FEDRAT/30000")
 ROUND = FAST[:FAST.index("GOTO/20,5,2")] + "".join(
     f"GOTO/{10 + 5 * np.sin(a):.4f},{8 - 5 * np.cos(a):.4f},0,0,0,1\n" for a in np.linspace(0.0, 3.0, 40)) + """RAPID
@@ -282,6 +333,13 @@ CASES: dict[str, Case] = {
     **{f"faces {name}": Case(FACES, "trunnion-bc", c) for name, c in SIX.items()},
     **{f"tall {name}": Case(TALL, "mill-3axis", SIX[name], {"tools": LENGTHS, "part": {"origin": (37.0, -23.0, 11.0)}})
        for name in ("linuxcnc", "iso", "fanuc", "heidenhain")},
+    **{f"rests {name}": Case(RESTS, "mill-3axis", c) for name, c in SIX.items()},
+    **{f"side {name}": Case(SIDE, "mill-3axis", c) for name, c in SIX.items()},
+    **{f"cooled {name}": Case(COOLED, "mill-3axis", SIX[name]) for name in ("haas", "siemens", "linuxcnc")},
+    "spline": Case(SPLINE, "mill-3axis", "linuxcnc"),
+    "chosen axes": Case(BALLS, "mikron-ucp710", "fanuc-30i", options={"orient": "auto"}),
+    "measured": Case(MILLED, "mikron-ucp710", "linuxcnc", {**TURNED, "output": {"tool_call": False}}),
+    "offset": Case(NX, "mill-3axis", "fanuc-30i", {**TURNED, "work_offset_code": "G56"}),
     "long link": Case(SAMPLES / "five_faces.cls", "mikron-ucp710", "linuxcnc"),
     "far": Case(NX, "mill-3axis", "linuxcnc", {"tools": LENGTHS, "part": {"origin": (-492.0, 0.0, 0.0)}}),
     "far arc": Case(HELIX, "mill-3axis", "linuxcnc", {"tools": LENGTHS, "part": {"origin": (-475.0, 0.0, 0.0)}}),
@@ -318,7 +376,7 @@ CASES: dict[str, Case] = {
     "fast": Case(FAST, "mikron-ucp710", "linuxcnc"),
     "fast planned": Case(FAST, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "round planned": Case(ROUND, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
-    "spline": Case(CURVE, "mill-3axis", "linuxcnc", TURNED),
+    "plane spline": Case(CURVE, "mill-3axis", "linuxcnc", TURNED),
     "loose": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"tolerance": 0.5}),
     "whole circle": Case(HELIX.replace("GOTO/-40,30,-8\n", ""), "mill-3axis", "linuxcnc"),
     "kept spindle": Case(FACES.replace("SPINDL/RPM,2000,CLW\n", ""), "trunnion-bc", "linuxcnc"),

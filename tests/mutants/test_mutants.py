@@ -20,7 +20,12 @@ SEVEN = {"MSYS ignored": "flat linuxcnc", "arcs in the other sense": "milled", "
 MORE = {"register of ADJUST dropped": "contact", "feed of the file + 2 %": "flat linuxcnc",
         "units of rotary words": "five linuxcnc", "work offset 0.5 mm off": "five linuxcnc",
         "retract plane 1 mm lower": "flat fanuc", "mist read as flood": "flat linuxcnc",
-        "no link where the axis turns": "faces linuxcnc", "coolant of the set-up as mist": "set-up"}
+        "no link where the axis turns": "faces linuxcnc", "coolant of the set-up as mist": "set-up",
+        "DELAY not read": "rests linuxcnc", "STOP read as OPSTOP": "rests fanuc", "register of CUTCOM not read": "side haas",
+        "chips broken where they are to be cleared": "flat siemens",
+        "code of coolant through the tool not known": "cooled haas",
+        "dwell of cycles in revolutions x 60": "rests iso", "feed x 1.006": "milled",
+        "travel of the machine file 20 mm wider": "far", "feed x 1.1 where tool axes were chosen": "chosen axes"}
 
 
 def test_there_are_ninety_faults_with_names_of_their_own() -> None:
