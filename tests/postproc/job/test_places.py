@@ -122,6 +122,18 @@ def test_states_are_brought_back() -> None:
     assert states[:len(states) // 2] == states[len(states) // 2:] and len(set(states)) == 2
 
 
+@pytest.mark.parametrize("order", ["tool", "part"])
+def test_stops_and_dwells_stand_at_every_place(order: PlaceOrder) -> None:
+    cut = ["RAPID", "GOTO/0,0,20", "GOTO/0,0,-1", "GOTO/5,0,-1", "DELAY/2", "GOTO/6,0,-1", "STOP", "GOTO/9,0,-1", "RAPID",
+           "GOTO/9,0,20", "OPSTOP", "SPINDL/OFF", "COOLNT/OFF"]
+    start = ["SPINDL/RPM,1000,CLW", "COOLNT/ON", "FEDRAT/MMPM,600"]
+    path, found = toolpaths.read_bytes("\n".join(["UNITS/MM", "LOADTL/1", *start, *cut, "LOADTL/2", *start, *cut, "FINI"]),
+                                       file="stops.apt")
+    result = good(postproc.convert(path, machines.load("mill-3axis"), "linuxcnc", SetupFile.model_validate(
+        {"tools": TOOLS, "places": TWO, "order": order}), diagnostics=found))
+    assert [sum(block == code for block in body(result.text)) for code in ("M0", "M1", "G4 P2")] == [4, 4, 4]
+
+
 @pytest.mark.parametrize("control", CONTROLS)
 def test_faces_of_a_tombstone(control: str) -> None:
     """The slides go the same places on every face, the table stands at its turn."""
