@@ -1,0 +1,47 @@
+"""Numbers of a program's header that an operator types in: work offsets, gauge lengths; read back and compared."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from postproc.base.header_words import HEADER, header_of
+from postproc.job.job import Job
+from toolpaths.diagnostics import Diagnostic, error
+
+_OFFSET = re.compile(r"(?i)work offset (.+?) in machine coordinates[^:\n]*: ([^\n()]*)")
+_TOOL = re.compile(r"(?im)^[^\n]*?tool T(\d+)\b[^\n]*, gauge length (-?[\d.]+) ")
+_WORD = re.compile(r"([A-Za-z])(-?\d+\.?\d*)")
+
+
+def check_header(data: bytes, job: Job, gcode: str) -> list[Diagnostic]:
+    """An error where the header states another number than the program is for; nothing without our header."""
+    text = header_of(data[:HEADER]).decode("utf-8", "replace")
+    wrong = [*_offsets(text, job), *_lengths(text, job)] if "postproc " in text.lower() else []
+    return [error("verify.header", f"the header says {what} {said}, the program is for {right}",
+                  file=gcode or job.toolpath.file, hint="do not run this program") for what, said, right in wrong]
+
+
+def _offsets(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
+    """What is stated of the work offset of each place, and is another: what, as stated, as it is."""
+    units = np.where(job.machine.rotary, 1.0, job.controller.lengths.unit)
+    for k, found in zip(range(len(job.places)), _OFFSET.finditer(text), strict=False):
+        right = dict(zip(job.machine.axis_names, job.control_at(k).work_offset / units, strict=True))
+        for letter, said in _WORD.findall(found[2]):
+            if not _same(said, float(right.get(letter.upper(), np.nan))):
+                yield f"{letter.upper()} of work offset {found[1]}", said, f"{right.get(letter.upper(), np.nan):.4f}"
+
+
+def _lengths(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
+    """The same of each tool's gauge length."""
+    for number, said in _TOOL.findall(text):
+        right = job.length_of(int(number)) / job.controller.lengths.unit
+        if not _same(said, right):
+            yield f"gauge length of T{number}", said, f"{right:.4f}"
+
+
+def _same(said: str, right: float) -> bool:
+    """Whether a number is the right one with the decimals that it has."""
+    return abs(float(said) - right) <= 0.501 * 10.0 ** -len(said.partition(".")[2])
