@@ -73,6 +73,12 @@ def test_inch_per_second_becomes_mm_per_second_and_degrees_stay(tmp_path: Path) 
     assert control is not None and control.pins["xyzac-trt-kins.y-offset"] == pytest.approx(508.0)
 
 
+def test_units_as_a_number_are_units_per_mm(tmp_path: Path) -> None:
+    """0.03937... units per mm are inches: 4 of them per s are 101.6 mm/s."""
+    machine = imported(tmp_path, trt(repr(1 / 25.4)), TRT_HAL)[1]
+    assert machine is not None and machine.limits.velocity[0] == pytest.approx(101.6)
+
+
 def test_pivots_come_from_hal(tmp_path: Path) -> None:
     """The built-in machine has the same pins: setp, a signal that is set, a key of the INI."""
     text, machine, found = imported(tmp_path, trt(), TRT_HAL)
@@ -154,6 +160,7 @@ def test_wrapped_rotary_is_modulo(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("old", "new", "code"), [
     ("LINEAR_UNITS = mm", "LINEAR_UNITS = furlong", "ERROR import.unit 11"),
     ("LINEAR_UNITS = mm\n", "", "ERROR import.unit 0"),
+    ("COORDINATES = XYZAC", "COORDINATES = XZ", "ERROR import.geometry 10"),
     ("ANGULAR_UNITS = degree", "ANGULAR_UNITS = grad", "ERROR import.unit 12"),
     ("xyzac-trt-kins", "maxkins", "ERROR import.kinematics 5"),
     ("xyzac-trt-kins", "genserkins", "ERROR import.kinematics 5"),
