@@ -33,6 +33,7 @@ BORDERS = {
     "machines/sheet/file_text.py": TABLES,
     "machines/value_words.py": "what pydantic says of a fault",
     "machines/analysis/report.py": FIGURES, "machines/geometric_error/exchange/survey.py": FIGURES,
+    "postproc/report/places.py": FIGURES,
     "postproc/report/summary.py": FIGURES, "postproc/report/trace.py": FIGURES, "postproc/report/unwinding.py": FIGURES,
     "postproc/placement/report.py": FIGURES, "postproc/cycle_time/report.py": FIGURES,
     "postproc/cycle_time/conversion.py": FIGURES, "postproc/cycle_time/shares.py": FIGURES,

@@ -22,6 +22,7 @@ from postproc.job.job import Job, prepare, with_shop
 from postproc.pipeline.convert import convert
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import PartPlacement, load_setup
+from postproc.setup.places import one_part
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
@@ -77,6 +78,7 @@ def align(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
     if has_errors(known):
         return AlignedPart(tuple(known))
     job, more = prepare(toolpath, machine, spec, setup, options)
+    more += one_part(setup.places, "a measured part", options.setup)
     if job is None or has_errors(more):
         return AlignedPart((*known, *more))
     read, more = read_readings(readings, job, probe.length, probe.machine_coordinates, probe.sigma)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -37,7 +37,7 @@ class Body:
     @property
     def is_part(self) -> bool:
         """True for what is cut."""
-        return self.name == PART
+        return self.name == PART or self.name.startswith(f"{PART} at ")
 
 
 @dataclass(frozen=True)
@@ -77,18 +77,20 @@ class Touch:
         return touch_words(self.tool, self.part, self.body.name, self.distance, self.limit)
 
 
-def scene(setup: SetupFile, placement: Placement, file: str) -> tuple[Scene | None, list[Diagnostic]]:
-    """The bodies that a set-up names, the part standing at `placement`; None where it names none or one is no good.
-
-    `file` is that of the set-up.
+def scene(setup: SetupFile, places: Sequence[tuple[str, Placement]],
+          file: str) -> tuple[Scene | None, list[Diagnostic]]:
+    """The bodies that a set-up names, part and what moves with it at each of `places` (name, where it stands); None where
+    it names none or one is no good. `file` is that of the set-up.
     """
     given = setup.bodies
     if given is None:
         return None, []
     part = Given(file=given.part) if given.part is not None else None
-    named = [(PART, "bodies.part", part, placement), ("the table", "bodies.table", given.table, _TABLE)]
-    named += [(f"fixture {one.name}", f"bodies.fixtures[{k}]", one, placement if one.frame == "part" else _TABLE)
-              for k, one in enumerate(given.fixtures)]
+    named = [(PART + _at(place), "bodies.part", part, where) for place, where in places]
+    named.append(("the table", "bodies.table", given.table, _TABLE))
+    for k, one in enumerate(given.fixtures):
+        stands = places if one.frame == "part" else [("", _TABLE)]
+        named += [(f"fixture {one.name}{_at(at)}", f"bodies.fixtures[{k}]", one, where) for at, where in stands]
     folder, found, bodies = Path(file).parent, [], []
     for name, key, each, where in named:
         if each is not None:
@@ -101,9 +103,13 @@ def scene(setup: SetupFile, placement: Placement, file: str) -> tuple[Scene | No
     return (None if has_errors(found) else Scene(tuple(bodies), given.clearance, given.gouge)), found
 
 
+def _at(place: str) -> str:
+    return place and f" at {place}"
+
+
 def described(setup: SetupFile, placement: Placement, file: str) -> tuple[str, list[Diagnostic]]:
     """(lines that say what stands where, what is wrong with the meshes of a set-up)."""
-    bodies, found = scene(setup, placement, file)
+    bodies, found = scene(setup, [("", placement)], file)
     found += _holders(setup, file)
     found += [replace(d, file=file) for number, tool in setup.tools.items()
               for d in stacked(number, tool, tool.flute_length)]

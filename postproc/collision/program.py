@@ -87,7 +87,7 @@ def _travels(motion: Motion, executed: BlockPoses, job: Job,
     if job.setup.bodies is None:
         return [], []
     file = job.options.setup
-    bodies, found = scene(job.setup, job.placement, file)
+    bodies, found = scene(job.setup, [(place.name, place.placement) for place in job.places], file)
     if bodies is None:
         return [], found
     moves, result = job.moves.without_pecks(), []

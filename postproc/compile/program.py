@@ -27,7 +27,8 @@ CommandName = Literal[
     "CUTTER_COMPENSATION_LEFT", "CUTTER_COMPENSATION_RIGHT", "CUTTER_COMPENSATION_OFF",
     "START_SPINDLE_CLOCKWISE", "START_SPINDLE_COUNTERCLOCKWISE", "STOP_SPINDLE_TURNING", CoolantCommand,
     "PROGRAM_STOP", "OPTIONAL_PROGRAM_STOP", "DWELL", "COMMENT", "INSERT",
-    "ENTER_SECTION", "LEAVE_SECTION", "OPERATION_START", "RESTATE", "CLAMP", "UNCLAMP", "HOOK", "SMOOTHING"]
+    "ENTER_SECTION", "LEAVE_SECTION", "OPERATION_START", "SET_ORIGIN_OFFSETS", "RESTATE", "CLAMP", "UNCLAMP", "HOOK",
+    "SMOOTHING"]
 """canonical functions without motion, named as in NIST RS274/NGC where that has them"""
 
 
@@ -37,6 +38,7 @@ class Command:
 
     ("ENTER_SECTION", (i,)) and ("LEAVE_SECTION", (i,)) stand where a section that needs codes begins and
     ends, ("OPERATION_START", (name,)) or (name, 1.0) where the program can be taken up, with 1.0 from home,
+    ("SET_ORIGIN_OFFSETS", (k,)) where the work offset becomes that of place k,
     ("SMOOTHING", (name,)) where the control's own smoothing becomes that of an operation, ("RESTATE",) behind
     blocks that a switch may leave out: modal codes are stated again. `skip`: the block switch leaves it out.
     """
@@ -61,6 +63,7 @@ class Section:
         plane: of "tilted", as the controller's printed angles give it; its origin is the work offset's zero
         angles: the printed angles in degrees, in the order of the controller's convention
         rotary: words (degrees) where the rotary axes stand on entering, by letter
+        place: number of the place whose work offset is in force
     """
 
     first: int
@@ -68,6 +71,7 @@ class Section:
     plane: Plane | None = None
     angles: tuple[float, ...] = ()
     rotary: tuple[tuple[str, float], ...] = ()
+    place: int = 0
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,9 @@ def sections_of(path: JointPath, new: Ints) -> tuple[Section, ...]:
     result: list[Section] = []
     for k in kept.tolist():
         frame = path.frames[int(path.frame[first[k]])]
-        if not result or result[-1].plane is not frame.control.plane or result[-1].law != frame.control.law:
-            result.append(Section(int(at[k]), frame.control.law, frame.control.plane, frame.angles, frame.rotary))
+        control, last = frame.control, result[-1] if result else None
+        if last is None or (last.plane, last.law, last.place) != (control.plane, control.law, control.place):
+            result.append(Section(int(at[k]), control.law, control.plane, frame.angles, frame.rotary, control.place))
     return tuple(result)
 
 
@@ -37,6 +38,7 @@ def with_sections(commands: Commands, sections: tuple[Section, ...]) -> Commands
         here = result.get(section.first, ())
         before = tuple(c for c in here if c.name in _BELONG_BEFORE and old.law != "axes")
         change = (*((Command("LEAVE_SECTION", (float(k - 1),)),) if old.law != "axes" else ()),
+                  *((Command("SET_ORIGIN_OFFSETS", (float(section.place),)),) if section.place != old.place else ()),
                   *((Command("ENTER_SECTION", (float(k),)),) if section.law != "axes" else ()))
         result[section.first] = (*before, *change, *(c for c in here if c not in before))
     return result

@@ -56,6 +56,8 @@ class Control:
         rolls: modulo axes by joint
         degree_is_inch: where a feed in inches refers to all axes, degrees count as inches, else as mm
         measured: mm of tool length that the work offset holds, where the program calls none
+        place: number of the place whose work offset it is, where the part stands at several
+        standing: degrees of rotary axes by letter with which the work offset is measured, where that is not with all at 0
     """
 
     machine: Machine
@@ -72,6 +74,8 @@ class Control:
     entry_frame: Literal["table", "entry", "either"] = "table"
     degree_is_inch: bool = False
     measured: float = 0.0
+    place: int = 0
+    standing: tuple[tuple[str, float], ...] = ()
     rolls: dict[int, Rollover] = field(default_factory=dict)
 
     def parked(self, q: Floats) -> Floats:
@@ -216,10 +220,20 @@ class Control:
             return offset
         if not kin.straight_slides:
             return np.zeros(kin.joints)
-        result: Floats = kin.at_tip(self.origin[None, :], np.zeros((1, kin.joints)), self.slides)[0] * self.unit
+        result: Floats = self.zero * self.unit
+        result[self.rotary] = 0.0
         if self.measured:
             result[self.xyz[2]] += self.measured
         return result
+
+    @property
+    def zero(self) -> Floats:
+        """(J,) joints at which the gauge point stands at the zero of the work offset, rotary axes as it is measured."""
+        kin, names = self.machine.kinematics, self.machine.axis_names
+        q = np.zeros((1, kin.joints))
+        for letter, angle in self.standing:
+            q[0, names.index(letter)] = angle * DEG
+        return np.asarray(kin.at_tip(self.origin[None, :], q, self.slides)[0])
 
     def words(self, q: Floats, kin: Kinematics, length: float) -> Floats:
         """Program words (N, J) (mm, deg) of joints q under the work offset and, where used, the tool length offset.

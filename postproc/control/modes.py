@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, get_args
 
@@ -45,7 +45,7 @@ class WordFrame:
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(asked="int8: O", decimals="J")
+@arrays(asked="int8: O", decimals="J", place="_")
 class OutputModes:
     """What controller and machine can do, and what is asked for each operation.
 
@@ -55,6 +55,8 @@ class OutputModes:
         decimals (J,): of the axis words
         tool_call: False where no length register is ever in force
         refused: what "auto" passes over
+        others: the control with the work offset of each further place, under its base law
+        place (operations,): number of the place of each; empty: all at the first
     """
 
     control: Control
@@ -63,6 +65,22 @@ class OutputModes:
     decimals: Ints
     tool_call: bool = True
     refused: Refused = frozenset()
+    others: tuple[Control, ...] = ()
+    place: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def of(self, operation: int) -> OutputModes:
+        """The modes at the place of an operation."""
+        return self.at(int(self.place[operation])) if len(self.place) else self
+
+    def at(self, place: int) -> OutputModes:
+        """The modes with the work offset of a place."""
+        if place and place not in self._places:
+            self._places[place] = replace(self, control=self.others[place - 1])
+        return self._places[place] if place else self
+
+    @cached_property
+    def _places(self) -> dict[int, OutputModes]:
+        return {}
 
     @cached_property
     def lacking(self) -> dict[InterpolationMode, MissingMode | None]:

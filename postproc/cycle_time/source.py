@@ -15,13 +15,15 @@ from postproc.controllers.model import ControllerFile
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.program import BlockOrigin, blocks_of
 from postproc.job.job import with_shop
+from postproc.job.turned_places import turned
 from postproc.pipeline.result import PostResult
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.text.canonical import Canonical
 from postproc.reference.holes import Phase
-from postproc.setup.model import SetupFile, part_placement
+from postproc.setup.model import SetupFile, at_places, part_placement
+from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
 from toolpaths.input_files import read_input, unreadable
 
@@ -37,7 +39,9 @@ def from_conversion(result: PostResult, override: float = 1.0) -> MotionBlocks:
     code, motion = found.executed
     moves, path = found.moves.without_pecks(), job.toolpath
     owner = np.clip(found.owner, 0, len(moves) - 1)
-    names = tuple(op.name or f"operation {k + 1}" for k, op in enumerate(path.operations))
+    places = [job.places[k].name for k in job.modes.place.tolist()] or [""] * len(path.operations)
+    names = tuple((op.name or f"operation {k + 1}") + (place and f" at {place}")
+                  for k, (op, place) in enumerate(zip(path.operations, places, strict=True)))
     inside = (found.owner >= 0) & (found.owner < len(moves))
     kept = np.flatnonzero(found.moves.phase != Phase.PECK)
     origin = BlockOrigin(path.operation[moves.row[owner]].astype(np.int64), names,
@@ -54,16 +58,17 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
     the part. `others`: files of subprograms by name; `override` as of `blocks_of`.
     """
     controller = with_shop(controller, machine, setup)
-    placement, found = part_placement(setup)
-    if placement is None:
+    origins, found = _origins(setup, machine)
+    if has_errors(found):
         return None, found
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     law: InterpolationMode = "tcp" if tip_law else "axes"
-    control = Control(machine, law, placement.points(np.zeros((1, 3)))[0], base=law,
-                      rapids=machine.rapids or controller.kinematics.rapids,
-                      feed_rule=controller.feed.length, rolls=rollovers(machine, controller)[0])
+    controls = {code: Control(machine, law, origin, base=law, rapids=machine.rapids or controller.kinematics.rapids,
+                              feed_rule=controller.feed.length, rolls=rollovers(machine, controller)[0])
+                for code, origin in origins}
+    control = next(iter(controls.values()))
     lengths = {int(number): tool.length for number, tool in setup.tools.items()}
-    code, motion, more = _executed(data, controller, control, lengths, file, others)
+    code, motion, more = _executed(data, controller, controls, lengths, file, others)
     found += more
     if code is None or motion is None or has_errors(found):
         return None, found
@@ -79,18 +84,33 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
     return blocks, found
 
 
-def _executed(data: bytes, controller: ControllerFile, control: Control, lengths: dict[int, float], file: str,
+def _origins(setup: SetupFile, machine: Machine) -> tuple[list[tuple[str, Floats]], list[Diagnostic]]:
+    """(register, zero of its work offset in the table frame) of the set-up, or of each of its places."""
+    result, found = list[tuple[str, Floats]](), list[Diagnostic]()
+    for k, here in enumerate(at_places(setup)):
+        placement, more = part_placement(here)
+        if placement is not None and setup.places:
+            placement, turning = turned(machine, setup.places[k], placement, "")
+            more += turning
+        found += more
+        result += [] if placement is None else [(here.work_offset_code, placement.points(np.zeros((1, 3)))[0])]
+    return result, found
+
+
+def _executed(data: bytes, controller: ControllerFile, controls: dict[str, Control], lengths: dict[int, float], file: str,
               others: Mapping[str, bytes] | None) -> tuple[Canonical | None, Motion | None, list[Diagnostic]]:
-    """Text to canonical words to motion."""
-    machine = control.machine
+    """Text to canonical words to motion; `controls` with the work offset of each register."""
+    control, *further = controls.values()
+    machine, program = control.machine, controller.program
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(controller, machine.axis_names, home, machine.stop, control.rolls,
                         machine.clamp_codes)
     code, found = reader.read(data, file, others)
     if code is None or has_errors(found):
         return None, None, found
+    numbers = [reader.offset_of(program.offset_block(code) or code) for code in controls]
     offsets = Offsets(control.work_offset, control.xyz, lengths, home, control.length_on_z, controller.cycles.peck_relief,
-                      control, reader.rises_first, reader.arc_slack)
+                      control, reader.rises_first, reader.arc_slack, tuple(zip(numbers[1:], further, strict=True)))
     motion, more = run(code, machine.axis_names, offsets, file)
     return code, motion, [*found, *more]
 

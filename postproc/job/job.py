@@ -20,6 +20,7 @@ from postproc.controllers.fitted import fitted
 from postproc.controllers.model import ControllerFile
 from postproc.job.length_words import words_depend_on_length
 from postproc.job.pivots import control_kinematics
+from postproc.job.places import Place, at_all, modes_at, places_of
 from postproc.job.program_names import program_number, work_offset
 from postproc.job.rapids import safe_rapids
 from postproc.job.records import job_records
@@ -33,12 +34,13 @@ from postproc.reference.events import register_changes, tool_changes
 from postproc.reference.hole_depths import unfit_holes
 from postproc.reference.largest_feed import limited_feeds
 from postproc.reference.moves import Moves, build_moves
+from postproc.reference.repeated import Repeated
 from postproc.reference.split_operations import cut_operations
 from postproc.reference.stated_feeds import without_feed
 from postproc.reference.unnumbered_tools import measured_length
-from postproc.setup.model import Placement, SetupFile, part_placement, work_frame
-from postproc.setup.system import standing, upside_down
-from toolpaths.arrays import Floats, Ints, shared, taken
+from postproc.setup.model import Placement, SetupFile, work_frame
+from postproc.setup.system import upside_down
+from toolpaths.arrays import Floats, Ints, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Frame, Kind, Role, Toolpath
@@ -78,6 +80,10 @@ class Job:
     """(tool number, what the set-up states of its spindle and coolant), where the CL file states none"""
     cutcom: tuple[CutcomOfTool, ...] = ()
     """the tools of the CL file that cut under CUTCOM"""
+    places: tuple[Place, ...] = ()
+    """where the part stands, one or several; `placement` and `setup` are those of the first"""
+    repeats: Repeated | None = None
+    """the rows of the path at each, where there are several"""
 
     @property
     def hooks(self) -> HooksModel:
@@ -95,9 +101,9 @@ class Job:
 
     @property
     def stock_corners(self) -> Floats | None:
-        """(8, 3) corners of the set-up's stock in the table frame; None without."""
+        """(8 P, 3) corners of the set-up's stock in the table frame, at all places; None without."""
         box = self.setup.rewind.stock
-        return None if box is None else self.placement.points(box.corners)
+        return None if box is None else np.concatenate([place.placement.points(box.corners) for place in self.places])
 
     @property
     def work_system(self) -> Frame:
@@ -158,6 +164,8 @@ class Job:
         first = np.searchsorted(self.moves.row, [e.index for e in self.toolpath.events if e.word == "GOHOME"]
                                 + [c.index for c in tool_changes(self.toolpath)])
         restart = self.operation_starts() if self.setup.output.apart else []
+        if self.repeats is not None and self.setup.clearance.between == "home":
+            restart = [*restart, *np.searchsorted(self.moves.row, self.repeats.begins).tolist()]
         return frozenset({0, *first.tolist(), *restart, *(self.indexed() if self.index_at_home else [])})
 
     @property
@@ -191,6 +199,15 @@ class Job:
     def grid(self) -> WordGrid:
         """Decimals of the axis words, and the units of lengths."""
         return word_grid(self.control, self.controller)
+
+    @cached_property
+    def place(self) -> Ints:
+        """(M,) number of the place of each move."""
+        return repeated(np.int64(0), len(self.moves)) if self.repeats is None else self.repeats.place[self.moves.row]
+
+    def control_at(self, place: int) -> Control:
+        """The control with the work offset of a place."""
+        return self.modes.at(place).control
 
     @property
     def corrects(self) -> bool:
@@ -239,17 +256,17 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += [*found, *program_number(toolpath, controller, setup, options)]
     diagnostics += [*unfit_holes(toolpath, controller), *_refused(toolpath), *_no_inverse_time(controller, options)]
-    setup, found = standing(setup, toolpath, options.setup)
-    diagnostics += found
-    placement, found = part_placement(setup, options.setup)
+    places, found = places_of(setup, toolpath, machine, options)
     diagnostics += found
     frame, found = work_frame(setup, toolpath, options.setup)
     diagnostics += found
     errors = {d.code for d in diagnostics if d.severity is Severity.ERROR}
-    if placement is None or frame is None or not errors <= OF_SETUP:
+    if not places or frame is None or not errors <= OF_SETUP:
         return None, diagnostics
+    toolpath, repeats = at_all(toolpath, places, setup.order)
+    setup, placement = places[0].setup, places[0].placement
     axis_tolerance = options.axis_tolerance * DEG
-    moves, found = build_moves(toolpath, setup, axis_tolerance)
+    moves, found = build_moves(toolpath, setup, axis_tolerance, repeats)
     found = [d for d in found if not (errors and d.code == "feed.no_speed")]  # follows from the speed that is missing
     diagnostics += [*found, *_default_feed(toolpath, setup)]
     moves, found = limited_feeds(moves, toolpath, machine.largest_feed)
@@ -268,14 +285,17 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     control = Control(machine, law, origin, largest, law, entry_frame=entry, own_kinematics=own,
                       rapids=machine.rapids or controller.kinematics.rapids, feed_rule=controller.feed.length,
                       degree_is_inch=controller.degree_is_inch, helix_planes=controller.arcs.helix_planes,
-                      rolls=rolls, measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
+                      rolls=rolls, standing=places[0].standing,
+                      measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
     diagnostics += [*_measured(control, controller, moves.axis, setup, options), *upside_down(
         moves.axis[moves.kind != Kind.RAPID], machine.home_axis, placement, options.setup)]
-    places = word_grid(control, controller).places
-    modes, found = output_modes(control, controller, setup, options, toolpath, places, refused)
-    diagnostics += found
+    decimals = word_grid(control, controller).places
+    modes, found = output_modes(control, controller, setup, options, toolpath, decimals, refused)
+    modes, more = modes_at(places, modes, frame, options.setup)
+    diagnostics += [*found, *more]
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, moves,
-              safe_space(moves, setup, placement), modes, geometric, tuple(records.stated), records.cutcom)
+              safe_space(moves, setup, placement), modes, geometric, tuple(records.stated), records.cutcom, places,
+              repeats)
     return None if errors else _with_rapids(job), diagnostics + _tool_lengths(job) + _unused_tools(job)
 
 

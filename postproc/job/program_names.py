@@ -10,12 +10,12 @@ from toolpaths.toolpath import Toolpath
 
 
 def work_offset(controller: ControllerFile, setup: SetupFile, options: Options) -> list[Diagnostic]:
-    """A work offset that the control does not have."""
+    """Work offsets that the control does not have: that of the set-up, or those of its places."""
     program = controller.program
-    if program.offset_block(setup.work_offset_code) is not None:
-        return []
-    return [error("setup.work_offset_code", f"work_offset_code = {setup.work_offset_code!r}: this control has no such work "
-                  "offset", file=options.setup, hint=f"allowed are {program.offsets_named}")]
+    codes = [place.work_offset_code for place in setup.places] or [setup.work_offset_code]
+    return [error("setup.work_offset_code", f"work_offset_code = {code!r}: this control has no such work offset",
+                  file=options.setup, hint=f"allowed are {program.offsets_named}")
+            for code in codes if program.offset_block(code) is None]
 
 
 def program_number(toolpath: Toolpath, controller: ControllerFile, setup: SetupFile,

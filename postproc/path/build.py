@@ -143,12 +143,15 @@ def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,
 def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
                progress: Progress | None) -> tuple[_Stand, list[float], list[Diagnostic]]:
     """The linking moves to all runs in order: (where the tool stands at the end, s that entries at zero cost, faults)."""
-    modes, space, refined = road.modes, road.space, road.plan.refined
+    space, refined = road.space, road.plan.refined
     moves, longer, found = refined.moves, list[float](), list[Diagnostic]()
     linked = np.array([run.first in road.home_rows and not refined.rewind[run.first] for run in runs.each],
                       dtype=np.bool_)
-    done = add_home_links(out, modes.base, space, runs, moves, linked)
+    done = np.zeros(len(runs.each), dtype=np.bool_)
+    for base in dict.fromkeys(run.modes.base for run in runs.each):
+        done |= add_home_links(out, base, space, runs, moves, linked)
     for run, there in zip(runs.each, done.tolist(), strict=True):
+        modes = run.modes
         first, by_home, end = run.first, run.first in road.home_rows, run.last - 1
         before, pose = stand, Pose(moves.tip[end], runs.axis[end], runs.q[end], run.frame.control)
         stand = _Stand(pose, run.frame, run.kin)
@@ -166,7 +169,9 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
             entry = zero_entry(modes.control, modes.tcp.control, run.kin, space, link)
             longer.append(entry.seconds)
             link = replace(link, clear=link.clear and entry.clear)
-        _add_link(out, moves, first, link, _Legs(before.frame, travel, run.frame, before.kin, run.kin, before.pose, entry))
+        leaving = road.modes.at(before.frame.control.place).base
+        _add_link(out, moves, first, link, _Legs(before.frame, leaving if by_home else travel, travel, run.frame, before.kin,
+                                                 run.kin, before.pose, entry))
         if not link.clear:
             found.append(faults.no_path(moves, first, road.file))
         if progress:
@@ -175,8 +180,8 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
 
 
 def _travel(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bool) -> WordFrame:
-    """The frame of the path between the safe planes: that of the tip where it is so on both sides."""
-    stays = before.control.law == "tcp" and after.control.law == "tcp" and not by_home
+    """The frame of the path between the safe planes: that of the tip where it is so on both sides, at one place."""
+    stays = before is after and after.control.law == "tcp" and not by_home
     return before if stays else modes.base
 
 
@@ -187,9 +192,10 @@ def _with_axes(curves: Curves, axis0: Floats, axis1: Floats) -> Curves:
 
 @dataclass(frozen=True)
 class _Legs:
-    """Frames and kinematics of a linking move: where it comes from, on the path, where it goes to."""
+    """Frames and kinematics of a linking move: where it comes from, to home, on the path, where it goes to."""
 
     before: WordFrame
+    home: WordFrame
     travel: WordFrame
     after: WordFrame
     kin_before: Kinematics
@@ -207,7 +213,7 @@ def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs)
     """
     if legs.start is not None:
         _leg(out, legs.before, legs.kin_before, legs.start.q, link.retract, row)
-    out.link(legs.travel, link.home, row, not legs.travel.control.tip_law, link.home_state)
+    out.link(legs.home, link.home, row, not legs.home.control.tip_law, link.home_state)
     out.begin[row] = out.count
     if legs.entry is not None:
         out.link(legs.travel, legs.entry.before, row, False, legs.entry.state)
@@ -240,7 +246,7 @@ def _add_end(out: PathBuilder, modes: OutputModes, stand: _Stand, space: SafeSpa
     """The travel home behind the last run."""
     if stand.pose is None:
         return
-    out.ended = 1
+    out.ended, modes = 1, modes.at(stand.frame.control.place)
     link = plan_link(modes.base.control, stand.kin, stand.kin, space, stand.pose, None, True)
     _leg(out, stand.frame, stand.kin, stand.pose.q, link.retract, row)
     out.link(modes.base, link.home, row, not modes.base.control.tip_law, link.home_state)

@@ -27,6 +27,8 @@ class SolvedRun:
     kin: Kinematics
     left: float
     """rad of the axis tolerance that linearising may use"""
+    modes: OutputModes
+    """those of its place"""
 
 
 @dataclass(frozen=True)
@@ -67,15 +69,16 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
         if law == "tilted" and not still[k]:
             found.append(turning_run(np.unique(moves.line[first:last]).tolist(), file))
             continue
-        frame = modes.tcp if law == "tcp" else modes.base
+        own = modes.of(owner[k])
+        frame = own.tcp if law == "tcp" else own.base
         if law == "tilted":
             if axis is moves.axis:
                 axis, q = np.array(axis), q.copy()
-            frame, at = modes.plane(kin, q[first])
+            frame, at = own.plane(kin, q[first])
             q[first:last] = kin.at_tip(moves.tip[first:last], np.tile(at, (last - first, 1)),
                                        frame.control.slides)
             axis[first:last] = kin.forward(q[first:first + 1])[1]
-        each.append(SolvedRun(first, last, frame, kin, left[k]))
+        each.append(SolvedRun(first, last, frame, kin, left[k], own))
     return SolvedRuns(tuple(each), axis, q), found
 
 

@@ -132,7 +132,7 @@ def _converted(made: PostResult, job: Job, controller: str | Path, name: str, ch
         "longest": 0, "spindle": None, "coolant": None, "program_name": None})
     tools = {n: t.model_copy(update={"spindle": None, "coolant": None}) for n, t in made.setup.tools.items()
              if int(n) == check.tool}
-    setup = made.setup.model_copy(update={"output": output, "work_offset": "", "tool_numbers": {}, "assumed": [],
+    setup = job.setup.model_copy(update={"output": output, "work_offset": "", "tool_numbers": {}, "assumed": [],
                                           "tools": tools})
     options = replace(made.options, output=check.output, setup="", setup_mark="", units="", dialect="", orient="keep",
                       feed="programmed", smooth=False, name=name)

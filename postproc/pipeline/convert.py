@@ -20,7 +20,8 @@ from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_
 from postproc.pipeline.stages import staged
 from postproc.readback.comparison.compare import Comparison
 from postproc.setup.fingerprint import fingerprint
-from postproc.setup.model import SetupFile, load_setup
+from postproc.setup.model import SetupFile, alone, load_setup
+from postproc.setup.places import one_part
 from postproc.setup.system import standing
 from postproc.verification.neighbour_files import NeighbourFiles, unfinished
 from postproc.verification.read_back import other_axes, other_setup, read_back
@@ -67,6 +68,7 @@ def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup
         if setup is not None:
             options = replace(options, setup=str(setup))
         setup = read_value(load_setup(options.setup or None))
+    setup = alone(setup)
     given = bool(options.setup) or setup != SetupFile()
     options = replace(options, setup_mark=fingerprint(setup, options.setup) if given else "")
     return with_shop(spec.divided(setup.output.files), machine, setup), machine, setup, options
@@ -83,6 +85,9 @@ def _begun(path: Toolpath, machine: Machine, controller: str | FilePath, spec: C
 def _oriented(start: PostResult, progress: Progress | None) -> tuple[PostResult, PostResult | None]:
     """With the tool axes that --orient asks for, where the path can be read at all; its program where that is known."""
     if start.options.orient == "keep" or not start.ok:
+        return start, None
+    start = start.with_found(one_part(start.setup.places, "--orient", start.options.setup))
+    if not start.ok:
         return start, None
     from postproc.orientation.report.figures_of_choice import slower
     from postproc.pipeline.oriented import oriented, written
@@ -101,6 +106,7 @@ def choose_axes(path: Toolpath, machine: Machine, controller: str | FilePath, op
 
     spec, machine, setup, options = _loaded(controller, machine, None, options)
     start = _begun(path, machine, controller, spec, setup, options, _reading(path, diagnostics))
+    start = start.with_found(one_part(start.setup.places, "the choice of tool axes", options.setup))
     return oriented(start, _stages, progress)[0] if start.ok else start
 
 

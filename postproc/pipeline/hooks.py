@@ -29,17 +29,20 @@ def refused_hooks(job: Job) -> list[Diagnostic]:
     reader = reader_for(job.controller, machine.axis_names, None, machine.stop, job.control.rolls,
                         machine.clamp_codes)
     found = _executed(reader, job)
-    values = dict.fromkeys(HOOK_VALUES, "NAME") | {"tool_number": "1", "work_offset": _offset(job)}
+    plain = dict.fromkeys(HOOK_VALUES, "NAME") | {"tool_number": "1"}
+    each = [plain | {"work_offset": name} for name in _offsets(job)]
     for place, blocks in hooks.places.items():
         for block in blocks:
-            if what := _unlike(job.controller, block, values) or _does(reader, filled(block, values)):
+            if what := next((w for v in each if (w := _unlike(job.controller, block, v) or _does(reader, filled(block, v)))),
+                            None):
                 found.append(error("hooks.code", f"{place} = {block!r}: {what[0]}", file=_file(job, place), hint=what[1]))
     return found
 
 
-def _offset(job: Job) -> str:
-    """The work offset as the control names it, which blocks may name too."""
-    return job.controller.program.offset_name(job.setup.work_offset_code)
+def _offsets(job: Job) -> list[str]:
+    """The work offsets of the program as the control names them, which blocks may name too."""
+    return [job.controller.program.offset_name(code) for code in (
+        job.setup.work_offset_code, *(place.code for place in job.places[1:]))]
 
 
 def _file(job: Job, key: str) -> str:

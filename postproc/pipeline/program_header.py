@@ -22,13 +22,10 @@ from postproc.setup.model import stated_value
 def header_lines(made: CompiledStage) -> list[str]:
     """The header of the program of a conversion that is compiled."""
     job, machine = made.job, made.machine
-    letters, said = zip(machine.axis_names, job.control.work_offset, machine.rotary, strict=True), made.controller.lengths
-    offset = " ".join(f"{k}{v:.4f}" if turns else f"{k}{said.plain(v)}" for k, v, turns in letters)
+    said = made.controller.lengths
     header = [f"postproc {VERSION}", f"source {FilePath(made.toolpath.file).name}", f"machine {machine.name}",
               f"controller {made.controller_name}", PENDING, *made.options.header(),
-              f"words: {_meanings(made.program)}",
-              f"work offset {made.controller.program.offset_name(made.setup.work_offset_code)} in machine coordinates: "
-              f"{offset}"]
+              f"words: {_meanings(made.program)}", *_work_offsets(job)]
     header += _measured(job)
     if made.setup.tool_numbers:
         numbers = dict.fromkeys(f"{t.name} = T{t.number}" for t in made.toolpath.tools if t.name)
@@ -45,6 +42,19 @@ def header_lines(made: CompiledStage) -> list[str]:
     if made.toolpath.name:
         header.insert(1, f"part {made.toolpath.name}")
     return header
+
+
+def _work_offsets(job: Job) -> list[str]:
+    """What the register of each place must hold."""
+    result, said = [], job.controller.lengths
+    for k, place in enumerate(job.places):
+        values = zip(job.machine.axis_names, job.control_at(k).work_offset, job.machine.rotary, strict=True)
+        offset = " ".join(f"{a}{v:.4f}" if turns else f"{a}{said.plain(v)}" for a, v, turns in values)
+        at = f"place {place.name}: " if place.name else ""
+        turned = "".join(f" with {letter} at {angle:g}" for letter, angle in place.standing)
+        result.append(f"{at}work offset {job.controller.program.offset_name(place.code)} in machine coordinates{turned}: "
+                      f"{offset}")
+    return result
 
 
 def _tip_frame(made: CompiledStage) -> list[str]:

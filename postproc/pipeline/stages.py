@@ -215,7 +215,8 @@ def written(made: CompiledStage, progress: Progress | None) -> tuple[WrittenStag
     """The text of the program, header with what made it, and of its subprograms in files of their own."""
     file, setup, shares = made.toolpath.file, made.setup, made.shares
     writer = writer_for(made.controller, made.program, made.toolpath.cycles, made.job.control.length_on_z,
-                        made.job.smoothing.default.mm, setup.work_offset_code, axis_smoothing=shares["axis_smoothing"],
+                        made.job.smoothing.default.mm, [(place.name, place.code) for place in made.job.places],
+                        axis_smoothing=shares["axis_smoothing"],
                         name=setup.output.program_name or made.options.name or FilePath(file).stem,
                         subprograms=setup.output.divided,
                         stock=made.job.stock, levels=made.job.smoothing.named)

@@ -101,7 +101,7 @@ def adjacent(work: PassContext, file: str) -> tuple[StationaryBodies | None, lis
     still = given.model_copy(update={"part": None, "fixtures": [one for one in given.fixtures if one.frame == "table"]})
     if still.table is None and not still.fixtures:
         return None, []
-    standing, found = scene(_with(work.setup, still), _HERE, file)
+    standing, found = scene(_with(work.setup, still), [("", _HERE)], file)
     forms, more = forms_of(work, file)
     if standing is None or has_errors(more):
         return None, [*found, *more]

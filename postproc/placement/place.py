@@ -22,6 +22,7 @@ from postproc.placement.place_times import TimedPlace, Timer
 from postproc.placement.search import FoundPlaces, PlaceSearch
 from postproc.placement.space import ANGLES, Space, space_of
 from postproc.setup.model import PartPlacement, SetupFile, part_placement
+from postproc.setup.places import one_part
 from postproc.setup.system import standing
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
@@ -137,7 +138,8 @@ def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opti
     """The passes with the part frame on the table frame, and the places that are allowed."""
     spec = read_value(load_controller(controller))
     now, found = part_placement(setup, options.setup)
-    if now is None:
+    found += one_part(setup.places, "the choice of a place", options.setup)
+    if now is None or has_errors(found):
         return None, None, found
     _, found = prepare(toolpath, machine, spec, setup, options)
     if has_errors(found):

@@ -13,6 +13,7 @@ from machines.kinematics.frames import spin_about, tool_x
 from postproc.reference.events import tool_changes
 from postproc.reference.holes import HoleLeg, hole_legs
 from postproc.reference.holes import Phase as Phase
+from postproc.reference.repeated import Repeated
 from postproc.reference.stated_feeds import feeds_of, follows_speed
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, shared, taken
@@ -131,14 +132,14 @@ def _spin_in(placement: Placement, axis: Floats, spin: Floats) -> Floats:
     return result
 
 
-def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bools:
+def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float, places: Repeated | None = None) -> Bools:
     """Rows (N,) that are reached by a linking move.
 
     The first motion, the first after a tool change, a bare GOHOME or a FROM elsewhere, the first of an
     operation whose tool axis differs from the last one's by more than `axis_tolerance` (rad), rapids that
     turn the axis by more than the set-up's link_angle, rapids from or to where the tool is held about its
-    axis, and the first of an operation that begins again (`begins_again`). Where such a row cuts,
-    `build_moves` puts a linked row before it.
+    axis, the first at another place, and the first of an operation that begins again (`begins_again`). Where
+    such a row cuts, `build_moves` puts a linked row before it.
     """
     n = len(toolpath)
     link = np.zeros(n, dtype=bool)
@@ -156,7 +157,7 @@ def link_rows(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float) -> Bo
     linked[0] = True
     linked |= boundary & begins_again(toolpath, setup)[toolpath.operation[moving]]
     stops = [e.index for e in toolpath.events if e.word == "GOHOME"] + [c.index for c in tool_changes(toolpath)]
-    for index in [*stops, *_starts_elsewhere(toolpath)]:
+    for index in [*stops, *_starts_elsewhere(toolpath), *([] if places is None else places.begins.tolist())]:
         at = int(np.searchsorted(moving, index))
         if at < len(moving):
             linked[at] = True
@@ -187,24 +188,24 @@ def _starts_elsewhere(toolpath: Toolpath) -> list[int]:
             or (toolpath.axis[k] != toolpath.axis[k - 1]).any()]
 
 
-def _begins(toolpath: Toolpath, link: Bools) -> Ints:
-    """(N,) for linked rows that cut: the row whose pose the cut begins at (FROM, or the last position), else -1.
+def _begins(toolpath: Toolpath, link: Bools, places: Repeated | None) -> Ints:
+    """(N,) for linked rows that cut: the row whose pose the cut begins at (FROM, or the last position there), else -1.
 
     The link then leads to that pose. A file whose very first record cuts has none: the tool comes down at its feed.
     """
     result = np.full(len(toolpath), -1)
     cutting = (toolpath.kind != Kind.RAPID) & (toolpath.role != Role.HOLE)
     rows = np.flatnonzero(link & cutting)
-    result[rows] = rows - 1
+    result[rows] = rows - 1 if places is None else places.previous[rows]
     return result
 
 
-def build_moves(toolpath: Toolpath, setup: SetupFile,
-                axis_tolerance: float) -> tuple[Moves, list[Diagnostic]]:
-    """The reference moves of a Toolpath, in the part frame."""
-    link = link_rows(toolpath, setup, axis_tolerance)
+def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float,
+                places: Repeated | None = None) -> tuple[Moves, list[Diagnostic]]:
+    """The reference moves of a Toolpath, in the part frame; `places` where it is repeated at several."""
+    link = link_rows(toolpath, setup, axis_tolerance, places)
     feed, seconds, diagnostics = feeds_of(toolpath, setup.output.feed)
-    begin = _begins(toolpath, link)
+    begin = _begins(toolpath, link, places)
     counts = np.where(toolpath.role == Role.START, 0, 1 + (begin >= 0))
     holes = np.flatnonzero(toolpath.role == Role.HOLE)
     legs = hole_legs(toolpath, link, holes)

@@ -12,6 +12,7 @@ from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.readback.comparison.compare import Comparison
 from postproc.readback.comparison.length_margins import margin_lines
 from postproc.reference.events import cutting, spindle_states
+from postproc.report.places import place_lines, places
 from postproc.report.unwinding import unwinding, unwinding_lines
 from postproc.verification.proof_text import statement
 from postproc.witness.evidence import Testimony
@@ -51,6 +52,7 @@ def as_dict(result: PostResult, output: str, estimate: Estimate | None = None) -
         "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
         "tolerance_shares": result.shares or {},
         "output_modes": output_modes(result),
+        "places": places(result, estimate),
         "unwinding": unwinding(result),
         "geometric_errors": _errors(result),
         "orientation": _orientation(result),
@@ -231,10 +233,11 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None) -
                      f"{_seconds(noted['time_s'])}, with the axes of the CL file {_seconds(noted['reference_time_s'])}")
     if d["files"]:
         lines.append(f"subprograms next to it: {', '.join(Path(file).name for file in d['files'])}")
-    if result.job is not None:
+    lines += place_lines(result, estimate)
+    if result.job is not None and result.job.repeats is None:
         offset = " ".join(f"{k}{round(v, 4) + 0.0:.4f}" for k, v in zip(
             result.machine.axis_names, result.job.control.work_offset, strict=True))
-        lines.append(f"work offset {result.controller.program.offset_name(result.setup.work_offset_code)}: {offset}")
+        lines.append(f"work offset {result.controller.program.offset_name(result.job.places[0].code)}: {offset}")
     lines += tool_lines(result)
     if estimate is not None:
         from postproc.cycle_time.conversion import text

@@ -16,6 +16,7 @@ from postproc.setup.bodies import BodiesModel, ToolBody
 from postproc.setup.files import seen_from_here
 from postproc.setup.orientation import OrientationLimits
 from postproc.setup.place import PlacementLimits
+from postproc.setup.places import REGISTER, PlaceOrder, PlaceSetup
 from postproc.setup.spindle import CoolantKind, SpindleSetup
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, warning
@@ -55,6 +56,9 @@ class LinkClearance(UserModel):
     index: Literal["plane", "home"] | None = None
     """where the tool waits while a link turns rotary axes: on the safe plane, or with the retract axis at home (G53 Z0);
     default: as the controller file has it ([links] index)"""
+    between: Literal["home", "plane"] = "home"
+    """where the tool goes between two [[places]]: with the retract axis to home (G53 Z0), or along the safe plane above
+    all of them"""
 
 
 TOOL_LIMITS = ("tip_acceleration", "tip_jerk", "axis_rate")
@@ -207,10 +211,15 @@ class SetupFile(UserModel):
     """name of the machine that the set-up is for: on another one convert warns; default: any"""
     work_offset: str = ""
     """name of the system of the CL file that is the work offset; default: its first"""
-    work_offset_code: str = Field(default="G54", pattern=r"^(G[0-9]+(\.[0-9])?( P[0-9]+)?|preset [0-9]+)$")
+    work_offset_code: str = Field(default="G54", pattern=REGISTER)
     """register of the control that holds it: G54 to G59, G59.1 to G59.3 where the control has them, or a
     further one by the control's own name, as "G54.1 P12" (Fanuc), "G154 P40" (Haas), "G520" (Siemens), "preset 12" (TNC)"""
     part: PartPlacement = PartPlacement()
+    places: list[PlaceSetup] = Field(default_factory=list, max_length=99)
+    """[[places]]: the part stands at several places, each with a work offset of its own; [part] and work_offset_code
+    are then those of no place, but what places do not state is as in [part]"""
+    order: PlaceOrder = "tool"
+    """of the places: tool: all that one tool cuts at every place before the next tool; part: one part after the other"""
     placement: PlacementLimits = PlacementLimits()
     clearance: LinkClearance = LinkClearance()
     tools: dict[Annotated[str, Field(pattern=r"^(0|[1-9][0-9]*)$")], ToolSetup] = Field(default_factory=dict)
@@ -232,11 +241,31 @@ class SetupFile(UserModel):
     orientation: OrientationLimits = OrientationLimits()
 
     @model_validator(mode="after")
+    def _places_differ(self) -> SetupFile:
+        for key in ("name", "work_offset_code"):
+            given = [getattr(one, key) for one in self.places]
+            if twice := next((one for k, one in enumerate(given) if one in given[:k]), None):
+                raise ValueError(f"places: {key} = {twice!r} stands twice")
+        return self
+
+    @model_validator(mode="after")
     def _assumed_keys(self) -> SetupFile:
         for key in self.assumed:
             if stated_value(self, key) is None:
                 raise ValueError(f"assumed names {key!r}, which the set-up does not state")
         return self
+
+
+def at_places(setup: SetupFile) -> list[SetupFile]:
+    """The set-up of each place, with its [part] and register; the set-up itself where it names none."""
+    return [setup.model_copy(update={"places": [], "work_offset_code": place.work_offset_code,
+                                     "part": setup.part.model_copy(update=place.stated)})
+            for place in setup.places] or [setup]
+
+
+def alone(setup: SetupFile) -> SetupFile:
+    """A set-up with one place that no table turns, as one with that place in [part]."""
+    return at_places(setup)[0] if len(setup.places) == 1 and not setup.places[0].turn else setup
 
 
 def stated_value(setup: SetupFile, key: str) -> Any:
@@ -284,6 +313,10 @@ class Placement:
             return values
         result: Floats = values @ self.rotation.T
         return result
+
+    def behind(self, inner: Placement) -> Placement:
+        """An inner change of frame, then this one."""
+        return Placement(self.rotation @ inner.rotation, self.points(inner.origin[None, :])[0])
 
     def inverse(self) -> Placement:
         """The return."""

@@ -29,7 +29,7 @@ def standing(setup: SetupFile, toolpath: Toolpath, file: str = "") -> tuple[Setu
 
     The system F takes its coordinates to the part frame, [part] S takes them to the table: the part stands at S F^-1.
     """
-    if not setup.part.system:
+    if not setup.part.system or setup.places:  # each place is looked at by itself
         return setup, []
     frame, found = _system(setup, toolpath, file)
     there, more = part_placement(setup, file)

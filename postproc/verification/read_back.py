@@ -13,6 +13,7 @@ from postproc.base.header_words import HEADER, NO_FILE, ProgramHeader, read_head
 from postproc.base.memory import give_back
 from postproc.base.options import Options
 from postproc.base.progress import Progress
+from postproc.control.control import Control
 from postproc.job.job import Job
 from postproc.readback.comparison.clamps import check_clamps, check_index
 from postproc.readback.comparison.compare import Comparison, compare
@@ -22,11 +23,11 @@ from postproc.readback.comparison.length_margins import LengthMargin
 from postproc.readback.comparison.options import check_options
 from postproc.readback.comparison.slow_moves import planned_feeds
 from postproc.readback.comparison.starts import check_end, check_start
-from postproc.readback.comparison.states import check_lengths
+from postproc.readback.comparison.states import check_lengths, registers_of
 from postproc.readback.comparison.stops_and_dwells import check_stops
 from postproc.readback.comparison.tool_changes import check_changes
 from postproc.readback.comparison.unstated_codes import check_stated
-from postproc.readback.dialects.base import UNITS_UNSTATED, as_bytes
+from postproc.readback.dialects.base import UNITS_UNSTATED, Reader, as_bytes
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
@@ -99,7 +100,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     if code is None or has_errors(diagnostics):
         return None, diagnostics
     offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
-                      job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack)
+                      job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack, _others(job, reader))
     motion, found = run(code, machine.axis_names, offsets, gcode)
     give_back()
     faults = Faults(job.toolpath.file, gcode)
@@ -131,6 +132,11 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
                  *_unmeasured(motion, executed, job, faults)]
     margins = _margins(motion, executed, LengthTrial(whole, offsets, job), comparison)
     return replace(comparison, lengths=margins), [*diagnostics, *noted]
+
+
+def _others(job: Job, reader: Reader) -> tuple[tuple[float, Control], ...]:
+    """The control with the work offset of every further place, by the number of its register."""
+    return tuple(zip(registers_of(job, reader)[1:], job.modes.others, strict=True))
 
 
 def _margins(motion: Motion, executed: BlockPoses, trial: LengthTrial, c: Comparison) -> tuple[LengthMargin, ...]:

@@ -16,12 +16,14 @@ from postproc.base.options import Options
 from postproc.control.control import Control
 from postproc.job.job import Job
 from postproc.readback.comparison.compare import Comparison
+from postproc.readback.comparison.states import registers_of
 from postproc.readback.dialects.base import as_bytes
+from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.poses import BlockPoses as Poses
 from postproc.readback.execution.poses import arc_sweeps, begins, coordinates
 from postproc.readback.text.modal import codes
-from postproc.setup.model import SetupFile
-from postproc.witness.evidence import Case, ExecutedBlocks, NotCompared, Testimony
+from postproc.setup.model import SetupFile, at_places
+from postproc.witness.evidence import Case, ExecutedBlocks, NotCompared, Testimony, together
 from postproc.witness.machine import merged
 from postproc.witness.second_reading import testify
 from toolpaths.arrays import Floats, Ints
@@ -121,7 +123,7 @@ def offset_joints(control: Control) -> Floats | None:
     """(J,) joints of the program's zero; None where words are no machine coordinates by it, or it holds a tool's length."""
     if control.base == "tcp" or control.measured or not control.machine.kinematics.straight_slides:
         return None
-    return np.asarray(control.work_offset / _units(control.machine.axis_names))
+    return control.zero
 
 
 def _units(letters: tuple[str, ...]) -> Floats:
@@ -140,9 +142,43 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
     """
     if source is None:
         return Testimony((), (NotCompared("all", "the path is not as it was read from a file"),)), []
-    control, words = job.control, job.controller.codes
+    found, said = list[Diagnostic](), list[Testimony]()
+    executed, shops = executed_of(comparison, comparison.poses, job), at_places(setup)
+    for k, place in enumerate(job.places):
+        own = shops[k] if len(shops) == 1 or not setup.places[k].turn else place.setup
+        case, name = _case(source, own, options, job, comparison, program, k), place.name and f"place {place.name}: "
+        rows = _rows_at(comparison, job, k)
+        if not len(rows):
+            return together(said), [error("witness.position", f"second witness: {name}no block of the program is made there",
+                                          file=job.toolpath.file, hint="do not run this program")]
+        try:
+            said.append(testify(case, executed if len(rows) == len(executed) else executed.take(rows)))
+        except (ArithmeticError, AssertionError, LookupError, TypeError, ValueError) as fault:
+            # A file that it does not get through weakens the proof, which the text then says; it must not stop the program.
+            why = f"the second witness failed: {type(fault).__name__}: {fault}"
+            hint = "leave --require-proof out, where the read-back alone is enough"
+            found = [error("witness.failed", f"{name}{why}; the program is not proved", file=job.toolpath.file, hint=hint)]
+            return Testimony((), (NotCompared("all", why),)), found if options.require_proof else []
+        found += [error(f"witness.{f.code}", f"second witness: {name}{f.message} (line {f.block} of the program)",
+                        file=job.toolpath.file, lines=[f.line] if f.line else [], count=f.count,
+                        hint="do not run this program") for f in said[-1].findings]
+    return together(said), found
+
+
+def _rows_at(comparison: Comparison, job: Job, place: int) -> Ints:
+    """The executed blocks under the work offset of a place: what the program itself says, not what it was written for."""
+    if len(job.places) < 2:
+        return np.arange(len(comparison.executed[1]))
+    reader = reader_for(job.controller, job.machine.axis_names)
+    return np.flatnonzero(comparison.executed[1].offset == registers_of(job, reader)[place])
+
+
+def _case(source: ClSource, setup: SetupFile, options: Options, job: Job, comparison: Comparison, program: bytes | str,
+          place: int) -> Case:
+    """What the witness is given of a program at one place."""
+    control, words = job.control_at(place), job.controller.codes
     errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})
-    case = Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
+    return Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
                 *errors, "{register}" in words.length_offset, "{register}" in words.compensation_left,
                 sum(bit for bit, code in ((1, words.flood), (2, words.mist), (4, words.through), (8, words.air)) if code),
@@ -151,14 +187,3 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
                 modulo={job.machine.axis_names[j]: roll.rule for j, roll in control.rolls.items()},
                 origin=control.origin, limits=limits_as_used(job.machine), work_offset=offset_joints(control),
                 chosen=job.toolpath.axis if options.orient != "keep" else None)
-    try:
-        said = testify(case, executed_of(comparison, comparison.poses, job))
-    except (ArithmeticError, AssertionError, LookupError, TypeError, ValueError) as fault:
-        # A file that it does not get through weakens the proof, which the text then says; it must not stop the program.
-        why = f"the second witness failed: {type(fault).__name__}: {fault}"
-        hint = "leave --require-proof out, where the read-back alone is enough"
-        found = [error("witness.failed", f"{why}; the program is not proved", file=job.toolpath.file, hint=hint)]
-        return Testimony((), (NotCompared("all", why),)), found if options.require_proof else []
-    return said, [error(f"witness.{f.code}", f"second witness: {f.message} (line {f.block} of the program)",
-                        file=job.toolpath.file, lines=[f.line] if f.line else [], count=f.count,
-                        hint="do not run this program") for f in said.findings]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
+
+import numpy as np
 
 from postproc.witness.text import Array
 
@@ -72,6 +74,7 @@ class ExecutedBlocks:
         poses_at: (tip, axis) of blocks as the reader has them: the claim that rods are held against
         approach_at: from which direction joints (K, J) are where they are, 1 forwards, -1 backwards; None where
             no errors depend on it
+        begins: joints (E, J) where blocks begin, where that is not where the one before ends; None: it is
     """
 
     letters: tuple[str, ...]
@@ -104,9 +107,28 @@ class ExecutedBlocks:
     joints_at: Callable[[Array, Any], Array]
     poses_at: Callable[[Array, Any], tuple[Array, Array]]
     approach_at: Callable[[Array, Any], Array] | None = None
+    begins: Array | None = None
 
     def __len__(self) -> int:
         return len(self.line)
+
+    def before(self, rows: Array) -> Array:
+        """(K, J) joints where blocks begin."""
+        if self.begins is not None:
+            return np.asarray(self.begins[rows])
+        return np.where((rows == 0)[:, None], self.start, self.joints[np.maximum(rows - 1, 0)])
+
+    def take(self, rows: Array) -> ExecutedBlocks:
+        """Some of the blocks, each beginning where the program has it begin."""
+        columns = {f.name: getattr(self, f.name)[rows] for f in fields(self)
+                   if f.name not in ("start", "begins") and isinstance(getattr(self, f.name), np.ndarray)}
+        approach, end = self.approach_at, len(self)
+        stops = tuple((int(np.searchsorted(rows, k)), number) for k, number in self.stops
+                      if (rows == (k if k < end else end - 1)).any())
+        return replace(self, **columns, begins=self.before(rows), stops=stops, steps=lambda some: self.steps(rows[some]),
+                       joints_at=lambda some, t: self.joints_at(rows[some], t),
+                       poses_at=lambda some, t: self.poses_at(rows[some], t),
+                       approach_at=None if approach is None else lambda some, t: approach(rows[some], t))
 
 
 FindingCode = Literal["position", "path", "kind", "clearance", "arc", "hole", "feed", "velocity", "tool", "length",
@@ -169,3 +191,16 @@ class Testimony:
     def own_kinematics(self) -> bool:
         """True where positions are compared by the witness's own reading of the machine file."""
         return bool(self.compared) and all(one.what != "kinematics" for one in self.not_compared)
+
+
+def together(said: list[Testimony]) -> Testimony:
+    """What was said of each place of a program as one."""
+    if len(said) < 2:
+        return said[0] if said else Testimony((), ())
+    counts = {c.what: sum(d.count for one in said for d in one.compared if d.what == c.what)
+              for one in said for c in one.compared}
+    return Testimony(tuple(Compared(what, n) for what, n in counts.items()),
+                     tuple(dict.fromkeys(n for one in said for n in one.not_compared)),
+                     tuple(f for one in said for f in one.findings), sum(one.points for one in said),
+                     max(one.worst_tip for one in said), max(one.worst_axis for one in said),
+                     sum(one.seconds for one in said))

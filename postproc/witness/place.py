@@ -83,8 +83,7 @@ class Poses:
 
     def before(self, rows: Array) -> Array:
         """(K, J) joints where blocks begin."""
-        q = self.executed.joints[np.maximum(rows - 1, 0)]
-        return np.where((rows == 0)[:, None], self.executed.start, q)
+        return self.executed.before(rows)
 
     def joints(self, rows: Array, t: float) -> Array:
         """(K, J) joints of blocks at a fraction."""

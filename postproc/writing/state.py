@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from textwrap import wrap
 
@@ -16,7 +16,7 @@ from postproc.compile.program import PER_MINUTE, Hole, Program, Section
 from postproc.controllers.cycles import CannedCycle
 from postproc.controllers.model import ControllerFile
 from postproc.controllers.output_modes import LengthState, Mode
-from postproc.controllers.texts import CYCLE_LENGTHS
+from postproc.controllers.texts import CYCLE_LENGTHS, blocks_of
 from postproc.job.smoothing import Smoothing
 from postproc.path.model import ARC
 from postproc.reference.coolant import CoolantCommand, switching
@@ -40,14 +40,17 @@ class WriterState:
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
-                 smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "",
-                 subprograms: bool = False, stock: Floats | None = None, levels: dict[str, Smoothing] | None = None) -> None:
+                 smoothing: float, places: Sequence[tuple[str, str]] = (("", "G54"),), axis_smoothing: float = 0.0,
+                 name: str = "", subprograms: bool = False, stock: Floats | None = None,
+                 levels: dict[str, Smoothing] | None = None) -> None:
         self.stock, self.levels, self.level = stock, levels or {}, list[str]()
         self.controller, self.program, self.cycles = controller, program, cycles
         self.length_offsets, self.smoothing, self.axis_smoothing = length_offsets, smoothing, axis_smoothing
-        self.work_offset = controller.program.offset_block(work_offset) or work_offset
-        self.offset_needs = controller.program.offset_needs(work_offset)
-        self.offset_name = controller.program.offset_name(work_offset)
+        self.places = places
+        needs = (controller.program.offset_needs(code) for _, code in places)
+        self.offset_needs = list(dict.fromkeys(text for text in needs if text))
+        self.offset_names = ", ".join(controller.program.offset_name(code) for _, code in places)
+        self.at_place(0)
         self.name = "".join(c if c.isascii() and c.isalnum() else "_" for c in name).upper()[:24] or "PROGRAM"
         self.units = controller.units_word
         self.subprograms = subprograms and bool(controller.subprograms.call)
@@ -66,13 +69,19 @@ class WriterState:
         self.ahead: tuple[int, list[str]] = (0, [])
         self.restate()
 
+    def at_place(self, place: int) -> list[str]:
+        """The name of a place and its work offset, which is in force from here on."""
+        (name, code), program = self.places[place], self.controller.program
+        self.work_offset, self.offset_name = program.offset_block(code) or code, program.offset_name(code)
+        return [self.comment(f"PLACE {name}"), *blocks_of(self.work_offset)]
+
     def named(self, number: int | str) -> dict[str, int | str]:
         """What the text of a frame or a subprogram may name."""
         return {"name": self.name, "number": number, "units": self.units}
 
     def options(self, modes: list[Mode]) -> list[str]:
         """What its modes need, and further options that the program needs, which the machine file does not confirm."""
-        needed = [text.replace("{work_offset}", self.offset_name) for mode in modes
+        needed = [text.replace("{work_offset}", self.offset_names) for mode in modes
                   for text in (mode.option, *mode.relies_on) if text]
         p, rules = self.program, self.controller
         arcs = np.flatnonzero(p.code == ARC)

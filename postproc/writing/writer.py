@@ -141,7 +141,7 @@ class Writer(WriterState, ABC):
 
     def relies_on(self) -> list[str]:
         """Settings of the control that the program needs, each once."""
-        needed = [self.offset_needs] if self.offset_needs else []
+        needed = list(self.offset_needs)
         needed += self.controller.inch.relies_on if self.controller.format.units == "inch" else ()
         needed += self.options(self.used_modes())
         letters, text = self.beyond_a_turn(), self.controller.program.relies_on_turns
@@ -273,6 +273,8 @@ class Writer(WriterState, ABC):
             yield self.hooked(command)
         elif command.name == "RESTATE":
             self.forget()
+        elif command.name == "SET_ORIGIN_OFFSETS":
+            yield from self.at_place(int(command.args[0]))
         elif command.name == "SMOOTHING":
             yield from self.other_smoothing(str(command.args[0]))
         elif command.name == "OPERATION_START":

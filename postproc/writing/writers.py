@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from postproc.compile.program import Program
 from postproc.controllers.model import ControllerFile, WriterName
 from postproc.job.smoothing import Smoothing
@@ -11,15 +13,15 @@ from toolpaths.toolpath import Cycle
 
 
 def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
-               smoothing: float, work_offset: str = "G54", axis_smoothing: float = 0.0, name: str = "",
-               subprograms: bool = False, stock: Floats | None = None,
+               smoothing: float, work_offset: str | Sequence[tuple[str, str]] = "G54", axis_smoothing: float = 0.0,
+               name: str = "", subprograms: bool = False, stock: Floats | None = None,
                levels: dict[str, Smoothing] | None = None) -> Writer:
     """The writer that the controller file names.
 
     Args:
         length_offsets: machine coordinates of Z are less the tool's length, which a register of the control adds
         smoothing, axis_smoothing: mm and degrees left to the controller's own smoothing
-        work_offset: the set-up's code, G54 to G59.3
+        work_offset: the set-up's code, G54 to G59.3; of several places (name, code) of each
         name: of the program, where the controller's programs hold one
         stock: (2, 3), least and greatest X, Y, Z of the stock in the work offset, mm
         levels: the control's own smoothing of operations by name, where it is another
@@ -35,5 +37,6 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
     writers: dict[WriterName, type[Writer]] = {
         "iso": IsoWriter, "linuxcnc": LinuxcncWriter, "fanuc": FanucWriter, "haas": HaasWriter, "siemens": SiemensWriter,
         "heidenhain": KlartextWriter}
-    return writers[controller.writer](controller, program, cycles, length_offsets, smoothing, work_offset, axis_smoothing,
+    places = [("", work_offset)] if isinstance(work_offset, str) else work_offset
+    return writers[controller.writer](controller, program, cycles, length_offsets, smoothing, places, axis_smoothing,
                                       name, subprograms, stock, levels)

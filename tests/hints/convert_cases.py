@@ -8,6 +8,14 @@ from tests.hints.machine_cases import machine_text
 START = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/MMPM,600\n"
 CUT = "RAPID\nGOTO/0,0,5\nGOTO/0,0,0\nGOTO/9,0,0\nRAPID\nGOTO/9,0,5\n"
 LENGTH = "[tools.1]\ngauge_length = 110.0\n"
+PLACES = """[[places]]
+name = "left"
+work_offset_code = "G54"
+[[places]]
+name = "right"
+work_offset_code = "G55"
+origin = [60.0, 0.0, 40.0]
+"""
 OVER = "RAPID\nGOTO/0,0,50\nGOTO/0,0,5\n"
 TAP = "RAPID\nGOTO/0,0,50\nCYCLE/TAP,DEPTH,5,MMPR,1,CLEAR,3\nGOTO/5,5,0\nCYCLE/OFF\n"
 TURNING = "RAPID\nGOTO/0,0,50\nGOTO/0,0,5\nGOTO/10,0,5,0.1,0,0.994987437\nGOTO/20,0,5,0.2,0,0.979795897\n"
@@ -267,6 +275,39 @@ _OUTPUT = [
         setup=LENGTH + '[hooks]\nbefore_tool = ["G91"]\npassive = ["G91"]\n',
         control="fanuc-30i",
         stops=("hooks.code",),
+    ),
+    convert(
+        "places.turn",
+        START + CUT,
+        r"its tables are (A)",
+        sheet("turn = { B = 90 }", r"turn = { \1 = 90 }"),
+        setup=LENGTH + PLACES + "turn = { B = 90 }\n",
+        machine="mill-4axis",
+    ),
+    convert(
+        "places.centre",
+        START + CUT,
+        r"take it out",
+        sheet("[clearance]\ncentre = [0.0, 0.0, 0.0]\n", ""),
+        setup=LENGTH + "[clearance]\ncentre = [0.0, 0.0, 0.0]\n" + PLACES,
+    ),
+    convert(
+        "places.measured",
+        START + CUT,
+        r"(measured = \"zero\")",
+        sheet('measured = "turned"', r"\1"),
+        setup=LENGTH + PLACES + 'turn = { A = 90 }\nmeasured = "turned"\n',
+        machine="mill-4axis",
+        control="fanuc-30i",
+        more=" --output-mode tcp",
+    ),
+    convert(
+        "places.one",
+        "CUTTER/10,5\n" + START + CUT,
+        r"take \[\[places\]\] out of the set-up",
+        sheet(PLACES, ""),
+        setup=LENGTH + PLACES,
+        more=" --orient auto",
     ),
     convert(
         "travel.exceeded",

@@ -80,7 +80,7 @@ class PassBodies:
 
 def pass_bodies(work: PassContext, file: str) -> tuple[PassBodies | None, list[Diagnostic]]:
     """The bodies of a set-up next to the passes of `work`; None where it (`file`) names none, or a mesh is no good."""
-    bodies, found = scene(work.setup, work.placement, file)
+    bodies, found = scene(work.setup, [("", work.placement)], file)
     if bodies is None:
         return None, found
     forms, more = forms_of(work, file)

@@ -39,11 +39,11 @@ def check_hooks(data: bytes | str, code: Canonical, motion: Motion, job: Job, ow
     text = lines_of(as_bytes(data)).upper()
     gaps, found = _gaps(code, motion, job, owner, text.count(b"\n")), list[Diagnostic]()
     ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == 10)
-    offset = job.controller.program.offset_name(job.setup.work_offset_code)
+    offsets = [job.controller.program.offset_name(place.code) for place in job.places]
     asked: dict[bytes, list[tuple[Gap, str, str]]] = {}
     for place, blocks in places.items():
         for block in blocks:
-            asked.setdefault(_pattern(block, offset), []).extend((gap, place, block) for gap in gaps[place])
+            asked.setdefault(_pattern(block, offsets), []).extend((gap, place, block) for gap in gaps[place])
     for pattern, wanted in asked.items():
         starts = [m.start() for m in re.finditer(pattern, text) if _begins(text, m.start())]
         left = unmatched(np.searchsorted(ends, np.array(starts, dtype=np.int64)) + 1,
@@ -62,9 +62,9 @@ _NUMBER = re.compile(rb"[ \t]*/?(?:N?\d+[ \t]+)?")
 _VALUES = {"tool_number": "[0-9]+", "tool_name": "[A-Z0-9 ._-]*", "operation": "[A-Z0-9 ._-]*"}
 
 
-def _pattern(block: str, offset: str) -> bytes:
-    """The block in capitals to the end of its line, whatever its values are, but with the work offset."""
-    values = _VALUES | {"work_offset": re.escape(offset.upper())}
+def _pattern(block: str, offsets: list[str]) -> bytes:
+    """The block in capitals to the end of its line, whatever its values are, but with a work offset of the program."""
+    values = _VALUES | {"work_offset": f"(?:{'|'.join(re.escape(one.upper()) for one in offsets)})"}
     parts = [re.escape(text.upper()) + ("" if name is None else "[0-9]+" if form else values[name])
              for text, name, form, _ in Formatter().parse(block.strip())]
     return (r"(?m)" + "".join(parts) + r"[ \t]*$").encode()

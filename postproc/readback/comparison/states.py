@@ -36,11 +36,11 @@ _SPINDLE = {-1: "anti-clockwise (M4)", 0: "stopped (M5)", 1: "clockwise (M3)"}
 
 
 @dataclass(frozen=True)
-@arrays(tool="N", register="N", direction="N", rpm="N", coolant="N", side="N", radius="N")
+@arrays(offset="N", tool="N", register="N", direction="N", rpm="N", coolant="N", side="N", radius="N")
 class _Asked:
-    """What the CL file asks for while it cuts: by row of the Toolpath, the work offset of the set-up."""
+    """What the CL file asks for while it cuts, by row of the Toolpath, and the work offset of its place."""
 
-    offset: float
+    offset: Floats
     tool: Ints
     register: Ints
     direction: Ints
@@ -53,12 +53,18 @@ class _Asked:
     def of(cls, job: Job, reader: Reader) -> _Asked:
         """That of a job."""
         direction, rpm = spindle_states(job.toolpath)
-        code = job.setup.work_offset_code
-        offset = reader.offset_of(job.controller.program.offset_block(code) or code)
+        place = np.zeros(len(job.toolpath), dtype=np.int64) if job.repeats is None else job.repeats.place
+        offset = np.array(registers_of(job, reader))[place]
         coolant = coolant_states(job.toolpath, job.controller.codes)
-        columns = (loaded_tools(job.toolpath), loaded_registers(job.toolpath), direction, rpm, coolant,
+        columns = (offset, loaded_tools(job.toolpath), loaded_registers(job.toolpath), direction, rpm, coolant,
                    compensation_states(job.toolpath), _radius_registers(job))
-        return cls(offset, *map(shared, columns))
+        return cls(*map(shared, columns))
+
+
+def registers_of(job: Job, reader: Reader) -> list[float]:
+    """The number of the register that holds the work offset of each place."""
+    program = job.controller.program
+    return [reader.offset_of(program.offset_block(place.code) or place.code) for place in job.places]
 
 
 def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, down: Bools,
@@ -118,7 +124,7 @@ def _states(motion: Motion, job: Job, asked: _Asked, rows: Ints, row: Ints,
         return f"{value:g}" if np.isfinite(value) and value >= 0 else "none"
     tool, register, direction, rpm = asked.tool[row], asked.register[row], asked.direction[row], asked.rpm[row]
     cooled, coolant, side, given = asked.coolant[row], motion.coolant[rows], asked.side[row], motion.compensation[rows]
-    radius, wanted_radius, code = motion.radius[rows], asked.radius[row], np.full(len(rows), asked.offset)
+    radius, wanted_radius, code = motion.radius[rows], asked.radius[row], asked.offset[row]
     same_speed = (np.abs(motion.rpm[rows] - rpm) <= 0.5) | np.isnan(rpm) | (direction == 0)
     yield "tool", motion.tool[rows] == tool, motion.tool[rows], tool, number
     yield "spindle", motion.spindle[rows] == direction, motion.spindle[rows], direction, _SPINDLE.__getitem__

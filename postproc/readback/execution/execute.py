@@ -105,11 +105,11 @@ def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets,
     found: list[Diagnostic] = _cancelled(words, modal, section, code.line, file)
     parts, used, position = [], [AXES], offsets.home
     begun = set(words.pick(LAW)[0].tolist())
-    for first, last, law, register in _stretches(words, modal, code.laws):
+    for first, last, law, register in _stretches(words, modal, code.laws, bool(offsets.others)):
         frame = AXES
         if law is not None:
-            where = file, int(code.line[first])
-            frame = frames.frame_of(law, offsets.control, offsets.length(register), position, where,
+            where, control = (file, int(code.line[first])), offsets.control_at(float(modal.offset[first]))
+            frame = frames.frame_of(law, control, offsets.length(register), position, where,
                                     found if first in begun else None)
             used.append(frame)
         number = len(used) - 1 if law is not None else 0
@@ -120,15 +120,17 @@ def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets,
     return _motion(words, modal, rows, code, tuple(used), offsets, rests, section.call), placed(found, code.files)
 
 
-def _stretches(words: Words, modal: Modal,
-               laws: tuple[WordMeaning, ...]) -> list[tuple[int, int, WordMeaning | None, int]]:
-    """(first, one past the last block, law, length register) of stretches under one law."""
+def _stretches(words: Words, modal: Modal, laws: tuple[WordMeaning, ...],
+               places: bool) -> list[tuple[int, int, WordMeaning | None, int]]:
+    """(first, one past the last block, law, length register) of stretches under one law, at one of several `places`."""
     n = words.lines
     law = fill(*words.pick(LAW), n, -1.0).astype(np.int64)
     own = np.array([one.name != "axes" for one in laws] + [False])[law]
     change = np.zeros(n + 1, dtype=bool)
     change[words.pick(LAW)[0]] = True
     change[1:] |= own[1:] & (np.diff(modal.length_register) != 0)
+    if places:
+        change[1:] |= own[1:] & (modal.offset[1:] != modal.offset[:-1])
     change[0] = False
     edges = [1, *np.flatnonzero(change).tolist(), n + 1]
     return [(a, b, laws[law[a]] if law[a] >= 0 and own[a] else None, int(modal.length_register[a]))
@@ -144,7 +146,8 @@ def _blocks(words: Words, modal: Modal, letters: tuple[str, ...], offsets: Offse
     lengths = np.unique(modal.length_register)
     length = shared(np.array([offsets.length(int(r)) for r in lengths])[np.searchsorted(lengths, modal.length_register)])
     steps = columns(words, small)
-    return BlockSection(0, modal.motion, modal.plane, modal.machine, modal.level, modal.inch, columns(words, letters), steps,
+    return BlockSection(0, modal.motion, modal.plane, modal.machine, modal.level, modal.inch, modal.offset,
+                        columns(words, letters), steps,
                         rest, length, columns(words, "ijk"), columns(words, "IJK"), columns(words, "ZRQPIJK"),
                         columns(words, ("z", "r", TURNS)), columns(words, "L")[:, 0], columns(words, CALL)[:, 0])
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from postproc.control.control import Control
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Floats, Ints, repeated, shared
 from toolpaths.shapes import arrays
 
 
@@ -18,7 +20,8 @@ class Offsets:
     `control` is needed where a program uses laws of its own; `rises_first`: a canned cycle brings a tool that
     is below its plane, or below the level where the cycle ends, up before it is over the hole (RS274/NGC, see
     `cycles.legs`);
-    `arc_slack`: mm by which the radius may differ between the ends of an arc.
+    `arc_slack`: mm by which the radius may differ between the ends of an arc; `others`: the control with each work offset
+    by the register's number, where a program has several; in any other register stands the first of them.
     """
 
     work: Floats
@@ -30,6 +33,23 @@ class Offsets:
     control: Control | None = None
     rises_first: bool = True
     arc_slack: float = math.inf
+    others: tuple[tuple[float, Control], ...] = ()
+
+    def control_at(self, register: float) -> Control | None:
+        """The control with the work offset of a register."""
+        return next((control for number, control in self.others if number == register), self.control)
+
+    def works(self, registers: Floats, whole: bool) -> Floats:
+        """(N, J) work offsets of registers (N,), by their numbers; not `whole`: but X, Y, Z, where these are the tip's."""
+        result = np.stack([self.work, *(control.work_offset for _, control in self.others)])
+        if not whole:
+            result[:, self.xyz[self.xyz >= 0]] = 0.0
+        if not self.others:
+            return repeated(result[0], len(registers))
+        held = np.zeros(len(registers), dtype=np.int64)
+        for k, (number, _) in enumerate(self.others, 1):
+            held[registers == number] = k
+        return shared(result[held])
 
     def length(self, register: int) -> float:
         """Tool length of a register, 0 for none."""

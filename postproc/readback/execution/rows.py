@@ -17,14 +17,15 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-@arrays(motion="int16: N", plane="int8: N", machine="N", level="int8: N", inch="N", columns="N J", steps="N J",
-        rest="N", length="N", relative="N 3", absolute="N 3", extra="N 7", deep="N 3", repeats="N", call="N")
+@arrays(motion="int16: N", plane="int8: N", machine="N", level="int8: N", inch="N", offset="N", columns="N J",
+        steps="N J", rest="N", length="N", relative="N 3", absolute="N 3", extra="N 7", deep="N 3", repeats="N", call="N")
 class BlockSection:
     """Blocks `first` and on (N), as their words and modal state have them.
 
     `columns`, `steps` (N, J) are absolute and relative axis words, `relative`, `absolute` (N, 3) centres of
     arcs from the start and in coordinates, `extra` (N, 7) the words Z, R, Q, P, I, J, K of a cycle, `deep`
-    (N, 3) z, r and turns, `repeats` and `call` (N,) as stated; NaN where a block states none.
+    (N, 3) z, r and turns, `repeats` and `call` (N,) as stated; NaN where a block states none. `offset` (N,): register of
+    the work offset.
     """
 
     first: int
@@ -33,6 +34,7 @@ class BlockSection:
     machine: Bools
     level: Array
     inch: Bools
+    offset: Floats
     columns: Floats
     steps: Floats
     rest: Bools

@@ -99,10 +99,7 @@ def _state(section: BlockSection, start: Floats, frame: ExecutionFrame, offsets:
 
 def _shift(section: BlockSection, frame: ExecutionFrame, offsets: Offsets) -> Floats:
     """(N, J) from the program's words to coordinates."""
-    row, xyz = offsets.work.copy(), offsets.xyz[offsets.xyz >= 0]
-    if frame.control is not None:
-        row[xyz] = 0.0
-    shift = repeated(row, len(section.columns))
+    shift = offsets.works(section.offset, frame.control is None)
     if frame.control is None and offsets.on_z and offsets.xyz[2] >= 0 and section.length.any():
         shift = np.array(shift)
         shift[:, offsets.xyz[2]] += section.length

@@ -17,6 +17,7 @@ import pytest
 import machines
 import postproc
 import postproc.job.job
+import postproc.job.places
 import postproc.reference.moves
 import toolpaths
 import toolpaths.cl.assemble
@@ -333,7 +334,7 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
     "lines of the rotary axes off, tip modes": (FIVE, "mikron-ucp710", "siemens-840d", "turned", joint(adjacent)),
     "C in the other direction": (FIVE, "mikron-ucp710", "linuxcnc", "turned", joint(turned_back)),
     "part placement transposed": (NX, "mill-3axis", "linuxcnc", "turned",
-                                  wrapped(postproc.job.job, "part_placement", transposed)),
+                                  wrapped(postproc.job.places, "part_placement", transposed)),
     "wrong tool number": (NX, "mill-3axis", "linuxcnc", "turned",
                           path_changed(next_tools)),
     "spindle in the other direction": (NX, "mill-3axis", "linuxcnc", "plain", events(other_direction)),
