@@ -12,7 +12,7 @@ from pathlib import Path
 
 from machines.exchange.draft import Draft
 from machines.exchange.ini_file import HalFiles, IniEntry, IniFile, read_ini
-from machines.exchange.linuxcnc_kins import COORDINATES, NOT_OURS, PinReader, put_geometry
+from machines.exchange.linuxcnc_kins import COORDINATES, NOT_OURS, UNREAD_PINS, PinReader, put_geometry
 from machines.kinematics.chain import ROTARY
 from toolpaths.units import MM_PER_INCH
 
@@ -119,6 +119,11 @@ class _IniMachine:
         own = self.ini.first(OWN, "STRUCTURE")
         if self.module != "trivkins":
             self.draft.put(("control", "module"), self.module, *self._line("KINS", "KINEMATICS"))
+            for name in UNREAD_PINS:
+                value, word = self.hal.pin(f"{self.module}.{name}")
+                if word is not None and value != 0.0:
+                    self.draft.error("import.pin", f"{' '.join(word.words)} is not read: the geometry is that of 0 there",
+                                     word.line, "", word.file)
             put_geometry(self.draft, self.module, PinReader(self._pin, self.scale))
             return
         self.draft.made(("kinematics", "kind"), "serial", "")

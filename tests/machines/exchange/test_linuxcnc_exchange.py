@@ -109,6 +109,12 @@ def test_a_pin_that_something_drives_is_refused_until_it_is_stated(tmp_path: Pat
     assert machine.control_kinematics.pins["xyzac-trt-kins.y-offset"] == 20.0
 
 
+@pytest.mark.parametrize("value", ["1", "TRUE"])
+def test_pins_that_turn_axes_round_are_refused(value: str, tmp_path: Path) -> None:
+    hal = TRT_HAL + f"setp xyzac-trt-kins.conventional-directions {value}\n"
+    assert "ERROR import.pin 8" in imported(tmp_path, trt(), hal)[2]
+
+
 def test_the_pivot_length_of_a_head_is_a_sum_with_the_tool(tmp_path: Path) -> None:
     """As LinuxCNC's own bridge mill: sum2 of a length and the tool's."""
     ini = HEADER.format(kins="5axiskins coordinates=XYZBCW", joints=6, letters="XYZBCW", unit="mm") + "".join(
