@@ -12,7 +12,7 @@ from pathlib import Path
 
 from machines.exchange.draft import Draft
 from machines.exchange.ini_file import HalFiles, IniEntry, IniFile, read_ini
-from machines.exchange.linuxcnc_kins import COORDINATES, NOT_OURS, PinReader, put_geometry
+from machines.exchange.linuxcnc_kins import COORDINATES, NOT_OURS, UNREAD_PINS, PinReader, put_geometry
 from machines.kinematics.chain import ROTARY
 from toolpaths.units import MM_PER_INCH
 
@@ -51,6 +51,10 @@ class _IniMachine:
         if not (self._is_ours() and self._units()):
             return self.draft, {}
         letters = self._letters()
+        if len(linear := [letter for letter in letters if letter not in ROTARY]) != 3:
+            self.draft.error("import.geometry", f"the linear axes are {', '.join(linear) or 'none'}: machines of three are "
+                             "read, no lathes, cutters of sheets or foam", self._line("TRAJ", "COORDINATES")[0])
+            return self.draft, {}
         name = self.ini.first("EMC", "MACHINE")
         if name:
             self.draft.put(("description",), name.value, name.line, name.said, name.file)
@@ -84,15 +88,17 @@ class _IniMachine:
     def _units(self) -> bool:
         linear, angular = self.ini.first("TRAJ", "LINEAR_UNITS"), self.ini.first("TRAJ", "ANGULAR_UNITS")
         unit = linear.value.split()[0].lower() if linear and linear.value else ""
-        if linear is None or unit not in LINEAR_UNITS:
+        per_mm = linear.number if linear is not None else None
+        if linear is None or (unit not in LINEAR_UNITS and not (per_mm and per_mm > 0.0)):
             self.draft.error("import.unit", f"{linear.said}: not a unit" if linear else "no [TRAJ] LINEAR_UNITS",
                              linear.line if linear else 0, f"write one of {', '.join(LINEAR_UNITS)}")
             return False
-        if angular is not None and angular.value.split()[:1] and angular.value.split()[0].lower() not in ANGULAR_UNITS:
+        words = angular.value.lower().split()[:1] if angular is not None else []
+        if angular is not None and words and words[0] not in ANGULAR_UNITS and angular.number != 1.0:
             self.draft.error("import.unit", f"{angular.said}: angles are read in degrees only", angular.line,
                              "write ANGULAR_UNITS = degree, and all angles in degrees", angular.file)
             return False
-        self.scale = LINEAR_UNITS[unit]
+        self.scale = LINEAR_UNITS[unit] if unit in LINEAR_UNITS else 1.0 / float(per_mm or 1.0)
         return True
 
     def _letters(self) -> list[str]:
@@ -113,6 +119,11 @@ class _IniMachine:
         own = self.ini.first(OWN, "STRUCTURE")
         if self.module != "trivkins":
             self.draft.put(("control", "module"), self.module, *self._line("KINS", "KINEMATICS"))
+            for name in UNREAD_PINS:
+                value, word = self.hal.pin(f"{self.module}.{name}")
+                if word is not None and value != 0.0:
+                    self.draft.error("import.pin", f"{' '.join(word.words)} is not read: the geometry is that of 0 there",
+                                     word.line, "", word.file)
             put_geometry(self.draft, self.module, PinReader(self._pin, self.scale))
             return
         self.draft.made(("kinematics", "kind"), "serial", "")

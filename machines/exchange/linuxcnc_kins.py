@@ -15,6 +15,8 @@ from machines.exchange.draft import Draft, KeyNames
 COORDINATES = {"trivkins": "XYZABCUVW", "xyzac-trt-kins": "XYZAC", "xyzbc-trt-kins": "XYZBC", "5axiskins": "XYZBCW",
                "lineardeltakins": "XYZABCUVW"}
 """letters of joints 0, 1, ... where the INI gives no coordinates="""
+UNREAD_PINS = ("conventional-directions", "J0off", "J1off", "J2off")
+"""pins that change the geometry where they are not 0"""
 _ROBOTS = "it moves arms, struts or belts, no machine of three linear and up to two rotary axes in a chain"
 NOT_OURS = {
     "maxkins": "up to LinuxCNC 2.9 it adds the offset of the swivelled head without turning it with the table, so that the "

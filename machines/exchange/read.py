@@ -49,7 +49,7 @@ def _form_of(path: Path, text: str) -> MachineForm | None:
         return "fusion"
     if text.lstrip().startswith("{") and '"axes"' in text:
         return "freecad"
-    if "[KINS]" in text or "[TRAJ]" in text:
+    if any(word in text for word in ("[KINS]", "[TRAJ]", "[EMC]", "#INCLUDE")):
         return "linuxcnc-ini"
     if any(word in text for word in ("$MA_", "$MC_", "$TC_CARR")):
         return "siemens"

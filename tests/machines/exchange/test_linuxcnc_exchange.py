@@ -73,6 +73,12 @@ def test_inch_per_second_becomes_mm_per_second_and_degrees_stay(tmp_path: Path) 
     assert control is not None and control.pins["xyzac-trt-kins.y-offset"] == pytest.approx(508.0)
 
 
+def test_units_as_a_number_are_units_per_mm(tmp_path: Path) -> None:
+    """0.03937... units per mm are inches: 4 of them per s are 101.6 mm/s."""
+    machine = imported(tmp_path, trt(repr(1 / 25.4)), TRT_HAL)[1]
+    assert machine is not None and machine.limits.velocity[0] == pytest.approx(101.6)
+
+
 def test_pivots_come_from_hal(tmp_path: Path) -> None:
     """The built-in machine has the same pins: setp, a signal that is set, a key of the INI."""
     text, machine, found = imported(tmp_path, trt(), TRT_HAL)
@@ -101,6 +107,12 @@ def test_a_pin_that_something_drives_is_refused_until_it_is_stated(tmp_path: Pat
     machine = imported(tmp_path, trt(), hal, ("xyzac-trt-kins.y-offset=20",))[1]
     assert machine is not None and machine.control_kinematics is not None
     assert machine.control_kinematics.pins["xyzac-trt-kins.y-offset"] == 20.0
+
+
+@pytest.mark.parametrize("value", ["1", "TRUE"])
+def test_pins_that_turn_axes_round_are_refused(value: str, tmp_path: Path) -> None:
+    hal = TRT_HAL + f"setp xyzac-trt-kins.conventional-directions {value}\n"
+    assert "ERROR import.pin 8" in imported(tmp_path, trt(), hal)[2]
 
 
 def test_the_pivot_length_of_a_head_is_a_sum_with_the_tool(tmp_path: Path) -> None:
@@ -154,6 +166,7 @@ def test_wrapped_rotary_is_modulo(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("old", "new", "code"), [
     ("LINEAR_UNITS = mm", "LINEAR_UNITS = furlong", "ERROR import.unit 11"),
     ("LINEAR_UNITS = mm\n", "", "ERROR import.unit 0"),
+    ("COORDINATES = XYZAC", "COORDINATES = XZ", "ERROR import.geometry 10"),
     ("ANGULAR_UNITS = degree", "ANGULAR_UNITS = grad", "ERROR import.unit 12"),
     ("xyzac-trt-kins", "maxkins", "ERROR import.kinematics 5"),
     ("xyzac-trt-kins", "genserkins", "ERROR import.kinematics 5"),
