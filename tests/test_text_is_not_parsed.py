@@ -30,6 +30,7 @@ FILES = {
     "postproc.readback.comparison.hooks": "blocks of the shop in programs",
     "postproc.readback.comparison.slow_moves": "F words of programs",
     "postproc.readback.comparison.unstated_codes": "codes of programs",
+    "postproc.verification.stated_numbers": "numbers in the header of a program",
     "postproc.verification.tool_table": "tool tables of controls",
     "postproc.writing.linuxcnc": "comments that LinuxCNC obeys", "postproc.writing.state": "decimals of words",
     "postproc.writing.writer": "labels of blocks"}

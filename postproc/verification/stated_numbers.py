@@ -44,4 +44,5 @@ def _lengths(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
 
 def _same(said: str, right: float) -> bool:
     """Whether a number is the right one with the decimals that it has."""
-    return abs(float(said) - right) <= 0.501 * 10.0 ** -len(said.partition(".")[2])
+    decimals = len(said) - said.index(".") - 1 if "." in said else 0
+    return abs(float(said) - right) <= 0.501 * 10.0**-decimals
