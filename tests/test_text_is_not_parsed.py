@@ -28,6 +28,7 @@ FILES = {
     "postproc.cycle_time.source": "whether a file is a CL file or a program",
     "postproc.readback.comparison.hooks": "blocks of the shop in programs",
     "postproc.readback.comparison.slow_moves": "F words of programs",
+    "postproc.readback.comparison.stock": "stock stated in programs",
     "postproc.readback.comparison.unstated_codes": "codes of programs",
     "postproc.verification.tool_table": "tool tables of controls",
     "postproc.writing.linuxcnc": "comments that LinuxCNC obeys", "postproc.writing.state": "decimals of words",
