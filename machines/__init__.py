@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from machines.machine import Machine
     from toolpaths.diagnostics import Diagnostic
 
-__all__ = ["catalogued", "load", "load_checked", "names", "schema"]
+__all__ = ["catalogued", "implausible", "load", "load_checked", "names", "schema"]
 
 
 def load(source: str | Path) -> Machine:
@@ -28,6 +28,13 @@ def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
     from machines import loader
 
     return loader.load_checked(source)
+
+
+def implausible(source: str | Path) -> list[Diagnostic]:
+    """What no machine has in a machine file that loads: a wrong unit, a pivot with a wrong sign; a warning each."""
+    from machines import loader
+
+    return loader.implausible_of(source)
 
 
 def names() -> list[str]:

@@ -20,8 +20,9 @@ from machines.kind_check import build_faults, contract_faults
 from machines.kinematics.base import Kinematics
 from machines.machine import ClampCodes, ControlOptions, Limits, Machine, Timing, Turns
 from machines.models import ControlModel, KinematicsModel, MachineModel, register_beyond
+from machines.plausible import implausible
 from machines.user_file import UserFile, nearest_word, read_toml, schema, validate
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors, read_value
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, Severity, error, has_errors, read_value
 from toolpaths.units import DEG, PER_MINUTE
 
 DATA = Path(__file__).parent / "data"
@@ -207,3 +208,16 @@ def names() -> list[str]:
 def catalogued() -> list[str]:
     """The built-in machines that people own, with a source for what a document states."""
     return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
+
+
+def implausible_of(source: str | Path) -> list[Diagnostic]:
+    """What no machine has in the file of a machine that loads: a warning each, at its line."""
+    file, _ = read_toml(source, builtin(), "machine")
+    model = check(file)[0] if file is not None else None
+    return [] if file is None or model is None else as_warnings(file, assemble(file, model))
+
+
+def as_warnings(file: UserFile, machine: Machine) -> list[Diagnostic]:
+    """The same of a file that has been read."""
+    found = [file.problem(p.code, p.path, p.message, p.hint) for p in implausible(machine)]
+    return [replace(one, severity=Severity.WARNING) for one in found]

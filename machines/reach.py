@@ -16,7 +16,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.kinematics.clearance_geometry import ClearanceGeometry
 from toolpaths.arrays import Bools, Floats
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, dot, unit
 from toolpaths.shapes import arrays
 
 BLOCK = 4096
@@ -146,8 +146,8 @@ class _Checks:
 
     def _swing(self, k: int, most: float, carried: bool, rig: ClearanceGeometry) -> Floats:
         """The stop `most` less the rod's angle from its direction in the middle; `carried` by the tilting platform."""
-        rod = _unit(rig.ends[:, k] - rig.carriages[:, k])
-        middle = _unit(self.middle.ends[:, k] - self.middle.carriages[:, k])
+        rod = unit(rig.ends[:, k] - rig.carriages[:, k])
+        middle = unit(self.middle.ends[:, k] - self.middle.carriages[:, k])
         if carried:
             rod, middle = _level(rod, rig.tilt), _level(middle, self.middle.tilt)
         return np.asarray(most - angle_between(rod, middle), dtype=np.float64)
@@ -208,8 +208,8 @@ def segment_distance(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
     Closest points of two segments by clamping the parameters in turn (Ericson, Real-Time Collision Detection, 5.1.9).
     """
     u, v, w = b - a, d - c, a - c
-    uu, vv, uv = _dot(u, u), _dot(v, v), _dot(u, v)
-    uw, vw = _dot(u, w), _dot(v, w)
+    uu, vv, uv = dot(u, u), dot(v, v), dot(u, v)
+    uw, vw = dot(u, w), dot(v, w)
     under = uu * vv - uv * uv
     apart = under > 1e-12 * uu * vv
     s = np.where(apart, np.clip((uv * vw - uw * vv) / np.where(apart, under, 1.0), 0.0, 1.0), 0.0)
@@ -223,12 +223,3 @@ def _level(v: Floats, tilt: Floats) -> Floats:
     """Vectors (N, 3) in the platform's own directions: turned back about x."""
     c, s = np.cos(tilt), np.sin(tilt)
     return np.stack([v[:, 0], c * v[:, 1] + s * v[:, 2], c * v[:, 2] - s * v[:, 1]], axis=1)
-
-
-def _unit(v: Floats) -> Floats:
-    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True), dtype=np.float64)
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    result: Floats = np.sum(a * b, axis=-1)
-    return result

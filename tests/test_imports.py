@@ -6,7 +6,7 @@ import ast
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -102,6 +102,34 @@ def test_a_circle_is_noticed() -> None:
     links = graph(found)
     assert links["a"] == {"b", "b.c"} and circle({name: links[name] - {"a"} for name in links})[1:] in (
         ["a.x", "a.y"], ["a.y", "a.x"])
+
+
+def handed_through() -> Iterator[str]:
+    """Names that a file takes from a file of the packages which does not define them: it would hand them through."""
+    for path in sorted(p for top in (*ROAD, "tests", "samples") for p in (ROOT / top).rglob("*.py")):
+        for node in nodes(path):
+            there = ROOT / f"{(node.module or '').replace('.', '/')}.py" if isinstance(node, ast.ImportFrom) else None
+            if isinstance(node, ast.ImportFrom) and there and there.is_file() and (node.module or "").startswith(ROAD):
+                yield from (f"{path.relative_to(ROOT)}: {node.module}.{one.name}" for one in node.names
+                            if one.name not in own_names(there))
+
+
+@cache
+def own_names(path: Path) -> frozenset[str]:
+    """What a file defines."""
+    return frozenset(node.name if isinstance(node, ast.FunctionDef | ast.ClassDef) else node.id for node in nodes(path)
+                     if isinstance(node, ast.FunctionDef | ast.ClassDef)
+                     or (isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)))
+
+
+def test_names_come_from_the_file_that_defines_them() -> None:
+    """No shims: what has moved is taken from where it is."""
+    assert list(handed_through()) == []
+
+
+def test_a_name_that_is_handed_through_is_noticed(tmp_path: Path) -> None:
+    (tmp_path / "shim.py").write_text("from postproc.joints.tracks import TRAVEL_SLACK\nOWN = 1\n")
+    assert own_names(tmp_path / "shim.py") == {"OWN"}
 
 
 def test_files_and_functions_are_short() -> None:

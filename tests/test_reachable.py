@@ -89,16 +89,22 @@ def defined(node: ast.stmt) -> list[str]:
         return [] if node.decorator_list else [node.name]
     if isinstance(node, ast.ClassDef):
         return [node.name]
+    return [name for name in _targets(node) if not name.startswith("__")]
+
+
+def _targets(node: ast.stmt) -> Iterator[str]:
+    """Names that an assignment gives a value."""
     targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
-    return [one.id for one in targets if isinstance(one, ast.Name) and not one.id.startswith("__")]
+    return (one.id for one in targets if isinstance(one, ast.Name))
 
 
 def unused(file: ast.Module, imported: set[str]) -> Iterator[str]:
     """Names of a file that nobody imports, and that no other statement of the file uses."""
+    body = [node for node in file.body if "__all__" not in set(_targets(node))]
     inside = [{n.id if isinstance(n, ast.Name) else n.value for n in walked(node)
-               if isinstance(n, ast.Name | ast.Constant)} for node in file.body]
+               if isinstance(n, ast.Name | ast.Constant)} for node in body]
     uses = Counter(name for names in inside for name in names)
-    for node, own in zip(file.body, inside, strict=True):
+    for node, own in zip(body, inside, strict=True):
         yield from (name for name in defined(node) if uses[name] == (name in own) and name not in imported)
 
 
@@ -158,5 +164,6 @@ def test_examples_of_a_page_import_what_is_there(page: Path) -> None:
 
 
 def test_a_function_that_only_tests_call_is_noticed() -> None:
-    text = "LEFT = 1\nUSED = 2\ndef alone() -> int:\n    return USED + alone()\ndef called() -> int:\n    return 1\n"
+    text = "__all__ = ['LEFT']\nLEFT = 1\nUSED = 2\n" \
+           "def alone() -> int:\n    return USED + alone()\ndef called() -> int:\n    return 1\n"
     assert set(unused(ast.parse(text), {"called"})) == {"LEFT", "alone"}

@@ -21,6 +21,7 @@ FLOORS = (
     ("machines.data", "built-in machine files: models of kinds and classes"),
     ("machines.catalogue", "built-in machine files: machines that people own, with sources"),
     ("machines.exchange", "machine files of others, LinuxCNC's written"),
+    ("machines.sheet", "a new machine: its data sheet, pivots, jogs, drawing"),
     ("machines.analysis", "what a machine is good for"),
     ("machines.geometric_error.tables", "curves and tables of errors, their files"),
     ("machines.geometric_error.actual", "the machine with errors, corrected commands"),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from postproc.orientation.report.text import KINDS
+from postproc.orientation.candidates.rejections import KINDS
 from tests.source import ROOT, nodes, product, tree, written
 
 PAGES = sorted(path for path in (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *(

@@ -39,6 +39,17 @@ def lengths(v: Floats) -> Floats:
     return result
 
 
+def unit(v: Floats, nowhere: float = np.nan) -> Floats:
+    """Unit vectors (..., 3) along v; `nowhere` in all three columns where v is 0."""
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    return np.asarray(np.divide(v, length, out=np.full_like(v, nowhere, dtype=np.float64), where=length > 0.0))
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """a . b (...,) of vectors (..., 3)."""
+    return np.asarray(np.sum(a * b, axis=-1))
+
+
 def cross(a: Floats, b: Floats) -> Floats:
     """a x b (..., 3), column by column."""
     return np.stack([a[..., j] * b[..., k] - a[..., k] * b[..., j] for j, k in ((1, 2), (2, 0), (0, 1))], axis=-1)

@@ -151,7 +151,7 @@ def _noted(left: Floats) -> tuple[Bools, Floats]:
     return np.asarray(np.sum(vt[values <= NOTED] ** 2, axis=0) > 1e-6), values[values > NOTED]
 
 
-def error_model(fitted: RotaryFit, axis: str, machine: str = "", name: str = "", sense: int = 1,
+def error_model(fitted: RotaryFit, axis: str, machine: str = "", sense: int = 1,
                 carries_part: bool = False) -> ErrorModel:
     """The model of the axis with its covariance; means 0 (they are mounting).
 
@@ -169,8 +169,7 @@ def error_model(fitted: RotaryFit, axis: str, machine: str = "", name: str = "",
     components = [Component(ErrorName(part, False, axis), Fourier(np.concatenate([[0.0], *amplitudes[part]])))
                   for part in range(len(DIRECTIONS))]
     frame: ErrorFrame = "fixed" if carries_part else "moving"
-    model = ErrorModel(SerialErrors(tuple(components), frame={axis: frame}), name=name or axis,
-                       machine=machine)
+    model = ErrorModel(SerialErrors(tuple(components), frame={axis: frame}), name=axis, machine=machine)
     at = np.concatenate([1 + part * (1 + 2 * harmonics) + np.arange(2 * harmonics) for part in range(len(DIRECTIONS))])
     covariance, spread = np.zeros((len(model.names), len(model.names))), np.kron(turn, np.eye(2 * harmonics))
     covariance[np.ix_(at, at)] = spread @ fitted.covariance @ spread.T

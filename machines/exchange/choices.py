@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-MachineForm = Literal["linuxcnc-ini"]
-"""files that are read"""
-GivenForm = Literal["auto", "linuxcnc-ini"]
+MachineForm = Literal["linuxcnc-ini", "siemens", "freecad", "heidenhain", "fusion"]
+"""files that are known by their text"""
+GivenForm = Literal["auto", "linuxcnc-ini", "siemens", "freecad", "heidenhain", "fusion"]
 """as an option"""
 ExportForm = Literal["linuxcnc-ini"]
 """files that are written"""

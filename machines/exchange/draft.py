@@ -75,11 +75,11 @@ class Draft:
         """What stands against the import."""
         self.found.append(error(code, message, file=file or self.file, lines=[line] if line else (), hint=hint))
 
-    def note(self, code: str, message: str, line: int = 0, file: str = "") -> None:
+    def info(self, code: str, message: str, line: int = 0, file: str = "") -> None:
         """What was taken."""
         self.found.append(info(code, message, file=file or self.file, lines=[line] if line else ()))
 
-    def warn(self, code: str, message: str, line: int = 0, hint: str = "", file: str = "") -> None:
+    def warning(self, code: str, message: str, line: int = 0, hint: str = "", file: str = "") -> None:
         """What is to be looked at."""
         self.found.append(warning(code, message, file=file or self.file, lines=[line] if line else (), hint=hint))
 

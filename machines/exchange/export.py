@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from machines.exchange.linuxcnc_files import hal_lines, ini_sections, ini_text
 from machines.exchange.linuxcnc_ini import OWN
 from machines.loader import builtin, check
@@ -54,6 +56,7 @@ def _inexpressible(machine: Machine, model: MachineModel, own: dict[str, str] | 
 def _timing(machine: Machine, model: MachineModel) -> dict[str, str]:
     timing = machine.timing
     found = {"TOOL_CHANGE": repr(timing.tool_change), "CLAMP": repr(timing.clamp), "UNCLAMP": repr(timing.unclamp)}
+    found |= {"LARGEST_FEED": repr(machine.largest_feed * 60.0)} if math.isfinite(machine.largest_feed) else {}
     found |= {"RETRACT_AXIS": model.retract_axis} if model.retract_axis else {}
     assumed = [f"{table.name}.{key}" for table in model.figures() for key in table.assumed]
     return found | ({"ASSUMED": " ".join(assumed)} if assumed else {})

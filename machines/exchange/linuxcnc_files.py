@@ -6,7 +6,6 @@ What LinuxCNC has no key for (geometry under trivkins, timing, what is assumed) 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -81,7 +80,7 @@ def _unit(machine: Machine, joint: int) -> float:
 
 
 def _traj(machine: Machine) -> dict[str, str]:
-    """No path is slower than its axes, unless the machine has a largest feed."""
+    """No path is slower than its axes: a largest feed would hold back rapids too."""
     limits, linear = machine.limits, ~np.array(machine.rotary)
     result = {"COORDINATES": " ".join(_coordinates(machine)), "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree"}
     for kind, some, unit in (("LINEAR", linear, 1.0), ("ANGULAR", ~linear, 1.0 / DEG)):
@@ -89,8 +88,6 @@ def _traj(machine: Machine) -> dict[str, str]:
             continue
         for what, of_axes in (("VELOCITY", limits.velocity), ("ACCELERATION", limits.acceleration)):
             fast = float(np.hypot.reduce(of_axes[some])) * unit
-            if kind == "LINEAR" and what == "VELOCITY" and math.isfinite(machine.largest_feed):
-                fast = min(fast, machine.largest_feed)
             result |= {f"DEFAULT_{kind}_{what}": repr(fast), f"MAX_{kind}_{what}": repr(fast)}
     return result
 

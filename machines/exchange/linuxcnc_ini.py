@@ -77,7 +77,7 @@ class _IniMachine:
                              hint="postproc machine new asks for the geometry itself")
             return False
         if any(word.lower().startswith("sparm=identityfirst") for word in entry.value.split()):
-            self.draft.warn("import.kinematics", f"{entry.said}: the control begins without {self.module}", entry.line,
+            self.draft.warning("import.kinematics", f"{entry.said}: the control begins without {self.module}", entry.line,
                             "switch it on before every program (motion.switchkins-type), or take sparm out", entry.file)
         return True
 
@@ -105,8 +105,8 @@ class _IniMachine:
             letters.remove("W")
             entry = self.ini.first("TRAJ", "COORDINATES") or self.ini.first("KINS", "KINEMATICS")
             assert entry is not None
-            self.draft.warn("import.axis", "W lengthens the tool under 5axiskins; it is left out and must stand at 0",
-                            entry.line, "no program made for this machine moves W: leave it where its HOME is", entry.file)
+            self.draft.warning("import.axis", "W lengthens the tool under 5axiskins: it is left out, no program moves it, "
+                               "and it must stand at 0", entry.line, "", entry.file)
         return letters
 
     def _geometry(self, letters: list[str]) -> None:
@@ -141,7 +141,7 @@ class _IniMachine:
                              "file", word.line, f"state it: --set {pin}=VALUE", word.file)
         elif word is None and self.hal.unread:
             names = ", ".join(entry.value for entry in self.hal.unread)
-            self.draft.warn("import.pin", f"{pin} is set nowhere in what was read, so it is LinuxCNC's {default:g}; "
+            self.draft.warning("import.pin", f"{pin} is set nowhere in what was read, so it is LinuxCNC's {default:g}; "
                             f"{names} was not read", self.hal.unread[0].line, f"compare it with halcmd getp {pin}, and "
                             f"state it: --set {pin}=VALUE")
         if word is None or value is None:
@@ -167,7 +167,7 @@ class _IniMachine:
         best = (min if least else max)(numbers, key=lambda one: one[0])
         other = next((entry for value, entry in numbers if value != best[0]), None)
         if other is not None:
-            self.draft.note("import.tighter", f"{other.said} and {best[1].said}: the tighter one counts", other.line,
+            self.draft.info("import.tighter", f"{other.said} and {best[1].said}: the tighter one counts", other.line,
                             other.file)
         return best
 
@@ -226,6 +226,8 @@ class _IniMachine:
         for key in ("tool_change", "clamp", "unclamp"):
             if (entry := self.ini.first(OWN, key.upper())) and entry.number is not None:
                 self.draft.put(("timing", key), entry.number, entry.line, entry.said, entry.file)
+        if (entry := self.ini.first(OWN, "LARGEST_FEED")) and entry.number:
+            self.draft.put(("control", "largest_feed"), entry.number, entry.line, entry.said, entry.file)
         if entry := self.ini.first(OWN, "RETRACT_AXIS"):
             self.draft.put(("retract_axis",), entry.value, entry.line, entry.said, entry.file)
         elif "Z" in letters and self.module != "lineardeltakins":

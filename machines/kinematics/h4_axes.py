@@ -11,10 +11,10 @@ import numpy as np
 
 from machines.kinematics.base import as_points
 from machines.kinematics.columns import of_one
-from machines.kinematics.h4_linear import ROUND_OFF, H4Linear, Pair, tilted, unit
+from machines.kinematics.h4_linear import ROUND_OFF, H4Linear, Pair, tilted
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats
-from toolpaths.rotations import wrap
+from toolpaths.rotations import unit, wrap
 from toolpaths.shapes import arrays
 
 X, UP = (1.0, 0.0, 0.0), [0.0, 0.0, 1.0]

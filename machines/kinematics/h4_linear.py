@@ -25,6 +25,7 @@ from machines.kinematics.sliders import Legs
 from machines.kinematics.taylor import TaylorAngle, TaylorVector
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
+from toolpaths.rotations import unit
 
 ROUND_OFF = 1e-12
 """rad: directions nearer than this are the same"""
@@ -266,10 +267,3 @@ def tilted(v: Floats, tilt: Floats) -> Floats:
     turned = np.empty((len(tilt), 3))
     turned[:, 0], turned[:, 1], turned[:, 2] = v[:, 0] + 0.0 * c, c * v[:, 1] - s * v[:, 2], s * v[:, 1] + c * v[:, 2]
     return turned
-
-
-def unit(v: Floats) -> Floats:
-    """Unit vectors (N, 3) along v (N, 3); NaN where v is 0."""
-    norm = np.linalg.norm(v, axis=1, keepdims=True)
-    result: Floats = v / np.where(norm > 0.0, norm, np.nan)
-    return result

@@ -28,7 +28,7 @@ from machines.kinematics.frames import reference_x, spin_about
 from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.rotations import angle_between, cross, lengths, wrap
+from toolpaths.rotations import angle_between, cross, dot, lengths, unit, wrap
 from toolpaths.shapes import arrays
 
 ROUND_OFF = 1e-12
@@ -359,13 +359,13 @@ class Serial(Kinematics):
         The directions in reach are a zone about the first rotary axis, so the nearest one lies on the great
         circle through that axis. Where `axis` lies along it, the direction at its zero angle is taken.
         """
-        unit, pole = _unit(as_points(axis, 3, "axis")), self._pole()
+        wanted, pole = unit(as_points(axis, 3, "axis")), self._pole()
         low, high = self.reach()
-        from_pole = angle_between(unit, pole)
+        from_pole = angle_between(wanted, pole)
         kept = np.clip(from_pole, low, high)[:, None]
-        across = unit - _dot(unit, pole)[:, None] * pole
-        side = np.where(_along(pole, unit)[:, None], perpendicular(pole, self.tool_axis), across)
-        side = _unit(np.where(np.linalg.norm(side, axis=1, keepdims=True) > 0.0, side, basis(pole)[0]))
+        across = wanted - dot(wanted, pole)[:, None] * pole
+        side = np.where(_along(pole, wanted)[:, None], perpendicular(pole, self.tool_axis), across)
+        side = unit(np.where(np.linalg.norm(side, axis=1, keepdims=True) > 0.0, side, basis(pole)[0]))
         projected = np.cos(kept) * pole + np.sin(kept) * side
         result: Floats = np.where(self._in_reach(from_pole)[:, None], axis, projected)
         return result
@@ -385,15 +385,4 @@ class Serial(Kinematics):
 def _along(direction: Floats, v: Floats) -> Bools:
     """True (N,) where v (N, 3) lies along +-direction."""
     result: Bools = lengths(cross(v, direction)) < ROUND_OFF
-    return result
-
-
-def _unit(v: Floats) -> Floats:
-    norm = np.linalg.norm(v, axis=1, keepdims=True)
-    result: Floats = v / np.where(norm > 0.0, norm, np.nan)
-    return result
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    result: Floats = np.sum(a * b, axis=-1)
     return result

@@ -18,19 +18,22 @@ from postproc.cli.console import (
 )
 from postproc.cli.group import Group
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
+from postproc.cli.machine_new import EXAMPLES as NEW
+from postproc.cli.machine_new import machine_new
 from postproc.cli.setup_align import EXAMPLES as ALIGNED
 from postproc.cli.setup_align import setup_align
 from postproc.cli.setup_new import EXAMPLES, setup_new
 from toolpaths.table_text import table_text
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                          help="Machines: list, show, check, analyse, import, export, schema.")
+                          help="Machines: new, list, show, check, analyse, import, export, schema.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                         help="Set-up files: new, align, check, schema.")
 
 
+machine_app.command("new", epilog=NEW)(machine_new)
 machine_app.command("import", epilog=IMPORTED)(machine_import)
 machine_app.command("export", epilog=EXPORTED)(machine_export)
 setup_app.command("new", epilog=EXAMPLES)(setup_new)
@@ -67,6 +70,7 @@ def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")]
     import machines
 
     m, found = machines.load_checked(file)
+    found = [*found, *machines.implausible(file)] if m is not None else found
     good = f"{file}: OK: {m.name}, {m.structure}, axes {' '.join(m.axis_names)}" if m else ""
     report(tuple(found), json, {"name": m.name if m else None, "diagnostics": [d.as_dict() for d in found]}, good)
 

@@ -14,7 +14,8 @@ from postproc.collision.swept import Swept
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, begins
-from postproc.reference.moves import Moves, Phase
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, has_errors, info
 from toolpaths.shapes import arrays

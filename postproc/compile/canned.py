@@ -11,7 +11,8 @@ from postproc.controllers.cycles import CannedCycle
 from postproc.controllers.model import ControllerFile
 from postproc.path.model import FEED, TRAVERSE, JointPath
 from postproc.reference.events import spindle_states
-from postproc.reference.moves import Moves, Phase
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
 from toolpaths.choices import CycleKind
 from toolpaths.toolpath import Cycle, Kind, Toolpath

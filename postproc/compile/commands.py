@@ -27,7 +27,8 @@ from postproc.reference.events import (
     tool_changes,
     words,
 )
-from postproc.reference.moves import Moves, Phase
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.toolpath import Event, Toolpath

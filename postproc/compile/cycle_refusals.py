@@ -8,7 +8,8 @@ from postproc.compile.canned import cycle_key, cycle_spec, falls, may_cycle
 from postproc.controllers.model import ControllerFile
 from postproc.path.model import JointPath
 from postproc.reference.events import spindle_states
-from postproc.reference.moves import Moves, Phase
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
 from toolpaths.choices import CycleKind
 from toolpaths.diagnostics import Diagnostic, error, info

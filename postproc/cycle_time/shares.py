@@ -86,10 +86,14 @@ def operations(e: Estimate, s: TimeShares) -> list[dict[str, object]]:
             for k, name in enumerate(e.blocks.operations)]
 
 
-def most_expensive(e: Estimate, s: TimeShares, count: int = 10) -> list[dict[str, object]]:
+_PLACES = 10
+"""most expensive ones that are named"""
+
+
+def most_expensive(e: Estimate, s: TimeShares) -> list[dict[str, object]]:
     """The places where most time goes beyond the feed of the program: lines, seconds lost, why."""
     lost = sum((values for name, values in s.by_cause.items() if name != "feed"), np.zeros(len(e.blocks)))
-    order: Ints = np.argsort(-np.asarray(lost), kind="stable")[:count]
+    order: Ints = np.argsort(-np.asarray(lost), kind="stable")[:_PLACES]
     names = [name for name in CAUSES if name != "feed"]
     result: list[dict[str, object]] = []
     for k in order.tolist():

@@ -21,7 +21,7 @@ from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.text.canonical import Canonical
-from postproc.reference.moves import Phase
+from postproc.reference.holes import Phase
 from postproc.setup.model import SetupFile, at_places, part_placement
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors

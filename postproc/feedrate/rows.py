@@ -17,6 +17,7 @@ import numpy as np
 from postproc.feedrate.limits import JointLimits, ToolLimits, steady_cap
 from postproc.feedrate.paths import Derivatives, Eased, ParametricToolPath
 from toolpaths.arrays import Floats, Ints
+from toolpaths.rotations import unit
 
 UNBOUND = 1e4
 """Where no velocity bounds x, this many times the steady cap does, so that numbers stay comparable."""
@@ -71,11 +72,11 @@ def tool(eased: Eased, sigma: Floats, s: Floats) -> ToolMotion:
     """The tool at sigma (N,), s (4, N) as of `Eased.parameter`."""
     path, inside = cast(ParametricToolPath, eased.path), eased.inside(s[0])
     inner = path.tip(inside)
-    tangent = _unit(inner.dq)
+    tangent = unit(inner.dq, 0.0)
     normal = _across(inner.d2q, tangent)
     flat = np.linalg.norm(normal, axis=1) <= 1e-12 * np.linalg.norm(inner.d2q, axis=1)
     normal[flat] = _across(inner.d3q, tangent)[flat]
-    normal = _unit(normal)
+    normal = unit(normal, 0.0)
     tilt = np.linalg.norm(path.axis(inside).dq, axis=1) * s[1]
     return ToolMotion(eased.chained(sigma, s, inner), (tangent, normal, np.cross(tangent, normal)), tilt)
 
@@ -116,11 +117,6 @@ def _capped(at: Derivatives, limits: JointLimits, joints: Floats, tool: Floats, 
     if not np.all(np.isfinite(cap)):
         raise ValueError("the path stands still somewhere between its ends: no limit bounds the speed there")
     return LimitRows(at.dq, at.d2q, at.d3q, limits, cap, np.where(which > named, count, which))
-
-
-def _unit(vectors: Floats) -> Floats:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.asarray(np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0))
 
 
 def _across(vectors: Floats, tangent: Floats) -> Floats:

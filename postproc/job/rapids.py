@@ -18,7 +18,8 @@ from machines.machine import Machine
 from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.modes import CONSTANT, OutputModes
-from postproc.joints.joint_path import TRAVEL_SLACK, nearest_solution
+from postproc.joints.joint_path import nearest_solution
+from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.path.blocks import rapid_codes
 from postproc.path.links import MARGINS, SafeSpace
 from postproc.reference.moves import Moves

@@ -5,14 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from machines.machine import Limits
-from postproc.joints.lattice import PoseRun
-from postproc.joints.plan import RunSolution, plan_runs
-from postproc.joints.tracks import TRAVEL_SLACK, distance
+from postproc.joints.tracks import distance
 from toolpaths.arrays import Floats, Ints, repeated
 from toolpaths.rotations import angle_between, wrap
-
-__all__ = ["TRAVEL_SLACK", "RunSolution", "branch_of", "nearest_solution", "reachable_axes", "solve", "wrap"]
 
 
 def reachable_axes(kin: Kinematics, axis: Floats, tolerance: float) -> tuple[Floats, Floats]:
@@ -27,12 +22,6 @@ def reachable_axes(kin: Kinematics, axis: Floats, tolerance: float) -> tuple[Flo
     if not use.any():
         return axis, repeated(0.0, len(axis))
     return np.where(use[:, None], nearest, axis), np.where(use, off, 0.0)
-
-
-def solve(kin: Kinematics, tip: Floats, axis: Floats, limits: Limits, start: Floats,
-          may_rewind: bool = False) -> RunSolution:
-    """The joints of a run of poses (N, 3), (N, 3) that begins after a stop at joints `start` (J,): see `plan_runs`."""
-    return plan_runs([PoseRun(kin, tip, axis)], limits, start, None, may_rewind)[0]
 
 
 def nearest_solution(kin: Kinematics, tip: Floats, axis: Floats, near: Floats,

@@ -13,7 +13,8 @@ from postproc.control.word_arcs import PLANE_COLUMNS, WordArcs, word_arcs
 from postproc.joints.joint_path import nearest_solution
 from postproc.path.linearise import family_turns, linearise
 from postproc.path.model import ARC, FEED, TRAVERSE
-from postproc.reference.moves import Moves, Phase
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints, joined, repeated, taken
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves

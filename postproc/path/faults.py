@@ -7,8 +7,8 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.control.control import Control
-from postproc.joints.joint_path import TRAVEL_SLACK
 from postproc.joints.spin import spins_off
+from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, info

@@ -16,7 +16,8 @@ from machines.kinematics.base import Kinematics
 from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.modes import WordFrame
-from postproc.joints.joint_path import TRAVEL_SLACK, nearest_solution
+from postproc.joints.joint_path import nearest_solution
+from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.path.blocks import LEG, PARTS, PathBuilder, rapid_codes
 from postproc.path.linearise import linearise
 from postproc.path.links import LEG_TOLERANCE, RISE, SAMPLES, SafeSpace, has_retract_axis

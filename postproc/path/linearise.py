@@ -12,10 +12,10 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.control.control import Control
-from postproc.joints.joint_path import branch_of, nearest_solution, wrap
+from postproc.joints.joint_path import branch_of, nearest_solution
 from postproc.path.bound import CurveBlocks, bounds
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.rotations import angle_between
+from toolpaths.rotations import angle_between, wrap
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 

@@ -14,7 +14,8 @@ import postproc.path.reach as reach
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.control.control import Control
-from postproc.joints.joint_path import TRAVEL_SLACK, nearest_solution
+from postproc.joints.joint_path import nearest_solution
+from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.path.linearise import linearise
 from postproc.reference.moves import Moves
 from postproc.setup.model import Placement, SetupFile

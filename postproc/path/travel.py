@@ -10,7 +10,7 @@ from machines.kinematics.base import Kinematics
 from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
-from postproc.joints.joint_path import TRAVEL_SLACK
+from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.path.model import ARC, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints

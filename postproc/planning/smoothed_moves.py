@@ -15,6 +15,7 @@ import numpy as np
 from postproc.planning.pass_geometry import chains
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.rotations import unit
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.smooth import STILL, Smooth, Tolerance, smooth_all
 
@@ -67,7 +68,7 @@ def smoothed_moves(moves: Moves, tolerance: Tolerance, stops: Ints, grain: Toler
         values = found.members.at(places, found.s[inside + 1])
         tip[begin + inside] = values[:, :3]
         if (moves.axis[begin:last] != moves.axis[begin - 1]).any():
-            axis[begin + inside] = _unit(values[:, 3:])
+            axis[begin + inside] = unit(values[:, 3:])
     share = _shares(moves, tip, axis, grain or Tolerance(0.2 * tolerance.tip, 0.2 * tolerance.axis))
     wanted = (tip != moves.tip).any(axis=1) | (axis != moves.axis).any(axis=1)
     tip, axis = _part(moves, tip, axis, share)
@@ -133,7 +134,7 @@ def _part(moves: Moves, tip: Floats, axis: Floats, share: Floats) -> tuple[Float
     tip[less] = moves.tip[less] + part * (tip[less] - moves.tip[less])
     turned = less[(axis[less] != moves.axis[less]).any(axis=1)]
     between = moves.axis[turned] + share[turned, None] * (axis[turned] - moves.axis[turned])
-    axis[turned] = np.where(share[turned, None] > 0.0, _unit(between), moves.axis[turned])
+    axis[turned] = np.where(share[turned, None] > 0.0, unit(between), moves.axis[turned])
     return tip, axis
 
 
@@ -157,7 +158,3 @@ def _inside(found: Smooth) -> tuple[Ints, Ints]:
     inner = members.spline[segment] & (found.s[1:] > members.s[segment]) & (found.s[1:] < members.s[segment + 1])
     rows = np.flatnonzero(inner)
     return rows, segment[rows]
-
-
-def _unit(v: Floats) -> Floats:
-    return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))

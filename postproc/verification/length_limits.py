@@ -23,7 +23,8 @@ from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.execution.poses import BlockPoses, begins
 from postproc.readback.text.canonical import Canonical
-from postproc.reference.moves import Moves, Phase
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves
 from postproc.setup.model import ToolSetup
 from postproc.verification.executed import executed_poses
 from toolpaths.arrays import Bools, Floats, Ints

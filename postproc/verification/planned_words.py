@@ -37,8 +37,8 @@ class WrittenBlocks:
         return cls((np.cumsum(keep) - 1)[path.move[rows]], needed[rows], np.nan_to_num(path.seconds[rows]))
 
 
-def check_planned(path: JointPath, moves: Moves, needed: Floats, merge: float, comparison: Comparison, job: Job,
-                  gcode: str = "") -> list[Diagnostic]:
+def check_planned(path: JointPath, moves: Moves, needed: Floats, merge: float, comparison: Comparison,
+                  job: Job) -> list[Diagnostic]:
     """Errors of blocks whose F words do not carry the plan.
 
     Args:
@@ -46,7 +46,7 @@ def check_planned(path: JointPath, moves: Moves, needed: Floats, merge: float, c
         merge: part by which feeds may have been lowered to be alike
     """
     motion, reference = comparison.executed[1], comparison.moves.without_pecks()
-    written, faults = WrittenBlocks.of(path, moves, needed), Faults(job.toolpath.file, gcode)
+    written, faults = WrittenBlocks.of(path, moves, needed), Faults(job.toolpath.file)
     count = len(reference)
     cutting = (motion.code > 0) & reference.run_by(comparison.owner) & ~motion.hole
     cutting &= (reference.hole < 0)[np.minimum(comparison.owner, count - 1)]

@@ -123,7 +123,8 @@ def offset_joints(control: Control) -> Floats | None:
     """(J,) joints of the program's zero; None where words are no machine coordinates by it, or it holds a tool's length."""
     if control.base == "tcp" or control.measured or not control.machine.kinematics.straight_slides:
         return None
-    return control.zero
+    return np.asarray(np.where(np.isin(np.arange(len(control.unit)), control.rotary), control.zero,
+                               control.work_offset / _units(control.machine.axis_names)))
 
 
 def _units(letters: tuple[str, ...]) -> Floats:

@@ -21,7 +21,7 @@ FEEDS = {"MMPM": (1.0, False), "IPM": (25.4, False), "FPM": (304.8, False), "MPM
          "IPS": (1524.0, False), "PERMIN": (None, False), "MMPR": (1.0, True), "IPR": (25.4, True), "FPR": (304.8, True),
          "PERREV": (None, True)}
 _SILENT = """
-    PARTNO PPRINT INSERT REMARK TPRINT LPRINT PPLABEL LETTER UNITS UNIT KNOT MULTAX FINI PAINT PPWORD PPFUN SYN OPFEATSTART
+    PARTNO PPRINT INSERT REMARK TPRINT LPRINT PPLABEL LETTER UNITS UNIT MULTAX FINI PAINT PPWORD PPFUN SYN OPFEATSTART
     OPFEATEND MOVE_ATTRIB BOX SETUP SWITCH DISPLY AUTOPS PSIS INTOL OUTTOL TOLER LINTOL MACHIN ALIGN PLABEL CLPRNT NOPOST
     PLOT CSI_SET_EXTENSION_LENGTH CSI_SET_FLUTE_LENGTH MCHTOL TOOLNO TRNTYP SELECT OPSKIP SEQNO MODE REWIND
     CLAMP BREAK CHECK LEADER HEAD POD AIR SLOWDN UNLOAD SELCTL OFSTNO CLEARP CLRSRF RETRCT END-OF-PATH START_OP END_OP
@@ -123,14 +123,6 @@ def _zsurf(e: Execution, r: Record, line: int) -> None:
 
 def _nurbs(e: Execution, r: Record, line: int) -> None:
     e.spline, e.spline_line = ([], []), line
-
-
-def _knot(e: Execution, r: Record, line: int) -> None:
-    e.spline[0].extend(r.numbers)
-
-
-def _cntrl(e: Execution, r: Record, line: int) -> None:
-    e.spline[1].append(tuple(r.numbers))
 
 
 def _end_spline(e: Execution) -> None:
@@ -361,9 +353,10 @@ def _cycle(e: Execution, r: Record, line: int) -> None:
 
 HANDLERS: dict[str, Callable[[Execution, Record, int], None]] = {
     "GOTO": _goto, "GODLTA": _godlta, "FROM": _from, "GOHOME": _gohome, "TLAXIS": _tlaxis, "ZSURF": _zsurf, "NURBS": _nurbs,
-    "KNOT": _knot, "CNTRL": _cntrl, "MSYS": _msys, "CSYS": _csys, "$$->CSYS": _csys, "CAMERA": _csys, "CATIA0": _csys,
-    "TRANS": _turned, "ROTATE": _turned, "ROTABL": _turned, "SUB-BEGIN": _sub, "SUB-END": _sub, "SUB-UNKNOWN": _sub_unknown,
-    "CIRCLE": _circle, "MOVARC": _circle, "INDIRV": _indirv, "TLON,GOFWD": _tlon,
+    "CNTRL": lambda e, r, line: e.spline[1].append(tuple(r.numbers)), "TRANS": _turned,
+    "KNOT": lambda e, r, line: e.spline[0].extend(r.numbers), "MSYS": _msys, "CSYS": _csys, "$$->CSYS": _csys,
+    "CAMERA": _csys, "CATIA0": _csys, "ROTATE": _turned, "ROTABL": _turned, "SUB-BEGIN": _sub, "SUB-END": _sub,
+    "SUB-UNKNOWN": _sub_unknown, "CIRCLE": _circle, "MOVARC": _circle, "INDIRV": _indirv, "TLON,GOFWD": _tlon,
     "RAPID": lambda e, r, line: e.rapid.add(e.row), "FEDRAT": _fedrat, "LOAD": _load, "LOADTL": _load, "TURRET": _load,
     "TOOL PATH": _tool_path, "TPRINT": lambda e, r, line: _named(e, r.body.split(",")[0]), "SPINDL": _spindl,
     "COOLNT": _coolnt, "AUXFUN": _by_code, "PREFUN": _by_code, "INSERT": _by_code, "CUTTER": _cutter, "TLDATA": _cutter,

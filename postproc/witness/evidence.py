@@ -123,8 +123,8 @@ class ExecutedBlocks:
         columns = {f.name: getattr(self, f.name)[rows] for f in fields(self)
                    if f.name not in ("start", "begins") and isinstance(getattr(self, f.name), np.ndarray)}
         approach = self.approach_at
-        stops = tuple((int(np.searchsorted(rows, at)), number) for at, number in self.stops)
-        return replace(self, **columns, stops=stops, begins=self.before(rows), steps=lambda some: self.steps(rows[some]),
+        stops = tuple((int(np.searchsorted(rows, k)), number) for k, number in self.stops)
+        return replace(self, **columns, begins=self.before(rows), stops=stops, steps=lambda some: self.steps(rows[some]),
                        joints_at=lambda some, t: self.joints_at(rows[some], t),
                        poses_at=lambda some, t: self.poses_at(rows[some], t),
                        approach_at=None if approach is None else lambda some, t: approach(rows[some], t))

@@ -229,8 +229,7 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
 
 def _coolants(c: Commanded, setup: dict[str, Any]) -> Array:
     """(N,) coolant, the set-up's for a tool that no COOLNT record is for: its own, or [output] where none flows."""
-    own, default = _stated_coolant(setup)
-    tool, result, silent = tools_of(c, setup), c.coolant.copy(), c.coolant == UNKNOWN
+    (own, default), tool, result, silent = _stated_coolant(setup), tools_of(c, setup), c.coolant.copy(), c.coolant == UNKNOWN
     begin = _loads(tool)
     later = np.isin(begin, begin[~silent & (c.flowed >= begin) & (c.coolant != 0)])
     others = ~later & (silent | ((c.flowed < begin) & (c.coolant != UNFOLLOWED)))
@@ -250,12 +249,11 @@ def _said(state: _State, value: float) -> str:
     """A state in words; UNKNOWN of the file as nothing that is stated."""
     if value == UNKNOWN:
         return "nothing"
-    if state == "length":
-        return f"{value:g}" if value >= 0 else "none"
-    if state == "tool":
-        return f"T{value:g}" if value >= 0 else "the tool in the spindle"
-    names = _SPINDLE if state == "spindle" else _COOLANT if state == "coolant" else {}
-    return names.get(int(value), f"{value:g}") if state != "coolant" or value in names else "on"
+    if state in ("length", "tool"):
+        names = ("none", f"{value:g}") if state == "length" else ("the tool in the spindle", f"T{value:g}")
+        return names[int(value >= 0)]
+    words = _SPINDLE if state == "spindle" else _COOLANT if state == "coolant" else {}
+    return words.get(int(value), f"{value:g}") if state != "coolant" or value in words else "on"
 
 
 def _stated_coolant(setup: dict[str, Any]) -> tuple[dict[int, str], str | None]:

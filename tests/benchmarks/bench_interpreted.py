@@ -30,8 +30,7 @@ from tests.postproc.collision.test_collision_search import HERE, random_case
 from tests.postproc.feedrate_kit import MIKRON, random_path, uniform
 from toolpaths.smoothing import sweep
 from toolpaths.smoothing.bspline import KnotVectors
-from toolpaths.smoothing.fit import Normal
-from toolpaths.smoothing.sweep import Data
+from toolpaths.smoothing.sweep import Data, Normal
 
 
 def seconds(run: Callable[[], object]) -> float:

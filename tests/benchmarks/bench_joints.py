@@ -18,11 +18,11 @@ import machines
 from machines.machine import Limits, Machine
 from postproc.control.control import Control
 from postproc.joints.greedy import greedy
-from postproc.joints.joint_path import solve
 from postproc.joints.lattice import PoseRun, lattice_of
 from postproc.joints.plan import plan_runs
 from postproc.joints.singular_detours import lead_past
 from postproc.path.linearise import linearise
+from tests.postproc.joint_kit import solve
 from toolpaths.shape import Curves
 from toolpaths.units import DEG
 

@@ -21,7 +21,7 @@ from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.orientation.candidates.candidate_times import turned, turned_all
 from postproc.orientation.candidates.candidates import tried
-from postproc.orientation.candidates.ranking import Ranking, prepare
+from postproc.orientation.candidates.ranking import Ranking, load_compiler
 from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import Pass, work_of
 from postproc.orientation.plans.choice import OrientationChoice
@@ -158,7 +158,7 @@ def ranking() -> None:
     for name in ("test_part.cls", "bicubic.cls"):
         work, _ = work_of(toolpaths.read(SAMPLES / name)[0], m, settings, Options())
         assert work is not None
-        prepare(work.passes * 100)
+        load_compiler()
         for one in work.passes[::max(1, len(work.passes) // 10)]:
             axes = np.column_stack((rng.uniform(-0.7, 0.7, (20, 2)), np.ones(20)))
             ranked = Ranking(turned(one, one.axis, m))

@@ -21,10 +21,10 @@ import machines
 import toolpaths
 from machines.machine import Machine
 from postproc.base.options import Options
-from postproc.cycle_time.conversion import from_conversion
 from postproc.cycle_time.estimate import estimate
 from postproc.cycle_time.model import load_model
 from postproc.cycle_time.planned import planned_times
+from postproc.cycle_time.source import from_conversion
 from postproc.pipeline.convert import convert
 from postproc.placement.place import PlacementChoice, place
 from postproc.placement.place_times import Timer

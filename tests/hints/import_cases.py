@@ -16,7 +16,13 @@ def _case(code: str, says: str, ini: str, *does: Edit, **files: str) -> HintCase
     return HintCase(code, IMPORT, {"shop.ini": ini, **more}, says, does)
 
 
+TABLE = "$MC_TRAFO_TYPE_1=40\n$MC_TRAFO5_AXIS1_1[0]=-1\n$MC_TRAFO5_BASE_TOOL_1[2]=-600\n"
+RECORD = '$TC_CARR23[1]="P"\n$TC_CARR7[1]=-1\n$TC_CARR6[1]=-600\n$TC_CARR46[1]=0.004\n'
+
 IMPORTS = [
+    _case("import.line", r"write (\$NAME\[index\] = value)", TABLE + "$MA_MAX_AX_VELO(X1)=30000\n",
+          Edit("shop.ini", "(X1)", "[X1]")),
+    _case("import.fine", "add them to the vectors", RECORD, Edit("shop.ini", "=-600\n$TC_CARR46[1]=0.004", "=-599.996")),
     _case("import.unit", "write one of (mm),", XYZ.replace("UNITS = mm", "UNITS = elle"), Edit("shop.ini", "elle", r"\1")),
     _case("import.geometry", r"STRUCTURE = (w A' b X Y Z \(C1\) t), POINT_A = (0 0 0)",
           HEADER.format(kins="trivkins coordinates=XYZA") + JOINTS,

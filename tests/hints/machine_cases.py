@@ -32,6 +32,8 @@ def _case(code: str, says: str, name: str, old: str, new: str, *does: tuple[str,
 
 
 MILL, H4A, DELTA, MIKRON = "mill-3axis", "h4a-c-table", "delta-cone", "mikron-ucp710"
+SHEET = "description = 'Our mill'\nsource = 'brochure'\n" + "".join(
+    f"[{letter}]\ntravel = \"500 mm\"\nrapid = \"30 m/min\"\n" for letter in "XYZ")
 C_TABLE = '[axes.C]\ntravel = "unlimited"\n'
 _TIMING = re.search(r"^\[timing\]\n(?:[^\[].*\n?|\n)*", machine_text(MILL), re.MULTILINE)
 assert _TIMING is not None
@@ -254,6 +256,22 @@ MACHINE = [
           'source.travel = "lost: ', ("[sources.list]", r'\1\n\2 = "our sheet"\n\3 = "maker"\n\n[sources.list]')),
     _case("machine.source", "take it out of `(assumed)`", "haas-umc-750", 'assumed = ["acceleration", ',
           'assumed = ["travel", "acceleration", ', ('["travel", ', "[")),
+    _case("machine.plausible", "mm/min and deg/min are (divided) by 60", MILL, "velocity = 500", "velocity = 30000",
+          ("velocity = 30000", "velocity = 500")),
+    HintCase(
+        "sheet.figure",
+        "machine new s.toml -o m.toml",
+        {"s.toml": SHEET.replace("30 m/min", "30")},
+        "a speed is in (m/min),",
+        (Edit("s.toml", '"30"', r'"30 \1"'),),
+    ),
+    HintCase(
+        "sheet.unanswered",
+        "machine new s.toml -o m.toml",
+        {},
+        "write (s.toml) and name it again",
+        (Edit("s.toml", "", SHEET),),
+    ),
     HintCase(
         "file.encoding",
         CHECK,

@@ -241,8 +241,6 @@ END-OF-PATH""")
 SIDE = MILLED.replace("GOTO/-20,14,-3\n", "CUTCOM/LEFT,7\nGOTO/-20,14,-3\n").replace(
     "RAPID\nGOTO/-30,30,50", "CUTCOM/OFF\nGOTO/-34,34,-3\nRAPID\nGOTO/-30,30,50")
 COOLED = NX.replace("COOLNT/FLOOD", "COOLNT/THRU").replace("COOLNT/MIST", "COOLNT/AIR")
-SPLINE = MILLED.replace("GODLTA/-6,3,0\n", "NURBS\nKNOT/0.5,1.0\nCNTRL/-22,16,-3\nCNTRL/-24,20,-3\nCNTRL/-26,17,-3\n"
-                        "CNTRL/-26,17,-3\n")
 BALLS = """UNITS/MM
 CUTTER/10,5
 LOADTL/1
@@ -336,7 +334,6 @@ CASES: dict[str, Case] = {
     **{f"rests {name}": Case(RESTS, "mill-3axis", c) for name, c in SIX.items()},
     **{f"side {name}": Case(SIDE, "mill-3axis", c) for name, c in SIX.items()},
     **{f"cooled {name}": Case(COOLED, "mill-3axis", SIX[name]) for name in ("haas", "siemens", "linuxcnc")},
-    "spline": Case(SPLINE, "mill-3axis", "linuxcnc"),
     "chosen axes": Case(BALLS, "mikron-ucp710", "fanuc-30i", options={"orient": "auto"}),
     "measured": Case(MILLED, "mikron-ucp710", "linuxcnc", {**TURNED, "output": {"tool_call": False}}),
     "offset": Case(NX, "mill-3axis", "fanuc-30i", {**TURNED, "work_offset_code": "G56"}),

@@ -63,10 +63,10 @@ FAULTS = (
     Fault("register of CUTCOM read as the next", "reader", "cutcom", "tuple(w for w in s.words",
           "tuple(w + 1.0 if isinstance(w, float) else w for w in s.words", SIDE),
     Fault("knots of splines squared", "reader", "nurbs", "inner = np.array(knots) / knots[-1] if",
-          "inner = (np.array(knots) / knots[-1]) ** 2 if", ("spline",)),
+          "inner = (np.array(knots) / knots[-1]) ** 2 if", ("plane spline",)),
     Fault("splines as their control polygon", "reader", "nurbs",
           "pieces = arcs if 0 < len(arcs) < len(chords) else [(x, y, z, ()) for x, y, z in chords.tolist()]",
-          "pieces = [(x, y, z, ()) for x, y, z in control]", ("spline",)),
+          "pieces = [(x, y, z, ()) for x, y, z in control]", ("plane spline",)),
     Fault("last feed not taken", "reader", "fedrat",
           "b.feed.set(b.row, feed_in(numbers[0] if value is None else value, unit, b.scale))",
           "b.feed.set(b.row, feed_in(numbers[0] if value is None else value, unit, b.scale)) if "

@@ -22,9 +22,8 @@ MORE = {"register of ADJUST dropped": "contact", "feed of the file + 2 %": "flat
         "retract plane 1 mm lower": "flat fanuc", "mist read as flood": "flat linuxcnc",
         "no link where the axis turns": "faces linuxcnc", "coolant of the set-up as mist": "set-up",
         "DELAY not read": "rests linuxcnc", "STOP read as OPSTOP": "rests fanuc", "register of CUTCOM not read": "side haas",
-        "chips broken where they are to be cleared": "flat siemens",
-        "code of coolant through the tool not known": "cooled haas",
-        "dwell of cycles in revolutions x 60": "rests iso", "feed x 1.006": "milled",
+        "chips broken where they are to be cleared": "flat siemens", "dwell of cycles in revolutions x 60": "rests iso",
+        "code of coolant through the tool not known": "cooled haas", "feed x 1.006": "milled",
         "travel of the machine file 20 mm wider": "far", "feed x 1.1 where tool axes were chosen": "chosen axes"}
 
 

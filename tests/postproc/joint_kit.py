@@ -7,7 +7,10 @@ from functools import cache
 import numpy as np
 
 import machines
-from machines.machine import Machine
+from machines.kinematics.base import Kinematics
+from machines.machine import Limits, Machine
+from postproc.joints.lattice import PoseRun
+from postproc.joints.plan import RunSolution, plan_runs
 from toolpaths.shape import Curves
 
 DEG = np.pi / 180.0
@@ -17,6 +20,11 @@ DEG = np.pi / 180.0
 def machine(name: str) -> Machine:
     """A built-in machine, loaded once."""
     return machines.load(name)
+
+
+def solve(kin: Kinematics, tip: np.ndarray, axis: np.ndarray, limits: Limits, start: np.ndarray) -> RunSolution:
+    """The joints of a run of poses (N, 3), (N, 3) that begins after a stop at joints `start` (J,): see `plan_runs`."""
+    return plan_runs([PoseRun(kin, tip, axis)], limits, start, None, False)[0]
 
 
 def unit(v: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from postproc.job.job import Job
+from postproc.readback.comparison.checks import block_seconds
 from postproc.readback.comparison.compare import Comparison
 from postproc.verification.read_back import read_back
 from toolpaths.diagnostics import Severity
@@ -106,12 +107,15 @@ def verdict(job: Job, text: str, effect: Effect) -> str:
 
 @dataclass(frozen=True)
 class Effect:
-    """What a program does: rows that move, where they end, whether they link, and what holds there; the rest behind each."""
+    """What a program does: rows that move, where they end, whether they link, what holds there and the rest behind each;
+    the move of the CL file that each is part of, and the seconds of all cuts of that move."""
 
     end: np.ndarray
     link: np.ndarray
     states: dict[str, np.ndarray]
     line: np.ndarray
+    move: np.ndarray
+    seconds: np.ndarray
 
     @classmethod
     def of(cls, job: Job, comparison: Comparison) -> Effect:
@@ -135,15 +139,21 @@ class Effect:
             states.pop("radius")
         states = {k: np.broadcast_to(v, (len(motion),))[keep] for k, v in states.items()}
         states["dwell"] = np.round(rest, 9)
-        return cls(motion.end[keep], link[keep], states, np.broadcast_to(motion.line, (len(motion),))[keep])
+        spent = np.where(cut, block_seconds(motion, job.control, job.controller.feed.arc_inverse == "radius"), 0.0)
+        seconds = np.where(link, spent, np.bincount(owner, weights=np.nan_to_num(spent))[owner])
+        return cls(motion.end[keep], link[keep], states, np.broadcast_to(motion.line, (len(motion),))[keep], owner[keep],
+                   seconds[keep])
 
     def kept(self, keep: np.ndarray) -> Effect:
         """Some of the rows."""
         return Effect(self.end[keep], self.link[keep], {k: v[keep] for k, v in self.states.items()},
-                      self.line[keep])
+                      self.line[keep], self.move[keep], self.seconds[keep])
 
     def against(self, other: Effect) -> str:
         """What differs in the other program."""
+        short = self.without_spare(other)
+        if short is not self and short.apart(other) in ("same", "near"):
+            return "near"
         whole = self.apart(other)
         if whole in ("same", "near"):
             return whole
@@ -155,21 +165,44 @@ class Effect:
         """The same for all rows."""
         if len(self.end) != len(other.end):
             return f"rows {len(self.end)} {len(other.end)}"
-        unlike = [name for name, a in self.states.items() if not _equal(a, other.states[name])]
+        near = [name for name, alike in (("feed", self.as_fast_as(other)), ("blend", self.rounds_more_than(other))) if alike]
+        changed = [name for name, a in self.states.items() if not _equal(a, other.states[name])]
+        unlike = [name for name in changed if name not in near]
         if unlike:
             name = unlike[0]
             both = zip(self.states[name], other.states[name], strict=True)
             k = next(k for k, (a, b) in enumerate(both) if not _equal(a, b))
             return f"{' '.join(unlike)} in line {self.line[k]}: {self.states[name][k]} {other.states[name][k]}"
         off = np.abs(self.end - other.end).max(initial=0.0)
-        return "same" if off <= 1e-9 else "near" if off <= NEAR else f"ends {off:.4f} in line " \
+        return "same" if off <= 1e-9 and not changed else "near" if off <= NEAR else f"ends {off:.4f} in line " \
             f"{self.line[int(np.abs(self.end - other.end).max(axis=1).argmax())]}"
+
+    def without_spare(self, other: Effect) -> Effect:
+        """Without the first block that the other program has not, where a move has more of them behind it: linearising
+        leaves room, and the read-back has bounded the longer block."""
+        n = len(other.end)
+        if len(self.end) != n + 1:
+            return self
+        apart = np.append((np.abs(self.end[:n] - other.end) > NEAR).any(axis=1), True)
+        k = int(apart.argmax())
+        inside = k < n and self.move[k] == self.move[k + 1] and not self.link[k]
+        return self.kept(np.arange(len(self.end)) != k) if inside else self
+
+    def as_fast_as(self, other: Effect) -> bool:
+        """Whether each move takes its time: feeds of its blocks are not held to anything, but for that."""
+        return bool((np.abs(self.seconds - other.seconds) <= SHARE * self.seconds + MOMENT).all())
+
+    def rounds_more_than(self, other: Effect) -> bool:
+        """Whether the control rounds corners in the other program as much or less."""
+        return bool((other.states["blend"] <= self.states["blend"]).all())
 
 
 STILL = 0.01
 """mm or degrees: blocks that move less are none"""
 NEAR = 0.02
 """mm or degrees: twice the tolerance"""
+SHARE, MOMENT = 0.006, 1e-3
+"""of its time, and s: what the time of a move may differ by"""
 
 
 def _equal(a: Any, b: Any) -> bool:

@@ -7,8 +7,9 @@ from functools import cache
 
 import numpy as np
 
+from machines.choices import Rapids
 from machines.kinematics.base import Kinematics
-from postproc.control.control import Control, Rapids
+from postproc.control.control import Control
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.readback.dialects.iso import IsoReader
 from postproc.readback.dialects.readers import reader_for

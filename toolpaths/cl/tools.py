@@ -91,7 +91,7 @@ def _register(b: ToolpathBuilder, register: float | None) -> float | None:
     return None
 
 
-def change(b: ToolpathBuilder, number: float, register: float | None, more: tuple[float, ...] = ()) -> None:
+def change(b: ToolpathBuilder, number: float, register: float | None) -> None:
     """Load tool `number`; the event LOADTL and the tool index follow."""
     if number != math.floor(number) or not 0 <= number < _MAX_NUMBER:
         b.log.error("cl.tool-number", f"{number:g} is not a tool number", b.line,
@@ -105,7 +105,7 @@ def change(b: ToolpathBuilder, number: float, register: float | None, more: tupl
     if register is not None:
         state.fields["length_register"] = int(register)
     _drop_plain_load(b, number)
-    b.event("LOADTL", (number,) + (() if register is None else (register,)) + more)
+    b.event("LOADTL", (number,) + (() if register is None else (register,)))
     if b.declared is None:
         _use(b, state)
 

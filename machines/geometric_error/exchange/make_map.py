@@ -110,11 +110,11 @@ def divided(base: ErrorMap, parts: Sequence[int]) -> ErrorMap:
     return replace(base, nodes=tuple(nodes), table=np.zeros((*map(len, nodes), 6)))
 
 
-def probes(lattice: ErrorMap, rng: np.random.Generator, count: int = PROBES) -> Floats:
-    """Random places (count, D) inside a lattice."""
+def probes(lattice: ErrorMap, rng: np.random.Generator) -> Floats:
+    """Random places (PROBES, D) inside a lattice."""
     ends = [(nodes[0], nodes[-1]) for nodes, _ in lattice.closed()]
     low, high = np.array(ends).T
-    return rng.uniform(low, high, (count, len(ends)))
+    return rng.uniform(low, high, (PROBES, len(ends)))
 
 
 def refined(actual: Actual, nominal: Actual, base: ErrorMap, fixed: Floats, tolerance: float,

@@ -45,12 +45,12 @@ def measured(model: ErrorModel) -> dict[str, tuple[float, float]]:
     return result
 
 
-def samples(model: ErrorModel, machine: Machine, actual: Actual, count: int, seed: int = 0) -> Floats:
+def samples(model: ErrorModel, machine: Machine, actual: Actual, count: int) -> Floats:
     """Coordinates w (N, 3 + R), N <= count, spread over the volume and at its corners; only where the model holds."""
     lower, upper = ranges(model, machine)
     if np.any(lower > upper):
         return np.zeros((0, 3 + actual.turns))
-    w = actual.coordinates(_joints(machine, lower, upper, np.random.default_rng(seed), count))
+    w = actual.coordinates(_joints(machine, lower, upper, np.random.default_rng(0), count))
     w = w[np.isfinite(actual.aim(w)[0]).all(axis=1)]
     return np.asarray(w[~actual.outside(w, INSIDE).any(axis=1)])
 

@@ -162,9 +162,9 @@ def _checked(matrix: Floats, path: Path, names: list[str]) -> tuple[Floats | Non
     return 0.5 * (matrix + matrix.T), []
 
 
-def write_covariance(model: ErrorModel, length: float = UNITS["um"], angle: float = UNITS["arcsec"]) -> str:
+def write_covariance(model: ErrorModel) -> str:
     """The text of a covariance table of a model, in the units of its file."""
-    scale = np.array([angle if angular(name) else length for name in model.names])
+    scale = np.array([UNITS["arcsec" if angular(name) else "um"] for name in model.names])
     matrix = np.zeros((len(scale), len(scale))) if model.covariance is None else model.covariance
     rows = (f"{name}," + ",".join(f"{x:.12g}" for x in row)
             for name, row in zip(model.names, matrix / np.outer(scale, scale), strict=True))

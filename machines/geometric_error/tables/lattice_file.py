@@ -116,12 +116,12 @@ def _column_faults(table: CsvTable, letters: tuple[str, ...]) -> list[Diagnostic
     return found
 
 
-def map_to_csv(error_map: ErrorMap, length: str = "um", angle: str = "arcsec") -> str:
+def map_to_csv(error_map: ErrorMap) -> str:
     """The text of a map; what `map_from_csv` reads back."""
     columns = {letter: ("deg" if letter in ROTARY else "mm", column)
                for letter, column in zip(error_map.letters, error_map.places().T, strict=True)}
     values = error_map.table.reshape(-1, 6)
-    columns |= {name: (angle if k >= 3 else length, values[:, k]) for k, name in enumerate(COLUMNS)}
+    columns |= {name: ("arcsec" if k >= 3 else "um", values[:, k]) for k, name in enumerate(COLUMNS)}
     point = f"tip of a tool of {error_map.length:g} mm" if error_map.length else "gauge point"
     directions = "machine" if error_map.bed else "table"
     return write_csv(columns, [f"error map: {point}, actual less commanded, tool relative to part, directions of the "

@@ -11,7 +11,7 @@ from postproc.collision.form import ToolForm, tool_form
 from postproc.collision.swept import Swept, along_curves, joined
 from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.orientation.passes.reasons import Touching
-from postproc.reference.moves import Phase
+from postproc.reference.holes import Phase
 from toolpaths.arrays import Bools, Floats
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between

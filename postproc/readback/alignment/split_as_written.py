@@ -10,7 +10,8 @@ from postproc.path.model import TRAVERSE
 from postproc.readback.alignment.align import EndPoses, aligned
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses
-from postproc.reference.moves import Moves, Phase
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves
 from postproc.reference.split_rapids import CORNER, along, splittable, with_corners
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import lengths

@@ -36,7 +36,8 @@ from postproc.readback.comparison.taps import check_taps
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import SAMPLES, BlockPoses, arc_sweeps
 from postproc.readback.text.canonical import Canonical
-from postproc.reference.moves import Moves, Phase
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between, lengths

@@ -221,6 +221,8 @@ def test_modulo_and_largest_feed_go_there_and_back(tmp_path: Path) -> None:
     assert "axes.C.cutting_velocity" in export_linuxcnc(ours, "own")[1][0].message
     back = there_and_back(ours, tmp_path)
     assert back.turns == ours.turns and back.largest_feed == pytest.approx(ours.largest_feed)
+    assert ours.largest_feed < ours.limits.velocity[0]
+    np.testing.assert_allclose(back.limits.velocity, ours.limits.velocity, rtol=1e-14)
 
 
 def test_what_is_assumed_stays_assumed(tmp_path: Path) -> None:

@@ -20,9 +20,9 @@ from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load
 from postproc.base.options import Options
 from postproc.cli.app import app
-from postproc.correction.arcs import LOOSE
 from postproc.correction.compensation import SHARE
 from postproc.correction.error_context import one_orientation
+from postproc.correction.reversals import LOOSE
 from postproc.pipeline.convert import verify
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import load_setup

@@ -12,7 +12,8 @@ from postproc.feedrate import interior, solve_again, windows
 from postproc.feedrate.feed import AllowedFeed, StepFeed
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.mesh import Spacing
-from postproc.feedrate.plan import Plan, PlannerOptions, plan, plan_second_order
+from postproc.feedrate.motion import Plan
+from postproc.feedrate.plan import PlannerOptions, plan, plan_second_order
 from postproc.feedrate.problem import MotionKnots
 from postproc.feedrate.trajectory import JointTrajectory
 from postproc.feedrate.windows import Method, SolvedWindows, solved

@@ -11,8 +11,10 @@ import pytest
 
 import machines
 from machines.machine import Limits
-from postproc.joints.joint_path import nearest_solution, reachable_axes, solve, wrap
+from postproc.joints.joint_path import nearest_solution, reachable_axes
+from tests.postproc.joint_kit import solve
 from tests.postproc.kit import angle, great_circle, machine, tilted, unit
+from toolpaths.rotations import wrap
 
 DEG = np.pi / 180.0
 

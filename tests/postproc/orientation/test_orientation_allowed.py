@@ -194,7 +194,7 @@ def test_chosen_axes_are_inside_and_the_own_one_is_reported() -> None:
         assert 5.0 <= at.lead(made.axis[None]).min() / DEG <= 50.0
         assert -50.0 <= at.tilt(made.axis[None]).max() / DEG <= -5.0
         assert made.seconds < choice.tried[0].own.seconds
-    free, _ = oriented(path, SetupFile())
+    free, _ = oriented(along_x(), SetupFile())
     assert free is not None
     assert free.tried[0].best.seconds <= choice.tried[0].best.seconds * (1.0 + 1e-4)
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from postproc.control.control import Control
-from postproc.joints.joint_path import nearest_solution, solve
+from postproc.joints.joint_path import nearest_solution
 from postproc.path.linearise import CurvePieces, _Front, family_turns, linearise
+from tests.postproc.joint_kit import solve
 from tests.postproc.kit import angle, great_circle, machine, pose_of, tilted, unit
 from toolpaths.shape import Curves
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from postproc.control.modes import table_axes
 from postproc.controllers.model import builtin_files
-from postproc.path.zero_entry import table_axes
 from postproc.readback.text.words import plain
 from tests.postproc.kit import convert, toolpath
 from tests.postproc.kit import good as converted

@@ -263,7 +263,7 @@ EACH = 3
 HARMLESS = {
     "same": "the same motion, states and times: words that state what holds already, a block twice that goes nowhere",
     "placed": "only rapids between operations end elsewhere: the read-back has found them clear of the part, inside travel",
-    "near": "everything ends within the tolerance, by which it has been compared",
+    "near": "everything ends within the tolerance, by which it has been compared, in the time of its move, no rounder",
     "warned": "a warning says so: axes that end the program away from home, more stops or rests than the CL file has",
 }
 

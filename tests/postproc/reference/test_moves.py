@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.reference.moves import Moves, Phase, build_moves
+from postproc.reference.holes import Phase
+from postproc.reference.moves import Moves, build_moves
 from postproc.setup.model import SetupFile
 from tests.postproc.kit import codes, goto, tilted, toolpath
 from toolpaths.diagnostics import Diagnostic

@@ -1,0 +1,94 @@
+"""Siemens machine data as text: `N36110 $MA_POS_LIMIT_PLUS[AX1]=400`, one assignment in a line.
+
+Source: SINUMERIK 840D sl, Detailed Machine Data Description (parameter manual): numbers, identifiers, units.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from machines.exchange.draft import Draft
+
+_ASSIGNMENT = re.compile(r"(?:N\d+\s+)?\$(?P<name>(?:M[ANC]|TC|S[CNA])_\w+)\s*(?:\[(?P<index>[^\]]*)\])?\s*"
+                         r"=\s*(?P<value>[^;]*)")
+_CHANNEL = re.compile(r"CHANDATA\s*\(\s*(\d+)\s*\)")
+
+
+@dataclass(frozen=True)
+class MachineDatum:
+    """One assignment; `index` as it is written, blanks left out."""
+
+    name: str
+    index: str
+    value: str
+    line: int
+
+    @property
+    def said(self) -> str:
+        """As it stands there."""
+        return f"${self.name}{f'[{self.index}]' if self.index else ''} = {self.value}"
+
+    @property
+    def number(self) -> float | None:
+        """The value, None where it is no number."""
+        try:
+            return float(self.value.strip("'\"").replace("EX", "E"))
+        except ValueError:
+            return None
+
+    @property
+    def text(self) -> str:
+        """The value without quotes."""
+        return self.value.strip('"').strip()
+
+
+@dataclass
+class SiemensData:
+    """The assignments of the first channel; of those that are made twice the last counts, as the control reads the file."""
+
+    data: dict[tuple[str, str], MachineDatum] = field(default_factory=dict)
+
+    def get(self, name: str, index: str = "") -> MachineDatum | None:
+        """An assignment, None where there is none."""
+        return self.data.get((name, index))
+
+    def number(self, name: str, index: str, default: float) -> float:
+        """Its number, or the default where it is not made."""
+        found = self.get(name, index)
+        return default if found is None or found.number is None else found.number
+
+    def vector(self, name: str) -> tuple[list[float], MachineDatum | None]:
+        """Elements 0 to 2, those left out 0; the first of them that is there."""
+        found = [self.get(name, str(k)) for k in range(3)]
+        return ([0.0 if one is None or one.number is None else one.number for one in found],
+                next((one for one in found if one is not None), None))
+
+    def of(self, name: str) -> list[MachineDatum]:
+        """All elements of a name."""
+        return [one for (other, _), one in self.data.items() if other == name]
+
+
+def read_data(draft: Draft, text: str) -> SiemensData:
+    """The assignments; what begins like one and is none, and what is assigned twice, is said."""
+    result, channel = SiemensData(), 1
+    for line, raw in enumerate(text.splitlines(), 1):
+        statement = raw.strip()
+        if named := _CHANNEL.search(statement):
+            channel = int(named[1])
+        found = _ASSIGNMENT.match(statement)
+        if found is None:
+            if statement.startswith("$") or "$M" in statement.split(";")[0]:
+                draft.warning("import.line", f"not understood: {statement[:60]}", line,
+                           "write $NAME[index] = value on one line")
+            continue
+        of_channel = found["name"].startswith(("MC_", "SC_", "TC_"))
+        if of_channel and channel != 1:
+            continue
+        datum = MachineDatum(found["name"], "".join((found["index"] or "").split()), found["value"].strip(), line)
+        before = result.get(datum.name, datum.index)
+        if before is not None and before.value != datum.value:
+            draft.warning("import.contradiction", f"{before.said} in line {before.line} and {datum.value}: the last one "
+                          "counts", line, "take out the line that is not meant")
+        result.data[datum.name, datum.index] = datum
+    return result

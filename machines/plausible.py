@@ -1,0 +1,96 @@
+"""Figures of a machine file that no machine has: units mistaken for one another, a pivot with the wrong sign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from machines.choices import MotionOrder
+from machines.key_problem import KeyProblem
+from machines.kinematics.chain import Joint
+from machines.machine import Machine
+from toolpaths.units import DEG
+
+Ranges = dict[MotionOrder, tuple[float, float]]
+LINEAR: Ranges = {"velocity": (2.0, 5000.0), "acceleration": (10.0, 1e5), "jerk": (50.0, 1e7)}
+"""mm/s, mm/s2, mm/s3: from the slowest bench mill to the fastest parallel machine"""
+ROTARY: Ranges = {"velocity": (1.0, 7200.0), "acceleration": (10.0, 1e5), "jerk": (50.0, 1e7)}
+"""deg/s, deg/s2, deg/s3"""
+LONGEST_RAMP = 4.0
+"""s from rest to full speed"""
+TRAVEL = (20.0, 60000.0)
+"""mm"""
+BEYOND = 0.25
+"""share of its travel by which a pivot may lie beyond the end of it"""
+HEAD = 1000.0
+"""mm between the gauge point and the pivots of a head"""
+_HINTS: dict[MotionOrder, str] = {
+    "velocity": "write it per second: mm/min and deg/min are divided by 60, m/min by 0.06, turns per minute times 6",
+    "acceleration": "write it in mm/s2 or deg/s2: m/s2 are times 1000, g times 9807, turns/s2 times 360",
+    "jerk": "write it in mm/s3 or deg/s3: m/s3 are times 1000, turns/s3 times 360",
+}
+
+
+def implausible(machine: Machine) -> Iterator[KeyProblem]:
+    """Every figure that no machine has; paths as in the machine file."""
+    for j, name in enumerate(machine.axis_names):
+        yield from _limits(machine, j, name)
+    points = {joint.name: joint for joint in machine.kinematics.chain}
+    slides = [joint for joint in points.values() if not joint.rotary]
+    for joint in points.values():
+        if joint.rotary:
+            carries = f"{joint.name}'" in machine.structure.split()
+            yield from _table_pivot(machine, joint, slides) if carries else _head_pivot(joint)
+
+
+def _limits(machine: Machine, j: int, name: str) -> Iterator[KeyProblem]:
+    rotary = machine.rotary[j]
+    unit, scale, known = ("deg", DEG, ROTARY) if rotary else ("mm", 1.0, LINEAR)
+    limits, path = machine.limits, ("axes", name)
+    for order, (key, (least, most)) in enumerate(known.items(), 1):
+        value = float(getattr(limits, key)[j]) / scale
+        if not least <= value <= most:
+            per = f"{unit}/s{order if order > 1 else ''}"
+            says = f"{key} of {name} is {value:g} {per}: machines have {least:g} to {most:g}"
+            yield KeyProblem("machine.plausible", (*path, key), says, _HINTS[key])
+    ramp = float(limits.velocity[j] / limits.acceleration[j])
+    if ramp > LONGEST_RAMP:
+        says = f"{name} takes {ramp:.3g} s from rest to full speed, most machines less than {LONGEST_RAMP:g} s"
+        yield KeyProblem("machine.plausible", (*path, "acceleration"), says, _HINTS["velocity"])
+    length = float(limits.upper[j] - limits.lower[j])
+    if not rotary and not TRAVEL[0] <= length <= TRAVEL[1]:
+        says = f"travel of {name} is {length:g} mm long: machines have {TRAVEL[0]:g} to {TRAVEL[1]:g}"
+        yield KeyProblem("machine.plausible", (*path, "travel"), says, "write it in mm: inches are times 25.4")
+
+
+def _table_pivot(machine: Machine, joint: Joint, slides: list[Joint]) -> Iterator[KeyProblem]:
+    """A table stands where the spindle comes to it: over its pivot sideways, above it along the retract axis."""
+    path = ("kinematics", "axes", joint.name, "point")
+    for slide in slides:
+        if abs(float(slide.direction @ joint.direction)) > 0.5:  # a pivot may lie anywhere along its own axis
+            continue
+        j = machine.axis_names.index(slide.name)
+        low, high = float(machine.limits.lower[j]), float(machine.limits.upper[j])
+        at, room = float(joint.point @ slide.direction), BEYOND * (high - low)
+        says = f"{joint.name} turns about a line at {slide.name} = {at:g} mm, {slide.name} goes from {low:g} to {high:g} mm"
+        if j == machine.retract_axis and at >= high:
+            yield KeyProblem("machine.plausible", path, f"{says}: the table is above the spindle",
+                             "see to the sign: pivots of tables lie below the gauge point, in machine coordinates")
+        elif j != machine.retract_axis and not low - room <= at <= high + room:
+            yield KeyProblem("machine.plausible", path, f"{says}: the spindle never comes over it",
+                             "see to the sign: a pivot is in machine coordinates, as displayed with the spindle over it")
+
+
+def _head_pivot(joint: Joint) -> Iterator[KeyProblem]:
+    """A head turns about a line above the gauge point of its spindle."""
+    path, height, away = ("kinematics", "axes", joint.name, "point"), float(joint.point[2]), float(np.abs(joint.point).max())
+    level = abs(float(joint.direction[2])) < 0.9
+    if level and height <= 0.0:
+        says = f"{joint.name} turns about a line {-height:g} mm below the gauge point of its own spindle"
+        yield KeyProblem("machine.plausible", path, says,
+                         "see to the sign: it is the vector from the gauge point to the pivot, upwards")
+    elif away > HEAD:
+        says = f"{joint.name} turns about a line {away:g} mm away from the gauge point, at most {HEAD:g} mm"
+        yield KeyProblem("machine.plausible", path, says,
+                         "measure it from the gauge point of the spindle, not from the machine's zero")

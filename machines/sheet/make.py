@@ -1,0 +1,234 @@
+"""A data sheet as a machine file: every fault of it at once, each at the line of the sheet where the figure stands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from machines.figures import ASSUMED, SOURCE
+from machines.loader import as_warnings, assemble, check
+from machines.machine import Machine
+from machines.sheet.file_text import FileValue, machine_text, nested
+from machines.sheet.jog import sense
+from machines.sheet.model import AxisSheet, DataSheet
+from machines.sheet.pivots import points_of
+from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
+from machines.toml_lines import KeyPath
+from machines.user_file import UserFile, ValueSource, read_toml, validate
+from toolpaths.diagnostics import Diagnostic, has_errors
+
+ENDLESS = "endless"
+NAME = "sheet"
+"""what the document is called in [sources] of the machine file"""
+_ACCELERATION, _TURNING_ACCELERATION = 2000.0, 500.0
+"""mm/s2, deg/s2, where the sheet states none"""
+_JERK = 10.0
+"""1/s, jerk over acceleration: none is ever printed"""
+_TIMES = {"tool_change": 6.0, "clamp": 0.5, "unclamp": 0.5}
+
+
+@dataclass(frozen=True)
+class NewMachine:
+    """What became of a sheet.
+
+    Attributes:
+        machine: None where the sheet has errors
+        text: of the machine file, "" likewise
+    """
+
+    machine: Machine | None
+    text: str
+    diagnostics: list[Diagnostic]
+
+    @property
+    def assumed(self) -> list[str]:
+        """Figures that the sheet does not state, by name."""
+        known = self.machine.figures if self.machine is not None else {}
+        return [name for name, origin in known.items() if origin == ASSUMED]
+
+
+@dataclass
+class _Making:
+    """The values of the machine file as they are found, with the line of the sheet that each is from."""
+
+    file: UserFile
+    figures: dict[KeyPath, FileValue] = field(default_factory=dict)
+    origins: dict[KeyPath, ValueSource] = field(default_factory=dict)
+    found: list[Diagnostic] = field(default_factory=list)
+
+    def put(self, path: KeyPath, value: FileValue, sheet: KeyPath) -> None:
+        """A value of the machine file, and the key of the sheet that it is from."""
+        self.figures[path] = value
+        self.origins[path] = self.file.origin(sheet)
+
+    def stated(self, path: KeyPath, value: FileValue, sheet: KeyPath, place: str) -> None:
+        """The same of a figure that the sheet states."""
+        self.put(path, value, sheet)
+        self.put((*path[:-1], SOURCE, path[-1]), f"{NAME}: {place}", sheet)
+
+    def assume(self, path: KeyPath, value: FileValue, sheet: KeyPath) -> None:
+        """The same of one that it does not state."""
+        self.put(path, value, sheet)
+        self.mark(path, sheet)
+
+    def mark(self, path: KeyPath, sheet: KeyPath) -> None:
+        """A figure that is assumed."""
+        words = (*path[:-1], ASSUMED)
+        known = self.figures.get(words, [])
+        self.put(words, [*(known if isinstance(known, list) else []), str(path[-1])], sheet)
+
+    def fault(self, sheet: KeyPath, says: str, hint: str = "") -> None:
+        """One more fault of the sheet."""
+        self.found.append(self.file.problem("sheet.figure", sheet, says, hint))
+
+    def read(self, sheet: KeyPath, text: str, measure: QuantityKind) -> float | None:
+        """A quantity; None where it is none, with its fault."""
+        try:
+            return read_quantity(text, measure)
+        except WrongFigureError as wrong:
+            self.fault(sheet, f"{'.'.join(str(key) for key in sheet)}: {wrong.says}", wrong.hint)
+            return None
+
+
+def new_machine(source: str | Path, name: str = "") -> NewMachine:
+    """The machine of a sheet; every fault of the sheet at once where it has some."""
+    file, found = read_toml(source, kind="data sheet")
+    sheet, more = validate(file, DataSheet) if file is not None else (None, [])
+    if file is None or sheet is None:
+        return NewMachine(None, "", [*found, *more])
+    making = _Making(file)
+    _header(making, sheet)
+    for letter, axis in sheet.axes.items():
+        _axis(making, letter, axis, letter in sheet.rotary)
+    _geometry(making, sheet)
+    _times(making, sheet)
+    if making.found:
+        return NewMachine(None, "", making.found)
+    whole = UserFile(name or file.name, file.file, nested(making.figures), making.origins)
+    model, faults = check(whole)
+    if model is None or has_errors(faults):
+        return NewMachine(None, "", faults)
+    machine = assemble(whole, model)
+    return NewMachine(machine, machine_text(making.figures, Path(source).name), [*faults, *as_warnings(whole, machine)])
+
+
+def _header(making: _Making, sheet: DataSheet) -> None:
+    making.put(("description",), sheet.description, ("description",))
+    making.put(("retract_axis",), "Z", ("Z",))
+    making.put(("sources", NAME, "document"), sheet.source, ("source",))
+    making.put(("sources", NAME, "by"), "maker", ("source",))
+    for letter in sorted(set(sheet.rotary) - set(sheet.axes)):
+        where = "table" if letter in sheet.table else "head"
+        making.fault((where,), f"axis {letter} has no table", f"add [{letter}] with travel and rapid")
+    for letter in sorted(set(sheet.axes) - set(sheet.rotary) - set("XYZ")):
+        making.fault((letter,), f"axis {letter} is neither in `table` nor in `head`",
+                     f'write table = ["{letter}"] or head = ["{letter}"]')
+
+
+def _axis(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> None:
+    """Travel, speed, home of one axis, and what is assumed of it."""
+    travel = _travel(making, letter, axis, rotary)
+    rapid = making.read((letter, "rapid"), axis.rapid, "turning speed" if rotary else "speed")
+    if travel is None or rapid is None:
+        return
+    at = ("axes", letter)
+    ends = "unlimited" if travel == (-math.inf, math.inf) else list(travel)
+    making.stated((*at, "travel"), ends, (letter, "travel"), f"{letter} travel")
+    making.stated((*at, "velocity"), _round(rapid), (letter, "rapid"), f"{letter} rapid")
+    acceleration = _TURNING_ACCELERATION if rotary else _ACCELERATION
+    if axis.acceleration:
+        read = making.read((letter, "acceleration"), axis.acceleration, "turning acceleration" if rotary else "acceleration")
+        acceleration = read or acceleration
+        making.stated((*at, "acceleration"), _round(acceleration), (letter, "acceleration"), f"{letter} acceleration")
+    else:
+        making.assume((*at, "acceleration"), acceleration, (letter,))
+    making.assume((*at, "jerk"), _round(_JERK * acceleration), (letter,))
+    if axis.home:
+        home = making.read((letter, "home"), axis.home, "angle" if rotary else "length")
+        making.stated((*at, "home"), _round(home or 0.0), (letter, "home"), f"{letter} home")
+    else:
+        making.assume((*at, "home"), min(max(0.0, travel[0]), travel[1]), (letter,))
+
+
+def _travel(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> tuple[float, float] | None:
+    """Both ends, mm or degrees."""
+    measure: QuantityKind = "angle" if rotary else "length"
+    path = (letter, "travel")
+    if axis.travel == ENDLESS:
+        if not rotary:
+            making.fault(path, f"{letter}.travel: a linear axis has ends", 'write its length, "762 mm"')
+            return None
+        return -math.inf, math.inf
+    if not isinstance(axis.travel, str):
+        ends = [making.read(path, text, measure) for text in axis.travel]
+        if ends[0] is None or ends[1] is None:
+            return None
+        return _round(ends[0]), _round(ends[1])
+    if rotary:
+        making.fault(path, f"{letter}.travel: {axis.travel!r} is one figure", 'write both ends, ["-35 deg", "120 deg"], or '
+                     '"endless"')
+        return None
+    length = making.read(path, axis.travel, measure)
+    if length is None:
+        return None
+    low = {"upper": -length, "lower": 0.0, "middle": -length / 2.0}[axis.zero]
+    return _round(low), _round(low + length)
+
+
+def _geometry(making: _Making, sheet: DataSheet) -> None:
+    """Structure, points and senses of the rotary axes."""
+    spindle = [letter for letter in "XYZ" if letter not in sheet.table_slides]
+    carried = [f"{letter}'" for letter in (*sheet.table[::-1], *sheet.table_slides[::-1])]
+    making.put(("kinematics", "kind"), "serial", ("table",))
+    making.put(("kinematics", "structure"), " ".join(["w", *carried, "b", *spindle, *sheet.head, "(C1)", "t"]), ("table",))
+    points, pivots = _points(making, sheet), sheet.pivots
+    for letter in sheet.rotary:
+        at, axis = ("kinematics", "axes", letter), sheet.axes.get(letter)
+        if letter in points and pivots is not None:
+            making.stated((*at, "point"), points[letter], ("pivots", "points"), f"pivots, {pivots.form}")
+        if axis is None or axis.jog is None:
+            making.mark((*at, "direction"), (letter,))
+            continue
+        try:
+            positive = sense(letter, letter in sheet.table, axis.jog)
+        except WrongFigureError as wrong:
+            making.fault((letter, "jog"), wrong.says, wrong.hint)
+            continue
+        making.put((*at, "positive"), positive, (letter, "jog"))
+        making.put((*at, SOURCE, "direction"), f"{NAME}: {letter} jog", (letter, "jog"))
+
+
+def _points(making: _Making, sheet: DataSheet) -> dict[str, list[float]]:
+    if not sheet.rotary:
+        return {}
+    if sheet.pivots is None:
+        making.fault(("table",), f"where {' and '.join(sheet.rotary)} lie is not stated",
+                     'add [pivots] form = "haas", "siemens", "heidenhain", "fanuc" or "machine", and its numbers')
+        return {}
+    try:
+        points, wrong = points_of(sheet.pivots.form, sheet.table, sheet.head, sheet.pivots.points)
+    except WrongFigureError as fault:
+        making.fault(("pivots", "form"), fault.says, fault.hint)
+        return {}
+    for one in wrong:
+        making.fault(("pivots", "points"), f"[pivots]: {one}", "as the control shows them, in its own order of signs")
+    return {letter: [_round(float(v)) for v in point] for letter, point in points.items()}
+
+
+def _times(making: _Making, sheet: DataSheet) -> None:
+    given = {"tool_change": sheet.times.tool_change, "clamp": sheet.times.clamp, "unclamp": sheet.times.clamp}
+    for key, text in given.items():
+        of_sheet = "clamp" if key == "unclamp" else key
+        if text:
+            value = making.read(("times", of_sheet), text, "time")
+            making.stated(("timing", key), _round(value or 0.0), ("times", of_sheet), f"times {of_sheet}")
+        else:
+            making.assume(("timing", key), _TIMES[key], ("description",))
+
+
+def _round(value: float) -> float:
+    """Without the digits that a change of units adds."""
+    return round(value, 6)
+
+

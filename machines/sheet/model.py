@@ -1,0 +1,95 @@
+"""The data sheet of a machine as its user writes it down: figures with units, the control's own pivot numbers, jogs."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from machines.models import Vector
+from machines.user_file import UserModel
+
+Jog = Literal["right up", "right down", "front up", "front down", "clockwise", "anti-clockwise", "tip left", "tip right",
+              "tip back", "tip front"]
+"""what is seen when a rotary axis is jogged by +10 degrees from 0"""
+ZeroEnd = Literal["upper", "lower", "middle"]
+PivotForm = Literal["machine", "haas", "siemens", "heidenhain", "fanuc"]
+
+
+class AxisSheet(UserModel):
+    """One `[X]` table: an axis as the brochure has it."""
+
+    travel: str | tuple[str, str]
+    """length of the travel, "762 mm", or both ends, ["-35 deg", "120 deg"]; "endless" for a rotary axis without ends"""
+    rapid: str
+    """"22.9 m/min", "900 in/min", "50 rpm": always with its unit"""
+    acceleration: str = ""
+    """"5 m/s2", "0.5 g"; left out: assumed"""
+    zero: ZeroEnd = "upper"
+    """where the control counts from, of a travel that is stated by its length: its upper end, as most do, or others"""
+    home: str = ""
+    """where programs begin and tools change; left out: the machine's zero, or the nearest that travel allows"""
+    jog: Jog | None = None
+    """rotary axes: what a jog by +10 degrees showed; left out: the sense of ISO 841 is assumed"""
+
+
+class PivotSheet(UserModel):
+    """The `[pivots]` table: numbers of the control, mm, in machine coordinates, all axes at 0."""
+
+    form: PivotForm
+    """whose names: haas (MRZP, settings 255 to 257 and 300 to 305), siemens (I1 to I4 of the swivel data set, what CYCLE996
+    measures), heidenhain (rows Trans of the kinematics, what cycle 451 measures), fanuc (19700 to 19714, by hand or G10
+    L52), machine (points of the lines themselves)"""
+    points: dict[str, Vector] = Field(default_factory=dict)
+    """by the control's name: "MRZP", "I2", "Trans 1", "19700"; with form "machine" by letter of the axis"""
+
+
+class TimingSheet(UserModel):
+    """The `[times]` table."""
+
+    tool_change: str = ""
+    """chip to chip, "4.2 s"; left out: assumed"""
+    clamp: str = ""
+    """of a rotary axis; left out: assumed"""
+
+
+class DataSheet(UserModel):
+    """A sheet."""
+
+    description: str
+    """one line"""
+    source: str
+    """the document that the figures are from: maker, title, edition, page"""
+    table: tuple[Literal["A", "B", "C"], ...] = ()
+    """rotary axes that carry the part, the one next to the bed first: ["B", "C"] for a trunnion B with a table C on it"""
+    head: tuple[Literal["A", "B", "C"], ...] = ()
+    """rotary axes that carry the tool, the one next to the slides first"""
+    table_slides: tuple[Literal["X", "Y", "Z"], ...] = ()
+    """linear axes that move the table, the one next to the bed first; the others move the spindle"""
+    X: AxisSheet
+    """axis X"""
+    Y: AxisSheet
+    """axis Y"""
+    Z: AxisSheet
+    """axis Z"""
+    A: AxisSheet | None = None
+    """axis A"""
+    B: AxisSheet | None = None
+    """axis B"""
+    C: AxisSheet | None = None
+    """axis C"""
+    pivots: PivotSheet | None = None
+    """where the rotary axes lie"""
+    times: TimingSheet = TimingSheet()
+    """times that no axis gives"""
+
+    @property
+    def axes(self) -> dict[str, AxisSheet]:
+        """Tables of the axes that the machine has."""
+        known = {"X": self.X, "Y": self.Y, "Z": self.Z, "A": self.A, "B": self.B, "C": self.C}
+        return {letter: axis for letter, axis in known.items() if axis is not None}
+
+    @property
+    def rotary(self) -> tuple[str, ...]:
+        """Letters of the rotary axes that `table` and `head` name."""
+        return (*self.table, *self.head)

@@ -1,0 +1,93 @@
+"""The command `postproc machine new`. Heavy packages are imported inside, so that --help is instant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from postproc.cli.console import Json, refuse_overwriting, report, shown_errors
+
+if TYPE_CHECKING:
+    from machines.sheet.make import NewMachine
+    from machines.sheet.questions import SheetQuestion
+
+EXAMPLES = """Example: postproc machine new shop.sheet.toml -o shop.toml --drawing shop.svg
+
+The sheet holds the figures of a brochure with their units, the pivot numbers of the control by its own names, and what was
+seen when each rotary axis was jogged. Where there is no such file, its questions are asked on the terminal, and it is
+written. All faults of a sheet come at once, each with its line; what the sheet states is not assumed."""
+
+
+def machine_new(sheet: Annotated[Path, typer.Argument(metavar="SHEET.toml", help="data sheet; where it is not there it is "
+                                                      "asked for and written")],
+                output: Annotated[Path, typer.Option("-o", "--output", metavar="M.toml", help="machine file to write")],
+                drawing: Annotated[str, typer.Option("--drawing", metavar="D.svg", help="draw frames, axes, pivots and "
+                                                     "senses")] = "",
+                force: Annotated[bool, typer.Option("--force", help="replace a file that there is already")] = False,
+                json: Json = "") -> None:
+    """Write a machine file from a data sheet, a pivot table and jogs; wrong units and signs are found."""
+    refuse_overwriting({"-o": str(output), "--drawing": drawing, "--json": json}, {"the sheet": str(sheet)})
+    for option, path in (("-o", output), ("--drawing", Path(drawing) if drawing else None)):
+        if path is not None and path.exists() and not force:
+            raise typer.BadParameter(f"{path} exists; --force replaces it", param_hint=option)
+    from machines.sheet.drawing import drawing as picture
+    from machines.sheet.make import new_machine
+
+    with shown_errors(json):
+        asked = not sheet.exists() and _asked(sheet)
+        made = new_machine(sheet, output.stem)
+    outputs: dict[Path, str | bytes] = {}
+    if made.machine is not None:
+        outputs[output] = made.text
+        if drawing:
+            outputs[Path(drawing)] = picture(made.machine)
+    values = {"output": str(output) if made.machine is not None else None, "sheet_written": asked, "assumed": made.assumed,
+              "diagnostics": [d.as_dict() for d in made.diagnostics]}
+    report(tuple(made.diagnostics), json, values, _text(made, output, drawing), outputs)
+
+
+def _asked(sheet: Path) -> bool:
+    """The sheet, written from the answers; where they end too soon it is not."""
+    from machines.sheet.questions import sheet_text
+    from toolpaths.diagnostics import DiagnosticError, error
+
+    try:
+        sheet.write_text(sheet_text(_ask), "utf-8")
+    except EOFError:
+        raise DiagnosticError([error("sheet.unanswered", f"the answers ended before {sheet} was whole; nothing was written",
+                                     hint=f"answer on a terminal, or write {sheet} and name it again")]) from None
+    return True
+
+
+def _ask(question: SheetQuestion) -> str:
+    """Asks until an answer fits.
+
+    Raises:
+        EOFError: where standard input has ended.
+    """
+    import sys
+
+    while True:
+        typer.echo(question.prompt(), nl=False, err=True)
+        line = sys.stdin.readline() if sys.stdin is not None else ""
+        if not line:
+            raise EOFError
+        try:
+            return question.parsed(line)
+        except ValueError as wrong:
+            typer.echo(str(wrong), err=True)
+
+
+def _text(made: NewMachine, output: Path, drawing: str) -> str:
+    """What was written, and what is left to do."""
+    if made.machine is None:
+        return ""
+    unproved = [name.split(".")[0] for name in made.assumed if name.endswith(".direction")]
+    lines = [f"written: {output}{f', {drawing}' if drawing else ''}",
+             f"{made.machine.structure}, {len(made.assumed)} figures assumed"]
+    if unproved:
+        lines.append(f"senses of {', '.join(unproved)} are not proved: jog each by +10, write what was seen into the sheet")
+    lines.append(f"next: postproc convert part.cls -m {output} -c CONTROLLER --check-program check.nc proves the pivots")
+    return "\n".join(lines)

@@ -1,0 +1,233 @@
+"""From a data sheet to a machine: units, pivots by the names of controls, jogs, and every slip at its line of the sheet."""
+
+from __future__ import annotations
+
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import machines
+from machines.machine import Machine
+from machines.sheet.drawing import drawing
+from machines.sheet.jog import QUESTIONS
+from machines.sheet.make import NewMachine, new_machine
+from machines.sheet.pivots import points_of
+from machines.sheet.quantity import WrongFigureError, read_quantity
+
+TRUNNION = """description = "Our trunnion mill"
+source = "brochure of 2023, p. 4"
+table = ["B", "C"]
+table_slides = ["X"]
+
+[X]
+travel = "762 mm"
+rapid = "22.9 m/min"
+[Y]
+travel = "508 mm"
+rapid = "900 ipm"
+[Z]
+travel = "20 in"
+rapid = "22.9 m/min"
+acceleration = "0.3 g"
+[B]
+travel = ["-35 deg", "120 deg"]
+rapid = "50 rpm"
+jog = "right up"
+[C]
+travel = "endless"
+rapid = "300 deg/s"
+jog = "anti-clockwise"
+
+[pivots]
+form = "haas"
+points = { "MRZP" = [-381.02, -254.11, -558.4], "MRZP second" = [-381.05, -254.11, -500.2] }
+
+[times]
+tool_change = "2.8 s"
+"""
+NUTATED = """description = "Our fork head"
+source = "brochure"
+head = ["C", "B"]
+
+[X]
+travel = "2 m"
+rapid = "30 m/min"
+[Y]
+travel = "1 m"
+rapid = "30 m/min"
+[Z]
+travel = "700 mm"
+rapid = "20 m/min"
+[C]
+travel = ["-200 deg", "200 deg"]
+rapid = "20 rpm"
+[B]
+travel = ["-110 deg", "110 deg"]
+rapid = "20 rpm"
+
+[pivots]
+form = "siemens"
+points = { "I3" = [0, 0, 250.1], "I2" = [0.02, 0, 30], "I1" = [-0.02, 0, -280.1] }
+"""
+
+
+def made(folder: Path, text: str = TRUNNION, old: str = "", new: str = "") -> NewMachine:
+    assert old in text, old
+    path = folder / "shop.sheet.toml"
+    path.write_text(text.replace(old, new, 1))
+    return new_machine(path, "shop")
+
+
+def machine_of(folder: Path, text: str) -> Machine:
+    result = made(folder, text)
+    assert result.machine is not None, [str(d) for d in result.diagnostics]
+    return result.machine
+
+
+def line_of(text: str, part: str) -> int:
+    return text[: text.index(part)].count("\n") + 1
+
+
+def test_a_trunnion_from_its_sheet(tmp_path: Path) -> None:
+    result = made(tmp_path)
+    assert result.diagnostics == [] and result.machine is not None
+    file = tmp_path / "shop.toml"
+    file.write_text(result.text)
+    m, found = machines.load_checked(file)
+    assert m is not None and not found and machines.implausible(file) == []
+    assert m.structure == "w C' B' X' b Y Z (C1) t" and m.axis_names == ("X", "Y", "Z", "B", "C")
+    np.testing.assert_allclose(m.limits.lower[:4], [-762, -508, -508, np.radians(-35)])
+    fast, turning = [22900 / 60, 900 * 25.4 / 60, 22900 / 60], np.radians([300, 300])
+    np.testing.assert_allclose(m.limits.velocity, [*fast, *turning], atol=1e-6)
+    assert m.limits.acceleration[2] == pytest.approx(0.3 * 9806.65) and m.timing.tool_change == 2.8
+    b, c = (joint for name in "BC" for joint in m.kinematics.chain if joint.name == name)
+    np.testing.assert_allclose([b.point, c.point], [[-381.02, -254.11, -558.4], [-381.05, -254.11, -500.2]])
+    np.testing.assert_allclose([b.direction, c.direction], [[0, 1, 0], [0, 0, -1]])
+    stated = {"X.travel", "B.velocity", "Z.acceleration", "C.point", "C.direction", "timing.tool_change"}
+    assert stated.isdisjoint(result.assumed)
+    assert {"X.acceleration", "B.jerk", "timing.clamp"} <= set(result.assumed)
+    assert m.figures["X.travel"] == "brochure of 2023, p. 4: X travel"
+
+
+def test_a_head_by_swivel_data(tmp_path: Path) -> None:
+    m = machine_of(tmp_path, NUTATED)
+    assert m.structure == "w b X Y Z C B (C1) t"
+    b, c = (joint for name in "BC" for joint in m.kinematics.chain if joint.name == name)
+    np.testing.assert_allclose([b.point, c.point], [[0, 0, 250.1], [0.02, 0, 280.1]])
+    assert {"B.direction", "C.direction"} <= {name for name, origin in m.figures.items() if origin == "assumed"}
+
+
+MRZP, SECOND = "[-381.02, -254.11, -558.4]", "[-381.05, -254.11, -500.2]"
+ODD = "machine.plausible"
+HEAD = '[0, 0, 250.1], "I2" = [0.02, 0, 30], "I1" = [-0.02, 0, -280.1]'
+UPSIDE_DOWN = '[0, 0, -250.1], "I2" = [0.02, 0, -30], "I1" = [-0.02, 0, 280.1]'
+
+
+@pytest.mark.parametrize(("text", "old", "new", "code", "says", "line"), [
+    (TRUNNION, MRZP, "[381.02, -254.11, -558.4]", ODD, "X = 381.02", "points"),
+    (TRUNNION, MRZP, "[-381.02, -254.11, 558.4]", ODD, "above the spindle", "points"),
+    (TRUNNION, SECOND, "[-381.05, 254.11, -500.2]", ODD, "Y = 254.11", "points"),
+    (NUTATED, HEAD, UPSIDE_DOWN, ODD, "below the gauge point", "points"),
+    (NUTATED, '"I1" = [-0.02, 0, -280.1]', '"I1" = [0.02, 0, -280.1]', "sheet.figure", "closes the chain", "points"),
+    (NUTATED, '"I2"', '"I4"', "sheet.figure", "I2 missing", "points"),
+    (TRUNNION, '"22.9 m/min"', '"22900 mm/s"', ODD, "22900 mm/s", "rapid"),
+    (TRUNNION, '"22.9 m/min"', '"22900"', "sheet.figure", "no unit", "rapid"),
+    (TRUNNION, '"0.3 g"', '"0.3 m/min"', "sheet.figure", "no unit of a acceleration", "acceleration"),
+    (TRUNNION, 'jog = "right up"', 'jog = "clockwise"', "sheet.figure", "is no answer for B", "jog"),
+    (TRUNNION, '["-35 deg", "120 deg"]', '"155 deg"', "sheet.figure", "one figure", None),
+    (TRUNNION, 'form = "haas"', 'form = "siemens"', "sheet.figure", "MRZP is not a name of siemens", "points"),
+    (TRUNNION, 'table = ["B", "C"]', 'table = ["C"]', "sheet.figure", "B is neither", "[B]"),
+    (TRUNNION, "rapid = ", "rapit = ", "file.unknown-key", "rapit", "rapit"),
+])
+def test_a_slip_is_seen_at_its_line(tmp_path: Path, text: str, old: str, new: str, code: str, says: str,
+                                    line: str | None) -> None:
+    found = made(tmp_path, text, old, new).diagnostics
+    assert any(d.code == code and says in d.message for d in found), [str(d) for d in found]
+    one = next(d for d in found if d.code == code and says in d.message)
+    assert (one.file == str(tmp_path / "shop.sheet.toml") and one.hint) or code == "file.unknown-key"
+    if line is not None:
+        assert one.lines == (line_of(text.replace(old, new, 1), line),)
+
+
+def test_all_faults_come_in_one_run(tmp_path: Path) -> None:
+    text = TRUNNION.replace('"762 mm"', '"762"').replace('"900 ipm"', '"fast"')
+    text = text.replace("right up", "tip left").replace("2.8 s", "2.8 h")
+    found = made(tmp_path, text).diagnostics
+    assert [d.lines[0] for d in found] == [line_of(text, part) for part in ('"762"', '"fast"', "tip left", "2.8 h")]
+
+
+@pytest.mark.parametrize(("letter", "in_table"), QUESTIONS)
+def test_what_a_jog_shows_is_what_the_machine_does(letter: str, in_table: bool, tmp_path: Path) -> None:
+    """By forward kinematics alone: where a point of the table, or the tip, is after the jog."""
+    other = "C" if letter != "C" else "B"
+    axes = f"[{letter}]\ntravel = [\"-90 deg\", \"90 deg\"]\nrapid = \"20 rpm\"\njog = \"{{}}\"\n" \
+           f"[{other}]\ntravel = [\"-90 deg\", \"90 deg\"]\nrapid = \"20 rpm\"\n"
+    place = "-400" if in_table else "200"
+    side = 'table = ["%s", "%s"]' % ((letter, other) if letter != "C" else (other, letter)) if in_table else \
+        'head = ["%s", "%s"]' % ((other, letter) if letter != "C" else (letter, other))
+    for seen, sign in zip(QUESTIONS[letter, in_table][1:], (1, -1), strict=True):
+        text = NUTATED.split("[C]")[0].replace('head = ["C", "B"]', side) + axes.format(seen) + \
+            f"[pivots]\nform = \"machine\"\npoints = {{ {letter} = [0, 0, {place}], {other} = [0, 0, {place}] }}\n"
+        m = machine_of(tmp_path, text)
+        moved = _moved(m, letter, in_table)
+        expected = {"front up": moved[1][2] > 1, "front down": moved[1][2] < -1, "right up": moved[0][2] > 1,
+                    "right down": moved[0][2] < -1, "clockwise": moved[0][1] < -1, "anti-clockwise": moved[0][1] > 1,
+                    "tip back": moved[2][1] > 1, "tip front": moved[2][1] < -1, "tip left": moved[2][0] < -1,
+                    "tip right": moved[2][0] > 1}
+        assert expected[seen], (letter, in_table, seen, sign, moved)
+
+
+def _moved(m: Machine, letter: str, in_table: bool) -> np.ndarray:
+    """How the right edge and the front edge of what turns, and the tip of a tool, move at +10 degrees, machine frame, mm."""
+    kin = m.kinematics.with_tool(0.0)
+    q = np.zeros((4, 5))
+    q[1:, :3] = np.eye(3)
+    turned = q.copy()
+    turned[:, m.axis_names.index(letter)] = np.radians(10.0)
+    tips = kin.forward(turned)[0]
+    pivot = next(joint.point for joint in m.kinematics.chain if joint.name == letter)
+    if in_table:  # tip = R x + t holds for the gauge point x: the place of a point p of the table is R^-1 (p - t)
+        matrix, shift = (tips[1:] - tips[0]).T, tips[0]
+        points = np.array([[100.0, 0, 0], [0, -100.0, 0], [0, 0, 0]]) + pivot
+        return (points - shift) @ matrix - points
+    turn = next(joint.direction for joint in m.kinematics.chain if joint.name == letter)
+    edges = np.array([[100.0, 0, 0], [0, -100.0, 0]])
+    tip = tips[0] - kin.forward(np.zeros((1, 5)))[0][0]
+    return np.array([*(np.radians(10.0) * np.cross(turn, edges)), tip])
+
+
+def test_pivots_of_each_control() -> None:
+    b, c = np.array([-1.0, -2.0, -300.0]), np.array([-1.5, -2.5, -280.0])
+    for form, given in (("haas", {"MRZP": b, "MRZP second": c}), ("siemens", {"I2": b, "I3": c - b, "I4": -c}),
+                        ("heidenhain", {"Trans 1": b, "Trans 2": c - b}), ("fanuc", {"19700": b, "19703": c - b}),
+                        ("machine", {"B": b, "C": c})):
+        points, wrong = points_of(form, ("B", "C"), (), {name: tuple(v) for name, v in given.items()})
+        assert wrong == [], form
+        np.testing.assert_allclose([points["B"], points["C"]], [b, c])
+    points, wrong = points_of("haas", ("B", "C"), (), {"MRZP": tuple(b)})
+    np.testing.assert_allclose([points["B"], points["C"]], [b, b])
+
+
+def test_quantities() -> None:
+    assert read_quantity("50 rpm", "turning speed") == 300.0 and read_quantity('30 "', "length") == 762.0
+    with pytest.raises(WrongFigureError, match="no unit"):
+        read_quantity("30", "length")
+
+
+def test_the_drawing_shows_travel_pivots_and_senses(tmp_path: Path) -> None:
+    m = machine_of(tmp_path, TRUNNION)
+    root = ElementTree.fromstring(drawing(m))
+    words = [element.text or "" for element in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert "B (table): through (-381.02, -254.11, -558.4)" in words
+    assert {"seen from the front", "seen from above", "X+", "B+", "C+"} <= set(words)
+    other = drawing(machine_of(tmp_path, TRUNNION.replace("anti-clockwise", "clockwise")))
+    assert other != drawing(m)
+
+
+def test_the_sheet_of_the_readme_is_one(tmp_path: Path) -> None:
+    page = (Path(machines.__file__).parent / "sheet" / "README.md").read_text("utf-8")
+    text = page.split("```toml\n")[1].split("```")[0]
+    assert tomllib.loads(text) and made(tmp_path, text).machine is not None
