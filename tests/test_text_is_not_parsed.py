@@ -29,6 +29,7 @@ FILES = {
     "postproc.cycle_time.source": "whether a file is a CL file or a program",
     "postproc.readback.comparison.hooks": "blocks of the shop in programs",
     "postproc.readback.comparison.slow_moves": "F words of programs",
+    "postproc.readback.comparison.stock": "stock stated in programs",
     "postproc.readback.comparison.unstated_codes": "codes of programs",
     "postproc.verification.stated_numbers": "numbers in the header of a program",
     "postproc.verification.tool_table": "tool tables of controls",

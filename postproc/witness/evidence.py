@@ -122,9 +122,8 @@ class ExecutedBlocks:
         """Some of the blocks, each beginning where the program has it begin."""
         columns = {f.name: getattr(self, f.name)[rows] for f in fields(self)
                    if f.name not in ("start", "begins") and isinstance(getattr(self, f.name), np.ndarray)}
-        approach, end = self.approach_at, len(self)
-        stops = tuple((int(np.searchsorted(rows, k)), number) for k, number in self.stops
-                      if (rows == (k if k < end else end - 1)).any())
+        approach = self.approach_at
+        stops = tuple((int(np.searchsorted(rows, k)), number) for k, number in self.stops)
         return replace(self, **columns, begins=self.before(rows), stops=stops, steps=lambda some: self.steps(rows[some]),
                        joints_at=lambda some, t: self.joints_at(rows[some], t),
                        poses_at=lambda some, t: self.poses_at(rows[some], t),

@@ -316,4 +316,42 @@ _OUTPUT = [
         sheet("", "[part]\norigin = [0.0, 0.0, -300.0]\n"),
     ),
 ]
-CONVERT = [*_PATH, *_OUTPUT]
+_STOCK = """0 BEGIN PGM P MM
+1 BLK FORM 0.1 Z X-9 Y-9 Z-9
+2 BLK FORM 0.2 X+20 Y+9 Z+0
+3 CYCL DEF 247 DATUM SETTING ~
+Q339=+1 ;DATUM NUMBER
+4 CYCL DEF 32.0 TOLERANCE
+5 CYCL DEF 32.1 T0.003
+6 CYCL DEF 32.2 HSC-MODE:0 TA0.015
+7 L Z+400 R0 FMAX M91
+8 TOOL CALL 1 Z S1000
+9 M3
+10 L X+0 Y+0 FMAX
+11 L Z+67.6478 FMAX
+12 L Z+5 FMAX
+13 L Z+0 F600
+14 L X+9
+15 L Z+5 FMAX
+16 L Z+67.6478 FMAX
+17 L Z+400 FMAX M91
+18 L X+0 Y+0 FMAX M91
+19 M9
+20 M5
+21 M30
+22 END PGM P MM
+"""
+_VERIFY = [
+    HintCase(
+        "verify.stock",
+        "verify p.h part.apt -m mill-3axis -c heidenhain-tnc640 --setup s.toml",
+        {
+            "part.apt": START + CUT + "FINI\n",
+            "s.toml": LENGTH + "[rewind.stock]\nlow = [-9.0, -9.0, -9.0]\nhigh = [12.0, 9.0, 0.0]\n",
+            "p.h": _STOCK,
+        },
+        r"correct \[rewind.stock\] of the set-up",
+        (sheet("12.0", "20.0"),),
+    )
+]
+CONVERT = [*_PATH, *_OUTPUT, *_VERIFY]

@@ -1,0 +1,34 @@
+"""The stock in the program (BLK FORM) is that of the set-up, in mm and in inches."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import machines
+import postproc
+import toolpaths
+from postproc.setup.model import SetupFile
+from tests.postproc.kit import codes, good
+
+
+def with_stock(width: float, units: str) -> SetupFile:
+    return SetupFile.model_validate({
+        "tools": {"1": {"gauge_length": 100.0}, "2": {"gauge_length": 90.0}}, "output": {"units": units},
+        "rewind": {"stock": {"low": (-70.0, -70.0, -30.0), "high": (width, 70.0, 0.0)}}})
+
+
+@pytest.mark.parametrize(("units", "other"), [("mm", "62.5"), ("inch", "2.46063")])
+def test_another_stock_is_named_until_the_set_up_has_it(tmp_path: Path, units: str, other: str) -> None:
+    path, found = toolpaths.read("samples/pocket.cls")
+    machine = machines.load("mill-3axis")
+    result = good(postproc.convert(path, machine, "heidenhain-tnc640", with_stock(70.0, units), diagnostics=found))
+    program = tmp_path / "p.h"
+    program.write_text(re.sub(r"(BLK FORM 0.2 X\+)[\d.]+", rf"\g<1>{other}", result.text))
+    said = postproc.verify(program, path, machine, "heidenhain-tnc640", with_stock(70.0, units), diagnostics=found)
+    wrong, = (d for d in said.diagnostics if d.code == "verify.stock")
+    assert wrong.lines == (3,) and "62.5000 mm" in wrong.message and "70.0000 mm" in wrong.message
+    again = postproc.verify(program, path, machine, "heidenhain-tnc640", with_stock(62.5, units), diagnostics=found)
+    assert "verify.stock" not in codes(again.diagnostics)
