@@ -233,17 +233,15 @@ def spline_arcs(control: Floats, inner: Floats, chord: float,
     if not size.min() > _STANDS * size.max():
         return []
     result: list[tuple[float, float, float, tuple[float, ...]]] = []
-    begin, direction = np.zeros(2), tangent[0] / size[0]
+    begin = np.zeros(2)
     for x, y, cx, cy, turn in biarcs(points, tangent / size[:, None], chord, before).tolist():
-        end = control[0] + x * u + y * v
+        end, out = control[0] + x * u + y * v, begin - (cx, cy)
         arc: tuple[float, ...] = ()
         if turn:
-            arc = (*(control[0] + cx * u + cy * v).tolist(), *normal.tolist(), math.hypot(cx - begin[0], cy - begin[1]),
-                   *(direction[0] * u + direction[1] * v).tolist())
+            arc = (*(control[0] + cx * u + cy * v).tolist(), *normal.tolist(), float(np.linalg.norm(out)),
+                   *(math.copysign(1.0, turn) * (out[0] * v - out[1] * u)).tolist())
         result.append((*end.tolist(), arc))
-        c, s = math.cos(turn), math.sin(turn)
         begin = np.array([x, y])
-        direction = np.array([c * direction[0] - s * direction[1], s * direction[0] + c * direction[1]])
     return result
 
 

@@ -77,6 +77,16 @@ def test_arcs_go_on_in_the_direction_in_which_the_one_before_ends(seed: int) -> 
         direction = comes
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_behind_a_bend_that_is_as_small_as_the_tolerance_arcs_go_on_forwards(seed: int) -> None:
+    """Lines run past such a bend: the direction in which the next arc begins is not that of the arc before them."""
+    random = np.random.default_rng(seed)
+    control = np.append(random.normal(0.0, 1.0, (8, 2)), np.zeros((8, 1)), axis=1)
+    control[4:6] = control[3] + random.normal(0.0, 1e-3, (2, 3)) * [1.0, 1.0, 0.0]
+    path = path_of(control, np.array([0.2, 0.4, 0.6, 0.8, 1.0]))
+    assert (path.arcs.sweep < np.pi).all()
+
+
 def test_far_fewer_arcs_than_chords() -> None:
     counts = [(len(spline_arcs(control, inner, 1e-3)), len(spline_points(control, inner, 1e-3)))
               for control, inner in (curve(seed) for seed in range(12))]
