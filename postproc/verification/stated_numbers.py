@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from postproc.base.header_words import HEADER, header_of
+from postproc.base.header_words import header_of
 from postproc.job.job import Job
 from toolpaths.diagnostics import Diagnostic, error
 
@@ -18,20 +18,31 @@ _WORD = re.compile(r"([A-Za-z])(-?\d+\.?\d*)")
 
 def check_header(data: bytes, job: Job, gcode: str) -> list[Diagnostic]:
     """An error where the header states another number than the program is for; nothing without our header."""
-    text = header_of(data[:HEADER]).decode("utf-8", "replace")
+    text = header_of(data).decode("utf-8", "replace")
     wrong = [*_offsets(text, job), *_lengths(text, job)] if "postproc " in text.lower() else []
     return [error("verify.header", f"the header says {what} {said}, the program is for {right}",
                   file=gcode or job.toolpath.file, hint="do not run this program") for what, said, right in wrong]
 
 
 def _offsets(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
-    """What is stated of the work offset of each place, and is another: what, as stated, as it is."""
+    """What is stated of each work offset, by its name, and is another: what, as stated, as it is."""
     units = np.where(job.machine.rotary, 1.0, job.controller.lengths.unit)
-    for k, found in zip(range(len(job.places)), _OFFSET.finditer(text), strict=False):
+    names = [job.controller.program.offset_name(place.code) for place in job.places]
+    places = {_plain(name): k for k, name in enumerate(names)}
+    for found in _OFFSET.finditer(text):
+        k = places.get(_plain(found[1]))
+        if k is None:
+            yield "work offset", found[1], " and ".join(names)
+            continue
         right = dict(zip(job.machine.axis_names, job.control_at(k).work_offset / units, strict=True))
         for letter, said in _WORD.findall(found[2]):
             if not _same(said, float(right.get(letter.upper(), np.nan))):
                 yield f"{letter.upper()} of work offset {found[1]}", said, f"{right.get(letter.upper(), np.nan):.4f}"
+
+
+def _plain(name: str) -> str:
+    """A name as comments may change it."""
+    return re.sub(r"[^a-z0-9.]+", " ", name.lower()).strip()
 
 
 def _lengths(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
