@@ -24,8 +24,8 @@ LENGTHS_PENDING = "length at the machine pending"
 """ends the line of each tool that says by how much its length may differ, while the program is written"""
 UNKNOWN = "--------"
 """in their place while the program is written"""
-HEADER = 4000
-"""characters of a program that hold its header"""
+HEADER, BEGIN = 40_000, 4000
+"""characters of a program that hold its header, with a line for each of many places and tools; that hold its first line"""
 _FIRST = re.compile(rb"(?im)^[ \tN\d]*[(;][ \t]*postproc \d")
 _COMMENT = re.compile(rb"(?i)[ \t]*(?:N?\d+[ \t]*)?(?:\([^()\n]*\)|;[^\n]*)?[ \t]*(?:\n|\Z)")
 
@@ -34,9 +34,9 @@ def header_of(data: bytes) -> bytes:
     """The comments in the header of a program, from the one that names postproc to the first block; comments of
     the CL file stand behind that. Where nothing names postproc, the first characters as they are."""
     text = data[:HEADER].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    first = _FIRST.search(text)
+    first = _FIRST.search(text, 0, BEGIN)
     if first is None:
-        return text
+        return text[:BEGIN]
     at = first.start()
     while at < len(text) and (line := _COMMENT.match(text, at)) is not None:
         at = line.end()

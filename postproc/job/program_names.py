@@ -13,9 +13,15 @@ def work_offset(controller: ControllerFile, setup: SetupFile, options: Options) 
     """Work offsets that the control does not have: that of the set-up, or those of its places."""
     program = controller.program
     codes = [place.work_offset_code for place in setup.places] or [setup.work_offset_code]
+    blocks = [program.offset_block(code) for code in codes]
+    twice = [(codes[blocks.index(block)], code) for k, (block, code) in enumerate(zip(blocks, codes, strict=True))
+             if block is not None and block in blocks[:k]]
     return [error("setup.work_offset_code", f"work_offset_code = {code!r}: this control has no such work offset",
                   file=options.setup, hint=f"allowed are {program.offsets_named}")
-            for code in codes if program.offset_block(code) is None]
+            for code, block in zip(codes, blocks, strict=True) if block is None] + [
+        error("setup.work_offset_code", f"work_offset_code = {code!r}: on this control that is the register of {first!r}, "
+              "which another place has", file=options.setup, hint="give each place a register of its own")
+        for first, code in twice]
 
 
 def program_number(toolpath: Toolpath, controller: ControllerFile, setup: SetupFile,

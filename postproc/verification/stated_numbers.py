@@ -29,13 +29,24 @@ def check_header(program: bytes | str, job: Job, gcode: str) -> list[Diagnostic]
 
 
 def _offsets(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
-    """What is stated of the work offset of each place, and is another: what, as stated, as it is."""
+    """What is stated of each work offset, by its name, and is another: what, as stated, as it is."""
     units = np.where(job.machine.rotary, 1.0, job.controller.lengths.unit)
-    for k, found in zip(range(len(job.places)), _OFFSET.finditer(text), strict=False):
+    names = [job.controller.program.offset_name(place.code) for place in job.places]
+    places = {_plain(name): k for k, name in enumerate(names)}
+    for found in _OFFSET.finditer(text):
+        k = places.get(_plain(found[1]))
+        if k is None:
+            yield "work offset", found[1], " and ".join(names)
+            continue
         right = dict(zip(job.machine.axis_names, job.control_at(k).work_offset / units, strict=True))
         for letter, said in _WORD.findall(found[2]):
             if not _same(said, float(right.get(letter.upper(), np.nan))):
                 yield f"{letter.upper()} of work offset {found[1]}", said, f"{right.get(letter.upper(), np.nan):.4f}"
+
+
+def _plain(name: str) -> str:
+    """A name as comments may change it."""
+    return re.sub(r"[^a-z0-9.]+", " ", name.lower()).strip()
 
 
 def _lengths(text: str, job: Job) -> Iterator[tuple[str, str, str]]:

@@ -89,9 +89,10 @@ def test_what_further_offsets_need_is_said_where_they_are_used() -> None:
 
 @cache
 def ruled(length: int, radius: int | None) -> Machine:
-    file = Path(FOLDER.name, f"{length}-{radius}.toml")
+    file = Path(FOLDER.name, f"{length}-{radius}", "ruled.toml")
+    file.parent.mkdir(exist_ok=True)
     rule = {"length_register": length, "radius_register": radius}
-    file.write_text('base = "mikron-ucp710"\nname = "ruled"\n[control]\n' + "".join(
+    file.write_text('base = "mikron-ucp710"\n[control]\n' + "".join(
         f'{key} = "T + {n}"\n' if n else f'{key} = "T"\n' for key, n in rule.items() if n is not None))
     return machines.load(file)
 

@@ -221,3 +221,8 @@ def test_tool_axes_are_chosen_for_one_part() -> None:
     result = postproc.convert(path, machines.load("mill-3axis"), "linuxcnc", SetupFile.model_validate({"places": TWO}),
                               Options(orient="auto"), found)
     assert codes(result.diagnostics) >= {"places.one"}
+
+
+def test_one_register_under_two_names_is_refused() -> None:
+    same = [TWO[0], TWO[1] | {"work_offset_code": "preset 1"}]
+    assert "setup.work_offset_code" in codes(made("pocket.cls", "mill-3axis", "heidenhain-tnc640", places=same).diagnostics)

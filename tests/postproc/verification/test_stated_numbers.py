@@ -13,6 +13,7 @@ from postproc.pipeline import program_header
 from postproc.pipeline.program_header import _work_offsets
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
+from postproc.setup.places import PlaceSetup
 from postproc.verification.stated_numbers import check_header
 from tests.postproc.kit import SAMPLES, convert
 from toolpaths.diagnostics import Severity
@@ -57,3 +58,31 @@ def test_verify_and_convert_ask_for_them(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(program_header, "_work_offsets", lambda job: [
         line.replace("X37", "X36") for line in _work_offsets(job)])
     assert [d.code for d in made("fanuc-30i", False).diagnostics if d.severity is Severity.ERROR] == ["verify.header"]
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_offsets_under_each_others_names_are_found(control: str) -> None:
+    setup = SETUP.model_copy(update={"places": [
+        PlaceSetup(name="left", work_offset_code="G54", origin=(-30.0, 0.0, 20.0)),
+        PlaceSetup(name="right", work_offset_code="G57", origin=(90.0, -10.0, 5.0))]})
+    result = convert(toolpaths.read(SAMPLES / "pocket.cls")[0], "mill-3axis", control, setup)
+    left, right = re.findall(r"(?i)work offset (.+?) in machine", result.text)[:2]
+    other = {left: right, right: left}
+    text = re.sub(r"(?i)(?<=work offset )(.+?)(?= in machine)", lambda m: other[m[0]], result.text)
+    assert result.ok and headers(result, result.text) == []
+    assert any(f"X of work offset {right}" in message for message in headers(result, text))
+    named = re.sub(rf"(?<=(?i:work offset) ){re.escape(left)}(?= (?i:in machine))", f"{left}9", result.text)
+    assert headers(result, named)[0].startswith(f"the header says work offset {left}9")
+
+
+def test_the_last_of_many_places_is_read_in_a_header_of_many_lines() -> None:
+    setup = SETUP.model_copy(update={"places": [
+        PlaceSetup(name=f"place number {k}", work_offset_code=f"G54.1 P{k + 1}", origin=(3.25 * k, -4.0 * k, 20.0))
+        for k in range(60)]})
+    path = toolpaths.read_bytes(b"UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/MMPM,600\nRAPID\nGOTO/0,0,20\n"
+                                b"GOTO/0,0,-1\nGOTO/5,0,-1\nRAPID\nGOTO/5,0,20\nFINI", file="p.apt")[0]
+    result = convert(path, "mill-3axis", "fanuc-30i", setup)
+    assert result.ok and headers(result, result.text) == []
+    assert result.text.index("G54.1 P60") > 4000
+    changed = result.text.replace("X191.7500 Y-236.0000", "X191.7500 Y-235.0000", 1)
+    assert headers(result, changed)[0].startswith("the header says Y of work offset G54.1 P60 -235.0000")
