@@ -12,7 +12,8 @@ from postproc.job.job import Job
 from postproc.readback.dialects.base import as_bytes
 from toolpaths.diagnostics import Diagnostic, error
 
-_OFFSET = re.compile(r"(?i)work offset (.+?) in machine coordinates[^:\n]*: ([^\n()]*)")
+_OFFSET = re.compile(r"(?i)work offset (.+?) in machine coordinates([^:\n]*): ([^\n()]*)")
+_STANDING = re.compile(r"(?i) with ([a-c]) at (-?[\d.e-]+)")
 _TOOL = re.compile(r"(?im)^[^\n]*?tool T(\d+)\b[^\n]*, gauge length (-?[\d.]+) ")
 _WORD = re.compile(r"([A-Za-z])(-?\d+\.?\d*)")
 
@@ -38,8 +39,12 @@ def _offsets(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
         if k is None:
             yield "work offset", found[1], " and ".join(names)
             continue
+        stands = " and ".join(f"{letter.upper()} at {angle}" for letter, angle in _STANDING.findall(found[2]))
+        right_stands = " and ".join(f"{letter} at {angle:g}" for letter, angle in job.places[k].standing)
+        if stands != right_stands:
+            yield f"work offset {found[1]} with", stands or "tables at 0", right_stands or "tables at 0"
         right = dict(zip(job.machine.axis_names, job.control_at(k).work_offset / units, strict=True))
-        for letter, said in _WORD.findall(found[2]):
+        for letter, said in _WORD.findall(found[3]):
             if not _same(said, float(right.get(letter.upper(), np.nan))):
                 yield f"{letter.upper()} of work offset {found[1]}", said, f"{right.get(letter.upper(), np.nan):.4f}"
 

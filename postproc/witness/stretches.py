@@ -95,7 +95,8 @@ def matched(targets: Targets, tip: Array, axis: Array, turns: Array, tolerance: 
     """(block (M,) that ends at each target, -1; target (E,) that each block serves, M behind the last)."""
     around = np.concatenate([targets.centre, targets.normal], axis=1)
     least = np.zeros(len(targets))
-    least[list(targets.splines)] = [0.5 * length_of(points) for points in targets.splines.values()]
+    half = np.array([0.5 * length_of(points) for points in targets.splines.values()])
+    least[list(targets.splines)] = np.where(half > tolerance, half, 0.0)  # on a shorter one the tool may stand
     match = walk(tip, axis, turns, targets.tip, targets.axis, targets.sweep, around, targets.skipped, least,
                  (tolerance, axis_tolerance))
     reached = match[:int(np.argmax(match < 0))] if (match < 0).any() else match

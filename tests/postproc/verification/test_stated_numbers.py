@@ -86,3 +86,14 @@ def test_the_last_of_many_places_is_read_in_a_header_of_many_lines() -> None:
     assert result.text.index("G54.1 P60") > 4000
     changed = result.text.replace("X191.7500 Y-236.0000", "X191.7500 Y-235.0000", 1)
     assert headers(result, changed)[0].startswith("the header says Y of work offset G54.1 P60 -235.0000")
+
+
+def test_how_tables_stand_for_a_work_offset_is_read() -> None:
+    setup = SETUP.model_copy(update={"places": [
+        PlaceSetup(name=f"face {k}", work_offset_code=f"G5{4 + k}", origin=(-20.0, 0.0, 60.0), turn={"A": 90.1234567 * k},
+                   measured="turned") for k in range(3)]})
+    result = convert(toolpaths.read(SAMPLES / "pocket.cls")[0], "mill-4axis", "fanuc-30i", setup)
+    assert result.ok and headers(result, result.text) == []
+    for other in (" WITH A AT 0:", ":"):
+        found = headers(result, result.text.replace(" WITH A AT 90.1235:", other))
+        assert len(found) == 1 and found[0].endswith("the program is for A at 90.1235")

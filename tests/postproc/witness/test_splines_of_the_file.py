@@ -58,6 +58,18 @@ def test_splines_are_compared(machine: str, control: str, end: str) -> None:
     assert counts["positions"] == 5 and counts["feeds"] == 3
 
 
+def test_a_spline_of_one_point_is_a_place_where_the_tool_stands() -> None:
+    lines = FILE.replace("UNITS/MM", "UNITS/INCHES").replace("FEDRAT/MMPM,", "FEDRAT/IPM,").splitlines()
+    begin, end = lines.index("NURBS/"), lines.index("RAPID", 10)
+    point = "CNTRL/.3937008,0,-.1181102"
+    lines[begin:end] = ["GOTO/.3937008,0,-.1181102", "NURBS/", "KNOT/1", *[point] * 3, "GOTO/1,0,-.1181102"]
+    read = read_bytes("\n".join([*lines, ""]).replace("GOTO/10,0,", "GOTO/.4,0,").replace(",-3\n", ",-.1\n").replace(
+        "50,0,0,1", "2,0,0,1").replace("MSYS/20.0,5.0,3.0", "MSYS/2.0,.5,.3").replace("30,0,50", "1,0,2"))
+    made = postproc.convert(read.toolpath, "mill-3axis", "fanuc-30i", SetupFile.model_validate(
+        {"tools": {"1": {"gauge_length": 120.0}}}), diagnostics=read.diagnostics)
+    assert made.ok and made.witness is not None and not made.witness.not_compared
+
+
 def test_points_are_those_of_scipy() -> None:
     random = np.random.default_rng(4)
     control, inner = random.normal(0.0, 20.0, (9, 3)), [0.1, 0.1, 0.3, 0.7, 0.8, 1.0]
