@@ -167,8 +167,7 @@ FAULTS = (
     Fault("links not compared", "proof", "check_links", "if not bad.any():", "if True:",
           why="the second witness refuses the same wrong programs"),
     Fault("holes not compared", "proof", "check_holes", "if not len(rows):", "if True:",
-          why="the second witness refuses the same wrong programs, but for one: it compares depths, and a retract between "
-          "pecks that is left out breaks chips where the CL file clears them"),
+          why="the second witness refuses the same wrong programs"),
     Fault("time of blocks per minute x 1.1", "proof", "block_seconds", "60.0 * length / unit / motion.feed))",
           "66.0 * length / unit / motion.feed))",
           why="the second witness refuses the same wrong programs"),
