@@ -26,6 +26,7 @@ from postproc.setup.system import standing
 from postproc.verification.neighbour_files import NeighbourFiles, unfinished
 from postproc.verification.read_back import other_axes, other_setup, read_back
 from postproc.verification.second_witness import second_witness
+from postproc.verification.stated_numbers import check_header
 from postproc.verification.tool_table import (
     MeasuredLength,
     measured_lengths,
@@ -166,7 +167,8 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     if begun.measured:
         begun = replace(begun, measured=_with_allowed(begun.measured, comparison, has_errors(more), lambda: read_back(
             data, replace(job, setup=at_gauge), path.file, progress, str(gcode), NeighbourFiles(gcode))))
-    found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more]
+    found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more,
+             *check_header(data, replace(job, setup=at_gauge), str(gcode))]
     said = None
     if comparison is not None and not has_errors(found):
         said, more = second_witness(start.source, asked, options, job, comparison, data)

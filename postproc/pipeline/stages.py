@@ -54,6 +54,7 @@ from postproc.verification.planned_words import check_planned
 from postproc.verification.proof_text import with_statement
 from postproc.verification.read_back import read_back
 from postproc.verification.second_witness import second_witness
+from postproc.verification.stated_numbers import check_header
 from postproc.writing.unwritable import floating_taps, unwritable
 from postproc.writing.writers import writer_for
 from toolpaths.diagnostics import Diagnostic, error, has_errors
@@ -249,6 +250,7 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
                                   others={name: text.encode() for name, text in made.files.items()},
                                   of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.program,
                                                                                       made.controller))
+    found = [*found, *check_header(made.text, job, "")]
     if comparison is not None and made.motion is not None and not has_errors(found):
         found = [*found, *check_planned(made.path, made.moves, on_written(made.compensation, made.motion.needed),
                                         made.options.merge_feeds, comparison, job)]

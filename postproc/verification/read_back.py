@@ -36,7 +36,6 @@ from postproc.readback.execution.poses import BlockPoses
 from postproc.readback.text.canonical import placed
 from postproc.verification.executed import executed_poses
 from postproc.verification.length_limits import LengthTrial, length_margins
-from postproc.verification.stated_numbers import check_header
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -122,8 +121,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         comparison = compare(code, motion, job, executed, gcode, planned)
     job = job.with_moves(comparison.moves)
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
-    unseen += [*lengths, *changed, *check_header(as_bytes(data[:HEADER]), job, gcode),
-               *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
+    unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(code, motion, job, comparison.owner, faults),
                *check_options(code, motion, job, faults), *check_index(motion, job, home, comparison.owner, faults),
                *check_hooks(data, code, motion, job, comparison.owner, faults),

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from postproc.base.header_words import header_of
+from postproc.base.header_words import HEADER, header_of, read_header
 from postproc.job.job import Job
+from postproc.readback.dialects.base import as_bytes
 from toolpaths.diagnostics import Diagnostic, error
 
 _OFFSET = re.compile(r"(?i)work offset (.+?) in machine coordinates([^:\n]*): ([^\n()]*)")
@@ -17,10 +18,13 @@ _TOOL = re.compile(r"(?im)^[^\n]*?tool T(\d+)\b[^\n]*, gauge length (-?[\d.]+) "
 _WORD = re.compile(r"([A-Za-z])(-?\d+\.?\d*)")
 
 
-def check_header(data: bytes, job: Job, gcode: str) -> list[Diagnostic]:
-    """An error where the header states another number than the program is for; nothing without our header."""
-    text = header_of(data).decode("utf-8", "replace")
-    wrong = [*_offsets(text, job), *_lengths(text, job)] if "postproc " in text.lower() else []
+def check_header(program: bytes | str, job: Job, gcode: str) -> list[Diagnostic]:
+    """An error where the header states another number than the program is for; nothing without our header, or where that
+    names another set-up, which is reported by itself."""
+    data = as_bytes(program[:HEADER])
+    text, header = header_of(data).decode("utf-8", "replace"), read_header(data)
+    ours = header.ours and (header.setup.mark if header.setup else "") == job.options.setup_mark
+    wrong = [*_offsets(text, job), *_lengths(text, job)] if ours else []
     return [error("verify.header", f"the header says {what} {said}, the program is for {right}",
                   file=gcode or job.toolpath.file, hint="do not run this program") for what, said, right in wrong]
 

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -27,6 +28,9 @@ FURTHER = [("fanuc-30i", "G54.1 P1", "G54.1 P1", "G54.1 P2"), ("fanuc-30i", "G54
            ("haas-ngc", "G154 P99", "G154 P99", "G154 P9"), ("siemens-840d", "G520", "G520", "G521"),
            ("siemens-840d", "G599", "G599", "G59"),
            ("heidenhain-tnc640", "preset 12", "CYCL DEF 247 DATUM SETTING ~\nQ339=+12 ;DATUM NUMBER", "Q339=+1 ")]
+
+
+FOLDER = TemporaryDirectory()
 
 
 def errors(result: PostResult) -> list[str]:
@@ -85,7 +89,12 @@ def test_what_further_offsets_need_is_said_where_they_are_used() -> None:
 
 @cache
 def ruled(length: int, radius: int | None) -> Machine:
-    return replace(machines.load("mikron-ucp710"), length_register=length, radius_register=radius)
+    file = Path(FOLDER.name, f"{length}-{radius}", "ruled.toml")
+    file.parent.mkdir(exist_ok=True)
+    rule = {"length_register": length, "radius_register": radius}
+    file.write_text('base = "mikron-ucp710"\n[control]\n' + "".join(
+        f'{key} = "T + {n}"\n' if n else f'{key} = "T"\n' for key, n in rule.items() if n is not None))
+    return machines.load(file)
 
 
 @cache

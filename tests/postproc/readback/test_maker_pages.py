@@ -13,6 +13,7 @@ import pytest
 from postproc.control.modes import table_axes
 from postproc.controllers.model import builtin_files
 from postproc.readback.text.words import plain
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import convert, toolpath
 from tests.postproc.kit import good as converted
 from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, control, faults, good, look, words
@@ -265,3 +266,12 @@ def test_a_number_without_a_point_is_refused_where_its_unit_is_a_parameter() -> 
 def test_only_haas_states_planes_that_turn_nothing() -> None:
     """G254 lets the offset follow the axes as they stand; G53.1, CYCLE800 and PLANE ... TURN drive them to the plane."""
     assert {name for name in builtin_files() if spec(name).plane_turns} == {"fanuc-30i", "siemens-840d", "heidenhain-tnc640"}
+
+
+def test_the_stock_is_stated_by_its_two_corners() -> None:
+    """T1, BLK FORM: 0.1 with the tool axis and the MIN corner, 0.2 with the MAX corner, both absolute."""
+    setup = SetupFile.model_validate({"tools": {"1": {"gauge_length": 100.0}}, "rewind": {
+        "stock": {"low": (0.0, 0.0, -40.0), "high": (100.0, 100.0, 0.0)}}})
+    path = toolpath("RAPID", "GOTO/50,50,10", "FEDRAT/MMPM,500", "GOTO/50,50,-5")
+    text = converted(convert(path, "mill-3axis", TNC, setup)).text
+    assert "BLK FORM 0.1 Z X+0 Y+0 Z-40" in text and "BLK FORM 0.2 X+100 Y+100 Z+0" in text

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
+import postproc
 import toolpaths
+from postproc.pipeline import program_header
+from postproc.pipeline.program_header import _work_offsets
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from postproc.setup.places import PlaceSetup
-from postproc.verification.read_back import read_back
+from postproc.verification.stated_numbers import check_header
 from tests.postproc.kit import SAMPLES, convert
 from toolpaths.diagnostics import Severity
 
@@ -25,8 +29,8 @@ def made(control: str, inch: bool) -> PostResult:
 
 
 def headers(result: PostResult, text: str) -> list[str]:
-    _, found = read_back(text.encode(), result.job, "p.cls", gcode="p.nc")
-    return [d.message for d in found if d.severity == Severity.ERROR and d.code == "verify.header"]
+    assert result.job is not None
+    return [d.message for d in check_header(text.encode(), result.job, "p.nc")]
 
 
 @pytest.mark.parametrize("inch", [False, True])
@@ -43,6 +47,17 @@ def test_a_number_changed_in_the_header_is_found(control: str, inch: bool) -> No
         assert headers(result, result.text.replace(offset[0], changed))[0].startswith(f"the header says {letter} of work")
     longer = re.sub(r"\d+(?=\.)", lambda m: str(int(m[0]) + 1), length[0])
     assert headers(result, result.text.replace(length[0], longer))[0].startswith("the header says gauge length of T")
+
+
+def test_verify_and_convert_ask_for_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result, program = made("fanuc-30i", False), tmp_path / "p.nc"
+    path, found = toolpaths.read(SAMPLES / "five_tilted.cls")
+    program.write_text(result.text.replace("X37.0000 Y", "X36.0000 Y"), "utf-8")
+    said = postproc.verify(program, path, "mikron-ucp710", "fanuc-30i", SETUP, diagnostics=found)
+    assert [d.code for d in said.diagnostics if d.severity is Severity.ERROR] == ["verify.header"]
+    monkeypatch.setattr(program_header, "_work_offsets", lambda job: [
+        line.replace("X37", "X36") for line in _work_offsets(job)])
+    assert [d.code for d in made("fanuc-30i", False).diagnostics if d.severity is Severity.ERROR] == ["verify.header"]
 
 
 @pytest.mark.parametrize("control", CONTROLS)
