@@ -11,6 +11,7 @@ from postproc.witness.commanded import RAPID
 from postproc.witness.evidence import Finding, FindingCode
 from postproc.witness.machine import Chain, limits_of
 from postproc.witness.place import Cut, Poses
+from postproc.witness.splines import goes_back
 from postproc.witness.stretches import BOTTOM, ENTER, Targets, is_cut, is_rapid, off
 from postproc.witness.text import Array
 
@@ -114,6 +115,10 @@ def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_ang
     after_hole = w.targets.kind[np.clip(w.owner - 1, 0, len(w.targets) - 1)] == BOTTOM
     fed = (w.kind == RAPID) & ~after_hole & ~w.gap & good & (w.code > 0) & (moved > STILL) & (not (bent and fed_rapids))
     found += _finding(w, np.flatnonzero(fed), lines, "kind", "feed motion on a rapid of the CL file")
+    for target, points in w.targets.splines.items():
+        rows = np.flatnonzero((w.owner == target) & good & (w.code > 0) & ~w.gap)
+        if goes_back(w.tip[rows], points, w.tolerance[0] + EXACT):
+            found += _finding(w, rows, lines, "path", "the tool does not go along the spline from its begin to its end")
     turned = _turned_in_rapid(w, math.radians(link_angle))
     good &= ~turned
     rows = np.flatnonzero(~good & ~w.gap & (np.arange(len(w.owner)) > 0) & ((w.code == 0) | cutting | rapid | ~w.inside))

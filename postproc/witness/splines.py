@@ -10,7 +10,7 @@ CHORD = 2e-4
 """mm that the chords are from the curve"""
 REPLACED = 0.001
 """mm that arcs or chords in the place of a spline may be from it"""
-_AT_ONCE = 200
+_AT_ONCE, _LOOKS = 200, 64
 
 
 def points_of(control: Array, knots: list[float]) -> Array:
@@ -44,14 +44,32 @@ def length_of(points: Array) -> float:
     return float(np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)).sum())
 
 
+def _chords(tip: Array, points: Array) -> tuple[Array, Array]:
+    """(K, P - 1) mm from tips to each chord, and how far along each they are (0 to 1)."""
+    begin, travel = points[:-1], np.diff(points, axis=0)
+    offset = tip[:, None] - begin
+    share = np.clip((offset * travel).sum(axis=2) / np.maximum((travel * travel).sum(axis=1), 1e-30), 0.0, 1.0)
+    rest = offset - share[:, :, None] * travel
+    return np.sqrt((rest * rest).sum(axis=2)), share
+
+
 def off_chords(tip: Array, points: Array) -> Array:
     """(K,) mm by which tips are off chords, less what may stand in the place of a spline."""
-    begin, travel = points[:-1], np.diff(points, axis=0)
-    square = np.maximum((travel * travel).sum(axis=1), 1e-30)
     away = np.empty(len(tip))
     for first in range(0, len(tip), _AT_ONCE):
-        offset = tip[first:first + _AT_ONCE, None] - begin
-        share = np.clip((offset * travel).sum(axis=2) / square, 0.0, 1.0)
-        rest = offset - share[:, :, None] * travel
-        away[first:first + _AT_ONCE] = np.sqrt((rest * rest).sum(axis=2).min(axis=1))
+        away[first:first + _AT_ONCE] = _chords(tip[first:first + _AT_ONCE], points)[0].min(axis=1)
     return np.maximum(away - REPLACED - CHORD, 0.0)
+
+
+def goes_back(tip: Array, points: Array, tolerance: float) -> bool:
+    """True where tips (K, 3), which are on a spline, do not follow each other along it in their order."""
+    tip = tip[np.unique(np.linspace(0, len(tip) - 1, _LOOKS).astype(int))] if len(tip) else tip
+    size, at, near = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)), 0.0, tolerance + REPLACED + CHORD
+    before = np.cumsum(size) - size
+    for away, share in zip(*_chords(tip, points), strict=True):
+        places = (before + share * size)[away <= near]
+        ahead = places[places >= at - 4.0 * near]
+        if len(places) and not len(ahead):
+            return True
+        at = max(at, float(ahead.min())) if len(ahead) else at
+    return False

@@ -189,8 +189,9 @@ class Effect:
         return self.kept(np.arange(len(self.end)) != k) if inside else self
 
     def as_fast_as(self, other: Effect) -> bool:
-        """Whether each move takes its time: feeds of its blocks are not held to anything, but for that."""
-        return bool((np.abs(self.seconds - other.seconds) <= SHARE * self.seconds + MOMENT).all())
+        """Whether each move takes its time, and no block of it is run much faster than before."""
+        faster = other.states["feed"] > FASTER * self.states["feed"] + 0.1
+        return not faster.any() and bool((np.abs(self.seconds - other.seconds) <= SHARE * self.seconds + MOMENT).all())
 
     def rounds_more_than(self, other: Effect) -> bool:
         """Whether the control rounds corners in the other program as much or less."""
@@ -203,6 +204,8 @@ NEAR = 0.02
 """mm or degrees: twice the tolerance"""
 SHARE, MOMENT = 0.006, 1e-3
 """of its time, and s: what the time of a move may differ by"""
+FASTER = 1.03
+"""of the feed of a block: the cutter's load rises as much, inside what overrides and the CAM system's own feeds leave"""
 
 
 def _equal(a: Any, b: Any) -> bool:

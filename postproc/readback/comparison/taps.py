@@ -23,9 +23,16 @@ def check_taps(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faul
     """Feed by speed is the pitch of the CL file, right- or left-hand as its spindle turns, coupled as the post has it."""
     taps = np.array([c.kind == "TAP" for c in job.toolpath.cycles] + [False])
     move = np.minimum(owner, len(moves) - 1)
-    rows = np.flatnonzero((owner < len(moves)) & (moves.phase[move] == Phase.DRILL) & taps[moves.cycle[move]])
+    drilled = (owner < len(moves)) & (moves.phase[move] == Phase.DRILL)
+    rows, others = (np.flatnonzero(drilled & which) for which in (taps[moves.cycle[move]], ~taps[moves.cycle[move]]))
+    others = others[np.isfinite(motion.pitch[others])]
+    result: list[Diagnostic] = []
+    if len(others):
+        result.append(faults.error("verify.tap", "the hole is tapped, the CL file does not tap it",
+                                   int(moves.line[move[others[0]]]), int(motion.line[others[0]]), len(others),
+                                   "the cycle of the hole"))
     if not len(rows):
-        return []
+        return result
     m = move[rows]
     sense, rpm = (a[moves.row[m]] for a in spindle_states(job.toolpath))
     stated = np.array([np.nan if c.pitch is None else c.pitch for c in job.toolpath.cycles])[moves.cycle[m]]
@@ -33,7 +40,6 @@ def check_taps(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faul
         wanted = sense * np.where(np.isfinite(stated), stated, 60.0 * moves.feed[m] / rpm)
     found = motion.pitch[rows]
     right = np.abs(found - wanted) <= PITCH_SLACK * np.abs(wanted)
-    result: list[Diagnostic] = []
     bad = np.flatnonzero(~right)
     if len(bad):
         k = int(bad[0])

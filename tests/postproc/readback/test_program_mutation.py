@@ -300,3 +300,11 @@ def test_no_change_is_silent_and_harmful(source: Path, controller: str, mode: st
 @pytest.mark.parametrize(("source", "controller", "mode"), CHANGED, ids=lambda v: getattr(v, "stem", v))
 def test_none_of_all_changes_is_silent_and_harmful(source: Path, controller: str, mode: str) -> None:
     assert judged(source, controller, mode, None) == []
+
+
+@pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc"])
+def test_a_hole_that_the_file_does_not_tap_is_not_tapped(controller: str) -> None:
+    """A cycle that is left out, or another one, behind taps: the spindle would turn back at the bottom."""
+    result, _ = off_axes(GOLDEN / "every_cycle.cls", controller, "auto")
+    for other in ("G84 ", ""):
+        assert "verify.tap" in found(result, re.sub("G85 ", other, result.text, count=1).splitlines())

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
 import postproc
 from postproc.setup.model import SetupFile
-from postproc.witness.splines import CHORD, off_chords, points_of
+from postproc.verification.second_witness import second_witness
+from postproc.witness.splines import CHORD, goes_back, off_chords, points_of
 from toolpaths.cl.read import read_bytes
 
 FILE = """TOOL PATH/A,TOOL,MILL_10
@@ -77,3 +80,32 @@ def test_points_are_those_of_scipy() -> None:
     true = BSpline(np.concatenate([np.zeros(4), inner, np.ones(3)]), control, 3)(np.linspace(0.0, 1.0, 301))
     assert off_chords(true, points).max() == 0.0
     assert off_chords(true + np.array([0.0, 0.0, 0.01]), points).max() > 0.01 - 0.001 - 2.0 * CHORD
+
+
+@pytest.mark.parametrize("form", ["closed", "crossing"])
+def test_the_way_along_a_spline_is_its_own(form: str) -> None:
+    side = 20.0 if form == "crossing" else -20.0
+    control = np.array([(0, 0, 0), (20, 20, 0), (40, side, 0), (40, -side, 0), (20, -20, 0), (0, 0, 0)], dtype=float)
+    points = points_of(control, [0.3, 0.6, 1.0])
+    some = points[::7]
+    assert not goes_back(some, points, 0.01)
+    assert goes_back(some[::-1], points, 0.01)
+    assert goes_back(np.concatenate([some[:len(some) // 2], some[:len(some) // 2][::-1]]), points, 0.01)
+
+
+def test_a_closed_spline_the_other_way_round_is_found() -> None:
+    points = ["20,10", "25,20", "0,30", "-20,10", "-10,-10", "10,0"]
+    knots = "KNOT/0.2,0.5,0.7,1.0"
+    begin, end = FILE.index("KNOT/"), FILE.index("NURBS/\nKNOT/1\n")
+
+    def text(order: list[str]) -> str:
+        return FILE[:begin] + "\n".join([knots if order[0] == "20,10" else "KNOT/0.3,0.5,0.8,1.0",
+                                         *(f"CNTRL/{p},-3" for p in order), ""]) + FILE[end:]
+
+    read = read_bytes(text(points))
+    made = postproc.convert(read.toolpath, "mill-3axis", "fanuc-30i", SetupFile.model_validate(
+        {"tools": {"1": {"gauge_length": 120.0}}}), diagnostics=read.diagnostics)
+    assert made.ok and made.job is not None and made.comparison is not None and made.source is not None
+    other = replace(made.source, data=text([*points[-2::-1], points[-1]]).encode())
+    _, found = second_witness(other, made.setup, made.options, made.job, made.comparison, made.text)
+    assert {d.code for d in found} == {"witness.path"}
