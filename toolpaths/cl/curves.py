@@ -17,7 +17,7 @@ SPLINE_CHORD = 0.001
 """mm: a spline is followed by arcs, or chords, no further from it than this"""
 _DEGREE = 3
 _MOST_CHORDS = 10000
-_LEAST_PLACES = 8
+_LEAST_PLACES = 16
 """of a span, that arcs are compared at"""
 _STANDS = 1e-6
 """of the largest speed along a spline: where it is less, its direction is not known"""
