@@ -56,7 +56,7 @@ class Chain:
 
     def pose(self, q: Array, letters: tuple[str, ...], length: Array) -> tuple[Array, Array]:
         """(tip, axis) (N, 3) in the table frame at joints q (N, J), mm and rad, of tools of `length` (N,) mm."""
-        tip, axis = -length[:, None] * self.tool, np.broadcast_to(self.tool, (len(q), 3))
+        tip, axis = -length[:, None] * self.tool, self.tool[None]
         for name in reversed(self.letters):
             value, along = q[:, letters.index(name)], self.direction[name]
             if name in "ABC":
@@ -65,7 +65,7 @@ class Chain:
                 axis = apply(turn, axis)
             else:
                 tip = tip + value[:, None] * along
-        return tip, axis
+        return tip, np.array(np.broadcast_to(axis, tip.shape))
 
     def slides(self, q: Array, letters: tuple[str, ...]) -> tuple[list[int], Array]:
         """(numbers of the linear joints, their directions (N, 3, 3) of motion in the table frame, one in each column)."""
@@ -87,7 +87,7 @@ def rotations(along: Array, angle: Array) -> Array:
 
 
 def apply(turns: Array, v: Array) -> Array:
-    """Turns (N, 3, 3) or (1, 3, 3) of vectors (N, 3)."""
+    """Turns (N, 3, 3) or (1, 3, 3) of vectors (N, 3) or (1, 3)."""
     return np.asarray(v @ turns[0].T if len(turns) == 1 else np.einsum("nij,nj->ni", turns, v))
 
 
