@@ -88,7 +88,7 @@ def rotations(along: Array, angle: Array) -> Array:
 
 def apply(turns: Array, v: Array) -> Array:
     """Turns (N, 3, 3) or (1, 3, 3) of vectors (N, 3) or (1, 3)."""
-    return np.asarray(v @ turns[0].T if len(turns) == 1 else np.einsum("nij,nj->ni", turns, v))
+    return np.asarray(v @ np.ascontiguousarray(turns[0].T) if len(turns) == 1 else np.einsum("nij,nj->ni", turns, v))
 
 
 def chain(table: dict[str, Any]) -> Chain:
