@@ -74,13 +74,11 @@ class OutputModes:
 
     def at(self, place: int) -> OutputModes:
         """The modes with the work offset of a place."""
-        if place and place not in self._places:
-            self._places[place] = replace(self, control=self.others[place - 1])
-        return self._places[place] if place else self
+        return self._places[place]
 
     @cached_property
-    def _places(self) -> dict[int, OutputModes]:
-        return {}
+    def _places(self) -> tuple[OutputModes, ...]:
+        return self, *(replace(self, control=control) for control in self.others)
 
     @cached_property
     def lacking(self) -> dict[InterpolationMode, MissingMode | None]:

@@ -174,9 +174,13 @@ class ProgramBlocks(UserModel):
         more = [f"{n.format(number=o.first)} to {n.format(number=o.last)}" for n, o in self.more_offsets.items()]
         return ", ".join(["G54 to G59", "G59.1 to G59.3", *more])
 
+    def offset_text(self, code: str) -> str:
+        """The block that switches a work offset on, as the set-up names it where the control has none such."""
+        return self.offset_block(code) or code
+
     def offset_name(self, code: str) -> str:
         """A work offset of the set-up as the control names it; of a parameter with a name, that name and its number."""
-        text = self.offset_block(code) or code
+        text = self.offset_text(code)
         named = re.search(r"=\+?(\d+) *;(.+)$", text)
         return f"{named[2].strip().lower()} {named[1]}" if named else text
 

@@ -108,7 +108,7 @@ def _executed(data: bytes, controller: ControllerFile, controls: dict[str, Contr
     code, found = reader.read(data, file, others)
     if code is None or has_errors(found):
         return None, None, found
-    numbers = [reader.offset_of(program.offset_block(code) or code) for code in controls]
+    numbers = [reader.offset_of(program.offset_text(code)) for code in controls]
     offsets = Offsets(control.work_offset, control.xyz, lengths, home, control.length_on_z, controller.cycles.peck_relief,
                       control, reader.rises_first, reader.arc_slack, tuple(zip(numbers[1:], further, strict=True)))
     motion, more = run(code, machine.axis_names, offsets, file)

@@ -72,7 +72,7 @@ class WriterState:
     def at_place(self, place: int) -> list[str]:
         """The name of a place and its work offset, which is in force from here on."""
         (name, code), program = self.places[place], self.controller.program
-        self.work_offset, self.offset_name = program.offset_block(code) or code, program.offset_name(code)
+        self.work_offset, self.offset_name = program.offset_text(code), program.offset_name(code)
         return [self.comment(f"PLACE {name}"), *blocks_of(self.work_offset)]
 
     def named(self, number: int | str) -> dict[str, int | str]:

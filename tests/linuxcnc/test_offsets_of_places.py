@@ -15,16 +15,11 @@ from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from postproc.setup.places import PlaceOrder
 from tests.linuxcnc import outputs
+from tests.postproc.job.test_places import FACES, TOOLS, TWO
 from toolpaths.arrays import Floats
 
 EXACT = 1e-9
 """mm and degrees"""
-TOOLS = {str(n): {"gauge_length": 90.0 + 10.0 * n} for n in range(1, 6)}
-ROW = [{"name": "left", "work_offset_code": "G54", "origin": (-30.0, 0.0, 20.0)},
-       {"name": "right", "work_offset_code": "G56", "origin": (90.0, -10.0, 5.0), "x_axis": (0.0, 1.0, 0.0),
-        "y_axis": (-1.0, 0.0, 0.0)}]
-FACES = [{"name": f"face {k}", "work_offset_code": f"G5{4 + k}", "origin": (-20.0, 0.0, 60.0), "turn": {"A": 90.0 * k}}
-         for k in range(3)]
 
 
 def with_offsets(result: PostResult) -> str:
@@ -45,7 +40,7 @@ def words(letters: tuple[str, ...], values: Floats) -> str:
 
 @pytest.mark.parametrize("order", ["tool", "part"])
 @pytest.mark.parametrize(("file", "machine", "places"), [
-    ("pocket.cls", "mill-3axis", ROW), ("pocket.cls", "mill-4axis", FACES)])
+    ("pocket.cls", "mill-3axis", TWO), ("pocket.cls", "mill-4axis", FACES)])
 def test_every_place_is_gone_to(interpret, file: str, machine: str, places: list[dict[str, object]],
                                 order: PlaceOrder) -> None:
     path, found = toolpaths.read(Path("samples") / file)

@@ -220,7 +220,7 @@ def spline_arcs(control: Floats, inner: Floats, chord: float,
     axis, radius, direction in which it begins, or () for a line; [] where it lies in no plane, has a corner or turns
     back. `before`: splines of the file so far."""
     plane = plane_of(control)
-    knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.ones(_DEGREE)])
+    knots = _knots(inner)
     if plane is None or (np.unique(inner[:-1], return_counts=True)[1] >= _DEGREE).any():
         return []
     u, v, normal = plane
@@ -251,8 +251,13 @@ def spline_points(control: Floats, inner: Floats, chord: float) -> Floats:
     control (n, 3); inner (n - 3,): the inner knots and 1. The number of chords of a span of length h is
     h sqrt(max |C''| / (8 chord)), the bound of linear interpolation.
     """
-    knots = np.concatenate([np.zeros(_DEGREE + 1), inner, np.ones(_DEGREE)])
+    knots = _knots(inner)
     return de_boor(control, knots, _places(control, knots, chord), _DEGREE)
+
+
+def _knots(inner: Floats) -> Floats:
+    """All knots of a clamped cubic on [0, 1], of the inner ones and 1."""
+    return np.concatenate([np.zeros(_DEGREE + 1), inner, np.ones(_DEGREE)])
 
 
 def _places(control: Floats, knots: Floats, chord: float, least: int = 1) -> Floats:

@@ -64,7 +64,7 @@ class _Asked:
 def registers_of(job: Job, reader: Reader) -> list[float]:
     """The number of the register that holds the work offset of each place."""
     program = job.controller.program
-    return [reader.offset_of(program.offset_block(place.code) or place.code) for place in job.places]
+    return [reader.offset_of(program.offset_text(place.code)) for place in job.places]
 
 
 def check_states(motion: Motion, job: Job, moves: Moves, owner: Ints, down: Bools,

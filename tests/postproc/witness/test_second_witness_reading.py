@@ -43,7 +43,10 @@ TEXTS = {
 }
 
 
-def agrees(text: bytes) -> None:
+@pytest.mark.parametrize("given", [*FILES, *(pytest.param(text, id=name) for name, text in TEXTS.items())],
+                         ids=lambda p: getattr(p, "name", None))
+def test_both_read_alike(given: Path | str) -> None:
+    text = given.read_bytes() if isinstance(given, Path) else given.encode()
     path, found = toolpaths.read_bytes(text)
     assert not has_errors(found), [str(d) for d in found]
     c = commanded(text)
@@ -57,16 +60,6 @@ def agrees(text: bytes) -> None:
     np.testing.assert_allclose(c.normal, path.arcs.normal, atol=1e-12)
     np.testing.assert_allclose(c.centre, path.arcs.center, atol=1e-9)
     np.testing.assert_allclose(c.sweep, path.arcs.sweep, atol=1e-9)
-
-
-@pytest.mark.parametrize("path", FILES, ids=lambda p: p.name)
-def test_both_read_the_samples_alike(path: Path) -> None:
-    agrees(path.read_bytes())
-
-
-@pytest.mark.parametrize("name", TEXTS)
-def test_both_read_alike(name: str) -> None:
-    agrees(TEXTS[name].encode())
 
 
 @pytest.mark.parametrize(("text", "what"), [
