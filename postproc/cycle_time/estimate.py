@@ -21,8 +21,6 @@ from toolpaths.units import DEG
 COVERAGE = 1.96
 """standard deviations on both sides that hold 95 % of a normal distribution"""
 _LIMITS: tuple[MotionOrder, ...] = get_args(MotionOrder)
-_WORD = "assumed "
-"""what the uncertainties of assumed values begin with"""
 _ORDERS = {"velocity": "", "acceleration": "2", "jerk": "3"}
 _UNITS = {"corner_tolerance": " mm", "block_time": " s", "stop_time": " s", "spindle_time": " s"}
 _TIMING = {"tool_change": Cause.TOOL_CHANGE, "clamp": Cause.INDEXING, "unclamp": Cause.INDEXING}
@@ -34,7 +32,7 @@ class Estimate:
 
     Attributes:
         seconds: the model's time; lower_bound: no control is faster; band: 95 % of machines as described lie in it
-        uncertainties: standard deviation of the time by what it comes from, s
+        uncertainties: standard deviation of the time by what it comes from, s; assumed: of assumed values by their names
     """
 
     blocks: MotionBlocks
@@ -44,6 +42,7 @@ class Estimate:
     lower_bound: float
     band: tuple[float, float]
     uncertainties: dict[str, float]
+    assumed: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -92,25 +91,31 @@ def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with
     seconds = total(blocks, times)
     bound = lower_bound(blocks, model)
     if not with_band:
-        return Estimate(blocks, model, times, seconds, bound, (seconds, seconds), {})
-    down, up, uncertainties = _uncertainties(blocks, machine, model, seconds)
+        return Estimate(blocks, model, times, seconds, bound, (seconds, seconds), {}, {})
+    down, up, uncertainties, assumed = _uncertainties(blocks, machine, model, seconds)
     low = seconds - down if machine.limits.assumed else max(seconds - down, min(bound, seconds))
-    return Estimate(blocks, model, times, seconds, bound, (max(low, 0.0), seconds + up), uncertainties)
+    return Estimate(blocks, model, times, seconds, bound, (max(low, 0.0), seconds + up), uncertainties,
+                    assumed)
 
 
 def _uncertainties(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel,
-                   seconds: float) -> tuple[float, float, dict[str, float]]:
-    """(s below, s above, standard deviation by origin): every uncertain value is moved by one standard deviation."""
+                   seconds: float) -> tuple[float, float, dict[str, float], dict[str, float]]:
+    """(s below, s above, standard deviation by origin, that of assumed values by name): every uncertain value is moved by
+    one standard deviation."""
     own = model.calibration.relative if model.calibration else model.own_share
     low = high = (COVERAGE * own * seconds) ** 2
-    uncertainties = {"the model itself": own * seconds}
     begin = total(blocks, timed(blocks, model))
-    for name, changed in _changes(blocks, machine, model):
+    assumed, fitted = _assumed_changes(blocks, machine, model), _fitted_changes(blocks, model)
+    deviation: dict[str, float] = {}
+    for name, changed in (*assumed, *fitted):
         moved = sorted(total(b, timed(b, m)) - begin for b, m in changed)
         low += (COVERAGE * min(moved[0], 0.0)) ** 2
         high += (COVERAGE * max(moved[-1], 0.0)) ** 2
-        uncertainties[name] = (moved[-1] - moved[0]) / 2.0
-    return float(np.sqrt(low)), float(np.sqrt(high)), uncertainties
+        deviation[name] = (moved[-1] - moved[0]) / 2.0
+    of_assumed = {name: deviation[name] for name, _ in assumed}
+    uncertainties = {"the model itself": own * seconds, **{f"assumed {name}": s for name, s in of_assumed.items()},
+                     **{name: deviation[name] for name, _ in fitted}}
+    return float(np.sqrt(low)), float(np.sqrt(high)), uncertainties, of_assumed
 
 
 def measure_first(e: Estimate, machine: Machine) -> Uncertain | None:
@@ -120,7 +125,7 @@ def measure_first(e: Estimate, machine: Machine) -> Uncertain | None:
     All axes slower take no less than one of them, so limits are moved axis by axis only while all of them together move the
     time by more than the worst value so far.
     """
-    known = {name.removeprefix(_WORD): s for name, s in e.uncertainties.items() if name.startswith(_WORD)}
+    known = e.assumed
     alone = {name: s for name, s in known.items() if name not in _LIMITS}
     begin = total(e.blocks, timed(e.blocks, e.model))
     for limit in sorted(known.keys() & set(_LIMITS), key=lambda name: -known[name]):
@@ -151,28 +156,27 @@ def _assumed_value(name: str, machine: Machine, model: CycleTimeModel) -> str:
 Change = tuple[MotionBlocks, CycleTimeModel]
 
 
-def _changes(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
-    """What may be otherwise: name, and the program and model with it lower and higher by one standard deviation."""
+def _assumed_changes(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
+    """Assumed values: name, and the program and model with it lower and higher by one standard deviation."""
     result: list[tuple[str, list[Change]]] = []
     for limit in _LIMITS:
         if (limit != "jerk" or (model.kind != "linuxcnc" and model.jerk)) and not model.calibration:
             which = np.array([f"{name}.{limit}" in machine.limits.assumed for name in machine.axis_names])
             if which.any():
-                result.append((f"{_WORD}{limit}", [(_scaled(blocks, limit, which, sign), model) for sign in (-1, 1)]))
+                result.append((limit, [(_scaled(blocks, limit, which, sign), model) for sign in (-1, 1)]))
     for name, cause in _TIMING.items():
         here = (blocks.pauses.cause == cause) & (blocks.pauses.seconds > 0.0)
         if name in machine.timing.assumed and here.any():
             own = getattr(machine.timing, name)
-            result.append((f"{_WORD}{name}", [(_longer(blocks, here, own * sign * ASSUMED[name]), model)
-                                               for sign in (-1, 1)]))
-    return result + _parameter_changes(blocks, model)
-
-
-def _parameter_changes(blocks: MotionBlocks, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
-    """The model's own parameters: assumed ones alone, fitted ones along the principal axes of their covariance."""
+            result.append((name, [(_longer(blocks, here, own * sign * ASSUMED[name]), model) for sign in (-1, 1)]))
     alone = [name for name in model.assumed if model.calibration is None or name not in PARAMETERS]
-    result = [(f"{_WORD}{name}", [(blocks, with_values(model, {name: sign * ASSUMED[name]})) for sign in (-1, 1)])
-              for name in alone]
+    return result + [(name, [(blocks, with_values(model, {name: sign * ASSUMED[name]})) for sign in (-1, 1)])
+                     for name in alone]
+
+
+def _fitted_changes(blocks: MotionBlocks, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
+    """The same of parameters fitted to a log, along the principal axes of their covariance."""
+    result: list[tuple[str, list[Change]]] = []
     if model.calibration is None:
         return result
     values, vectors = np.linalg.eigh(np.array(model.calibration.covariance))
