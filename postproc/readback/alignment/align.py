@@ -103,15 +103,18 @@ def _line_done(tip: Any, axis: Any, start: Any, end: Any, axis0: Any, axis1: Any
 
 
 @loop(alone=True)
-def _nearer(tip: Any, axis: Any, after: Any, axis_after: Any, end: Any, axis1: Any, grain: float,
-            axis_grain: float) -> Any:
-    """True where a pose is off the end of its move by more than rounding, and the block after it comes nearer."""
+def _approach(tip: Any, axis: Any, after: Any, axis_after: Any, end: Any, axis1: Any, grain: float,
+              axis_grain: float) -> int:
+    """1: the pose after comes nearer to the end of the move, 0: it is as near, -1: it leaves it, or the pose before was there.
+
+    A tenth of the last decimal is nothing: standing tips of two poses differ by the arithmetic of the kinematics.
+    """
     off, turn = _apart(tip, end), _angle(axis, axis1)
-    if off <= grain and turn <= axis_grain:
-        return False
     off_after, turn_after = _apart(after, end), _angle(axis_after, axis1)
-    comes = off_after < off - 0.1 * grain or turn_after < turn - 0.1 * axis_grain
-    return comes and off_after <= max(off, grain) and turn_after <= max(turn, axis_grain)
+    there = off <= grain and turn <= axis_grain
+    if there or off_after > max(off, grain) + 0.1 * grain or turn_after > max(turn, axis_grain) + 0.1 * axis_grain:
+        return -1
+    return 1 if off_after < off - 0.1 * grain or turn_after < turn - 0.1 * axis_grain else 0
 
 
 @loop(alone=True, takes=(_ROWS, _ROWS, _NUMBERS, _ROWS, _ROWS, _ROWS, _ROWS, _KINDS, _ROWS, _ROWS, _NUMBERS, *[_NUMBER] * 4))
@@ -154,12 +157,15 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
             for r in range(j + 1, count):
                 owner[r] = i
             return match, owner
-        # Several blocks may end within the tolerance of the end: the move keeps those that come nearer to it.
-        while k < count and _nearer(tip[k - 1], axis[k - 1], tip[k], axis[k], end[i], axis1[i], grain,
-                                    axis_grain):
-            owner[k] = i
-            k += 1
+        # Several blocks may end within the tolerance of the end: the move keeps those up to the last that comes nearer to it.
         j = k - 1
+        step = 0
+        while k < count and step >= 0:
+            step = _approach(tip[j], axis[j], tip[k], axis[k], end[i], axis1[i], grain, axis_grain)
+            if step > 0:
+                owner[j + 1:k + 1] = i
+                j = k
+            k += 1
         match[i] = j
     return match, owner
 

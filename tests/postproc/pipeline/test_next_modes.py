@@ -155,13 +155,14 @@ def test_what_no_mode_converts_fails_once_with_what_to_do(monkeypatch: pytest.Mo
 
 
 @pytest.mark.covering
-@pytest.mark.parametrize("controller", ["fanuc-30i", "heidenhain-tnc640"])
-@pytest.mark.parametrize("sample", ["five_faces.cls", "joints/singular_pass.cls"])
-def test_auto_converts_what_another_mode_converts(sample: str, controller: str) -> None:
+@pytest.mark.parametrize("controller", ["fanuc-30i", "heidenhain-tnc640", "haas-ngc"])
+@pytest.mark.parametrize(("sample", "machine"), [("five_faces.cls", "trunnion-bc"), ("joints/singular_pass.cls", "head-table")])
+def test_auto_converts_what_another_mode_converts(sample: str, machine: str, controller: str) -> None:
     path, setup = read(sample), SAMPLES / "tools.setup.toml"
-    done = {mode: postproc.convert(path, "trunnion-bc", controller, setup, Options(output=mode)).ok
-            for mode in ("auto", *MODES)}
-    assert done["auto"] or not any(done.values())
+    auto = postproc.convert(path, machine, controller, setup)
+    assert auto.ok or not any(postproc.convert(path, machine, controller, setup, Options(output=mode)).ok for mode in MODES)
+    if sample == "joints/singular_pass.cls":
+        assert auto.ok and auto.comparison is not None and auto.comparison.worst_tip < 0.006  # of 0.01
 
 
 @pytest.mark.slow
