@@ -103,7 +103,7 @@ class _Writing:
             move, operation = self.starts[0]
             named = self.toolpath.operations[operation]
             if before is not None and (move > self.first_move[before.index] or (
-                    move == self.first_move[before.index] and named.line > before.line)):
+                    move == self.first_move[before.index] and not self._within(before, named.line, int(self.moves.row[move])))):
                 return
             self.starts.pop(0)
             self.compensation.off_before(move)
@@ -112,6 +112,11 @@ class _Writing:
             self.at(self._label(move)).append(Command("OPERATION_START", args, named.line))
             if self.restart and self.loaded is not None:
                 self._restate(self.loaded, self.at(int(self.path.begin[move])), move, named.line)
+
+    def _within(self, event: Event, line: int, row: int) -> bool:
+        """True for a record before a row that belongs to the operation from a line on: where the path stands at several
+        places, the last records of the place before have lines behind that of the row."""
+        return line <= event.line <= int(self.toolpath.line[row])
 
     def _label(self, move: int) -> int:
         """The block that an operation begins with: the travel home, where it leads there, so that a program
@@ -122,7 +127,7 @@ class _Writing:
     def _restate(self, loaded: ToolChange, out: list[Command], move: int, line: int) -> None:
         """The tool in the spindle again, unless the operation changes it."""
         row = int(self.moves.row[move])
-        here = [e for e in self.at_row.get(row, ()) if e.line >= line]
+        here = [e for e in self.at_row.get(row, ()) if self._within(e, line, row)]
         if not any((e.index, e.line) in self.changes for e in here):
             out += self.state.change(replace(loaded, line=line), {e.word for e in here}, True)
             self._preload(out, line)

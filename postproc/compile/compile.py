@@ -51,7 +51,7 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
     kept_holes = tuple(Hole(int(new[h.first]), int(new[h.last + 1]) - 1, h.cycle, h.plane_level, h.bottom, h.retract,
                             h.initial, h.key, int(new[h.drill])) for h in holes)
     line = moves.line[path.move[keep]]
-    placed, found = with_skips(with_sections(_moved(commands, new), sections), skip[keep], line,
+    placed, found = with_skips(with_sections(_moved(commands, new), sections, line), skip[keep], line,
                                toolpath.file)
     program = Program(control.machine.axis_names, end[keep], write[keep], path.code[keep], feeds.feed[keep],
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], path.center[keep], path.home[keep],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import pairwise, takewhile
 
 import numpy as np
 
@@ -28,17 +28,29 @@ def sections_of(path: JointPath, new: Ints) -> tuple[Section, ...]:
     return tuple(result)
 
 
-def with_sections(commands: Commands, sections: tuple[Section, ...]) -> Commands:
-    """The commands with those that leave one section and enter the next.
+def with_sections(commands: Commands, sections: tuple[Section, ...], line: Ints) -> Commands:
+    """The commands with those that leave one section and enter the next; `line` (K,): of the CL file, of each block.
 
-    Cutter compensation ends inside its section; all else at the same block comes after the change.
+    Cutter compensation ends inside its section, the last records of a place stand before the next place is called; all
+    else at the same block comes after the change.
     """
     result = dict(commands)
     for k, (old, section) in enumerate(pairwise(sections), 1):
-        here = result.get(section.first, ())
+        here, other = result.get(section.first, ()), section.place != old.place
         before = tuple(c for c in here if c.name in _BELONG_BEFORE and old.law != "axes")
-        change = (*((Command("LEAVE_SECTION", (float(k - 1),)),) if old.law != "axes" else ()),
-                  *((Command("SET_ORIGIN_OFFSETS", (float(section.place),)),) if section.place != old.place else ()),
+        rest = tuple(c for c in here if c not in before)
+        ended = _ended(rest, section.place, int(line[section.first])) if other else ()
+        change = (*((Command("LEAVE_SECTION", (float(k - 1),)),) if old.law != "axes" else ()), *ended,
+                  *((Command("SET_ORIGIN_OFFSETS", (float(section.place),)),) if other else ()),
                   *((Command("ENTER_SECTION", (float(k),)),) if section.law != "axes" else ()))
-        result[section.first] = (*before, *change, *(c for c in here if c not in before))
+        result[section.first] = (*before, *change, *rest[len(ended):])
     return result
+
+
+def _ended(here: tuple[Command, ...], place: int, line: int) -> tuple[Command, ...]:
+    """The last records of the place before, among the commands `here` at the first block of a place, with its `line`.
+
+    Their lines are behind that; where the first place comes again (with the next tool) they are before the tool change.
+    """
+    change = next((c.line for c in here if c.name == "CHANGE_TOOL"), 0) if place == 0 else 0
+    return tuple(takewhile(lambda c: c.line > line or c.line < change, here))

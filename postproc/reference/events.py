@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -85,12 +84,17 @@ def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
 def stops_between(toolpath: Toolpath) -> list[ToolChange]:
     """The tool changes, but for the first, before which the file itself does not stop since the last cut:
     where `stop_between_tools` does."""
-    changes = tool_changes(toolpath)[1:]
-    stops = sorted((e.index, e.line) for e in toolpath.events if e.word in ("STOP", "OPSTOP"))
-    cuts = np.flatnonzero(cutting(toolpath))
-    last = [int(cuts[k - 1]) if k else -1 for k in np.searchsorted(cuts, [c.index for c in changes]).tolist()]
-    before = [bisect(stops, (c.index, c.line)) for c in changes]
-    return [c for c, cut, k in zip(changes, last, before, strict=True) if k == 0 or stops[k - 1][0] <= cut]
+    changes = {id(said): said for said in tool_changes(toolpath)[1:]}
+    named = iter(said for said, _, _ in tool_loads(toolpath))
+    cuts, result, stop = np.flatnonzero(cutting(toolpath)), list[ToolChange](), -1
+    for event in toolpath.events:
+        if event.word in ("STOP", "OPSTOP"):
+            stop = event.index
+        elif event.word in TOOL_WORDS and numbers(event) and id(said := next(named)) in changes:
+            k = int(np.searchsorted(cuts, said.index))
+            if stop < 0 or (k and stop <= cuts[k - 1]):
+                result.append(said)
+    return result
 
 
 def register_changes(toolpath: Toolpath) -> list[ToolChange]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -134,6 +135,22 @@ def test_stops_and_dwells_stand_at_every_place(order: PlaceOrder) -> None:
     assert [sum(block == code for block in body(result.text)) for code in ("M0", "M1", "G4 P2")] == [4, 4, 4]
 
 
+@pytest.mark.parametrize("order", ["tool", "part"])
+def test_records_at_the_end_of_a_place_stand_before_the_next_operation(order: PlaceOrder) -> None:
+    """Its lines are behind those with which the next place begins: neither a stop of its own is missed nor a label too early."""
+    lines = ["UNITS/MM"]
+    for n in (1, 2):
+        lines += [f"TOOL PATH/OP{n},TOOL,T{n}", "MSYS/0,0,0,1,0,0,0,1,0", f"LOAD/TOOL,{n}", "SPINDL/RPM,1000,CLW",
+                  "FEDRAT/MMPM,600", "RAPID", "GOTO/0,0,20", "GOTO/0,0,-1", "GOTO/9,0,-1", "RAPID", "GOTO/9,0,20", "STOP",
+                  "PPRINT/DONE", "END-OF-PATH"]
+    path, found = toolpaths.read_bytes("\n".join([*lines, "FINI"]), file="ends.cls")
+    result = good(postproc.convert(path, machines.load("mill-3axis"), "linuxcnc", SetupFile.model_validate(
+        {"tools": TOOLS, "places": TWO, "order": order, "output": {"stop_between_tools": True}}), diagnostics=found))
+    assert [sum(block == code for block in body(result.text)) for code in ("M0", "M1")] == [4, 0]
+    said = "".join(one[1] for one in re.finditer(r"(?m)^\(?(?=PLACE|DONE|M0$)(.)", result.text))
+    assert said == ("MDPMDPMDPMD" if order == "tool" else "MDMDPMDMD")
+
+
 @pytest.mark.parametrize("control", CONTROLS)
 def test_faces_of_a_tombstone(control: str) -> None:
     """The slides go the same places on every face, the table stands at its turn."""
@@ -177,8 +194,8 @@ def test_parallel_machines_take_places_without_a_turn() -> None:
 def test_an_offset_that_is_not_switched_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     kept = sections.with_sections
 
-    def without(commands: object, some: object) -> object:
-        result = kept(commands, some)
+    def without(*rest: object) -> object:
+        result = kept(*rest)
         return {k: tuple(c for c in group if c.name != "SET_ORIGIN_OFFSETS") for k, group in result.items()}
 
     monkeypatch.setattr("postproc.compile.compile.with_sections", without)
