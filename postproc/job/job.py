@@ -294,8 +294,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     modes, more = modes_at(places, modes, frame, options.setup)
     diagnostics += [*found, *more]
     job = Job(toolpath, machine, controller, setup, options, placement, control, moves, moves,
-              safe_space(moves, setup, placement), modes, geometric, tuple(records.stated), records.cutcom, places,
-              repeats)
+              safe_space(moves, setup, placement, None if repeats is None else repeats.place[moves.row]), modes, geometric,
+              tuple(records.stated), records.cutcom, places, repeats)
     return None if errors else _with_rapids(job), diagnostics + _tool_lengths(job) + _unused_tools(job)
 
 

@@ -19,7 +19,7 @@ from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.path.linearise import linearise
 from postproc.reference.moves import Moves
 from postproc.setup.model import Placement, SetupFile
-from toolpaths.arrays import Bools, Floats, box_corners
+from toolpaths.arrays import Bools, Floats, Ints, box_corners
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -37,22 +37,30 @@ LEG_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True)
-@arrays(centre="3", corners="8 3")
+@arrays(centre="3", corners="8 3", centres="P 3")
 class SafeSpace:
-    """Centre (3,) of the part in the table frame, radius about it and box (8, 3) of all that is cut, distances in mm."""
+    """Centre (3,) of the part in the table frame, radius about it and box (8, 3) of all that is cut, distances in mm.
+
+    `centres` (P, 3): of the part at each place, from which `distance` counts.
+    """
 
     centre: Floats
     radius: float
     corners: Floats
     distance: float | None
     margin: float
+    centres: Floats
 
     def plane(self, axis: Floats, turning: bool, share: float) -> float:
         """Distance of the safe plane square to `axis` from the centre; `share` of the margin."""
-        if self.distance is not None:
-            return self.distance
-        reach = self.radius if turning else float((self.corners @ axis).max() - self.centre @ axis)
-        return reach + share * self.margin
+        return float(self.planes(axis[None], np.array([turning]), share)[0])
+
+    def planes(self, axis: Floats, turning: Bools, share: float = 1.0) -> Floats:
+        """The same (N,) of directions (N, 3). Where a distance is given: the highest of the planes of all places."""
+        corners = self.corners if self.distance is None else self.centres
+        height = np.max(axis @ (corners - self.centre).T, axis=1)
+        return height + self.distance if self.distance is not None else np.where(
+            turning, self.radius, height) + share * self.margin
 
     def clear(self, tip: Floats, axis: Floats, margin: float) -> Bools:
         """(N,) True where the tool, a half line from its tip along its axis, stays `margin` mm off the path's extent."""
@@ -67,20 +75,32 @@ class SafeSpace:
         return np.asarray(np.maximum(above, nearest - self.radius))
 
 
-def safe_space(moves: Moves, setup: SetupFile, placement: Placement) -> SafeSpace:
-    """The safe planes of a path (already in the table frame); what is only passed in rapid does not count."""
-    cutting = moves.kind != Kind.RAPID
-    starts = cutting & ~moves.link
-    used = cutting | np.append(starts[1:], False)
-    tips = moves.tip[used] if used.any() else moves.tip
-    if len(moves.arcs):
-        tips = np.concatenate([tips, _outermost(moves.curves())])
+def safe_space(moves: Moves, setup: SetupFile, placement: Placement, place: Ints | None = None) -> SafeSpace:
+    """The safe planes of a path (already in the table frame); what is only passed in rapid does not count.
+
+    `place` (M,): number of the place of each move, where there are several.
+    """
+    tips = _cut(moves, slice(None))
     low, high = tips.min(axis=0), tips.max(axis=0)
     centre = 0.5 * (low + high)
     if setup.clearance.centre is not None:
         centre = placement.points(np.array([setup.clearance.centre]))[0]
     radius = float(np.sqrt(((tips - centre) ** 2).sum(axis=1).max()))
-    return SafeSpace(centre, radius, box_corners(low, high), setup.clearance.distance, setup.clearance.margin)
+    centres = centre[None]
+    if place is not None:
+        centres = np.array([[0.5 * (x.min() + x.max()) for x in _cut(moves, np.flatnonzero(place == k)).T]
+                            for k in np.unique(place)])
+    return SafeSpace(centre, radius, box_corners(low, high), setup.clearance.distance, setup.clearance.margin, centres)
+
+
+def _cut(moves: Moves, rows: Ints | slice) -> Floats:
+    """(K, 3) tips of what is cut by some rows, and the places where its arcs are outermost."""
+    cutting = moves.kind != Kind.RAPID
+    starts = cutting & ~moves.link
+    used = (cutting | np.append(starts[1:], False))[rows]
+    tips = moves.tip[rows]
+    tips = tips[used] if used.any() else tips
+    return np.concatenate([tips, _outermost(moves.curves(rows))]) if len(moves.arcs) else tips
 
 
 def _outermost(curves: Curves) -> Floats:

@@ -47,7 +47,7 @@ class RetractPlan:
     def _away(self, rapid: float, feed: float, tip: Floats, axis: Floats) -> Floats:
         """Time (N,) s to draw back from poses (N, 3) to the sphere about what is cut, and to come down again."""
         height = ((tip - self.space.centre) * axis).sum(axis=1)
-        top = self.space.distance if self.space.distance is not None else self.space.radius + self.space.margin
+        top = self.space.planes(axis, np.ones(len(axis), dtype=np.bool_))
         return np.asarray(np.maximum(top - height, 0.0) * (1.0 / rapid + 1.0 / feed))
 
     def link(self, control: Control, kin: Kinematics, before: Pose | None, after: Pose) -> Link:

@@ -48,7 +48,8 @@ class LinkClearance(UserModel):
     centre: SetupVector | None = None
     """centre of the safe planes in the part frame, mm; default: middle of the path's extents"""
     distance: float | None = Field(default=None, gt=0.0)
-    """from the centre to every safe plane (each stands square to the tool axis), mm; default: outside the path"""
+    """from the centre to every safe plane (each stands square to the tool axis), mm; default: outside the path. With
+    [[places]] from the middle of each: the highest of these planes is the safe one"""
     margin: float = Field(default=50.0, gt=0.0)
     """added to the path's own extent where no distance is given, mm"""
     link_angle: float = Field(default=5.0, gt=0.0, le=180.0)

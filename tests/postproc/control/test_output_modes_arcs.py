@@ -198,7 +198,7 @@ def test_a_way_is_looked_at_along_its_dog_leg() -> None:
     m = machine("mill-3axis")
     m = replace(m, limits=replace(m.limits, velocity=np.full(3, 300.0)))
     corners = 10.0 * np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-    space = SafeSpace(np.zeros(3), 10.0, corners, None, 5.0)
+    space = SafeSpace(np.zeros(3), 10.0, corners, None, 5.0, np.zeros((1, 3)))
     travel = np.array([[-40.0, -40.0, 0.0], [40.0, 0.0, 0.0]])
     for rapids, clear in (("straight", True), ("dog-leg", False)):
         assert stays_clear(Control(m, "axes", np.zeros(3), rapids=rapids), m.kinematics, space, travel, 1.0) == clear

@@ -151,6 +151,23 @@ def test_records_at_the_end_of_a_place_stand_before_the_next_operation(order: Pl
     assert said == ("MDPMDPMDPMD" if order == "tool" else "MDMDPMDMD")
 
 
+def test_distance_counts_from_the_middle_of_each_place() -> None:
+    """The safe plane is the highest of those of the places alone, and the program retracts to it."""
+    path, found = toolpaths.read_bytes("\n".join([
+        "UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600", "RAPID", "GOTO/0,0,20", "GOTO/0,0,-1", "GOTO/5,0,-1",
+        "RAPID", "GOTO/5,0,20", "FINI"]), file="one.apt")
+    far = SetupFile.model_validate({"tools": TOOLS, "clearance": {"distance": 70.0, "between": "plane"},
+                                    "places": [TWO[0], TWO[1] | {"origin": (90.0, -10.0, -60.0)}]})
+
+    def top(setup: SetupFile) -> float:
+        done = good(postproc.convert(path, machines.load("mill-3axis"), "linuxcnc", setup, diagnostics=found))
+        height = done.comparison.executed[1].end[:, 2]
+        return float(height[height < 399.0].max())
+
+    alone = [top(one) for one in at_places(far)]
+    assert top(far) == pytest.approx(max(alone)) and alone[0] - alone[1] == pytest.approx(80.0)
+
+
 @pytest.mark.parametrize("control", CONTROLS)
 def test_faces_of_a_tombstone(control: str) -> None:
     """The slides go the same places on every face, the table stands at its turn."""
