@@ -114,7 +114,7 @@ class ProgramBlocks(UserModel):
     """of the program, where the controller has numbers"""
     stock: tuple[Annotated[str, placeholders("x0", "y0", "z0", "x1", "y1", "z1")], ...] = ()
     """blocks behind `begin` that state the stock for the control's graphics, where the set-up has one
-    ([rewind.stock]): its least and greatest X, Y, Z, mm in the work offset with all rotary axes at 0"""
+    ([rewind.stock]): its least and greatest X, Y, Z, at all places, mm in the first work offset, rotary axes at 0"""
     preamble: tuple[Annotated[str, placeholders("work_offset", "units")], ...] = ()
     """safe start: units, modes and planes that the program relies on; {work_offset} is the
     set-up's code, {units} states mm or inches"""

@@ -32,3 +32,12 @@ def test_another_stock_is_named_until_the_set_up_has_it(tmp_path: Path, units: s
     assert wrong.lines == (3,) and "62.5000 mm" in wrong.message and "70.0000 mm" in wrong.message
     again = postproc.verify(program, path, machine, "heidenhain-tnc640", with_stock(62.5, units), diagnostics=found)
     assert "verify.stock" not in codes(again.diagnostics)
+
+
+def test_the_stock_of_several_places_holds_all_of_them() -> None:
+    path, found = toolpaths.read("samples/pocket.cls")
+    places = [{"name": name, "work_offset_code": code, "origin": (x, 0.0, 20.0)} for name, code, x in (
+        ("left", "G54", 10.0), ("right", "G55", 160.0))]
+    setup = SetupFile.model_validate({**with_stock(70.0, "mm").model_dump(), "places": places})
+    result = good(postproc.convert(path, machines.load("mill-3axis"), "heidenhain-tnc640", setup, diagnostics=found))
+    assert result.text.splitlines()[1:3] == ["1 BLK FORM 0.1 Z X-70 Y-70 Z-30", "2 BLK FORM 0.2 X+220 Y+70 Z+0"]
