@@ -75,6 +75,27 @@ def test_offsets_under_each_others_names_are_found(control: str) -> None:
     assert headers(result, named)[0].startswith(f"the header says work offset {left}9")
 
 
+@pytest.mark.parametrize("control", CONTROLS)
+def test_a_line_that_is_missing_is_found_and_a_folded_one_is_read(control: str, tmp_path: Path) -> None:
+    shop = tmp_path / "short.toml"
+    shop.write_text(f'base = "{control}"\n[format]\nline_length = 60\n')
+    setup = SETUP.model_copy(update={"places": [
+        PlaceSetup(name="left", work_offset_code="G54", origin=(-30.0, 0.0, 20.0)),
+        PlaceSetup(name="right", work_offset_code="G57", origin=(90.0, -10.0, 5.0))]})
+    path = toolpaths.read(SAMPLES / "pocket.cls")[0]
+    for by in (control, str(shop)):
+        result = convert(path, "mill-4axis", by, setup)
+        assert result.ok and headers(result, result.text) == []
+        lines = result.text.splitlines(keepends=True)
+        for named, said in (("place right", "of work offset"), ("tool T2 ", "gauge length of T2 nothing")):
+            k = next(n for n, line in enumerate(lines) if named.lower() in line.lower())
+            found = headers(result, "".join(lines[:k] + lines[k + 1:]))
+            assert by != control or (len(found) == 1 and found[0].startswith(f"the header says {said}")), found
+        assert headers(result, result.text.replace("A0.0000", "", 1))[0].startswith("the header says A of work offset")
+        moved = re.sub("(?i)Y-10.0000", "Y-11.0000", result.text)
+        assert headers(result, moved)[0].startswith("the header says Y of work offset")
+
+
 def test_the_last_of_many_places_is_read_in_a_header_of_many_lines() -> None:
     setup = SETUP.model_copy(update={"places": [
         PlaceSetup(name=f"place number {k}", work_offset_code=f"G54.1 P{k + 1}", origin=(3.25 * k, -4.0 * k, 20.0))
