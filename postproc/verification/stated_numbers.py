@@ -53,9 +53,9 @@ def _offsets(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
             yield f"work offset {found[1]} with", stands or "tables at 0", right_stands or "tables at 0"
         said = {letter.upper(): number for letter, number in _WORD.findall(found[3])}
         right = dict(zip(job.machine.axis_names, (job.control_at(k).work_offset / units).tolist(), strict=True))
-        for letter in right | said:
-            if not _same(said.get(letter, NOTHING), right.get(letter, np.nan)):
-                yield f"{letter} of work offset {found[1]}", said.get(letter, NOTHING), f"{right.get(letter, np.nan):.4f}"
+        for letter, value in right.items():
+            if not _same(said.get(letter, NOTHING), value):
+                yield f"{letter} of work offset {found[1]}", said.get(letter, NOTHING), f"{value:.4f}"
     yield from (("of work offset", f"{names[k]} {NOTHING}", "it") for k in missing.values())
 
 
