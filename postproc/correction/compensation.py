@@ -255,7 +255,8 @@ def framed(path: JointPath, nominal: JointPath, modes: OutputModes, work: ErrorC
         whole = np.flatnonzero(work.group == run)
         if not np.isfinite(path.q[k[0]]).all():  # out of reach, reported by the caller
             continue
-        new, at = modes.plane(work.kinematics(int(work.tools[k[0]])), path.q[k[0]])
+        place = path.frames[int(frame[k[0]])].control.place
+        new, at = modes.at(place).plane(work.kinematics(int(work.tools[k[0]])), path.q[k[0]])
         if new not in frames:
             frames.append(new)
         frame[k] = frames.index(new)

@@ -168,6 +168,19 @@ def test_distance_counts_from_the_middle_of_each_place() -> None:
     assert top(far) == pytest.approx(max(alone)) and alone[0] - alone[1] == pytest.approx(80.0)
 
 
+def test_errors_are_corrected_at_every_place() -> None:
+    """The plane of a corrected run is that of its own place, and what is left is inside the tolerance at each."""
+    tilted = ",0.1,0,0.994987437"
+    path, found = toolpaths.read_bytes("\n".join([
+        "UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600", "MULTAX/ON", "RAPID", f"GOTO/0,0,20{tilted}",
+        f"GOTO/0,0,-1{tilted}", f"GOTO/0,9,-1{tilted}", "RAPID", f"GOTO/0,9,20{tilted}", "FINI"]), file="one.apt")
+    here = [TWO[0] | {"origin": (-20.0, 0.0, 10.0)}, TWO[1] | {"origin": (60.0, -10.0, 5.0)}]
+    result = good(postproc.convert(path, machines.load("mikron-ucp710"), "fanuc-30i", SetupFile.model_validate(
+        {"tools": TOOLS, "places": here}), Options(error_model="samples/errors/mikron-ucp710.toml"), found))
+    assert result.witness is not None and not result.witness.not_compared and result.comparison.worst_tip < 0.01
+    assert [block for block in body(result.text) if block in ("G54", "G57", "G69")] == ["G69", "G57", "G69"]
+
+
 @pytest.mark.parametrize("control", CONTROLS)
 def test_faces_of_a_tombstone(control: str) -> None:
     """The slides go the same places on every face, the table stands at its turn."""
