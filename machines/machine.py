@@ -79,12 +79,14 @@ class ControlOptions:
         stated: file and line by option
         tip_frame: "table" or "entry" as in [modes.tcp] frame, "" where the file does not say
         power_on: codes in force before every program
+        settings: words of what programs rely on and the file confirms
     """
 
     fitted: Mapping[BoughtOption, bool] = field(default_factory=dict)
     stated: Mapping[BoughtOption, tuple[str, int]] = field(default_factory=dict)
     tip_frame: Literal["table", "entry", ""] = ""
     power_on: tuple[str, ...] = ()
+    settings: tuple[str, ...] = ()
 
     def absent(self, option: BoughtOption) -> bool:
         """True where the file says that the control has it not."""
@@ -93,6 +95,10 @@ class ControlOptions:
     def confirmed(self, option: BoughtOption) -> bool:
         """True where it says that it has."""
         return self.fitted.get(option, False)
+
+    def unconfirmed(self, needs: tuple[str, ...]) -> tuple[str, ...]:
+        """Of what programs need, as their headers say it, what `settings` do not confirm."""
+        return tuple(text for text in needs if not any(words.lower() in text.lower() for words in self.settings))
 
 
 @dataclass(frozen=True)

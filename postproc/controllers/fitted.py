@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from machines.machine import ControlOptions
 from postproc.controllers.model import ArcRules, ControllerFile, Start
 from postproc.controllers.output_modes import Modes
@@ -19,14 +21,19 @@ def fitted(controller: ControllerFile, options: ControlOptions) -> ControllerFil
         cycles = cycles.model_copy(update={"rigid_option": ""})
     if options.power_on:
         start = Start(codes=tuple(dict.fromkeys((*start.codes, *options.power_on))))
+    inch = controller.inch.model_copy(update={"relies_on": options.unconfirmed(controller.inch.relies_on)})
+    rules: dict[Literal["shortest", "sign"], str] = {
+        rule: text for rule, text in controller.rollover.needs.items() if options.unconfirmed((text,))}
     return controller.model_copy(update={
+        "inch": inch, "rollover": controller.rollover.model_copy(update={"needs": rules}),
         "modes": _fitted_modes(controller.modes, options), "arcs": _fitted_arcs(controller.arcs, options),
         "program": _fitted_program(controller.program, options), "codes": codes, "cycles": cycles, "start": start})
 
 
 def _fitted_modes(modes: Modes, options: ControlOptions) -> Modes:
     """The modes that the control has; the frame of the tip as the machine file confirms it."""
-    tcp, tilted = modes.tcp, modes.tilted
+    tcp, tilted = (mode and mode.model_copy(update={"relies_on": options.unconfirmed(mode.relies_on)})
+                   for mode in (modes.tcp, modes.tilted))
     if tcp is not None and options.tip_frame:
         tcp = tcp.model_copy(update={"frame": options.tip_frame})
     if tcp is not None and options.confirmed("tip_control"):
@@ -46,6 +53,10 @@ def _fitted_arcs(arcs: ArcRules, options: ControlOptions) -> ArcRules:
 
 def _fitted_program(program: ProgramBlocks, options: ControlOptions) -> ProgramBlocks:
     """Without the blocks of the smoothing where the control has it not."""
+    program = program.model_copy(update={
+        "relies_on_turns": "".join(options.unconfirmed((program.relies_on_turns,))),
+        "more_offsets": {name: more.model_copy(update={"needs": "".join(options.unconfirmed((more.needs,)))})
+                         for name, more in program.more_offsets.items()}})
     if options.absent("smoothing"):
         return program.model_copy(update={"path_tolerance": program.exact_path, "path_tolerance_off": (),
                                           "smoothing_option": program.without_smoothing})

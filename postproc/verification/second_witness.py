@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import tomllib
+from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -146,8 +148,9 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
     found, said = list[Diagnostic](), list[Testimony]()
     executed, shops = executed_of(comparison, comparison.poses, job), at_places(setup)
     for k, place in enumerate(job.places):
-        own = shops[k] if len(shops) == 1 or not setup.places[k].turn else place.setup
-        case, name = _case(source, own, options, job, comparison, program, k), place.name and f"place {place.name}: "
+        case, name = _case(source, shops[k], options, job, comparison, program, k), place.name and f"place {place.name}: "
+        if setup.places:
+            case = replace(case, setup=case.setup | {"turn": setup.places[k].turn, "measured": setup.places[k].turned})
         rows = _rows_at(comparison, job, k)
         if not len(rows):
             return together(said), [error("witness.position", f"second witness: {name}no block of the program is made there",
@@ -163,7 +166,24 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
         found += [error(f"witness.{f.code}", f"second witness: {name}{f.message} (line {f.block} of the program)",
                         file=job.toolpath.file, lines=[f.line] if f.line else [], count=f.count,
                         hint="do not run this program") for f in said[-1].findings]
-    return together(said), found
+    return together(said), [*found, *_order(setup, comparison, job)]
+
+
+def _order(setup: SetupFile, comparison: Comparison, job: Job) -> list[Diagnostic]:
+    """An error where the cuts do not go from place to place in the order of the set-up: each place once, or once for every
+    tool between two changes."""
+    motion, count = comparison.executed[1], len(job.places)
+    cut = np.flatnonzero((motion.code > 0) & (comparison.owner < len(comparison.moves.without_pecks())))
+    registers = registers_of(job, reader_for(job.controller, job.machine.axis_names))
+    steps = [(int(tool) if setup.order == "tool" else 0, float(offset)) for tool, offset in zip(
+        np.broadcast_to(motion.tool, len(motion))[cut], np.broadcast_to(motion.offset, len(motion))[cut], strict=True)]
+    steps = [one for k, one in enumerate(steps) if k == 0 or steps[k - 1] != one]
+    groups = [[offset for _, offset in some] for _, some in groupby(steps, key=lambda one: one[0])]
+    again = setup.order == "tool"  # a tool may come back behind one that cuts nothing
+    if count < 2 or all(some == registers * (len(some) // count if again else 1) for some in groups):
+        return []
+    return [error("witness.order", f'second witness: the places are not gone through as order = "{setup.order}" says',
+                  file=job.toolpath.file, hint="do not run this program")]
 
 
 def _rows_at(comparison: Comparison, job: Job, place: int) -> Ints:

@@ -75,6 +75,13 @@ class Chain:
         moved = [self.pose(q + np.eye(len(letters))[k], letters, none)[0] - base for k in linear]
         return linear, np.stack(moved, axis=2)
 
+    def turned(self, place: tuple[Array, Array], turn: dict[str, float]) -> tuple[Array, Array]:
+        """On the table at zero: a place (rotation, origin) as it stands in the machine, tables turned by `turn` (degrees)."""
+        q = np.radians([np.zeros(len(self.letters)), [turn.get(name, 0.0) for name in self.letters]])
+        at, (_, slides) = self.pose(q, self.letters, np.zeros(2))[0], self.slides(q, self.letters)
+        rotation = slides[1] @ np.linalg.inv(slides[0])
+        return rotation @ place[0], rotation @ (place[1] - at[0]) + at[1]
+
 
 def rotations(along: Array, angle: Array) -> Array:
     """(N, 3, 3), or (1, 3, 3) where all angles are the same: turns about a unit vector, by Rodrigues' formula."""

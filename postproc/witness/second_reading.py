@@ -46,11 +46,13 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
         return _nothing(f"system {fault} was not found", began)
     except ValueError:
         return _nothing("the tool axes were chosen, and the file has more or fewer positions for this reading", began)
+    table = merged(case.machine)
+    if (turn := case.setup.get("turn")) and isinstance(nominal := kinematics_of(table), Chain):
+        place = nominal.turned(place, turn)
     missing = [NotCompared("record", what, line) for what, line in c.unread.items()]
     missing += [] if case.chosen is None else [NotCompared("choice of tool axes", "--orient")]
     if not len(c) or not c.known.any():
         return _nothing("no position was understood", began, missing)
-    table = merged(case.machine)
     machine = _machine(case, table)
     if machine is None:
         missing.append(NotCompared("kinematics", "parallel machine with geometric errors: poses of the read-back"
@@ -155,7 +157,9 @@ def _zero(case: Case, c: Commanded, place: tuple[Array, Array], poses: Poses) ->
     off = float(np.abs(case.origin - wanted).max())
     if off <= ZERO and case.work_offset is not None and isinstance(poses.machine, Chain):
         there = poses.machine.pose(case.work_offset[None], poses.executed.letters, np.zeros(1))[0]
-        off = float(np.abs(there[0] - wanted).max())
+        held = [math.degrees(q) - case.setup.get("measured", {}).get(name, 0.0) for name, q in zip(
+            poses.executed.letters, case.work_offset.tolist(), strict=True) if name in "ABC"]
+        off = float(np.abs([*(there[0] - wanted), *held]).max())
     if off <= ZERO:
         return [], 1
     return [Finding("offset", f"the work offset is {off:.6f} mm off the system of the CL file that it is for", 0, 0)], 1

@@ -238,6 +238,7 @@ CYCLE/OFF
 RAPID
 GOTO/10,25,50
 END-OF-PATH""")
+WETTED = MILLED.replace("COOLNT/FLOOD\n", "").replace("GOTO/-20,14,-3\n", "COOLNT/FLOOD\nGOTO/-20,14,-3\n")
 SIDE = MILLED.replace("GOTO/-20,14,-3\n", "CUTCOM/LEFT,7\nGOTO/-20,14,-3\n").replace(
     "RAPID\nGOTO/-30,30,50", "CUTCOM/OFF\nGOTO/-34,34,-3\nRAPID\nGOTO/-30,30,50")
 COOLED = NX.replace("COOLNT/FLOOD", "COOLNT/THRU").replace("COOLNT/MIST", "COOLNT/AIR")
@@ -320,6 +321,12 @@ SIX = {"fanuc": "fanuc-30i", "siemens": "siemens-840d", "heidenhain": "heidenhai
        "linuxcnc": "linuxcnc", "iso": "generic-iso"}
 MODES = ("fanuc", "siemens", "heidenhain", "haas")
 ERRORS = {"error_model": str(SAMPLES / "errors" / "mikron-ucp710.toml")}
+PLACES: dict[str, Any] = {"places": [
+    {"name": "left", "work_offset_code": "G54"},
+    {"name": "right", "work_offset_code": "G56", "origin": (-61.0, 33.0, 4.0), "x_axis": (0.0, 1.0, 0.0),
+     "y_axis": (-1.0, 0.0, 0.0)}]}
+SIDES = [{"name": f"side {k}", "work_offset_code": f"G5{5 + k}", "origin": (-20.0, 7.0, 40.0), "turn": {"A": 90.0 * k},
+          "measured": "turned" if k else "zero"} for k in range(2)]
 CASES: dict[str, Case] = {
     **{f"flat {name}": Case(NX, "mill-3axis", c) for name, c in SIX.items()},
     **{f"helix {name}": Case(HELIX, "mill-3axis", c) for name, c in SIX.items()},
@@ -379,6 +386,13 @@ CASES: dict[str, Case] = {
     "kept spindle": Case(FACES.replace("SPINDL/RPM,2000,CLW\n", ""), "trunnion-bc", "linuxcnc"),
     "planned": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "smooth": Case(SHORT, "mikron-ucp710", "linuxcnc", options={"smooth": True}),
+    **{f"bare {name}": Case(text, str(Path(__file__).with_name("bare_control.toml")), SIX[name])
+       for name, text in (("siemens", LAWS), ("haas", HELIX), ("fanuc", RESTS), ("heidenhain", FIVE))},
+    "places fanuc": Case(MILLED + SECOND, "mill-3axis", "fanuc-30i", {**TURNED, **PLACES}),
+    "places siemens": Case(FACES, "trunnion-bc", "siemens-840d", {**TURNED, **PLACES, "order": "part"}),
+    "places order": Case(MILLED + SECOND, "mill-3axis", "linuxcnc", {**TURNED, **PLACES, "order": "part"}),
+    "places haas": Case(WETTED, "mill-4axis", "haas-ngc", {"tools": LENGTHS, "places": SIDES}),
+    "places errors": Case(FACES, "mikron-ucp710", "fanuc-30i", {**TURNED, **PLACES}, ERRORS),
     "restart": Case(NX, "mill-3axis", "fanuc-30i", {**TURNED, "output": {"restart": True}}),
     "rewind": Case(SAMPLES / "joints" / "forced_rewind.cls", "mikron-ucp710", "linuxcnc",
                    {"file": str(SAMPLES / "joints" / "forced_rewind.setup.toml")}),

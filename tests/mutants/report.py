@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from tests.mutants.programs import Found
+from tests.mutants.rooms import BESIDE
 from tests.mutants.run import Outcome
 
 COLUMNS = ("conversion", "verify", "tests", "nothing", "no harm")
@@ -34,8 +35,8 @@ In all of them the part stands off the rotary axes, and tools have different len
   states the same; or the program is the same, and all wrong programs that were tried stay refused. A fault that acts
   nowhere and has no reason beside it counts as caught by nothing.
 
-Readers and proof (the last rooms) change no program but what is made of it: they count by wrong programs that pass with the
-fault. Such a program needs a second fault to be written.
+Readers and proof change no program but what is made of it: they count by wrong programs that pass with the fault. Such a
+program needs a second fault to be written. The last three rooms work beside the conversion: their tests are asked.
 
 """
 
@@ -46,7 +47,7 @@ def column(outcome: Outcome) -> str:
         return "conversion"
     if outcome.caught_by == "verify":
         return "verify"
-    if outcome.caught_by in ("survives", "blind"):
+    if outcome.caught_by in ("survives", "blind") or outcome.fault.room in BESIDE:
         return "tests" if outcome.test else "nothing"
     return "nothing" if outcome.caught_by == "not acting" and not outcome.fault.why else "no harm"
 

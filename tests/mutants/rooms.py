@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from tests.mutants import faults_controls as controls
 from tests.mutants import faults_machine as machine
+from tests.mutants import faults_places as places
 from tests.mutants import faults_reading as reading
 from tests.mutants.battery import CASES, SIX
 from tests.mutants.plant import Fault
 
-FAULTS: tuple[Fault, ...] = (*reading.FAULTS, *machine.FAULTS, *controls.FAULTS)
+FAULTS: tuple[Fault, ...] = (*reading.FAULTS, *machine.FAULTS, *controls.FAULTS, *places.FAULTS)
+BESIDE = ("lengths at the machine", "measured part", "check program")
+"""rooms whose faults change no conversion: tests alone are asked"""
 BATTERY: dict[str, tuple[str, ...]] = {
     "reader": ("flat linuxcnc", "flat siemens", "contact", "inch", "creo", "five linuxcnc"),
     "frames": ("flat linuxcnc", "laws linuxcnc", "creo", "catia", "solidworks", "system", "cycles fanuc"),
@@ -26,6 +29,9 @@ BATTERY: dict[str, tuple[str, ...]] = {
     "joints": ("five linuxcnc", "faces linuxcnc", "rewind", "laws siemens"),
     "planning": ("planned", "smooth", "five linuxcnc"),
     "proof": ("flat linuxcnc", "five linuxcnc", "laws siemens"),
+    "options": ("bare siemens", "bare haas", "bare fanuc", "bare heidenhain"),
+    "places": ("places fanuc", "places siemens", "places haas"),
+    **dict.fromkeys(BESIDE, ("flat linuxcnc",)),
 }
 TESTS: dict[str, tuple[str, ...]] = {
     "reader": ("toolpaths/cl/test_cl_motion.py", "toolpaths/cl/test_cl_records.py",
@@ -66,6 +72,11 @@ TESTS: dict[str, tuple[str, ...]] = {
                   "postproc/verification/test_verify_edits.py", "postproc/readback/test_reader_laws.py",
                       "postproc/readback/test_readback.py",
                   "postproc/readback/test_program_mutation.py"),
+    "options": ("postproc/control/test_options.py",),
+    "places": ("postproc/job/test_places.py",),
+    "lengths at the machine": ("postproc/verification/test_length_margins.py",),
+    "measured part": ("postproc/alignment/test_align.py",),
+    "check program": ("postproc/pipeline/test_check_program.py",),
     "proof": ("postproc/readback/test_readback.py", "postproc/readback/test_program_mutation.py",
               "postproc/readback/test_pecks_dwells_ends.py"),
 }

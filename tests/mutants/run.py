@@ -16,7 +16,7 @@ from typing import Any
 from tests.mutants.battery import CASES
 from tests.mutants.judge import Made, blind, body, change, converted, edits_of, made, passed_on, short, verified
 from tests.mutants.plant import Fault, NotPlanted, functions, planted
-from tests.mutants.rooms import cases_of, files_asked, proves
+from tests.mutants.rooms import BESIDE, cases_of, files_asked, proves
 
 SECONDS = 60
 """s that a process may take"""
@@ -39,7 +39,8 @@ class Outcome:
     def survives(self) -> bool:
         """True where the conversion's own proof lets harm pass that nobody has explained, a fault acts nowhere, or wrong
         programs pass and no test fails."""
-        unexplained = self.caught_by in ("verify", "not acting") and not self.fault.why
+        unexplained = self.caught_by in ("verify", "not acting") and not (
+            self.fault.why or (self.fault.room in BESIDE and self.test))
         return self.caught_by == "survives" or unexplained or (self.caught_by == "blind" and not self.test)
 
 
@@ -186,7 +187,7 @@ def _sum_up(result: Outcome, tests: bool) -> None:
     kind, _, detail = worst.partition(": ")
     where = next(n for n, said in result.cases.items() if said == worst)
     result.caught_by, result.detail = kind, f"{detail} ({where})"
-    if kind in ("survives", "blind", "verify") and tests:
+    if (kind in ("survives", "blind", "verify") or result.fault.room in BESIDE) and tests:
         result.test = apart(lambda: _tests(result.fault))
 
 

@@ -104,6 +104,16 @@ def test_the_work_offset_whose_rotary_values_must_be_zero_is_named(controller: s
     assert "ROTARY VALUES" not in converted(controller, "", "axes").text.upper()
 
 
+@pytest.mark.parametrize(("controller", "output", "words"), [
+    ("fanuc-30i", "tcp", "5006#6 tos"), ("haas-ngc", "tcp", "MRZP offsets"), ("siemens-840d", "auto", "swivel data set"),
+    ("heidenhain-tnc640", "tcp", "rotary values of 0")])
+def test_each_setting_is_confirmed_by_itself(controller: str, output: str, words: str) -> None:
+    """The header leaves out what the machine file confirms, and nothing else; the words are the same."""
+    usual, sure = (converted(controller, text, output).text.upper().splitlines() for text in ("", f'settings = ["{words}"]'))
+    gone = [line for line in usual if "NEEDS" in line and words.upper() in line]
+    assert gone and [line for line in usual if "NEEDS" in line and line not in gone] == [line for line in sure if "NEEDS" in line]
+
+
 @pytest.mark.parametrize("controller", BOUGHT)
 @pytest.mark.parametrize("option", ["tilted_planes", "tip_control"])
 def test_a_program_that_uses_what_is_not_fitted_is_found(controller: str, option: str) -> None:
