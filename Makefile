@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile -rfEs
 SOURCES := toolpaths machines postproc
 NUMERIC = $(shell grep -rl --include='test_*.py' 'mark\.numeric' tests)
 
-.PHONY: demo test quick numeric hard damage changes slow mutants lint lock clean
+.PHONY: demo test quick numeric hard damage changes slow mutants programs lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -42,6 +42,10 @@ JOBS ?= 1
 mutants: $(STAMP)
 	$(BIN)/python -m tests.mutants --jobs $(JOBS) $(if $(ROOM),--room "$(ROOM)") $(if $(ONLY),--only "$(ONLY)") \
 		$(if $(ROOM)$(ONLY),,--json tests/mutants/results.json --page tests/mutants/README.md) $(MUTANTS_ARGS)
+
+# Changes of written programs alone, by control: caught, warned of, silent and harmful.
+programs: $(STAMP)
+	$(BIN)/python -m tests.mutants --programs "$(ONLY)"
 
 # Under a minute on two processors once compiled code is kept (tests/tiers.py says what belongs to it).
 quick: $(STAMP)

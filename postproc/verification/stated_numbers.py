@@ -68,7 +68,7 @@ def _lengths(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
     """The same of the gauge length of each tool that moves."""
     for number in sorted({job.number_of(k) for k in np.unique(job.moves.tool).tolist()}):
         right, said = job.length_of(number) / job.controller.lengths.unit, re.findall(_LENGTH.format(number), text)
-        if number >= job.setup.output.tool_call and not any(_same(one, right) for one in said):
+        if number > (-1 if job.setup.output.tool_call else 0) and not any(_same(one, right) for one in said):
             yield f"gauge length of T{number}", said[-1] if said else NOTHING, f"{right:.4f}"
 
 

@@ -17,7 +17,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
 
 def main() -> int:
     from tests.mutants.programs import all_programs
-    from tests.mutants.report import as_dict, page, summary
+    from tests.mutants.report import as_dict, page, programs_page, summary
     from tests.mutants.rooms import FAULTS
     from tests.mutants.run import Bench, outcomes
 
@@ -29,12 +29,18 @@ def main() -> int:
     wanted.add_argument("--no-tests", action="store_true",
                         help="do not ask the tests about what the proof lets pass")
     wanted.add_argument("--no-programs", action="store_true", help="leave the faults in written programs out")
+    wanted.add_argument("--programs", default=None, metavar="NAME",
+                        help="no faults in functions: written programs alone, those whose name holds this")
     wanted.add_argument("--json", type=Path)
     wanted.add_argument("--page", type=Path, help="write the published table")
     a = wanted.parse_args()
     faults = [f for f in FAULTS if a.room in f.room and a.only.lower() in f.name.lower()]
     if not faults:
         wanted.error(f"no fault of room {a.room!r} with {a.only!r} in its name")
+    if a.programs is not None:
+        programs = all_programs(a.programs)
+        print(programs_page(programs))
+        return 1 if any(p.survivors for p in programs) else 0
     found = outcomes(faults, Bench(), not a.no_tests, a.jobs)
     programs = [] if a.no_programs or a.room or a.only else all_programs()
     if a.json:

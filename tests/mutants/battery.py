@@ -386,6 +386,9 @@ CASES: dict[str, Case] = {
     "kept spindle": Case(FACES.replace("SPINDL/RPM,2000,CLW\n", ""), "trunnion-bc", "linuxcnc"),
     "planned": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "smooth": Case(SHORT, "mikron-ucp710", "linuxcnc", options={"smooth": True}),
+    **{f"{kind} {name}": Case(text, "mill-3axis", c, {**TURNED, "output": output}) for name, c in SIX.items()
+       for kind, text, output in (("spline", CURVE, {}), ("inches", NX, {"units": "inch"}), ("again", NX, {"restart": True}),
+                                  ("homing", CONTACT.replace(",ADJUST,7", ""), {}))},
     **{f"bare {name}": Case(text, str(Path(__file__).with_name("bare_control.toml")), SIX[name])
        for name, text in (("siemens", LAWS), ("haas", HELIX), ("fanuc", RESTS), ("heidenhain", FIVE))},
     "places fanuc": Case(MILLED + SECOND, "mill-3axis", "fanuc-30i", {**TURNED, **PLACES}),

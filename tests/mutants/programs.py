@@ -19,9 +19,10 @@ from tests.mutants.run import apart
 from tests.postproc.mutation_kit import Effect, Mutant, mutants
 
 SEED = 19
-PROGRAMS = (*(f"{kind} {c}" for c in SIX for kind in ("flat", "laws", "axes", "helix", "five")),
+PROGRAMS = (*(f"{kind} {c}" for c in SIX for kind in (
+    "flat", "laws", "axes", "helix", "five", "faces", "rests", "side", "spline", "inches", "again", "homing")),
             *(f"{kind} {c}" for c in ("fanuc", "siemens", "heidenhain", "haas") for kind in ("cycles", "tip")))
-EACH = 54
+EACH = 26
 """changes of each program"""
 SAME = {"same": "the same motion, states and times", "near": "ends within the tolerance, the rest the same",
         "placed": "only rapids between operations end elsewhere, clear of the part and inside travel"}

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
-from tests.mutants.programs import Found
+from tests.mutants.programs import WARNED, Found
 from tests.mutants.rooms import BESIDE
 from tests.mutants.run import Outcome
 
@@ -85,10 +85,11 @@ def page(found: list[Outcome], programs: list[Found]) -> str:
             test = f"`{one.test}`" if one.test else ""
             said = {"verify": f"`verify` {test}", "tests": test, "nothing": "**nothing**"}.get(kind, kind)
             text += f"| {one.fault.room} | {one.fault.name} | {said} | {one.fault.why or one.detail} |\n"
-    return text + "\n" + _programs(programs)
+    return text + "\n" + programs_page(programs)
 
 
-def _programs(programs: list[Found]) -> str:
+def programs_page(programs: list[Found]) -> str:
+    """What became of changes of written programs, by control."""
     if not programs:
         return ""
     total, harmless = sum(p.count for p in programs), Counter[str]()
@@ -97,13 +98,14 @@ def _programs(programs: list[Found]) -> str:
         harmless += p.harmless
         kinds += p.kinds
         caught += p.caught
-    lines = [f"## Faults in {total:,} programs", "",
-             "| control | changed | refused by verify | no harm | pass and do harm |",
-             "|---|---|---|---|---|"]
+    lines = [f"## Faults in {total:,} programs", "", "`make programs` prints this part alone.", "",
+             "| control | programs | changed | refused by verify | warned of | no harm | silent and harmful |",
+             "|---|---|---|---|---|---|---|"]
     for control in dict.fromkeys(p.name.split()[-1] for p in programs):
         own = [p for p in programs if p.name.split()[-1] == control]
-        lines.append(f"| {control} | {sum(p.count for p in own)} | {sum(p.caught.total() for p in own)} | "
-                     f"{sum(p.harmless.total() for p in own)} | {sum(len(p.survivors) for p in own)} |")
+        warned = sum(p.harmless[WARNED] for p in own)
+        lines.append(f"| {control} | {len(own)} | {sum(p.count for p in own)} | {sum(p.caught.total() for p in own)} | {warned} | "
+                     f"{sum(p.harmless.total() for p in own) - warned} | {sum(len(p.survivors) for p in own)} |")
     lines += ["", "Kinds of change: " + ", ".join(f"{kind.strip()} {n}" for kind, n in kinds.most_common()) + ".",
               "Refused by: " + ", ".join(f"{code}.* {n}" for code, n in caught.most_common()) + ".",
               "No harm: " + "; ".join(f"{why} ({n})" for why, n in harmless.most_common()) + ".", ""]
