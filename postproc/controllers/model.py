@@ -80,6 +80,9 @@ class FeedRules(UserModel):
     the units of the block that moves"""
 
 
+OutsideCorners = Literal["", "arc", "intersection"]
+
+
 class CutterCompensation(UserModel):
     """Rules of cutter compensation next to its codes; moves are those in the plane of the words."""
 
@@ -87,6 +90,14 @@ class CutterCompensation(UserModel):
     """the first move behind G41 or G42 may be an arc"""
     ends_on_arc: bool = False
     """the first move behind G40 may be an arc"""
+    start: Literal["", "next"] = ""
+    """where the first move behind G41 and G42 ends, and the one behind G40 begins. next: the radius off the contour, square
+    to it, straight from and to the side of the tool; empty: otherwise or not known, nothing is offset back to the contour"""
+    corners: OutsideCorners = ""
+    """how the tool goes round outside corners of the contour: arc, on its radius round them; intersection of the shifted
+    lines, up to a right angle; empty: not known"""
+    states: str = ""
+    """block before G41 or G42 of a contour that was offset back: what the control must have in force for these rules"""
     modal_register: bool = False
     """D holds until another is stated, whatever tool is loaded: where CUTCOM names none, the number of the
     tool's length register is written"""

@@ -21,6 +21,7 @@ from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.text.canonical import Canonical
+from postproc.reference.cutcom_of_tools import radii_of
 from postproc.reference.holes import Phase
 from postproc.setup.model import SetupFile, at_places, part_placement
 from toolpaths.arrays import Floats
@@ -68,7 +69,7 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
                 for code, origin in origins}
     control = next(iter(controls.values()))
     lengths = {int(number): tool.length for number, tool in setup.tools.items()}
-    code, motion, more = _executed(data, controller, controls, lengths, file, others)
+    code, motion, more = _executed(data, controller, controls, lengths, radii_of(setup), file, others)
     found += more
     if code is None or motion is None or has_errors(found):
         return None, found
@@ -97,8 +98,9 @@ def _origins(setup: SetupFile, machine: Machine) -> tuple[list[tuple[str, Floats
     return result, found
 
 
-def _executed(data: bytes, controller: ControllerFile, controls: dict[str, Control], lengths: dict[int, float], file: str,
-              others: Mapping[str, bytes] | None) -> tuple[Canonical | None, Motion | None, list[Diagnostic]]:
+def _executed(data: bytes, controller: ControllerFile, controls: dict[str, Control], lengths: dict[int, float],
+              radii: tuple[tuple[int, float], ...], file: str, others: Mapping[str, bytes] | None,
+              ) -> tuple[Canonical | None, Motion | None, list[Diagnostic]]:
     """Text to canonical words to motion; `controls` with the work offset of each register."""
     control, *further = controls.values()
     machine, program = control.machine, controller.program
@@ -110,7 +112,8 @@ def _executed(data: bytes, controller: ControllerFile, controls: dict[str, Contr
         return None, None, found
     numbers = [reader.offset_of(program.offset_text(code)) for code in controls]
     offsets = Offsets(control.work_offset, control.xyz, lengths, home, control.length_on_z, controller.cycles.peck_relief,
-                      control, reader.rises_first, reader.arc_slack, tuple(zip(numbers[1:], further, strict=True)))
+                      control, reader.rises_first, reader.arc_slack, tuple(zip(numbers[1:], further, strict=True)),
+                      radii, controller.cutter_compensation.corners)
     motion, more = run(code, machine.axis_names, offsets, file)
     return code, motion, [*found, *more]
 

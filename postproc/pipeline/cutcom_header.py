@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from postproc.compile.program import Program
 from postproc.job.job import Job
-from postproc.reference.cutcom_of_tools import CutcomOfTool
+from postproc.reference.cutcom_of_tools import CutcomOfTool, radius_of
+from postproc.setup.model import ToolSetup
 
 
 def cutcom_lines(job: Job, program: Program) -> list[str]:
@@ -19,19 +20,14 @@ def _line(job: Job, tool: CutcomOfTool, registers: list[int]) -> str:
         return f"{name}: CUTCOM is not written, the words are the path of the tool's centre"
     text = job.controller.cutter_compensation.holds
     held = " and ".join(dict.fromkeys(text.format(register=r) for r in registers or [tool.number]))
-    radius = _radius(job, tool.number)
+    own = radius_of(tool.number, job.setup.tools.get(str(tool.number), ToolSetup()), job.toolpath)
+    radius = job.controller.lengths.text(own) if own else ""
     if tool.kind == "radius":
-        return f"{name}: CUTCOM by the radius, {held} holds {radius or 'the radius of the tool'}, the words are the contour"
+        back = ", offset back from the path of the tool's centre" if tool.radius else ""
+        return (f"{name}: CUTCOM by the radius, {held} holds {radius or 'the radius of the tool'}, the words are the "
+                f"contour{back}")
     return (f"{name}: CUTCOM by the wear, {held} holds by how much the radius is greater than "
             f"{radius or 'that of the CAM system'}, the words are the path of the tool's centre")
-
-
-def _radius(job: Job, number: int) -> str:
-    """Half the diameter of set-up or CL file, "" where neither states one."""
-    own = job.setup.tools.get(str(number))
-    stated = [tool.diameter for tool in job.toolpath.tools if tool.number == number and tool.diameter]
-    diameter = (own.diameter if own else None) or next(iter(stated), None)
-    return f"{job.controller.lengths.text(0.5 * diameter)}" if diameter else ""
 
 
 def _registers(program: Program) -> dict[int, list[int]]:

@@ -14,12 +14,20 @@ from toolpaths.toolpath import Event, Toolpath
 @dataclass(frozen=True)
 class CutcomOfTool:
     """A tool that cuts under CUTCOM: its number (0 without one), what its register holds, whether the set-up
-    says so, and the lines of CUTCOM/LEFT and RIGHT."""
+    says so, the lines of CUTCOM/LEFT and RIGHT, and mm by which the control shifts the words to the path of the CL file:
+    the radius where that is the path of the tool's centre and the words are the contour, else 0."""
 
     number: int
     kind: Compensation
     stated: bool
     lines: tuple[int, ...]
+    radius: float = 0.0
+
+
+def radius_of(number: int, tool: ToolSetup, toolpath: Toolpath) -> float:
+    """mm, half the diameter of set-up or CL file, 0 where neither states one."""
+    stated = (one.diameter for one in toolpath.tools if one.number == number and one.diameter)
+    return 0.5 * (tool.diameter or next(stated, 0.0))
 
 
 def kind_of(tool: ToolSetup) -> Compensation:
@@ -36,7 +44,18 @@ def tools_under_cutcom(toolpath: Toolpath, setup: SetupFile) -> tuple[CutcomOfTo
             found.setdefault(number, []).append(event.line)
     tools = {number: setup.tools.get(str(number), ToolSetup()) for number in found}
     return tuple(CutcomOfTool(number, kind_of(tool := tools[number]), tool.compensation is not None or tool.contour,
-                              tuple(lines)) for number, lines in found.items())
+                              tuple(lines), radius_of(number, tool, toolpath) if _offset_back(tool) else 0.0)
+                 for number, lines in found.items())
+
+
+def radii_of(setup: SetupFile) -> tuple[tuple[int, float], ...]:
+    """(tool, mm) of the tools whose path is offset back to the contour, where the set-up states their diameter."""
+    return tuple((int(number), 0.5 * tool.diameter) for number, tool in setup.tools.items()
+                 if _offset_back(tool) and tool.diameter)
+
+
+def _offset_back(tool: ToolSetup) -> bool:
+    return tool.compensation == "radius" and not tool.contour
 
 
 def with_compensation(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, list[Diagnostic]]:
@@ -48,7 +67,7 @@ def with_compensation(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, l
     found, bare = list[Diagnostic](), set[int]()
     for one in tools_under_cutcom(toolpath, setup):
         tool = setup.tools.get(str(one.number), ToolSetup())
-        if refused := _refusal(tool):
+        if refused := _refusal(tool, one.radius):
             found.append(error(f"cutcom.{refused[0]}", f"T{one.number}: {refused[1]}", file=toolpath.file,
                                lines=one.lines[:6], count=len(one.lines), hint=refused[2].format(number=one.number)))
         elif one.kind == "none":
@@ -62,13 +81,12 @@ def with_compensation(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, l
     return replace(toolpath, events=events), found
 
 
-def _refusal(tool: ToolSetup) -> tuple[Literal["radius", "contour"], str, str] | None:
+def _refusal(tool: ToolSetup, radius: float) -> tuple[Literal["radius", "contour"], str, str] | None:
     """(code, what is wrong, what to do) of a register that does not belong to what the CL file holds."""
-    if tool.compensation == "radius" and not tool.contour:
-        return ("radius", 'compensation = "radius" for CL points of the tool\'s centre: a register that holds the radius '
-                "would shift the tool by it once more",
-                '[tools.{number}] compensation = "wear" (the register holds what the radius differs by), or contour = true '
-                "where the CAM system writes the contour under CUTCOM")
+    if _offset_back(tool) and not radius > 0.0:
+        return ("radius", 'compensation = "radius" for CL points of the tool\'s centre, and neither CL file nor set-up '
+                "states its diameter: how far the contour is from them is not known",
+                "[tools.{number}] diameter = 10.0 (mm)")
     if tool.contour and tool.compensation in ("wear", "none"):
         return ("contour", f'compensation = "{tool.compensation}" for a CL file that holds the contour (contour = true): '
                 "the tool would cut its radius too deep",

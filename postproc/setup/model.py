@@ -79,8 +79,9 @@ class ToolSetup(ToolBody):
     """name by which the control calls the tool (Siemens Operate T="...", TNC TOOL CALL "..."); default: its number"""
     compensation: Compensation | None = None
     """what CUTCOM is for this tool. wear: its register holds by how much the radius is greater than the CAM system's, 0
-    for the tool as drawn (CL points of the tool's centre); radius: it holds the radius (contour = true); none: CUTCOM is
-    not written, the words are the path of the tool's centre. Default: wear, radius where contour = true"""
+    for the tool as drawn (CL points of the tool's centre); radius: it holds the radius, and the path of the tool's centre
+    is offset back to the contour (with contour = true the CL file holds that already); none: CUTCOM is not written, the
+    words are the path of the tool's centre. Default: wear, radius where contour = true"""
     contour: bool = False
     """true: under CUTCOM the CL file holds the contour, not the path of the tool's centre"""
     tip_acceleration: float | None = Field(default=None, gt=0.0)

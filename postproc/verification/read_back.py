@@ -100,8 +100,10 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         diagnostics += placed([_located(d, job.toolpath.file, of_cl) for d in check_stated(code, reader, gcode)], code.files)
     if code is None or has_errors(diagnostics):
         return None, diagnostics
+    radii = tuple((tool.number, tool.radius) for tool in job.cutcom if tool.radius)
     offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
-                      job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack, _others(job, reader))
+                      job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack, _others(job, reader),
+                      radii, job.controller.cutter_compensation.corners)
     motion, found = run(code, machine.axis_names, offsets, gcode)
     give_back()
     faults = Faults(job.toolpath.file, gcode)

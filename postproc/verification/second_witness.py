@@ -95,9 +95,9 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
     return ExecutedBlocks(job.machine.axis_names, joints, start, motion.line, motion.code, np.asarray(straight),
                           arc_sweeps(motion, control), motion.feed, motion.inverse, motion.unit, by_tip, control.feed_rule,
                           control.degree_is_inch, job.controller.feed.arc_inverse == "radius", motion.compensation,
-                          motion.radius, stops_of(comparison), motion.tool, motion.spindle, motion.rpm, motion.coolant,
-                          motion.dwell, motion.pitch, motion.hole, motion.register, lengthless, steps, joints_at, poses_at,
-                          approach_at if job.corrects else None)
+                          motion.radius, motion.contour, stops_of(comparison), motion.tool, motion.spindle, motion.rpm,
+                          motion.coolant, motion.dwell, motion.pitch, motion.hole, motion.register, lengthless,
+                          steps, joints_at, poses_at, approach_at if job.corrects else None)
 
 
 def stops_of(comparison: Comparison) -> tuple[tuple[int, float], ...]:

@@ -258,6 +258,7 @@ def _load(e: Execution, r: Record, line: int) -> None:
 def _cutter(e: Execution, r: Record, line: int) -> None:
     d, corner, aside, above = (*r.numbers[:4 if len(r.numbers) == 7 else 2], 0.0, 0.0, 0.0, 0.0)[:4]
     ball = above == corner and not aside if aside or above else d == 2.0 * corner
+    e.cutter.set(e.row, 0.5 * d * e.scale)
     e.ball.set(e.row, corner * e.scale if ball and corner > 0.0 and not r.has("DRILL", "TAP") else math.nan)
 
 

@@ -60,7 +60,8 @@ class Commanded:
         rpm (N,): NaN where not stated; turned, flowed (N,): row of the last SPINDL and COOLNT record; name (N,): into names
         systems: rotation and origin of every system of the file by its name, in order; first: name of the one
             that the first position is in, "" for the absolute frame, None where that is not sure
-        radius (N,): register that CUTCOM names, NaN; ball (N,): mm, radius of a tool that ends in one, NaN for others
+        radius (N,): register that CUTCOM names, NaN; ball, cutter (N,): mm, radius of a tool that ends in a
+            ball, NaN for others, and of any tool
         unread: what was not understood, by its text
     """
 
@@ -93,6 +94,7 @@ class Commanded:
     first: str | None
     radius: Array
     ball: Array
+    cutter: Array
     rests: tuple[Pause, ...]
     stops: tuple[Pause, ...]
     splines: dict[int, Array] = field(default_factory=dict)

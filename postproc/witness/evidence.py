@@ -65,7 +65,8 @@ class ExecutedBlocks:
         steps: words (K, J) of blocks less those where they begin, mm and degrees; by_tip (E,): X, Y, Z are the tip
         rule: what a feed per minute refers to ("xyz-first", "geometry", "all"); degree_is_inch: with all axes in
             inches, degrees count as such, else as mm; by_angle: inverse time of arcs counts rad
-        side (E,): cutter compensation, 40 off, 41 left, 42 right; radius (E,): its register
+        side (E,): cutter compensation, 40 off, 41 left, 42 right; radius (E,): its register; contour (E, 4): X, Y from where
+            the tool's centre begins and ends the block to the contour as programmed, 0 where the words are the centre's
         stops: (block before which it stands, M number) of each
         tool, spindle, rpm, coolant, dwell, pitch, hole (E,): as in force; pitch NaN outside taps, hole True in cycles
         register (E,): length register in force, -1 for none; lengthless (E,): True where none may be, since
@@ -93,6 +94,7 @@ class ExecutedBlocks:
     by_angle: bool
     side: Array
     radius: Array
+    contour: Array
     stops: tuple[tuple[int, float], ...]
     tool: Array
     spindle: Array

@@ -59,12 +59,11 @@ def assembled(e: Execution) -> Commanded:
     gap[[row for row in e.gap if row < n] + uncertain] = True
     return Commanded(tip, axis, kind, line, known, gap, feed[:, 0], feed[:, 1] > 0, feed[:, 2] > 0, arc, centre, normal,
                      sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.side.column(n, np.int64),
-                     e.register.column(n, np.int64),
-                     e.name.column(n, np.int64), tuple(e.names),
+                     e.register.column(n, np.int64), e.name.column(n, np.int64), tuple(e.names),
                      spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64),
                      np.array(e.coolant.rows, np.int64)[_index(e.coolant, n)], e.systems, _first_system(e, place),
-                     e.radius.column(n, np.float64), e.ball.column(n, np.float64), tuple(e.rests), tuple(e.stops),
-                     _splines(e, tip, place, common), e.unread)
+                     e.radius.column(n, np.float64), e.ball.column(n, np.float64), e.cutter.column(n, np.float64),
+                     tuple(e.rests), tuple(e.stops), _splines(e, tip, place, common), e.unread)
 
 
 def _splines(e: Execution, tip: Array, place: Array, common: Array) -> dict[int, Array]:

@@ -127,6 +127,13 @@ _PATH = [
         code_left=True,
     ),
     convert(
+        "cutcom.offset_back",
+        START + LEFT + ARC + "GOTO/-20,-20,2\nCUTCOM/OFF\nGOTO/0,-20,2\nRAPID\nGOTO/0,0,20\n",
+        r"compensation = \"(wear)\": the words",
+        sheet('"radius"', r'"\1"'),
+        setup=LENGTH + 'compensation = "radius"\n',
+    ),
+    convert(
         "cutcom.left_on",
         START
         + LEFT

@@ -241,6 +241,28 @@ END-OF-PATH""")
 WETTED = MILLED.replace("COOLNT/FLOOD\n", "").replace("GOTO/-20,14,-3\n", "COOLNT/FLOOD\nGOTO/-20,14,-3\n")
 SIDE = MILLED.replace("GOTO/-20,14,-3\n", "CUTCOM/LEFT,7\nGOTO/-20,14,-3\n").replace(
     "RAPID\nGOTO/-30,30,50", "CUTCOM/OFF\nGOTO/-34,34,-3\nRAPID\nGOTO/-30,30,50")
+ROUNDED = """UNITS/MM
+CUTTER/10
+LOADTL/1
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/-60,0,20
+FEDRAT/400,MMPM
+GOTO/-60,0,2
+CUTCOM/LEFT
+GOTO/-40,-15,2
+CIRCLE/-40,0,2,0,0,1,15
+GOTO/-25,0,2
+GOTO/-25,10,2
+CIRCLE/-20,10,2,0,0,-1,5
+GOTO/-20,15,2
+GOTO/20,15,2
+CUTCOM/OFF
+GOTO/20,40,2
+RAPID
+GOTO/20,40,20
+FINI
+"""
 COOLED = NX.replace("COOLNT/FLOOD", "COOLNT/THRU").replace("COOLNT/MIST", "COOLNT/AIR")
 BALLS = """UNITS/MM
 CUTTER/10,5
@@ -340,6 +362,9 @@ CASES: dict[str, Case] = {
        for name in ("linuxcnc", "iso", "fanuc", "heidenhain")},
     **{f"rests {name}": Case(RESTS, "mill-3axis", c) for name, c in SIX.items()},
     **{f"side {name}": Case(SIDE, "mill-3axis", c) for name, c in SIX.items()},
+    **{f"contour {name}": Case(ROUNDED, "mill-3axis", SIX[name],
+                               {"tools": {"1": {"gauge_length": 90.0, "compensation": "radius"}}})
+       for name in ("siemens", "heidenhain")},
     **{f"cooled {name}": Case(COOLED, "mill-3axis", SIX[name]) for name in ("haas", "siemens", "linuxcnc")},
     "chosen axes": Case(BALLS, "mikron-ucp710", "fanuc-30i", options={"orient": "auto"}),
     "measured": Case(MILLED, "mikron-ucp710", "linuxcnc", {**TURNED, "output": {"tool_call": False}}),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from tests.mutants.plant import Fault
 
+CONTOURS = ("contour siemens", "contour heidenhain")
+
 FAULTS = (
     Fault("lines of the rotary axes off by 0.1 mm", "kinematics", "SerialModel._joint",
           "np.array(axis.point or (0.0, 0.0, 0.0)))",
@@ -129,6 +131,10 @@ FAULTS = (
           '_SWITCH["RIGHT" if side == "LEFT" else "LEFT"]'),
     Fault("side by the other word", "cutter compensation", "compensation_side", "if side == w",
           "if side[0] == w[0] and side != w", tuple(f"side {name}" for name in ("fanuc", "siemens", "linuxcnc"))),
+    Fault("contour on the other side", "cutter compensation", "_Pieces.contour", "np.sign(self.radius), abs",
+          "-np.sign(self.radius), abs", CONTOURS),
+    Fault("radius of the register a fifth less", "cutter compensation", "radius_of", "return 0.5 *", "return 0.4 *", CONTOURS),
+    Fault("start-up not square", "cutter compensation", "_stretch", "points[1] + there[0]", "points[1] + here[0]", CONTOURS),
     Fault("CUTCOM dropped", "cutter compensation", "RadiusCompensation.begin",
           "self.out.setdefault(block, []).append(command)", "self.active = ''"),
     Fault("CUTCOM/OFF dropped", "cutter compensation", "RadiusCompensation.off",

@@ -67,7 +67,8 @@ class SiemensReader(Reader):
 
     groups: Groups = GROUPS | {
         "motion": (0, 1, 2, 3), "units": (70, 71, 700, 710), "offset": (54, 55, 56, 57, 500, *range(505, 600)),
-        "path": (9, 60, 64), "once": (4,), "exact_stop": (601, 602, 603), "length": (), "level": (), "arc_distance": ()}
+        "path": (9, 60, 64), "once": (4,), "exact_stop": (601, 602, 603), "corners": (450,),
+        "length": (), "level": (), "arc_distance": ()}
     m_codes = (*M_CODES, 17.0)
     letters = "GMFSTDNIJKRLP?~>"
     stating = {k: v for k, v in Reader.stating.items() if k != "level"} | {"length": "D, or a tool"}

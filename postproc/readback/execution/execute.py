@@ -27,7 +27,7 @@ from toolpaths.units import MM_PER_INCH
 @arrays(line="E", code="int8: E", end="E J", start="J", plane="int8: E", ccw="E", center="E 3", feed="E", inverse="E",
         tool="E", register="E", spindle="int8: E", rpm="E", coolant="E", hole="E", missing_feed="E", dwell="E",
         compensation="int8: E", offset="E", blend="E", frame="E", block="E", radius="E", pitch="E", floating="E",
-        unit="E")
+        unit="E", contour="E 4")
 class Motion:
     """E executed blocks.
 
@@ -46,6 +46,7 @@ class Motion:
         block (E,): running number of the block; radius (E,): register of the radius in force (D), NaN for none
         pitch (E,): mm per turn of a tapping cycle, negative for left-hand ones, NaN outside; floating (E,): not coupled
         unit (E,): mm that 1 of `feed` stands for where it counts a length: 25.4 for inches
+        contour (E, 4): as in MotionRows
     """
 
     line: Ints
@@ -74,6 +75,7 @@ class Motion:
     pitch: Floats
     floating: Bools
     unit: Floats
+    contour: Floats
     frames: tuple[ExecutionFrame, ...] = (AXES,)
 
     def __len__(self) -> int:
@@ -149,7 +151,8 @@ def _blocks(words: Words, modal: Modal, letters: tuple[str, ...], offsets: Offse
     return BlockSection(0, modal.motion, modal.plane, modal.machine, modal.level, modal.inch, modal.offset,
                         columns(words, letters), steps,
                         rest, length, columns(words, "ijk"), columns(words, "IJK"), columns(words, "ZRQPIJK"),
-                        columns(words, ("z", "r", TURNS)), columns(words, "L")[:, 0], columns(words, CALL)[:, 0])
+                        columns(words, ("z", "r", TURNS)), columns(words, "L")[:, 0], columns(words, CALL)[:, 0],
+                        offsets.shifts(modal.tool, modal.compensation) if offsets.radii else repeated(0.0, n + 1))
 
 
 def _cancelled(words: Words, modal: Modal, section: BlockSection, line: Ints, file: str) -> list[Diagnostic]:
@@ -171,10 +174,11 @@ def _motion(words: Words, modal: Modal, rows: MotionRows, code: Canonical, used:
     state = {k: taken(getattr(modal, k), block) for k in (
         "plane", "inverse", "tool", "spindle", "rpm", "coolant", "compensation", "offset", "blend")}
     return Motion(in_files(code.line[block], code.files), rows.code, rows.end, offsets.home,
-                  ccw=shared(taken(modal.motion, block) == 3), center=rows.center, feed=shared(feed),
+                  ccw=shared(rows.ccw), center=rows.center, feed=shared(feed),
                   register=taken(modal.length_register, block), hole=rows.hole, missing_feed=shared(missing),
                   dwell=shared(dwell), frame=rows.frame, block=block, radius=taken(number_of(words, "D"), block),
-                  pitch=pitch, floating=floating, unit=shared(feed_units(modal, code)[block]), frames=used, **state)
+                  pitch=pitch, floating=floating, unit=shared(feed_units(modal, code)[block]), contour=shared(rows.contour),
+                  frames=used, **state)
 
 
 def feed_units(modal: Modal, code: Canonical) -> Floats:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.control.control import Control
+from postproc.controllers.model import OutsideCorners
 from toolpaths.arrays import Floats, Ints, repeated, shared
 from toolpaths.shapes import arrays
 
@@ -34,6 +35,17 @@ class Offsets:
     rises_first: bool = True
     arc_slack: float = math.inf
     others: tuple[tuple[float, Control], ...] = ()
+    radii: tuple[tuple[int, float], ...] = ()
+    """(tool, mm that its radius register holds) where the words are a contour offset back from the tool's centre"""
+    corners: OutsideCorners = ""
+    """how the control goes round outside corners of such a contour"""
+
+    def shifts(self, tools: Ints, sides: Ints) -> Floats:
+        """(N,) mm by which words are shifted to the left of the move, negative to the right, with tools and sides (N,)."""
+        result = np.zeros(len(tools))
+        for number, radius in self.radii:
+            result[tools == number] = radius
+        return shared(np.where(sides == 41, result, np.where(sides == 42, -result, 0.0)))
 
     def control_at(self, register: float) -> Control | None:
         """The control with the work offset of a register."""

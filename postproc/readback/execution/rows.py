@@ -18,14 +18,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 @arrays(motion="int16: N", plane="int8: N", machine="N", level="int8: N", inch="N", offset="N", columns="N J",
-        steps="N J", rest="N", length="N", relative="N 3", absolute="N 3", extra="N 7", deep="N 3", repeats="N", call="N")
+        steps="N J", rest="N", length="N", relative="N 3", absolute="N 3", extra="N 7", deep="N 3", repeats="N", call="N",
+        radius="N")
 class BlockSection:
     """Blocks `first` and on (N), as their words and modal state have them.
 
     `columns`, `steps` (N, J) are absolute and relative axis words, `relative`, `absolute` (N, 3) centres of
     arcs from the start and in coordinates, `extra` (N, 7) the words Z, R, Q, P, I, J, K of a cycle, `deep`
     (N, 3) z, r and turns, `repeats` and `call` (N,) as stated; NaN where a block states none. `offset` (N,): register of
-    the work offset.
+    the work offset; `radius` (N,): mm by which the control shifts the words to the left, negative to the right.
     """
 
     first: int
@@ -45,6 +46,7 @@ class BlockSection:
     deep: Floats
     repeats: Floats
     call: Floats
+    radius: Floats
 
     def cut(self, first: int, last: int) -> BlockSection:
         """Blocks first to before last."""
@@ -68,10 +70,11 @@ class BlockSection:
 
 
 @dataclass(frozen=True)
-@arrays(block="R", code="int8: R", end="R J", center="R 3", frame="R", hole="R", feed="R", dwell="R")
+@arrays(block="R", code="int8: R", end="R J", center="R 3", frame="R", hole="R", feed="R", dwell="R", ccw="R", contour="R 4")
 class MotionRows:
     """R rows of motion: block, code, end (R, J) in machine coordinates, centre (R, 3) in those of the frame,
-    number of the frame; hole, feed (NaN: the F word in force), rest of cycles."""
+    number of the frame; hole, feed (NaN: the F word in force), rest of cycles; ccw of arcs; `contour` (R, 4): X, Y from
+    where the tool's centre begins and ends the row to the contour under compensation by the radius, 0 elsewhere."""
 
     block: Ints
     code: Array
@@ -81,6 +84,8 @@ class MotionRows:
     hole: Bools
     feed: Floats
     dwell: Floats
+    ccw: Bools
+    contour: Floats
 
     @staticmethod
     def joined(parts: list[MotionRows], width: int) -> MotionRows:
@@ -90,7 +95,7 @@ class MotionRows:
         if not parts:
             none = np.zeros(0)
             return MotionRows(none.astype(np.int64), none.astype(np.int8), np.zeros((0, width)), np.zeros((0, 3)),
-                              none.astype(np.int64), none.astype(bool), none, none)
+                              none.astype(np.int64), none.astype(bool), none, none, none.astype(bool), np.zeros((0, 4)))
         return MotionRows(*(joined([getattr(p, f.name) for p in parts]) for f in fields(MotionRows)))
 
 

@@ -12,6 +12,7 @@ from postproc.readback.execution.arcs import centres, whole_turns
 from postproc.readback.execution.drilling import spell_holes
 from postproc.readback.execution.frames import ExecutionFrame
 from postproc.readback.execution.rows import BlockSection, MotionRows, SectionState
+from postproc.readback.execution.tool_radius import with_radius
 from postproc.readback.text.canonical import Canonical
 from postproc.readback.text.cycles import CycleLeg
 from postproc.readback.text.modal import CYCLES
@@ -34,7 +35,7 @@ def run_section(section: BlockSection, frame: ExecutionFrame, number: int, posit
     start, moving = frame.coordinates(position[None, :])[0], _moving(section)
     _refused(section, frame, moving, code.line, file, found)
     cycles = bool((moving & among(section.motion, CYCLES)).any() or np.isfinite(section.call).any())
-    size = len(moving) if cycles or section.has_steps else _PART
+    size = len(moving) if cycles or section.has_steps or section.radius.any() else _PART
     parts: list[MotionRows] = []
     for first in range(0, len(moving), size):
         part = slice(first, first + size)
@@ -69,10 +70,16 @@ def _rows(section: BlockSection, frame: ExecutionFrame, number: int, start: Floa
     motion = section.motion[line]
     kind = np.where(motion == 0, 0, np.where(among(motion, (2, 3)), 2, 1)).astype(np.int8)
     rows = MotionRows(line + section.first, kind, end, *(repeated(one, len(line)) for one in (
-        np.zeros(3), number, False, np.nan, 0.0)))
+        np.zeros(3), number, False, np.nan, 0.0)), ccw=motion == 3, contour=repeated(np.zeros(4), len(line)))
     if spelt:
         rows = _with_legs(rows, line, spelt)
     rows = _with_arcs(rows, state, line, code.line, file, found)
+    if (shift := section.radius[rows.block - section.first]).any():
+        rows, faults = with_radius(rows, start, shift, offsets.xyz, offsets.corners)
+        found += [error("gcode.compensation", f"cutter compensation by the radius: {said}", file=file,
+                        lines=[int(code.line[rows.block[k]])], hint="write it as the post does, or state compensation = "
+                        "\"wear\" in the set-up where the words are the path of the tool's centre")
+                  for k, said in faults.items()]
     return replace(rows, end=frame.position(rows.end)), ends[-1]
 
 

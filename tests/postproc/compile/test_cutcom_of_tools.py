@@ -82,7 +82,6 @@ def test_what_nobody_has_stated_is_warned_of(controller: str) -> None:
 
 
 @pytest.mark.parametrize(("kind", "code", "then"), [
-    ({"compensation": "radius"}, "cutcom.radius", {"compensation": "radius", "contour": True}),
     ({"compensation": "wear", "contour": True}, "cutcom.contour", {"compensation": "wear"}),
     ({"compensation": "none", "contour": True}, "cutcom.contour", {"compensation": "radius", "contour": True})])
 def test_a_register_that_does_not_belong_to_the_points_is_refused(kind: dict[str, Any], code: str,

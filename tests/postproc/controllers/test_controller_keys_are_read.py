@@ -25,7 +25,8 @@ OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "feed.kept_by_units
           "inch.degree", "levels", "smoothing_words", "kinematics.smoothing_in_modes",
           "modes.tcp", "modes.tilted", "arcs.helix_planes",
           "cutter_compensation.begins_on_arc", "cutter_compensation.ends_on_arc", "cutter_compensation.modal_register",
-          "cutter_compensation.holds",
+          "cutter_compensation.holds", "cutter_compensation.start", "cutter_compensation.corners",
+          "cutter_compensation.states",
           *(f"pivots.{key}" for key in ("table", "table_to_table", "tool_to_head", "head_to_head", "mixed_table",
                                         "mixed_head", "mixed_closing_table", "mixed_closing_head", "closing_table",
                                         "closing_head")),
@@ -41,8 +42,9 @@ OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "feed.kept_by_units
           *(f"rollover.{key}" for key in ("default", "rules", "shortest", "positive", "negative", "zero_negative", "on",
                                           "needs"))}
 """keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py,
-test_compensated_arcs.py, test_parts.py, test_rollover.py, test_inch_output.py, test_smoothing_levels.py, test_options.py,
-test_hooks_refused.py, test_output_quality.py, test_align.py, test_cycle_time_program.py, test_tools_and_feeds_unstated.py
+test_compensated_arcs.py, test_contour_words.py, test_parts.py, test_rollover.py, test_inch_output.py,
+test_smoothing_levels.py, test_options.py, test_hooks_refused.py, test_output_quality.py, test_align.py,
+test_cycle_time_program.py, test_tools_and_feeds_unstated.py
 and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief", "cycles.plane_at_start", "arcs.helix_by_angle"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states, and what rounding moves"""

@@ -217,6 +217,13 @@ def test_an_arc_begins_compensation_on_linuxcnc_alone() -> None:
     assert not any(rule.ends_on_arc for rule in rules.values())
 
 
+def test_how_outside_corners_are_gone_round() -> None:
+    """F2: intersection of straight moves (19607#2 CCC = 0); S1: G450; T1: transitional arc; H1 does not say."""
+    rules = {name: spec(name).cutter_compensation for name in builtin_files()}
+    assert {name: (rule.start, rule.corners) for name, rule in rules.items() if rule.start} == {
+        FANUC: ("next", "intersection"), HAAS: ("next", ""), SIEMENS: ("next", "arc"), TNC: ("next", "arc")}
+
+
 @pytest.mark.parametrize(("dialect", "modal"), [(FANUC, True), (HAAS, True), (ISO, True), (NGC, False)])
 def test_the_radius_register_is_modal(dialect: str, modal: bool) -> None:
     """F1, H1: D stays until another is stated, whatever tool came since; LinuxCNC takes the tool in the spindle."""

@@ -250,7 +250,7 @@ def test_the_estimate_takes_what_the_read_back_has_executed(controller: str,
     result = converted(HEAD + CUT + HOLE.replace("CLEAR", "MMPM,100,CLEAR"), controller=controller)
     assert result.ok and result.job is not None and result.comparison is not None
     code, motion, _ = source._executed(result.text.encode(), result.controller, {"G54": result.job.control},
-                                       result.job.register_lengths(), "", {})
+                                       result.job.register_lengths(), (), "", {})
     assert code is not None and motion is not None
     again = estimate_of(replace(result, comparison=replace(result.comparison, executed=(code, motion))))
 
