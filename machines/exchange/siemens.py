@@ -1,8 +1,10 @@
-"""A machine from Siemens machine data: TRAORI (transformation types 24, 40, 56), a swivel data record, axis limits.
+"""A machine from Siemens machine data: TRAORI (types 24, 40, 56; 16 to 21, 32 to 35), a swivel data record, axis limits.
 
 Units by the parameter manual: MD32000 mm/min and rev/min, MD32300 m/s2 and rev/s2, MD32431 m/s3 and rev/s3, MD36100 and
 MD36110 mm and degrees. Vectors: SINUMERIK Operate, Commissioning Manual 6FC5397-1DP40-6BA1, 21.7 "Swiveling": axis 2 is
-based on axis 1; an axis that moves the workpiece has the sign of its vector changed.
+based on axis 1; an axis that moves the workpiece has the sign of its vector changed. Types 16 to 21 (tool) and 32 to 35
+(workpiece), axes along X, Y, Z by letters: Function Manual Transformations A5E47435470B, 3.2, and the list of MD24100 in
+Parameter Manual 6FC5397-8EP40 (the first axis turns the second).
 """
 
 from __future__ import annotations
@@ -22,6 +24,10 @@ from toolpaths.units import MM_PER_INCH
 Carried = Literal["T", "P", "M"]
 """$TC_CARR23: tool, part or both are swivelled"""
 _TYPES: dict[int, Carried] = {24: "T", 40: "P", 56: "M"}
+_SEQUENCES = ("AB", "AC", "BA", "BC", "CA", "CB")
+"""of the rotary axes, by the last four bits of the older types, whose axes are not vectors"""
+_OLDER: dict[int, tuple[Carried, str]] = {
+    **{16 + k: ("T", _SEQUENCES[k]) for k in (0, 2, 4, 5)}, **{32 + k: ("P", _SEQUENCES[k]) for k in range(4)}}
 UNLIMITED = 1e7
 """positions from which a limit is none: Siemens' own defaults are +-1e8"""
 _FIGURES = {"velocity": ("MA_MAX_AX_VELO", "", 1.0 / 60.0, 360.0 / 60.0),
@@ -87,7 +93,7 @@ class _SiemensMachine:
         elif "kinematics.structure" in self.draft.stated:
             pass
         elif turning:
-            self.draft.error("import.geometry", "neither a transformation of type 24, 40 or 56 nor a swivel data record "
+            self.draft.error("import.geometry", "neither a transformation that is read nor a swivel data record "
                              f"says where {' and '.join(turning)} {'are' if turning[1:] else 'is'}", hint=_HINT)
         else:
             self.draft.made(("kinematics", "structure"), "w b X Y Z (C1) t", "")
@@ -125,9 +131,12 @@ class _SiemensMachine:
             kind, n = round(datum.number or 0.0), datum.name.removeprefix("MC_TRAFO_TYPE_")
             if kind in _TYPES:
                 return self._of_type(datum, _TYPES[kind], n)
+            if kind in _OLDER:
+                return self._of_older_type(datum, *_OLDER[kind], n)
             if 16 <= kind <= 51:
-                self.draft.warning("import.kinematics", f"{datum.said}: of the 5-axis transformations only types 24, 40 "
-                                   "and 56 are read, whose axes are vectors", datum.line, _HINT)
+                self.draft.warning("import.kinematics", f"{datum.said}: of the 5-axis transformations types 24, 40, 56, 16 "
+                                   "to 21 and 32 to 35 are read; of 48 to 51 no document at hand says which vector goes to "
+                                   "the table", datum.line, _HINT)
         return None
 
     def _types(self) -> list[MachineDatum]:
@@ -145,6 +154,18 @@ class _SiemensMachine:
         names = [self.data.get("MC_AXCONF_CHANAX_NAME_TAB", str(round(number) - 1)) for number in numbers]
         letters = [_letter(name.text) if name else "" for name in names]
         return SwivelGeometry(carried, vectors, points, self._letters(letters, vectors), datum)
+
+    def _of_older_type(self, datum: MachineDatum, carried: Carried, letters: str, n: str) -> SwivelGeometry | None:
+        """Axes along X, Y, Z by their letters; in which direction they count is not documented, so it is said."""
+        if not self._plain(n):
+            return None
+        points = _points(carried, self._vector(f"MC_TRAFO5_BASE_TOOL_{n}"), self._joint(carried, n))
+        sense = -1.0 if carried == "P" else 1.0
+        first, second = ([sense * float(letter == axis) for axis in "ABC"] for letter in letters)
+        self.draft.info("import.sense", f"{datum.said}: {letters[0]} and {letters[1]} are taken to turn the tool relative "
+                        "to the part as ISO 841 has them: the type does not say it, so turn both by hand at the machine and "
+                        "compare", datum.line)
+        return SwivelGeometry(carried, (first, second), points, (letters[0], letters[1]), datum)
 
     def _plain(self, n: str) -> bool:
         """No zero offset, no reversed count, tool along z: what is not modelled is refused."""

@@ -66,6 +66,8 @@ class DataSheet(UserModel):
     """rotary axes that carry the tool, the one next to the slides first"""
     table_slides: tuple[Literal["X", "Y", "Z"], ...] = ()
     """linear axes that move the table, the one next to the bed first; the others move the spindle"""
+    spindle: str = ""
+    """its largest speed, "8100 rpm"; left out: not known"""
     X: AxisSheet
     """axis X"""
     Y: AxisSheet

@@ -79,6 +79,8 @@ def sheet_text(ask: Ask) -> str:
         sheet.lines += _turn(sheet, letter, letter in table)
     if table or head:
         sheet.lines += _pivots(sheet, tuple(table), tuple(head))
+    speed = sheet.text("largest speed of the spindle, e.g. 8100 rpm; empty: not known", "", _quantity("turning speed"))
+    sheet.lines.insert(2, f"spindle = {speed}")
     change = sheet.text("tool change, chip to chip, e.g. 4.2 s; empty: not known", "", _quantity("time"))
     return "\n".join([*sheet.lines, *(["", "[times]", f"tool_change = {change}"] if change != '""' else [])]) + "\n"
 

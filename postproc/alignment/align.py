@@ -32,6 +32,8 @@ COVERAGE = 2.0
 """k of the expanded uncertainty"""
 OF_TOLERANCE = 0.5
 """share of the tolerance above which the uncertainty of the place is warned of"""
+LEAN_SHARE = 0.1
+"""share of the axis tolerance up to which a lean is taken by a machine that has no axis for it, to be safe"""
 
 
 @dataclass(frozen=True)
@@ -112,10 +114,11 @@ def _proved(toolpath: Toolpath, machine: Machine, controller: str | Path, job: J
     if program.job is not None:
         entry = control_entry(job, program.job, place)
     errors = [d for d in program.diagnostics if d not in known]
-    if not program.ok and nominal.axis > options.axis_tolerance and int(np.sum(machine.rotary)) < 2:
+    if not program.ok and nominal.axis > LEAN_SHARE * options.axis_tolerance and int(np.sum(machine.rotary)) < 2:
         errors.append(info("align.tilt", f"the part leans by {nominal.axis:.4f} degrees: no axes of {machine.name} for that",
-                           file=place.readings.file, hint=f"shim it until it leans by less than {options.axis_tolerance:g} "
-                           "degrees and measure again, or give the --axis-tolerance that the part allows"))
+                           file=place.readings.file, hint=f"shim it until it leans by less than "
+                           f"{LEAN_SHARE * options.axis_tolerance:g} degrees and measure again, or give --axis-tolerance "
+                           f"{nominal.axis / LEAN_SHARE:.2g}, where the part allows it"))
     return AlignedPart((*known, *errors), place, part if program.ok else None, uncertainty, nominal, tuple(effects),
                        tuple(entry), program)
 

@@ -24,6 +24,12 @@ SCHEMA_VERSION = 1
 """of the JSON objects of all commands; it rises where a key changes its meaning or goes"""
 ALIKE = 4
 """diagnostics of one code and one remedy up to which each is shown"""
+PLACED = frozenset({"travel.exceeded", "reach.axis", "reach.position", "link.blocked", "path.jump"})
+"""codes whose remedy is that of `place.found`, where that is said"""
+FOLLOWS = {"cl.no-feed": ("feed.missing",), "setup.tool_unused": ("tool.number",), "place.found": ("path.odd_record",),
+           "joints.chosen": ("travel.exceeded", "reach.axis", "path.odd_record"),
+           **dict.fromkeys(PLACED, ("path.odd_record",))}
+"""by code: its causes; where one of them is said, people read that alone"""
 LONGEST_NAME = 255
 """characters that the name of a file may have"""
 
@@ -166,7 +172,18 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
 
 def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
     """Diagnostics for people: of many with one code and one remedy the first, and where the others are; of one
-    wrong number one line. JSON has them all."""
+    wrong number one line. Where there are errors they come first, and what only follows from another is left out. JSON has
+    them all, in the order of the stages."""
+    from dataclasses import replace
+
+    from toolpaths.diagnostics import Severity, has_errors
+
+    if has_errors(diagnostics):
+        codes = {d.code for d in diagnostics}
+        diagnostics = tuple(sorted((d for d in diagnostics if codes.isdisjoint(FOLLOWS.get(d.code, ()))),
+                                   key=lambda d: -d.severity))
+        if "place.found" in codes and least <= Severity.INFO:
+            diagnostics = tuple(replace(d, hint="") if d.code in PLACED else d for d in diagnostics)
     groups: dict[tuple[Severity, str, str], list[Diagnostic]] = {}
     for d in diagnostics:
         if d.severity >= least:

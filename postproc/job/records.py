@@ -10,7 +10,7 @@ from postproc.controllers.model import ControllerFile
 from postproc.reference.cutcom_of_tools import CutcomOfTool, tools_under_cutcom, with_compensation
 from postproc.reference.length_registers import by_rule, own_registers
 from postproc.reference.records import checked_records, plain_records
-from postproc.reference.spindle_defaults import Stated, standing_cuts, stated_by_setup, with_defaults
+from postproc.reference.spindle_defaults import Stated, standing_cuts, stated_by_setup, too_fast, with_defaults
 from postproc.reference.tool_numbers import numbered
 from postproc.setup.model import SetupFile, assumed_values, other_machine
 from toolpaths.diagnostics import Diagnostic, Severity
@@ -42,7 +42,7 @@ def job_records(toolpath: Toolpath, machine: Machine, controller: ControllerFile
     toolpath, found = checked_records(toolpath, controller)
     diagnostics += found
     if not any(d.severity is Severity.ERROR and d.code.split(".")[0] in ("spindle", "insert") for d in diagnostics):
-        diagnostics += standing_cuts(toolpath)
+        diagnostics += [*standing_cuts(toolpath), *too_fast(toolpath, machine.largest_speed)]
     toolpath = by_rule(toolpath, controller, machine.length_register, machine.radius_register)
     toolpath, found = own_registers(toolpath, controller)
     return JobRecords(toolpath, stated, cutcom), _of_milling(toolpath, [*diagnostics, *found])

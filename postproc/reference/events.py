@@ -152,15 +152,20 @@ def spindle_after(event: Event, before: Spindle) -> Spindle:
     return Spindle(before.rpm if speed is None else speed, direction, direction)
 
 
-def spindle_states(toolpath: Toolpath) -> tuple[Ints, Floats]:
-    """(direction (N,), rev/min (N,) NaN while unknown) of the spindle at every row."""
-    states = [Spindle()]
-    starts = [0]
+def spindle_changes(toolpath: Toolpath) -> list[tuple[Spindle, int]]:
+    """(state behind it, line) of each SPINDL record."""
+    result = list[tuple[Spindle, int]]()
     for event in toolpath.events:
         if event.word == "SPINDL":
-            states.append(spindle_after(event, states[-1]))
-            starts.append(event.index)
-    at = state_at(starts, len(toolpath))
+            result.append((spindle_after(event, result[-1][0] if result else Spindle()), event.line))
+    return result
+
+
+def spindle_states(toolpath: Toolpath) -> tuple[Ints, Floats]:
+    """(direction (N,), rev/min (N,) NaN while unknown) of the spindle at every row."""
+    changes = spindle_changes(toolpath)
+    states = [Spindle(), *(state for state, _ in changes)]
+    at = state_at([0, *(e.index for e in toolpath.events if e.word == "SPINDL")], len(toolpath))
     return np.array([s.direction for s in states])[at], np.array([s.rpm for s in states])[at]
 
 

@@ -8,7 +8,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from postproc.reference.events import TOOL_WORDS, Spindle, cutting, numbers, speed_said, spindle_after, spindle_states, words
+from postproc.reference.events import (
+    TOOL_WORDS,
+    Spindle,
+    cutting,
+    numbers,
+    speed_said,
+    spindle_after,
+    spindle_changes,
+    spindle_states,
+    words,
+)
 from postproc.setup.model import SetupFile, ToolSetup
 from postproc.setup.spindle import CoolantKind, Direction, SpindleSetup
 from toolpaths.arrays import Bools, Ints
@@ -223,6 +233,18 @@ def standing_cuts(toolpath: Toolpath) -> list[Diagnostic]:
         result.append(_refused(toolpath, unknown, "spindle.no_speed", "cutting while no record has stated the spindle speed",
                                f"state SPINDL/RPM,n,CLW in the CAM system, or {_remedy(toolpath, unknown)}"))
     return result
+
+
+def too_fast(toolpath: Toolpath, largest: float) -> list[Diagnostic]:
+    """An error where the file, or the set-up for it, asks for more than the spindle's largest speed, rev/min: a control
+    runs the largest, and feeds per turn and taps with it."""
+    asked = [(state.rpm, line) for state, line in spindle_changes(toolpath) if state.rpm > largest]
+    if not asked:
+        return []
+    return [error("spindle.too_fast", f"the spindle would turn at {max(asked)[0]:g} rev/min, the machine has at most "
+                  f"{largest:g} ([control] largest_speed)", file=toolpath.file,
+                  lines=sorted({line for _, line in asked if line > 0})[:6], count=len(asked),
+                  hint=f"state at most {largest:g} in SPINDL, or in the set-up's spindle, and feeds that go with it")]
 
 
 def _drawn_out(toolpath: Toolpath) -> Bools:

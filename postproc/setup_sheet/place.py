@@ -21,6 +21,7 @@ from postproc.setup.model import PartPlacement, Placement, SetupFile
 from postproc.setup.place import PlacementLimits
 from postproc.setup.system import BEYOND
 from postproc.setup_sheet.attitudes import Attitude, attitudes_of
+from postproc.setup_sheet.odd_record import odd_record
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, Severity, info
 from toolpaths.toolpath import Toolpath
@@ -103,10 +104,14 @@ def _beyond(result: PostResult) -> bool:
 
 
 def found_place(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
-    """What `place` would find for a conversion that is refused by travel or reach: a note with [part], or why
-    no place fits; nothing for other refusals. `toolpath` is as it was read."""
+    """What `place` would find for a conversion that is refused by travel or reach: a note with [part], or why no place fits,
+    or the one record that no place puts right; nothing for other refusals. `toolpath` is as it was read."""
     if result.ok or not _beyond(result):
         return []
+    limits, slides = result.machine.limits, ~np.array(result.machine.rotary)
+    odd = odd_record(toolpath, float((limits.upper - limits.lower)[slides].max()))
+    if odd is not None:
+        return [odd]
     if len(toolpath) > _MOST:
         return [_note("postproc setup new looks for a place that fits", "")]
     setup = result.setup

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tests.hints.align_cases import ALIGN
 from tests.hints.cl_cases import CL
 from tests.hints.cl_word_cases import CL_WORDS
 from tests.hints.convert_cases import CONVERT
@@ -10,6 +11,8 @@ from tests.hints.file_cases import FILE
 from tests.hints.gcode_cases import GCODE
 from tests.hints.import_cases import IMPORTS
 from tests.hints.machine_cases import MACHINE
+from tests.hints.place_cases import PLACE
 from tests.hints.tool_cases import TOOLS
+from tests.hints.verify_cases import VERIFY
 
-CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE]
+CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE, *ALIGN, *PLACE, *VERIFY]

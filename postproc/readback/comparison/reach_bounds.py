@@ -34,5 +34,6 @@ def check_reach_bounds(motion: Motion, executed: BlockPoses, moves: Moves, owner
         passed, unit = (-value / DEG, "degrees") if angular else (-value, "mm")
         line = int(moves.line[owner[row]]) if owner[row] < len(moves) else 0
         result.append(faults.error("verify.reach", f"{name}: passed by {passed:.4f} {unit}", line, int(motion.line[row]),
-                                   hint="the machine cannot go there: move the part in the set-up (part.origin)"))
+                                   hint="the machine cannot go there: put the block back, or move the part in the set-up "
+                                   "(part.origin)"))
     return result

@@ -167,7 +167,7 @@ def _wrong_pose(law: WordMeaning, rotation: Floats, control: Control, kin: Kinem
     picked = _picked(rotation, law.choice, control, kin, q)
     if picked is None:
         return [error("gcode.plane", f"{law.code}: no position of {', '.join(names[j] for j in control.rotary)} brings the "
-                      "tool square to the plane", file=file, lines=[line], hint="the machine cannot take this plane")]
+                      "tool square to the plane", file=file, lines=[line], hint="write a plane that the rotary axes reach")]
     if (np.abs(picked - stands) > ANGLE_SLACK).any():
         return [_pose_error(law, control, stands, picked, file, line)]
     spin = angle_between(tool_frame(kin, q)[:, :1].T, rotation[:, :1].T)[0] / DEG

@@ -139,8 +139,9 @@ def test_what_the_header_of_a_program_states_gives_the_machine_back(name: str, r
 
 
 @pytest.mark.parametrize(("old", "new", "code"), [
-    ("TRAFO_TYPE_1=40", "TRAFO_TYPE_1=33", "ERROR import.geometry 0"),
-    ("TRAFO_TYPE_1=40", "TRAFO_TYPE_1=33", "WARNING import.kinematics 20"),
+    ("TRAFO_TYPE_1=40", "TRAFO_TYPE_1=49", "ERROR import.geometry 0"),
+    ("TRAFO_TYPE_1=40", "TRAFO_TYPE_1=49", "WARNING import.kinematics 20"),
+    ("TRAFO_TYPE_1=40", "TRAFO_TYPE_1=33", "INFO import.sense 20"),
     ("N24100", "$MC_TRAFO5_ROT_AX_OFFSET_1[0]=90\nN24100", "ERROR import.kinematics 20"),
     ("N24100", "$MC_TRAFO5_ROT_SIGN_IS_PLUS_1[1]=0\nN24100", "ERROR import.kinematics 20"),
     ("N24100", "N36110 $MA_POS_LIMIT_PLUS[AX1]=far\nN32000 $MA_MAX_AX_VELO[AX1]=fast\nN24100", "ERROR import.number 21"),
@@ -154,6 +155,22 @@ def test_what_the_header_of_a_program_states_gives_the_machine_back(name: str, r
 ])
 def test_what_is_wrong_is_said_with_its_line(old: str, new: str, code: str, tmp_path: Path) -> None:
     assert code in imported(tmp_path, AC + TABLE.replace(old, new, 1))[1]
+
+
+def test_older_types_have_axes_along_their_letters(tmp_path: Path) -> None:
+    """Type 33 is the table of type 40 with A along X and C along Z; type 20 = 16 + 4 is a head whose C turns its A."""
+    table = imported(tmp_path, AC + TABLE)[0]
+    older = imported(tmp_path, AC + TABLE.replace("TYPE_1=40", "TYPE_1=33"))[0]
+    head = imported(tmp_path, AXES.format(first="C", second="A") + TABLE.replace("TYPE_1=40", "TYPE_1=20"))[0]
+    assert table is not None and older is not None and head is not None
+    q = np.array([[10.0, 20.0, 30.0, 0.5, 0.7]])
+    for one, other in zip(table.kinematics.forward(q), older.kinematics.forward(q), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
+    assert (older.structure, head.structure) == (table.structure, "w b X Y Z C A (C1) t")
+    points = {joint.name: joint for joint in head.kinematics.chain if joint.rotary}
+    np.testing.assert_allclose(points["A"].point, [0.0, 0.0, -600.0])
+    np.testing.assert_allclose(points["C"].point, [0.0, 0.02, -650.0])
+    np.testing.assert_allclose([points["A"].direction, points["C"].direction], [[1, 0, 0], [0, 0, 1]])
 
 
 def test_other_channels_are_left_out(tmp_path: Path) -> None:

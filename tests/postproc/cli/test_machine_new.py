@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from tests.postproc.pipeline.test_machines_of_the_catalogue import PART, TILTED
 ANSWERS = ("Our trunnion mill", "brochure of 2023, p. 4", "B C", "none", "X",
            "762", "762 mm", "", "22.9 m/min", "", "508 mm", "upper", "900 ipm", "", "20 in", "", "22.9 m/min", "0.3 g",
            "-35 120", "50 rpm", "", "up", "endless", "300 deg/s", "", "anti-clockwise",
-           "haas", "-381.02 -254.11", "-381.02 -254.11 -558.4", "-381.05 -254.11 -500.2", "2.8 s")
+           "haas", "-381.02 -254.11", "-381.02 -254.11 -558.4", "-381.05 -254.11 -500.2", "8100 rpm", "2.8 s")
 """with two that are refused and asked again: a length without its unit, a pivot of two numbers"""
 
 
@@ -40,6 +41,7 @@ def test_the_questions_make_the_sheet_and_the_machine(folder: Path) -> None:
     assert asked.structure == typed.structure
     assert [(j.name, j.point.tolist(), j.direction.tolist()) for j in asked.kinematics.chain if j.rotary] == [
         (j.name, j.point.tolist(), j.direction.tolist()) for j in typed.kinematics.chain if j.rotary]
+    assert (asked.largest_speed, typed.largest_speed) == (8100.0, math.inf)
     assert (asked.limits.lower == typed.limits.lower).all() and (asked.limits.velocity == typed.limits.velocity).all()
 
 
