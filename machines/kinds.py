@@ -30,6 +30,7 @@ BUILT_IN = {
     "serial": "machines.serial_models:SerialModel",
     "linear-delta": "machines.parallel_models:LinearDeltaModel",
     "h4-linear": "machines.parallel_models:H4LinearModel",
+    "legs": "machines.legs_models:LegsModel",
 }
 """`[kinematics] kind` -> module:model of that table; imported when a file asks for it"""
 HOW = f'a package registers a kind in the entry point group "{GROUP}"; a file of yours is named in {FILES}=FILE.py'

@@ -9,7 +9,8 @@ determinant of the full constraint matrix. None may vanish or change its sign an
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -39,9 +40,10 @@ def reach_faults(legs: Legs, joints: Floats, space: Workspace, names: Sequence[s
     if not far:
         rods = ends - legs.carriages(legs.inverse(ends))
         volume = determinant(rods / legs.lengths[:, None])
-        yield from _sign_fault("machine.singular", "det Jx (rods as unit vectors)", volume, place, np.zeros(len(place)),
-                               "the rods come into one plane: move the slides, change a root or make the workspace "
-                               "smaller")
+        yield from sign_fault("machine.singular", "det Jx (rods as unit vectors)", volume,
+                              partial(place_words, place, np.zeros(len(place))), "the rods come into one plane: move "
+                              "the slides, change a root or make the workspace "
+                              "smaller")
 
 
 def delta_faults(legs: Legs, joints: Floats, space: Workspace, across: Floats) -> Iterator[KeyProblem]:
@@ -52,8 +54,9 @@ def delta_faults(legs: Legs, joints: Floats, space: Workspace, across: Floats) -
     if not np.isfinite(q).all():
         return
     stopped = np.cross((ends - legs.carriages(q)) / legs.lengths[:, None], across / _norm(across))
-    yield from _sign_fault("machine.mobility", "det (AB x b) of the three pairs", determinant(stopped), place,
-                           np.zeros(len(place)), "the pairs leave the platform a turn: change the direction of `rods`")
+    yield from sign_fault("machine.mobility", "det (AB x b) of the three pairs", determinant(stopped),
+                          partial(place_words, place, np.zeros(len(place))), "the pairs leave the platform a turn: "
+                          "change the direction of `rods`")
 
 
 def h4_faults(legs: Legs, joints: Floats, space: Workspace, rods: Sequence[Sequence[Vector]],
@@ -73,13 +76,14 @@ def h4_faults(legs: Legs, joints: Floats, space: Workspace, rods: Sequence[Seque
     pairs = [k for k, leg in enumerate(rods) if len(leg) == 2]
     lever = max(float(np.abs(joints[:, 1:]).max()), 1.0)
     scale = legs.lengths[:, None] * np.array([1.0, 1.0, 1.0, lever])
-    yield from _sign_fault(
+    yield from sign_fault(
         "machine.mobility", "condition V-4, [(A1B1 x b1) x (A2B2 x b2)].x of unit vectors",
-        v4(jx[:, :, :3], legs, pairs), place, tilt, "the rods of both pairs come into one plane with x, so that "
+        v4(jx[:, :, :3], legs, pairs), partial(place_words, place, tilt), "the rods of both pairs come into one "
+        "plane with x, so that "
         "nothing holds the tilt axis along x: let the pairs reach the platform from opposite sides")
-    yield from _sign_fault("machine.singular", "det Jx (rods as unit vectors, moments by the largest arm)",
-                           determinant(jx / scale), place, tilt,
-                           "the platform is singular there: move the slides or make the workspace smaller")
+    yield from sign_fault("machine.singular", "det Jx (rods as unit vectors, moments by the largest arm)",
+                          determinant(jx / scale), partial(place_words, place, tilt),
+                          "the platform is singular there: move the slides or make the workspace smaller")
 
 
 def v4(rods: Floats, legs: Legs, pairs: Sequence[int]) -> Floats:
@@ -113,21 +117,23 @@ def _out_of_reach(legs: Legs, ends: Floats, place: Floats, tilt: Floats,
         bad = np.flatnonzero(~(half[:, k] > 0.0))
         if len(bad):
             yield KeyProblem("machine.workspace", ("workspace",), f"rod {name} ({legs.lengths[k]:g} mm) does not reach "
-                             f"{_at(place, tilt, int(bad[0]))} and {len(bad) - 1} of {len(place)} other places examined",
+                             f"{place_words(place, tilt, int(bad[0]))} and {len(bad) - 1} of {len(place)} other places "
+                             "examined",
                              "make the workspace smaller or the rod longer")
 
 
-def _sign_fault(code: str, what: str, value: Floats, place: Floats, tilt: Floats,
-                hint: str) -> Iterator[KeyProblem]:
+def sign_fault(code: str, what: str, value: Floats, at: Callable[[int], str], hint: str) -> Iterator[KeyProblem]:
+    """Values (N,) that come near 0 or change their sign between places, of which `at` gives the words."""
     mostly = value if np.median(value) > 0.0 else -value
     worst, best = int(np.argmin(mostly)), int(np.argmax(mostly))
     if mostly[worst] < LEAST:
-        yield KeyProblem(code, ("workspace",), f"{what} is {value[worst]:.3g} at {_at(place, tilt, worst)} and "
-                         f"{value[best]:.3g} at {_at(place, tilt, best)}; it must keep its sign, at least {LEAST:g} off 0",
+        yield KeyProblem(code, ("workspace",), f"{what} is {value[worst]:.3g} at {at(worst)} and "
+                         f"{value[best]:.3g} at {at(best)}; it must keep its sign, at least {LEAST:g} off 0",
                          hint)
 
 
-def _at(place: Floats, tilt: Floats, k: int) -> str:
+def place_words(place: Floats, tilt: Floats, k: int) -> str:
+    """Place k of places (N, 3) mm and tilts (N,) rad."""
     x, y, z = place[k]
     return f"x {x:g}, y {y:g}, z {z:g} mm" + (f", tilt {tilt[k] / DEG:g} degrees" if tilt.any() else "")
 

@@ -107,11 +107,12 @@ class _Checks:
 
     def __init__(self, kinematics: Kinematics) -> None:
         assert kinematics.workspace is not None  # see `is_checked`
-        self.space, self.letters = kinematics.workspace, kinematics.axis_names
+        self.space = kinematics.workspace
         self.columns: list[MarginColumn] = [*self._box(), *self._tilts()]
-        platform = kinematics.on_rods
-        if platform is not None and platform.clearance is not None:
-            self.middle, self.legs, self.clearance = platform.middle_rig(), platform.legs, platform.clearance
+        parts = kinematics.clearance_parts
+        if parts is not None and parts.clearance is not None:
+            self.middle, self.legs, self.clearance = parts.middle_rig(), parts.legs, parts.clearance
+            self.leg_names = parts.leg_names
             self.columns += [*self._stops(), *self._bars()]
         self.names = tuple(name for name, _, _ in self.columns)
         self.angular = np.array([angular for _, angular, _ in self.columns], dtype=np.bool_)
@@ -139,7 +140,7 @@ class _Checks:
     def _stops(self) -> Iterator[MarginColumn]:
         stops = (("slide", False, self.clearance.carriage_angle),
                  ("platform", True, self.clearance.platform_angle))
-        for k, letter in enumerate(self.letters[: len(self.legs.lengths)]):
+        for k, letter in enumerate(self.leg_names):
             for where, carried, most in stops:
                 if most is not None:
                     yield f"joint {letter} at {where}", True, partial(self._swing, k, most, carried)
@@ -149,7 +150,7 @@ class _Checks:
         rod = unit(rig.ends[:, k] - rig.carriages[:, k])
         middle = unit(self.middle.ends[:, k] - self.middle.carriages[:, k])
         if carried:
-            rod, middle = _level(rod, rig.tilt), _level(middle, self.middle.tilt)
+            rod, middle = rig.level(rod), self.middle.level(middle)
         return np.asarray(most - angle_between(rod, middle), dtype=np.float64)
 
     def _bars(self) -> Iterator[MarginColumn]:
@@ -165,7 +166,7 @@ class _Checks:
                 thick = given.rod_radius + given.spindle_radius
                 yield f"{name} - spindle", False, partial(self._gap, a, self.spindle, thick)
             if given.rail_radius is not None:
-                for k, letter in enumerate(self.letters[: len(self.legs.lengths)]):
+                for k, letter in enumerate(self.leg_names):
                     yield (f"{name} - slide {letter}", False,
                            partial(self._gap, a, partial(self.rail, k), given.rod_radius + given.rail_radius))
 
@@ -177,7 +178,7 @@ class _Checks:
     def rod_names(self) -> list[str]:
         """rod X1, rod X2, rod Y1, ..."""
         leg = self.clearance.leg.tolist()
-        return [f"rod {self.letters[k]}{1 + leg[:i].count(k)}" for i, k in enumerate(leg)]
+        return [f"rod {self.leg_names[k]}{1 + leg[:i].count(k)}" for i, k in enumerate(leg)]
 
     def _share_a_joint(self, a: int, b: int) -> bool:
         ends = [self.rod(i, self.middle)[1] for i in (a, b)]
@@ -218,8 +219,3 @@ def segment_distance(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
     gap = w + s[:, None] * u - t[:, None] * v
     return np.asarray(np.linalg.norm(gap, axis=1), dtype=np.float64)
 
-
-def _level(v: Floats, tilt: Floats) -> Floats:
-    """Vectors (N, 3) in the platform's own directions: turned back about x."""
-    c, s = np.cos(tilt), np.sin(tilt)
-    return np.stack([v[:, 0], c * v[:, 1] + s * v[:, 2], c * v[:, 2] - s * v[:, 1]], axis=1)

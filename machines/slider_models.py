@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
-from typing import Annotated, Literal
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from pydantic import AfterValidator
@@ -111,17 +111,7 @@ class SliderModel(KinematicsModel):
 
     def build_clearance(self) -> ClearanceSizes:
         """In mm and rad."""
-        legs, given = list(self.legs.values()), self.clearance
-        shifts = [(k, shift) for k, leg in enumerate(legs) for shift in leg.rods or ((0.0, 0.0, 0.0),)]
-        rails = all(leg.rail_ends is not None for leg in legs) and given.rail_radius is not None
-        return ClearanceSizes(
-            leg=np.array([k for k, _ in shifts]), shift=np.array([s for _, s in shifts]),
-            rod_radius=given.rod_radius,
-            spindle_radius=given.spindle_radius, spindle=given.spindle,
-            rail_radius=given.rail_radius if rails else None,
-            rail_offset=np.array([leg.rail_offset for leg in legs]),
-            rail_ends=np.array([leg.rail_ends or (0.0, 0.0) for leg in legs]),
-            carriage_angle=_radians(given.carriage_angle), platform_angle=_radians(given.platform_angle))
+        return clearance_sizes(list(self.legs.values()), self.clearance)
 
     @property
     @abstractmethod
@@ -155,6 +145,26 @@ class SliderModel(KinematicsModel):
     @abstractmethod
     def mobility_problems(self) -> Iterator[KeyProblem]:
         """Faults that show over the workspace."""
+
+
+class RodsOfLeg(Protocol):
+    """What clearances need of a leg's table."""
+
+    rods: tuple[Vector, ...]
+    rail_offset: Vector
+    rail_ends: Interval | None
+
+
+def clearance_sizes(legs: Sequence[RodsOfLeg], given: ClearanceModel) -> ClearanceSizes:
+    """Of the tables of the legs, in mm and rad."""
+    shifts = [(k, shift) for k, leg in enumerate(legs) for shift in leg.rods or ((0.0, 0.0, 0.0),)]
+    rails = all(leg.rail_ends is not None for leg in legs) and given.rail_radius is not None
+    return ClearanceSizes(
+        leg=np.array([k for k, _ in shifts]), shift=np.array([s for _, s in shifts]), rod_radius=given.rod_radius,
+        spindle_radius=given.spindle_radius, spindle=given.spindle, rail_radius=given.rail_radius if rails else None,
+        rail_offset=np.array([leg.rail_offset for leg in legs]),
+        rail_ends=np.array([leg.rail_ends or (0.0, 0.0) for leg in legs]),
+        carriage_angle=_radians(given.carriage_angle), platform_angle=_radians(given.platform_angle))
 
 
 def _radians(degrees: float | None) -> float | None:

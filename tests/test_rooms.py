@@ -17,6 +17,7 @@ FLOORS = (
     ("toolpaths.cl.text", "characters and lines of CL files to statements, dialects, subprograms"),
     ("toolpaths.cl", "statements to a Toolpath, and back to text"),
     ("machines.kinematics", "serial and parallel kinematics"),
+    ("machines.kinematics.legs", "any platform on legs, its drives and freedoms as data"),
     ("machines", "machine files, the Machine, polytopes, reach"),
     ("machines.data", "built-in machine files: models of kinds and classes"),
     ("machines.catalogue", "built-in machine files: machines that people own, with sources"),

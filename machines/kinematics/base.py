@@ -20,7 +20,7 @@ import numpy as np
 
 from machines.kinematics import by_samples
 from machines.kinematics.chain import Joint
-from machines.kinematics.clearance_geometry import ClearanceGeometry
+from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceParts
 from machines.kinematics.rod_platform import RodPlatform
 from machines.kinematics.taylor import TaylorVector, straight
 from machines.kinematics.workspace import Workspace
@@ -68,6 +68,8 @@ class Kinematics(ABC):
     (product of exponentials, see `Serial`); () of any other"""
     on_rods: RodPlatform | None = None
     """the platform and its rods, where rods carry the tool"""
+    clearance_parts: ClearanceParts | None = None
+    """rods, spindle and slides that may touch each other (`machines.reach`)"""
     workspace: Workspace | None = None
     """where the machine is declared to work: of the platform's reference point, of the gauge point without a platform"""
     singular_names: tuple[str, ...] = ()

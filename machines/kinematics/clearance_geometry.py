@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
 
 from toolpaths.arrays import Floats, Ints
 from toolpaths.shapes import arrays
@@ -39,14 +42,15 @@ class ClearanceSizes:
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(place="N 3", tilt="N", carriages="N K 3", ends="N K 3", gauge="N 3", axis="N 3")
+@arrays(place="N 3", tilt="N", carriages="N K 3", ends="N K 3", gauge="N 3", axis="N 3", turn="N 3 3")
 class ClearanceGeometry:
     """Where the parts are at N joints, in the machine frame, mm and rad.
 
     Attributes:
-        place, tilt: reference point (N, 3) of the platform and its turn (N,) about x
-        carriages, ends: (N, K, 3) joints of the legs at the slides and at the platform
+        place, tilt: reference point (N, 3) of the platform and its tilt (N,), about x where there is no `turn`
+        carriages, ends: (N, K, 3) joints of the legs at the drives and at the platform
         gauge, axis: (N, 3) gauge point and tool axis
+        turn: (N, 3, 3) of a platform that turns otherwise than about x
     """
 
     place: Floats
@@ -55,3 +59,42 @@ class ClearanceGeometry:
     ends: Floats
     gauge: Floats
     axis: Floats
+    turn: Floats | None = None
+
+    def level(self, v: Floats) -> Floats:
+        """Vectors (N, 3) in the platform's own directions."""
+        if self.turn is not None:
+            return np.asarray(np.einsum("nij,ni->nj", self.turn, v), dtype=np.float64)
+        c, s = np.cos(self.tilt), np.sin(self.tilt)
+        return np.stack([v[:, 0], c * v[:, 1] + s * v[:, 2], c * v[:, 2] - s * v[:, 1]], axis=1)
+
+
+class LegLines(Protocol):
+    """Legs as lines: what of them does not move."""
+
+    @property
+    def points(self) -> Floats:
+        """(K, 3) mm, of a slide its carriage's joint at 0."""
+
+    @property
+    def directions(self) -> Floats:
+        """(K, 3) unit vectors, of a slide its travel."""
+
+
+class ClearanceParts(Protocol):
+    """A machine whose parts may touch each other."""
+
+    @property
+    def legs(self) -> LegLines:
+        """K legs."""
+
+    @property
+    def leg_names(self) -> tuple[str, ...]:
+        """Letters of their drives."""
+
+    @property
+    def clearance(self) -> ClearanceSizes | None:
+        """Sizes of the parts."""
+
+    def middle_rig(self) -> ClearanceGeometry:
+        """Where the parts are in the middle of the workspace, N = 1."""

@@ -31,6 +31,16 @@ class OnSlides(Kinematics):
         return self
 
     @property
+    def clearance_parts(self) -> OnSlides:  # type: ignore[override]  # nothing assigns it
+        """Itself."""
+        return self
+
+    @property
+    def leg_names(self) -> tuple[str, ...]:
+        """See `ClearanceParts`."""
+        return self.axis_names[: len(self.legs.lengths)]
+
+    @property
     @abstractmethod
     def platform_joints(self) -> Floats:
         """See `RodPlatform`."""
@@ -65,11 +75,11 @@ class OnSlides(Kinematics):
 
     def singular_distance(self, q: Floats) -> Floats:
         """See the base class, and `singular_distance.py`."""
-        return distance(self._unit_free, self.legs, q)
+        return distance(self._unit_free, q)
 
     def singular_distance_between(self, q: Floats) -> Floats:
         """See the base class."""
-        return distance_between(self._unit_free, self.legs, q)
+        return distance_between(self._unit_free, q)
 
     def _unit_free(self, q: Floats) -> tuple[Floats, Floats]:
         return unit_free(self.loop_matrix_at(q), self.legs, self.platform_joints)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ _ALONG = {"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1), "U": (1, 0, 0), "V": (
 LIMITS = ("least", "greatest", "velocity", "acceleration", "jerk", "home")
 ROD = 1e-4
 """mm by which a rod may miss its length"""
+SPIN_STEPS = 3
 
 
 def largest_feed(table: dict[str, Any]) -> float:
@@ -115,54 +116,97 @@ def chain(table: dict[str, Any]) -> Chain:
 
 @dataclass(frozen=True)
 class Rods:
-    """A machine on slides: whether its rods have their lengths where a tool is claimed to be."""
+    """A platform on rods: whether they have their lengths where a tool is claimed to be; of each leg its letter, its drive,
+    (foot at 0, direction, platform joint, arm) (4, 3), rod, root."""
 
-    slide: Array
-    direction: Array
-    joint: Array
-    length: Array
-    root: Array
-    legs: tuple[str, ...]
+    legs: tuple[tuple[str, str, Array, float, float], ...]
+    turns: str
     gauge: float
-    rotary: str
-    carries: str
-    sense: float
     pivot: Array
+    rotary: str = ""
+    carries: str = ""
+    sense: float = 1.0
+    carriers: dict[str, Array] = field(default_factory=dict)
 
     def misfit(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array, length: Array) -> Array:
         """(N,) mm: the worst of rods off their length, and of the axis off what the platform can do (times
-        1000); infinite where a carriage stands on the wrong side of its rod."""
+        1000); infinite where the foot of a rod stands on the wrong side of it."""
         turn = self.sense * q[:, letters.index(self.rotary)] if self.rotary else np.zeros(len(q))
         if self.carries == "part":
             back = rotations(np.array([0.0, 0.0, 1.0]), -turn)
             tip, axis = apply(back, tip), apply(back, axis)
         s, c = (np.sin(turn), np.cos(turn)) if self.carries == "spindle" else (np.zeros(len(q)), np.ones(len(q)))
-        tilt = np.arctan2(-axis[:, 1], axis[:, 2]) if self.rotary else np.zeros(len(q))
-        expected = np.stack([s, -np.sin(tilt) * c, np.cos(tilt) * c], axis=1)
-        platform = rotations(np.array([1.0, 0.0, 0.0]), tilt)
-        centre = tip + (self.gauge + length)[:, None] * axis - apply(platform,
-                                                                     np.broadcast_to(self.pivot, tip.shape))
-        worst = 1000.0 * np.abs(axis - expected).max(axis=1)
-        for k, name in enumerate(self.legs):
-            carriage = self.slide[k] + q[:, letters.index(name)][:, None] * self.direction[k]
-            rod = carriage - centre - apply(platform, np.broadcast_to(self.joint[k], tip.shape))
-            size = np.sqrt((rod * rod).sum(axis=1))
-            wrong = (rod @ self.direction[k]) * self.root[k] < 0.0
-            worst = np.maximum(worst, np.where(wrong, np.inf, np.abs(size - self.length[k])))
-        return np.asarray(worst)
+        for name, along in self.carriers.items():
+            tip = tip - q[:, letters.index(name)][:, None] * along
+        k, sign, spins = int(self.turns != "b"), 1.0 if self.turns == "b" else -1.0, self.turns == "abc"
+        tilt = np.arctan2(sign * axis[:, k], axis[:, 2]) * bool(self.turns)
+        platform = least_turns(axis) if spins else rotations(np.eye(3)[1 - k], tilt)
+        expected = axis if spins else apply(platform, np.stack([s, 0.0 * s, c], axis=1))
+        above = tip + (self.gauge + length)[:, None] * axis
+        off, slope = self._legs(q, letters, above, platform)
+        for _ in range(SPIN_STEPS if spins else 0):  # between two blocks the tool turns about itself
+            spin = -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)
+            platform = platform @ rotations(np.array([0.0, 0.0, 1.0]), np.where(np.isfinite(spin), spin, 0.0))
+            off, slope = self._legs(q, letters, above, platform)
+        return np.asarray(np.maximum(1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0)))
+
+    def _legs(self, q: Array, letters: tuple[str, ...], above: Array, platform: Array) -> tuple[Array, Array]:
+        """(mm by which each rod misses its length, how that changes as the platform turns about its own z) (K, N)."""
+        offs, slopes = [], []
+        for letter, drive, (foot, along, joint, arm), size, root in self.legs:
+            value, own = q[:, letters.index(letter)], joint[None] - self.pivot
+            reach = apply(rotations(along, value), arm[None]) if drive == "arm" else 0.0
+            rod = foot + (value[:, None] * along if drive == "slide" else reach) - above - apply(platform, own)
+            moved = along if drive == "slide" else np.cross(along, reach) if drive == "arm" else 0.0
+            long, due = np.sqrt((rod * rod).sum(axis=1)), size + value * (drive == "length")
+            wrong = ((rod * moved).sum(axis=1) * root < 0.0) | (due <= 0.0)
+            offs.append(np.where(wrong, np.inf, long - due))
+            slopes.append(-(rod * apply(platform, np.cross([0.0, 0.0, 1.0], own))).sum(axis=1) / long)
+        return np.array(offs), np.array(slopes)
+
+
+def least_turns(axis: Array) -> Array:
+    """(N, 3, 3): the least turns that take z to unit vectors (N, 3), none of them against it."""
+    x, y, z = axis.T
+    return np.stack([1.0 - x * x / (1.0 + z), -x * y / (1.0 + z), x, -x * y / (1.0 + z), 1.0 - y * y / (1.0 + z), y,
+                     -x, -y, z], axis=1).reshape(-1, 3, 3)
+
+
+def ring(layout: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The legs of a table `[kinematics.layout]`."""
+    names, found = layout["letters"], {}
+    angles = layout.get("angles") or [360.0 * k / len(names) for k in range(len(names))]
+    asides, arm = layout.get("aside") or [0.0] * len(names), layout.get("arm", 1.0)
+    for name, *turns, aside in zip(names, angles, layout.get("joint_angles") or angles, asides, strict=True):
+        (out, there), lean = np.exp(1j * np.radians(turns)), math.radians(layout.get("lean", 0.0))
+        foot, end = (layout["radius"] + 1j * aside) * out, (layout["joint_radius"] + 1j * aside) * there
+        level = 1j * out if layout["drive"] == "arm" else math.sin(lean) * out
+        found[name] = {
+            **layout, "direction": (level.real, level.imag, 0.0 if layout["drive"] == "arm" else math.cos(lean)),
+            "point": (foot.real, foot.imag, layout.get("height", 0.0)), "arm": (arm * out.real, arm * out.imag, 0.0),
+            "joint": (end.real, end.imag, layout.get("joint_height", 0.0))}
+    return found
 
 
 def rods(table: dict[str, Any]) -> Rods:
-    """The rods of a machine file of kind "linear-delta" or "h4-linear"."""
+    """The rods of a machine file of kind "legs", "linear-delta" or "h4-linear"."""
     kinematics = table["kinematics"]
-    legs, rotary = kinematics["legs"], kinematics.get("rotary", {})
+    rotary, carriers = kinematics.get("rotary", {}), kinematics.get("carriers", {})
+    tables = {**(ring(kinematics["layout"]) if "layout" in kinematics else {}), **kinematics.get("legs", {})}
 
-    def column(key: str, default: Any = (0.0, 0.0, 0.0)) -> Array:
-        return np.array([leg.get(key, default) for leg in legs.values()], np.float64)
 
-    return Rods(column("slide"), unit(column("direction")), column("joint"), column("rod"), column("root", 1.0), tuple(legs),
-                float(kinematics.get("gauge", 0.0)), rotary.get("letter", ""), rotary.get("carries", ""),
-                float(rotary.get("positive", 1)), np.array(rotary.get("pivot", (0.0, 0.0, 0.0)), np.float64))
+    def rows(leg: dict[str, Any], *keys: str) -> Array:
+        return np.array([leg.get(key, (0.0, 0.0, float(key == "direction"))) for key in keys], np.float64)
+
+    legs = tuple((name, leg.get("drive", "slide"), rows({"point": leg.get("slide"), **leg}, "point", "direction", "joint",
+                  "arm"), float(leg["rod"]), float(leg.get("root", 1))) for name, leg in tables.items())
+    for _, _, leg, _, _ in legs:
+        leg[1] = unit(leg[1])
+    if kinematics.get("kind") == "legs":
+        return Rods(legs, "".join(sorted(set(kinematics["freedoms"]) & set("abc"))), 0.0, rows(kinematics, "gauge")[0],
+                    carriers={name: unit(rows(one, "direction")[0]) for name, one in carriers.items()})
+    return Rods(legs, "a" if rotary else "", float(kinematics.get("gauge", 0.0)), rows(rotary, "pivot")[0],
+                rotary.get("letter", ""), rotary.get("carries", ""), float(rotary.get("positive", 1)))
 
 
 def kinematics_of(table: dict[str, Any]) -> Chain | Rods | None:
@@ -170,7 +214,7 @@ def kinematics_of(table: dict[str, Any]) -> Chain | Rods | None:
     kind = table.get("kinematics", {}).get("kind", table.get("kinematics", {}).get("family"))
     if kind == "serial":
         return chain(table)
-    return rods(table) if kind in ("linear-delta", "h4-linear") else None
+    return rods(table) if kind in ("linear-delta", "h4-linear", "legs") else None
 
 
 def limits_of(table: dict[str, Any], letters: tuple[str, ...]) -> tuple[Array, Array]:

@@ -32,7 +32,7 @@ def poses(m: Machine, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndar
     if m.kinematics.straight_slides:
         q = joints(m, n, seed)
         return q, *m.kinematics.forward(q)
-    if m.kinematics.on_rods is None:  # nothing but its travel says where it works
+    if m.kinematics.workspace is None:  # nothing but its travel says where it works
         q = joints(m, 1000, seed)
         tip, axis = m.kinematics.forward(q)
         met = np.isfinite(tip).all(axis=1)
@@ -53,7 +53,12 @@ def poses(m: Machine, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndar
 
 @cache
 def box(name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest tip (3,) of a parallel machine at random joint positions at which its legs meet."""
+    """Least and greatest tip (3,) of a parallel machine at random joint positions at which its legs meet; of one that
+    turns in every direction over its workspace, for it seldom keeps its spin at 0 there."""
+    kin = machine(name).kinematics
+    if kin.on_rods is None:
+        rig = kin.rig(machine(name).home[None])
+        return kin.workspace.lower + (rig.gauge - rig.place)[0], kin.workspace.upper + (rig.gauge - rig.place)[0]
     tip, _ = machine(name).kinematics.forward(joints(machine(name), 1000))
     met = tip[np.isfinite(tip).all(axis=1)]
     return met.min(axis=0), met.max(axis=0)

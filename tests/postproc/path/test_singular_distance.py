@@ -32,7 +32,7 @@ def test_distances_against_the_rates_of_the_machine(name: str) -> None:
     assert (found > 0.05).all() and (found <= 2.0).all()
     rates = kin.jacobian(q)[:, :3, :kin.legs.lengths.size]
     fastest = np.linalg.svd(rates, compute_uv=False)[:, 0]
-    arm = 1.0 if not any(kin.rotary) else 6.0
+    arm = 6.0 if any(kin.turns_tool) else 1.0
     assert (fastest <= arm / found[:, 1]).all()
 
 

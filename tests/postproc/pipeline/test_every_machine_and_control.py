@@ -48,7 +48,9 @@ FINI
 @cache
 def part_for(machine: str) -> tuple[toolpaths.Toolpath, object]:
     """The part, and the set-up that puts it where the machine reaches."""
-    kind = "h4a" if machine.startswith("h4a") else "delta" if machine.startswith(("delta", "uranesx")) else "tools"
+    own = machines.load(machine)
+    kind = "tools" if own.kinematics.workspace is None or own.control_kinematics else (
+        "h4a" if machine.startswith("h4a") else "delta")
     setup, _ = load_setup(SAMPLES / f"{kind}.setup.toml")
     return toolpaths.read_bytes(PART)[0], setup
 

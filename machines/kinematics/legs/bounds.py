@@ -1,0 +1,169 @@
+"""A platform on legs along straight moves of its drives, with a bound of its third derivative over the whole move.
+
+`rod_loops.py` for any legs and freedoms. With r the rods, b the arms (turned), s the steps of the drives, A(q) their
+joints, l(q) the lengths and (v, w) the platform's twist, f = r.r / 2 - l.l / 2 stays 0. Differentiated once, twice and
+three times:
+
+    r' = v + w x b - A',   b' = w x b,   b'' = w' x b + w x (w x b),   l'' = 0
+    r.v + (b x r).w    =  r.A' + l l'
+    r.v' + (b x r).w'  = -r'.r' + l'.l' - r.(w x (w x b)) + r.A''
+    r.v'' + (b x r).w'' = -3 r'.r'' - r.(2 w' x (w x b) + w x (w' x b) + w x (w x (w x b))) + r.A'''
+
+linear systems with the matrix Jx at each order. Over the whole move the right sides are bounded by norms; Jx differs from
+its value in the middle by at most what its rows can change in half the move, which bounds its least singular value from
+below (Weyl). The bounds assume a largest |r'| and |w|, and hold if they come out smaller: by continuity no rod can then
+leave them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from machines.kinematics.legs.loops import Loops
+from machines.kinematics.rod_loops import UNBOUNDED
+from machines.kinematics.sliders import solved
+from machines.kinematics.taylor import TaylorVector
+from toolpaths.arrays import Floats
+from toolpaths.rotations import cross, dot, lengths
+from toolpaths.shapes import arrays
+
+_ROUNDS, _GROWTH = 6, 1.02
+
+
+@dataclass(frozen=True)
+class PlatformJets:
+    """A platform that moves: rates at the middle of the move, bounds over all of it; turns count by the lever.
+
+    Attributes:
+        place, turn: (N, 3) mm and (N, 3, 3)
+        first, second: (N, 6) twist (v, w) and its derivative in the middle
+        spin, bend, third: (N,) bounds of |w|, |w'| and |(v'', lever w'')|; third is UNBOUNDED where none was found
+        lever: mm per rad
+    """
+
+    place: Floats
+    turn: Floats
+    first: Floats
+    second: Floats
+    spin: Floats
+    bend: Floats
+    third: Floats
+    lever: float
+
+    def point(self, arm: Floats) -> TaylorVector:
+        """A point `arm` (3,) mm from the reference point, in directions of the platform."""
+        return self._jet(arm, 1.0)
+
+    def direction(self, axis: Floats) -> TaylorVector:
+        """A direction (3,) that turns with the platform."""
+        return self._jet(axis, 0.0)
+
+    def _jet(self, arm: Floats, moves: float) -> TaylorVector:
+        b, w, bend = self.turn @ arm, self.first[:, 3:], self.second[:, 3:]
+        first = moves * self.first[:, :3] + cross(w, b)
+        second = moves * self.second[:, :3] + cross(bend, b) + cross(w, cross(w, b))
+        size = float(np.linalg.norm(arm))
+        third = self.third * np.hypot(moves, size / self.lever) + (3.0 * self.bend * self.spin + self.spin**3) * size
+        return TaylorVector(list((moves * self.place + b).T), list(first.T), list(second.T), np.minimum(third, UNBOUNDED))
+
+
+@dataclass(frozen=True, eq=False)
+@arrays(place="N 3", turn="N 3 3", q="N K", step="N K")
+class MovingLoops:
+    """The loops along straight moves of the drives by `step` (N, K), `place`, `turn` and `q` those in the middle."""
+
+    loops: Loops
+    place: Floats
+    turn: Floats
+    q: Floats
+    step: Floats
+
+    def jets(self) -> PlatformJets:
+        """See the file."""
+        drives, b, r, s = self.loops.drives, self._arms, self._rods, self.step
+        moved = drives.moved(self.q) * s[:, :, None]
+        first = self._solved(drives.gains(r, self.q) * s)
+        v, w = first[:, None, :3], first[:, None, 3:]
+        turns = cross(w, b)
+        rod_rates = v + turns - moved
+        curved = np.where(drives.arm, s * s, 0.0)[:, :, None] * -self._drive_arms
+        second = self._solved((drives.stretch * s) ** 2 - dot(rod_rates, rod_rates) + dot(r, curved - cross(w, turns)))
+        spin, bend, third = self._bounds(lengths(rod_rates), lengths(first[:, 3:]))
+        return PlatformJets(self.place, self.turn, first, second, spin, bend, third, self.loops.lever)
+
+    @cached_property
+    def _arms(self) -> Floats:
+        return self.loops.arms(self.turn)
+
+    @cached_property
+    def _rods(self) -> Floats:
+        return self.loops.matrix_at(self.place, self.turn, self.q)[1]
+
+    @cached_property
+    def _drive_arms(self) -> Floats:
+        """(N, K, 3) mm: Rot(u, q) a."""
+        return np.asarray(np.where(self.loops.drives.arm[:, None], self.loops.drives.feet(self.q) - self.loops.drives.points,
+                                   0.0), dtype=np.float64)
+
+    @cached_property
+    def _jx(self) -> Floats:
+        return self.loops.matrix(self._rods, self._arms)
+
+    def _solved(self, right: Floats) -> Floats:
+        x = solved(self._jx, right)
+        x[~np.isfinite(right).all(axis=1)] = np.nan
+        return self.loops.twists(x)
+
+    @cached_property
+    def _reach(self) -> Floats:
+        """(K,) mm: |b|, 0 of a platform that does not turn."""
+        return np.asarray(lengths(self.loops.joints) * bool(self.loops.turns), dtype=np.float64)
+
+    @cached_property
+    def _longest(self) -> Floats:
+        """(N, K) mm: the rods at most."""
+        drives = self.loops.drives
+        return np.asarray(drives.spans(self.q) + 0.5 * np.abs(self.step) * drives.stretch, dtype=np.float64)
+
+    @cached_property
+    def _drive(self) -> tuple[Floats, Floats, Floats]:
+        """Bounds (N, K) of l', |A''| and |A'''|."""
+        drives, s = self.loops.drives, np.abs(self.step)
+        arm = np.where(drives.arm, drives.size, 0.0)
+        return drives.stretch * s, arm * s**2, arm * s**3
+
+    def _bounds(self, rod_speed: Floats, rate: Floats) -> tuple[Floats, Floats, Floats]:
+        """Bounds (N,) of |w|, |w'| and |(v'', lever w'')| from |r'| (N, K) and |w| (N,) in the middle; UNBOUNDED where
+        none."""
+        lever, speed, spin = self.loops.lever, rod_speed * _GROWTH, rate * _GROWTH
+        least = np.linalg.svd(np.nan_to_num(self._jx), compute_uv=False)[:, -1]
+        result = np.full((3, len(rate)), UNBOUNDED)
+        for _ in range(_ROUNDS):
+            bend, rod_bend, grip = self._second(speed, spin, least)
+            new_speed, new_spin = rod_speed + 0.5 * rod_bend, rate + 0.5 * bend / lever
+            third = self._third(speed, spin, bend, rod_bend, grip)
+            held = (new_speed <= speed).all(axis=1) & (new_spin <= spin) & (third < result[2])
+            result[:, held] = np.stack([spin, bend / lever, third])[:, held]
+            speed, spin = new_speed * _GROWTH, new_spin * _GROWTH
+        return result[0], result[1], result[2]
+
+    def _second(self, speed: Floats, spin: Floats, least: Floats) -> tuple[Floats, Floats, Floats]:
+        """(|(v', lever w')| (N,), |r''| (N, K), 1 / least singular value of Jx (N,)) at most while |r'| <= speed (N, K) and
+        |w| <= spin (N,); NaN where Jx might become singular."""
+        reach, longest, lever, t = self._reach, self._longest, self.loops.lever, spin[:, None]
+        stretch, curved, _ = self._drive
+        rows = np.hypot(speed, reach * (speed + t * longest) / lever)
+        left = least - 0.5 * np.sqrt((rows**2).sum(axis=1))
+        grip = 1.0 / np.where(left > 0.0, left, np.nan)
+        right = speed**2 + stretch**2 + longest * (t**2 * reach + curved)
+        bend = grip * np.sqrt((right**2).sum(axis=1))
+        return bend, bend[:, None] * np.hypot(1.0, reach / lever) + t**2 * reach + curved, grip
+
+    def _third(self, speed: Floats, spin: Floats, bend: Floats, rod_bend: Floats, grip: Floats) -> Floats:
+        """Bound (N,) of |(v'', lever w'')|."""
+        turning = (3.0 * spin * bend / self.loops.lever + spin**3)[:, None] * self._reach
+        right = 3.0 * speed * rod_bend + self._longest * (turning + self._drive[2])
+        return np.asarray(grip * np.sqrt((right**2).sum(axis=1)), dtype=np.float64)

@@ -1,0 +1,86 @@
+"""Whether the platform of a machine on legs moves as `freedoms` says, over the whole declared workspace.
+
+Each driven leg is a row (r, b x r) of the platform's constraints, each pair of parallel rods another: it stops the turn
+about r x s, with s from one rod to the other (Company 2000, V-1 to V-5). Together they must hold all six motions, or x, y
+and the turn about z where the joints are hinges along z (no z among the freedoms); and no pair may stop a turn that the
+machine is to have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+import numpy as np
+
+from machines.key_problem import KeyProblem
+from machines.kinematics.legs.on_legs import OnLegs
+from machines.mobility import LEAST, place_words, sign_fault
+from toolpaths.arrays import Floats
+from toolpaths.rotations import cross, unit
+
+GRID, HEADINGS, TILTS = (5, 5, 5), 12, 4
+"""places per direction, faces included; where the tool tilts, directions from z"""
+STOPPED = 1e-6
+"""part of a turn that a pair of rods may stop"""
+
+
+def examined(kinematics: OnLegs) -> tuple[Floats, Floats, Floats]:
+    """(C (N, 3), R (N, 3, 3), tilts (N,)) all over the workspace, its edges included, carriers at 0."""
+    place, tilt = kinematics.workspace.grid((*GRID, TILTS + 5))
+    if kinematics.loops.turns == "abc":
+        heading = np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False)
+        place, tilt, heading = (np.repeat(place, HEADINGS, axis=0), np.repeat(tilt, HEADINGS), np.tile(heading, len(place)))
+    else:
+        heading = np.full(len(tilt), -0.5 * np.pi if kinematics.loops.turns == "a" else 0.0)
+    axis = np.stack([np.sin(tilt) * np.cos(heading), np.sin(tilt) * np.sin(heading), np.cos(tilt)], axis=1)
+    turn, held = kinematics.turn_of(axis, np.zeros(len(axis))), kinematics.loops.basis[:3].any(axis=1)
+    return np.where(held, place, 0.0), turn, tilt
+
+
+def leg_faults(kinematics: OnLegs, pairs: Sequence[Floats | None]) -> Iterator[KeyProblem]:
+    """Legs out of reach, a singular platform, motions that nothing holds.
+
+    Args:
+        pairs: of each leg from one rod to the other (3,) mm, None of a single rod
+    """
+    place, turn, tilt = examined(kinematics)
+    loops, legs = kinematics.loops, kinematics.legs
+    ends = loops.ends(place, turn)
+    q = legs.solve(ends, legs.roots)
+    if len(bad := np.flatnonzero(np.isnan(q[:, 0]))):
+        yield KeyProblem("machine.workspace", ("workspace",), f"a leg does not reach "
+                                                              f"{place_words(place, tilt, int(bad[0]))} and "
+                         f"{len(bad) - 1} of {len(place)} other places examined",
+                         "make the workspace smaller or the rods longer")
+        return
+    jx, rods = loops.matrix_at(place, turn, q)
+    yield from sign_fault("machine.singular", "det Jx (rods as unit vectors, moments by the longest arm)",
+                          np.linalg.det(jx / legs.spans(q)[:, :, None]), partial(place_words, place, tilt),
+                          "the platform is singular there: move the drives or make the workspace smaller")
+    yield from _held(kinematics, pairs, unit(rods), loops.arms(turn))
+
+
+def _held(kinematics: OnLegs, pairs: Sequence[Floats | None], rods: Floats, arms: Floats) -> Iterator[KeyProblem]:
+    loops = kinematics.loops
+    held = [cross(rods[:, k], np.broadcast_to(s / np.linalg.norm(s), rods[:, k].shape))
+            for k, s in enumerate(pairs) if s is not None]
+    turns = loops.basis[3:][:, loops.basis[3:].any(axis=0)]
+    for k, row in zip([k for k, s in enumerate(pairs) if s is not None], held, strict=True):
+        if np.abs(row @ turns).max(initial=0.0) > STOPPED:
+            yield KeyProblem("machine.mobility", ("legs", kinematics.leg_names[k], "rods"), "the pair of rods stops a "
+                                                                                            "turn that "
+                             f"freedoms = {list(loops.freedoms)} has", "let the joints of the pair lie along the axis of "
+                                                                       "that "
+                             "turn, or write one rod")
+            return
+    rows = np.concatenate([np.concatenate([rods, cross(arms, rods) / loops.lever], axis=2),
+                           *(np.concatenate([0.0 * row, row], axis=1)[:, None] for row in held)], axis=1)
+    columns = [0, 1, 2, 3, 4, 5] if "z" in loops.freedoms else [0, 1, 5]
+    least = (np.linalg.svd(rows[:, :, columns], compute_uv=False)[:, -1] if rows.shape[1] >= len(columns) else np.zeros(1))
+    if least.min() < LEAST:
+        yield KeyProblem("machine.mobility", ("legs",), f"{rods.shape[1]} legs and {len(held)} pairs of rods do not hold "
+                                                        "the "
+                         f"platform everywhere (least singular value {least.min():.3g}): it moves otherwise than freedoms = "
+                         f"{list(loops.freedoms)}", "give `rods` of the legs that are pairs, or the freedoms that the "
+                                                    "machine has")
