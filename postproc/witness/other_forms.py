@@ -158,6 +158,7 @@ class FreeCad(Saying):
 
     per = "PERMIN"
     motion, fed, given, level = 80.0, math.nan, math.nan, math.nan
+    turns = 0.0
     steps, initial = False, True
     cycle: tuple[Word, ...] = ()
 
@@ -167,18 +168,19 @@ class FreeCad(Saying):
         blocks = [re.sub(r"\([^()]*\)|;.*", " ", line).upper() for line in text.split("\n")]
         own = "(EXPORTED BY FREECAD)" not in text[:4000].upper()
         self.per = "MMPS" if own else "PERMIN"
-        inch = not own and any(re.search(r"\bG20\b(?!\.)", block) for block in blocks)
-        self.say("UNITS", "INCHES" if inch else "MM")
+        if own:
+            self.say("UNITS", "MM")
         for self.line, block in enumerate(blocks, 1):
             words = [(letter, float(number)) for letter, number in _WORDS.findall(block)]
             said = {letter: number for letter, number in words if letter not in "GMN"}
             for letter, number in words:
                 if letter == "G":
                     self._command(number, said)
+            spoken = self.held.get("S", 0.0)
             self.held |= {a: b for a, b in said.items() if a in "ST" or (a in "ZRQP" and self.motion in _HOLES)}
-            for letter, number in words:
-                if letter == "M":
-                    self._switch(number)
+            codes = [number for letter, number in words if letter == "M"]
+            for number in codes or ([self.turns] if self.turns and said.get("S", spoken) != spoken else []):
+                self._switch(number)
             moves = bool(said.keys() & set("XYZ"))
             if self.cycle and (self.motion == 80.0 or (moves and self.motion not in _HOLES)):
                 self.cycle, self.level = (), math.nan
@@ -195,10 +197,14 @@ class FreeCad(Saying):
             self.initial = number == 98.0
         elif number == 4.0:
             self.say("DELAY", said["P"])
+        elif number in (20.0, 21.0) and self.per == "PERMIN":
+            self.say("UNITS", "INCHES" if number == 20.0 else "MM")
 
     def _switch(self, number: float) -> None:
+        self.turns = number if number in (3.0, 4.0) else 0.0 if number == 5.0 else self.turns
         if number in (3.0, 4.0):
-            self.say("SPINDL", self.held.get("S", 0.0), "RPM", "CLW" if number == 3.0 else "CCLW")
+            speed: tuple[Word, ...] = (self.held["S"], "RPM") if self.held.get("S") else ()
+            self.say("SPINDL", *speed, "CLW" if number == 3.0 else "CCLW")
         elif number == 6.0:
             self.say("LOADTL", self.held.get("T", 0.0))
         elif number in _PLAIN:

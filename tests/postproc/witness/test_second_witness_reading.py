@@ -47,7 +47,7 @@ TEXTS = {
         "1000\n1 1 1 7 0 0 0 0 0. 0\n1\n0 8. 5. 13. 90. 0\n1003\n0\n"),
     "FreeCAD: steps, modal motion, a mixture of retracts": (
         "(Exported by FreeCAD)\n(Post Processor: linuxcnc)\nG20 G90\nT1 M6\nS900 M4\nG0 Z1\nX1 Y1\nG91 G1 X1 F3\nY-.5\nG90\n"
-        "G3 X4 Y.5 I1 J0\nG4 P.5\nG99 G82 X4 Y1 Z-1 R.2 P.3 F2\nX5\nG98 G73 X6 Q.1\nG80\nG1 Z2\nM0\nM1\nM2\n"),
+        "G3 X4 Y.5 I1 J0\nG4 P.5\nG99 G82 X4 Y1 Z-1 R.2 P.3 F2\nS800\nX5\nG98 G73 X6 Q.1\nG80\nG1 Z2\nM0\nM1\nM2\n"),
     "points in the common system": ("$$-> FEATNO / 1\n$$-> CSYS / 1,0,0,5, $\n0,0.8,-0.6,6, $\n0,0.6,0.8,7\nGOTO/1,2,3\n"
                                     "GOTO/1,2,3,0,0.6,0.8\nGOTO/4,5,6\nMULTAX/ON\nGOTO/7,8,9,0,0,1\n"),
 }

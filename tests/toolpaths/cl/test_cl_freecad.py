@@ -62,7 +62,10 @@ def test_its_own_form_has_feeds_per_second_and_is_asked_for() -> None:
     ("M8\n", "G18\n", ("cl.unknown-word", (13,))), ("M8\n", "hello\n", ("cl.text", (13,))),
     ("G1 X-5.000", "G1 X-5.000 A30.", ("cl.axis", (20,))), (" F120.000", "", ("cl.feed", (17,))),
     ("G0 Z5.000\nG0 X10.000 Y0.000\n", "G1 X10. F100.\n", ("cl.goto", (14,))), ("I-10.000 J0.000", "", ("cl.circle", (18,))),
-    ("M9\n", "G55\n", ("cl.work-offset", (33,))), ("linuxcnc_post", "grbl_post", ("cl.cycle-value", (29,))),
+    ("M9\n", "G55\n", ("cl.work-offset", (33,))), ("G43 H2", "G43 H5", ("cl.length-register", (9,))),
+    ("G21\n", "G21\nG20\n", ("cl.units", (7,))), ("J-5.000 K0.000", "J-5.000 K1", ("cl.circle", (19,))),
+    ("G1 X-5.000", "G1 X-5.000 M9", ("cl.text", (20,))), ("G1 X-5.000", "G1 X-5.000 L2", ("cl.text", (20,))),
+    ("linuxcnc_post", "grbl_post", ("cl.cycle-value", (29,))),
     (" R3.000\nG80\nG99", "\nG80\nG99", None)])
 def test_what_is_not_carried_out_is_refused(old: str, new: str, found: tuple[str, tuple[int, ...]] | None) -> None:
     """The last: R stays from hole to hole."""
@@ -73,4 +76,10 @@ def test_what_is_not_carried_out_is_refused(old: str, new: str, found: tuple[str
 
 def test_a_feed_of_a_rapid_is_none_of_a_cut_and_inches_are_none_of_its_own_form() -> None:
     assert ("cl.feed", (3,)) in errors("G0 X0 Y0 Z5\nG0 F100 Z2\nG1 Z0\n", dialect="freecad")
-    assert ("cl.units", ()) in errors("G20\n" + OWN, dialect="freecad")
+    assert ("cl.unknown-word", (1,)) in errors("G20\n" + OWN, dialect="freecad")
+    assert [d.code for d in read_bytes(PLATE.replace("G21\n", "\n")).diagnostics] == ["cl.no-units"]
+
+
+def test_a_speed_alone_holds_where_the_spindle_turns() -> None:
+    p = read_bytes(PLATE.replace("G98\n", "G98\nS900\n").replace("M3 S3000", "M4")).toolpath
+    assert [(e.index, e.values) for e in p.events if e.word == "SPINDL"][:2] == [(0, ("CCLW",)), (7, (900.0, "RPM", "CCLW"))]

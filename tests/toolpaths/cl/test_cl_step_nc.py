@@ -53,6 +53,8 @@ def test_tools_states_and_rests() -> None:
     ("0.01,.TCP.", "0.01,.CCP.", "feed"),
     ("(#10,#11),$,#8", "(#10,#8),$,#8", "SETUP in a workplan"), ("#1=PROJECT", "#1=PRODUCT", "no PROJECT"),
     ("#80=MILLING_MACHINE_FUNCTIONS(.T.,$,$", "#80=MILLING_MACHINE_FUNCTIONS(.T.,$,.T.", "coolants at a time"),
+    ("#70,#80,$,$,$,$)", "#70,#80,$,#9,$,$)", "approach"), ("#80=MILLING_MACHINE_FUNCTIONS(.T.,$,$,.F.,$,()",
+    "#80=MILLING_MACHINE_FUNCTIONS(.T.,$,$,.F.,$,(#9)", "clamps"), ("-50.,$,.F.", "-50.,$,.T.", "the spindle drives"),
     ("#901=COMPOSITE", "#901=(COMPOSITE", "names nothing")])
 def test_what_is_not_carried_out_is_refused(old: str, new: str, said: str) -> None:
     assert old in TILTED

@@ -28,6 +28,7 @@ _OFFSETS = frozenset(float(f"{n / 10:g}") for n in (*range(540, 600, 10), *range
 _M = {0.0: "STOP", 1.0: "OPSTOP", 2.0: "FINI", 30.0: "FINI", 5.0: "SPINDL/OFF", 7.0: "COOLNT/MIST", 8.0: "COOLNT/FLOOD",
       9.0: "COOLNT/OFF"}
 _TURNING = frozenset("ABC")
+_LETTERS = frozenset("ABCDFGHIJKMNPQRSTXYZ")
 
 
 class FreeCadReader:
@@ -40,13 +41,14 @@ class FreeCadReader:
         self.seconds = self.native or (post is not None and "linuxcnc" in post[1])
         self.at: list[float | None] = [None, None, None]
         self.motion, self.relative, self.initial, self.plane = -1.0, False, True, 17.0
-        self.speed, self.tool, self.sticky, self.cycle = 0.0, 0.0, dict[str, float](), ""
+        self.speed, self.sense, self.tool, self.sticky, self.cycle = 0.0, "", 0.0, dict[str, float](), ""
         self.level: float | None = None
         self.feed, self.stated = math.nan, math.nan
 
     def read(self) -> AsStatements:
         """All lines; an error in the log where one holds what is no command."""
-        self.out.add(0, f"UNITS/{'INCHES' if self._inch() else 'MM'}")
+        if self.native:
+            self.out.add(0, "UNITS/MM")
         for number, raw in enumerate(self.text.split("\n"), 1):
             self.line = number
             self._say(raw)
@@ -59,14 +61,6 @@ class FreeCadReader:
                 self._line([(letter.upper(), float(value)) for letter, value in found if letter.upper() != "N"])
         return self.out
 
-    def _inch(self) -> bool:
-        """G20 makes the lengths of a post's file inches; FreeCAD's own form has mm alone."""
-        inch = re.search(r"\bG20\b(?!\.)", _COMMENT.sub(" ", self.text)) is not None
-        if inch and self.native:
-            self.log.error("cl.units", "G20 in FreeCAD's own form, which is mm", 0, "export with a post of FreeCAD, which "
-                           "converts, or take G20 out")
-        return inch and not self.native
-
     def _say(self, raw: str) -> None:
         for one, other in _COMMENT.findall(raw):
             begins = _BEGIN.match(one.strip())
@@ -74,16 +68,27 @@ class FreeCadReader:
 
     def _line(self, words: list[tuple[str, float]]) -> None:
         values = {letter: value for letter, value in words if letter not in "GM"}
+        moves = not values.keys().isdisjoint("XYZ")
+        letters = [letter for letter, _ in words]
+        strange = next((letter for letter in letters if letter not in _LETTERS), "")
+        twice = len(values) + letters.count("G") + letters.count("M") < len(words)
+        if strange or twice or (moves and "M" in letters):
+            why = f"{strange} is no word of a command" if strange else "a word stands twice, or M next to a move"
+            self.log.error("cl.text", why, self.line, "write one command in each line")
         if _TURNING & values.keys() and any(values.get(a) for a in _TURNING):
             self.log.error("cl.axis", "A, B or C turn the part on a machine that the file does not describe", self.line,
                            "export positions of the part, or APT from another system")
-        self.speed, self.tool = values.get("S", self.speed), values.get("T", self.tool)
+        self.tool = values.get("T", self.tool)
+        if values.get("S", self.speed) != self.speed:
+            self.speed = values["S"]
+            if self.sense and "M" not in letters:
+                self._turn(self.sense)
         for letter, code in words:
             if letter == "G":
                 self._g(code, values)
             elif letter == "M":
                 self._m(code)
-        if values.keys() & set("XYZ"):
+        if moves:
             self._move(values)
 
     def _g(self, code: float, values: dict[str, float]) -> None:
@@ -100,15 +105,25 @@ class FreeCadReader:
             self.out.add(self.line, f"DELAY/{signed(values['P'])}")
         elif code in _OFFSETS:
             self.out.add(self.line, f"ZERO/{code:g}")
-        elif code not in _SILENT_G and not (code == 20.0 and not self.native):
+        elif code in (20.0, 21.0) and not self.native:
+            self.out.add(self.line, "UNITS/INCHES" if code == 20.0 else "UNITS/MM")
+        elif code == 43.0 and values.get("H", self.tool) != self.tool:
+            self.log.error("cl.length-register", f"length register H{values['H']:g} of T{self.tool:g}", self.line,
+                           "let FreeCAD take the number of the tool, or name the register in the set-up")
+        elif code not in _SILENT_G:
             self.out.add(self.line, f"G{code:g}/")
+
+    def _turn(self, sense: str) -> None:
+        self.sense = sense
+        self.out.add(self.line, f"SPINDL/{signed(self.speed)},RPM,{sense}" if self.speed > 0.0 else f"SPINDL/{sense}")
 
     def _m(self, code: float) -> None:
         if code in (3.0, 4.0):
-            self.out.add(self.line, f"SPINDL/{signed(self.speed)},RPM,{'CLW' if code == 3.0 else 'CCLW'}")
+            self._turn("CLW" if code == 3.0 else "CCLW")
         elif code == 6.0:
             self.out.add(self.line, f"LOADTL/{self.tool:g}")
         else:
+            self.sense = "" if code == 5.0 else self.sense
             self.out.add(self.line, _M.get(code, f"M{code:g}/"))
 
     def _no_cycle(self) -> None:
@@ -160,8 +175,8 @@ class FreeCadReader:
 
     def _arc(self, start: list[float | None], end: tuple[float, ...], values: dict[str, float]) -> None:
         x, y, z = start
-        if x is None or y is None or z is None or not values.keys() & set("IJ"):
-            self.log.error("cl.circle", "an arc without a point before it, or without I and J", self.line,
+        if x is None or y is None or z is None or not values.keys() & set("IJ") or values.get("K"):
+            self.log.error("cl.circle", "an arc without a point before it, without I and J, or with K", self.line,
                            "arcs state their centre by I and J from where they begin")
             return
         centre = (x + values.get("I", 0.0), y + values.get("J", 0.0), z)

@@ -27,6 +27,7 @@ _NEUTRAL = frozenset({1009, 1010, 1011, 1012, 1015, 1016, 1017, 1020, 1050})
 _RAPID, _SAME = -2.0, -1.0
 _COOLANT_DIGIT = 100_000
 _SAME_PLACE = 1e-6
+_UPRIGHT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class NciReader:
@@ -134,6 +135,10 @@ class NciReader:
     def five_axes(self, code: int, v: list[float]) -> None:
         """11: tip, a point of the tool axis above it, feed, -, flags."""
         self._no_cycle()
+        for plane, first in self.frames.items():
+            if max(abs(a - b) for a, b in zip(first, _UPRIGHT, strict=False)) > _SAME_PLACE:
+                self.log.error("cl.frame", f"5-axis moves under a turned plane (code {plane}): nothing documents in "
+                               "which system they stand", self.line, "write 5-axis moves in the top plane")
         axis = np.array(v[3:6]) - v[:3]
         length = float(np.linalg.norm(axis))
         if not length > 0.0:

@@ -40,6 +40,7 @@ class StepNcReader:
     axis: tuple[float, ...] = UP
     said: dict[str, str] = field(default_factory=dict)
     workpiece: Value = None
+    setup: Value = None
 
     def read(self) -> AsStatements:
         """All working steps in order; an error in the log where one cannot be carried out."""
@@ -74,6 +75,9 @@ class StepNcReader:
     def _plan(self, plan: Instance, deep: int) -> None:
         if plan.name != "WORKPLAN" or deep > 20:
             raise Unread(f"{plan.name} in the place of a workplan", plan.line)
+        if plan.value(3) is not None and self.setup not in (None, plan.value(3)):
+            raise Unread("workplans of two set-ups: nothing says how they lie to each other", plan.line)
+        self.setup = plan.value(3) or self.setup
         for one in self._listed(plan.value(1), plan):
             if one.name == "WORKPLAN":
                 self._plan(one, deep + 1)
@@ -113,6 +117,8 @@ class StepNcReader:
 
     def _operation(self, operation: Instance, secure: float) -> None:
         """An operation: path list, tool direction, id, retract plane, start, tool, technology, functions first."""
+        if operation.value(9) is not None or operation.value(10) is not None:
+            raise Unread("strategies of approach and retract are not carried out", operation.line)
         axis = self._tool_axis(operation.value(1), operation)
         self._tool(self._of(operation.value(5), operation))
         first = True
@@ -158,6 +164,8 @@ class StepNcReader:
     def _technology(self, value: Value, owner: Instance) -> None:
         """MILLING_TECHNOLOGY(feed m/s, its point, cutting speed, spindle 1/s, feed per tooth, ...)."""
         t = self._of(value, owner, "MILLING_TECHNOLOGY")
+        if t.value(4) is not None or t.value(5) == ".T.":
+            raise Unread("feeds per tooth, and feeds that the spindle drives, are not carried out", t.line)
         if t.value(0) is None or t.value(1) == ".CCP." or (t.value(3) is None and t.value(2) is not None):
             raise Unread("its feed must be that of the tool centre in m/s, its spindle speed in turns per second", t.line)
         self._state(t.line, "feed", f"FEDRAT/{signed(_number(t.value(0), t) * _MM_PER_M)},MMPS")
@@ -170,6 +178,8 @@ class StepNcReader:
         """MILLING_MACHINE_FUNCTIONS(coolant, -, mist, through the tool, ...)."""
         f = self._of(value, owner, "MILLING_MACHINE_FUNCTIONS")
         kinds = [word for word, k in (("FLOOD", 0), ("MIST", 2), ("THRU", 3)) if f.value(k) == ".T."]
+        if f.value(5) or f.value(7) is not None or f.value(8) is not None or f.value(9):
+            raise Unread("clamps, oriented stops and functions of the shop are not carried out", f.line)
         if len(kinds) > 1:
             raise Unread(f"coolants at a time: {', '.join(kinds)}", f.line)
         self._state(f.line, "coolant", f"COOLNT/{(kinds or ['OFF'])[0]}")
