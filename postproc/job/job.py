@@ -32,7 +32,7 @@ from postproc.path.links import SafeSpace, safe_space
 from postproc.reference.cutcom_of_tools import CutcomOfTool
 from postproc.reference.events import register_changes, tool_changes
 from postproc.reference.hole_depths import unfit_holes
-from postproc.reference.largest_feed import limited_feeds
+from postproc.reference.largest_feed import limited_feeds, speeds_too_high
 from postproc.reference.moves import Moves, build_moves
 from postproc.reference.repeated import Repeated
 from postproc.reference.split_operations import cut_operations
@@ -255,6 +255,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
                     *smoothing_plan(controller, setup, options, toolpath, machine)[1]]
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += [*found, *program_number(toolpath, controller, setup, options)]
+    diagnostics += speeds_too_high(toolpath, machine.largest_spindle_speed)
     diagnostics += [*unfit_holes(toolpath, controller), *_refused(toolpath), *_no_inverse_time(controller, options)]
     places, found = places_of(setup, toolpath, machine, options)
     diagnostics += found
@@ -345,7 +346,7 @@ def _refused(toolpath: Toolpath) -> list[Diagnostic]:
     result = []
     turning = [op for op in toolpath.operations if op.turning]
     if turning:
-        named = ", ".join(op.name or f"the operation in line {op.line}" for op in turning[:3])
+        named = ", ".join(op.name or (f"the operation in line {op.line}" if op.line else "all of it") for op in turning[:3])
         whole = "this is a turning file" if len(turning) == len(toolpath.operations) else "turning stands between milling"
         result.append(error("convert.turning", f"{whole} ({named}): milling alone is converted", file=toolpath.file,
                             lines=[op.line for op in turning][:6], count=len(turning),

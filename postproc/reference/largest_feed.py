@@ -1,4 +1,5 @@
-"""The largest cutting feed of the machine: feeds of the CL file above it are limited to it, with a warning."""
+"""The largest cutting feed of the machine: feeds of the CL file above it are limited to it, with a warning; and the largest
+speed of its spindle, above which a cut is refused."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from postproc.reference.events import cutting, spindle_states
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, warning
@@ -14,6 +16,17 @@ from toolpaths.units import PER_MINUTE
 
 ROUNDING = 1e-9
 """share of a feed that reckoning may change"""
+
+
+def speeds_too_high(toolpath: Toolpath, largest: float) -> list[Diagnostic]:
+    """Cuts at a spindle speed above the largest, rev/min, of CL file or set-up: the control would clamp it or stop."""
+    rpm = spindle_states(toolpath)[1]
+    rows = np.flatnonzero(cutting(toolpath) & (rpm > largest * (1.0 + ROUNDING)))
+    if not len(rows):
+        return []
+    return [error("spindle.largest", f"cuts at {rpm[rows].max():g} rev/min, the spindle turns at {largest:g} rev/min at "
+                  "most ([control] largest_spindle_speed)", file=toolpath.file, lines=toolpath.line[rows[:6]].tolist(),
+                  count=len(rows), hint=f"state at most {largest:g} rev/min (SPINDL, or spindle of the set-up)")]
 
 
 def limited_feeds(moves: Moves, toolpath: Toolpath, largest: float) -> tuple[Moves, list[Diagnostic]]:

@@ -199,6 +199,13 @@ _SPINDLE_FEED = [
         m=machine_text("mill-3axis") + "\n[control]\nlargest_feed = 500\n",
     ),
     convert(
+        "spindle.largest",
+        FAST + CUT,
+        "state at most ([0-9]+) rev/min",
+        part("RPM,9000", r"RPM,\1"),
+        m=machine_text("mill-3axis") + "\n[control]\nlargest_spindle_speed = 8000\n",
+    ),
+    convert(
         "feed.no_inverse_time",
         START + TURNING,
         "--feed-mode (auto) or (per-minute)",
