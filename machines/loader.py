@@ -162,7 +162,7 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         control_kinematics=model.control_kinematics(), file=file.file,
         stop=model.control.stop or "" if model.control is not None else "",
         rapids=control.rapids or "", largest_feed=control.largest_feed * PER_MINUTE if control.largest_feed else math.inf,
-        largest_speed=control.largest_speed or math.inf,
+        largest_spindle_speed=control.largest_spindle_speed or math.inf,
         cutting_velocity=_cutting_velocity(model, kinematics), options=_options(file, control), hooks=model.hooks,
         look_ahead=control.look_ahead, block_time=control.block_time,
         length_register=register_beyond(control.length_register),

@@ -140,7 +140,7 @@ class Machine:
             names none; None: D is no rule of its own
         rapids: path of rapids of several axes, "" where the machine file does not say
         largest_feed: mm/s, the largest cutting feed; infinite where the machine file does not say
-        largest_speed: rev/min of the spindle; infinite likewise
+        largest_spindle_speed: rev/min; infinite where the machine file does not say
         cutting_velocity: per joint, mm/s or rad/s, largest at feed; () where that is the velocity of rapids
         options: what the file says of the options of the control
         look_ahead, block_time: blocks that the control sees ahead, s that it takes for a block; None: not stated
@@ -171,7 +171,7 @@ class Machine:
     radius_register: int | None = None
     rapids: Rapids | Literal[""] = ""
     largest_feed: float = math.inf
-    largest_speed: float = math.inf
+    largest_spindle_speed: float = math.inf
     cutting_velocity: tuple[float, ...] = ()
     options: ControlOptions = field(default_factory=ControlOptions)
     look_ahead: int | None = None

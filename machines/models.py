@@ -175,8 +175,8 @@ class ControlModel(UserModel):
     largest_feed: Positive | None = None
     """mm/min, as F words have it: the largest cutting feed of the machine, which the control clamps greater feeds to or
     refuses. Fanuc: parameter 1422; default: none but the velocities of the axes"""
-    largest_speed: Positive | None = None
-    """rev/min, the largest speed of the spindle; a CL file that asks for more is refused. Default: not known"""
+    largest_spindle_speed: Positive | None = None
+    """rev/min: cuts at more are refused, and `setup new` takes no more; default: not stated, nothing is checked"""
     look_ahead: int | None = Field(default=None, ge=1)
     """blocks that the control sees ahead while it plans speeds, by the option that is fitted; default: as the model of the
     cycle time has it"""

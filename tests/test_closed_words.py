@@ -29,7 +29,8 @@ FROM_FILES = {
     "machines/exchange/": "words of files of others",
     "machines/parallel_models.py": "names of LinuxCNC's modules"}
 """texts that others wrote; what is made of them is a Literal"""
-WORDS_OF_FILES = {"Event.word", "Statement.major", "Statement.body", "Record.major", "Record.body", "DialectStatement.name"}
+WORDS_OF_FILES = {"Event.word", "Statement.major", "Statement.body", "Record.major", "Record.body", "DialectStatement.name",
+                  "Instance.name"}
 """fields that hold them"""
 OTHERS = {
     ("machines/value_words.py", "kind"): "pydantic's names of faults",

@@ -15,6 +15,7 @@ FLOORS = (
     ("toolpaths", "arrays, units, diagnostics, files, the Toolpath"),
     ("toolpaths.smoothing", "smooth curves within a tolerance"),
     ("toolpaths.cl.text", "characters and lines of CL files to statements, dialects, subprograms"),
+    ("toolpaths.cl.systems", "files of systems that write no APT text, as statements"),
     ("toolpaths.cl", "statements to a Toolpath, and back to text"),
     ("machines.kinematics", "serial and parallel kinematics"),
     ("machines.kinematics.legs", "any platform on legs, its drives and freedoms as data"),

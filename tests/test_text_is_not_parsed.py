@@ -9,7 +9,8 @@ from tests.source import ROOT, nodes
 from tests.test_imports import texts
 
 READERS = {
-    "toolpaths.cl": "CL files", "toolpaths.cl.text": "CL files", "machines.geometric_error.tables": "CSV tables",
+    "toolpaths.cl": "CL files", "toolpaths.cl.text": "CL files", "toolpaths.cl.systems": "CL files",
+    "machines.geometric_error.tables": "CSV tables",
     "machines.exchange": "machine files of others",
     "postproc.controllers": "controller files",
     "postproc.readback.text": "programs", "postproc.readback.dialects": "programs",

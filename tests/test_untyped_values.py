@@ -80,6 +80,7 @@ ANYTHING = {
     "postproc/placement/bodies.py": "managers of trimesh, which states no types",
     "postproc/placement/write.py": "a document of tomlkit", "postproc/pipeline/stages.py": "the value of any stage",
     "postproc/readback/comparison/states.py": "a state of any kind, and how it is worded",
+    "postproc/witness/other_forms.py": "values of Part 21 text, lists within lists",
     "postproc/witness/execution.py": "a value of any kind, held from a row on"}
 """other files in whose annotations anything stands"""
 MAPPINGS = {"dict", "Mapping", "MutableMapping"}

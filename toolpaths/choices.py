@@ -8,8 +8,8 @@ LengthUnit = Literal["mm", "inch"]
 """what the numbers of a file are"""
 GivenUnit = Literal["", "mm", "inch"]
 """asked for; "" as the file says"""
-DialectName = Literal["generic", "nx", "makino", "creo", "solidworks", "solidworks-clt", "catia", "ncl", "camplete",
-                      "mfgsuite", "autodesk-iso", "hsmworks"]
+DialectName = Literal["generic", "nx", "makino", "creo", "solidworks", "solidworks-clt", "tlaxis", "catia", "ncl",
+                      "camplete", "mfgsuite", "autodesk-iso", "hsmworks", "nci", "freecad", "step-nc"]
 GivenDialect = Literal["", DialectName]
 """asked for; "" as the file is recognised"""
 FigureEnding = Literal[".png", ".svg"]

@@ -119,7 +119,7 @@ def _header(making: _Making, sheet: DataSheet) -> None:
     making.put(("sources", NAME, "document"), sheet.source, ("source",))
     making.put(("sources", NAME, "by"), "maker", ("source",))
     if sheet.spindle and (speed := making.read(("spindle",), sheet.spindle, "turning speed")):
-        making.put(("control", "largest_speed"), _round(speed / 6.0), ("spindle",))
+        making.put(("control", "largest_spindle_speed"), _round(speed / 6.0), ("spindle",))
     for letter in sorted(set(sheet.rotary) - set(sheet.axes)):
         where = "table" if letter in sheet.table else "head"
         making.fault((where,), f"axis {letter} has no table", f"add [{letter}] with travel and rapid")

@@ -253,7 +253,7 @@ def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", 
     from toolpaths.cl.read import read_file
 
     with shown_errors(json), progress_bar() as progress:
-        no_program(file)
+        no_program(file, dialect)
         result = read_file(file, units=options.units or None, dialect=options.dialect or None,
                            allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
     found = figures(result)
@@ -302,7 +302,7 @@ def _options(tolerance: float, axis_tolerance: float, feed_mode: FeedModeChoice,
 def _read(file: Path, options: Options, progress: Progress) -> tuple[Toolpath, list[Diagnostic]]:
     import toolpaths
 
-    no_program(file)
+    no_program(file, options.dialect)
     return toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
                           allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
 

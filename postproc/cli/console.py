@@ -62,20 +62,23 @@ def controller_file(name: str) -> ControllerFile:
     return spec
 
 
-def no_program(file: Path) -> None:
-    """An error where a program of a control stands in the place of a CL file; standard input is not looked at.
+def no_program(file: Path, dialect: str = "") -> None:
+    """An error where a program of a control stands in the place of a CL file; standard input is not looked at, nor a file
+    whose dialect is given, nor one that is G-code and CL file in one (FreeCAD).
 
     Raises:
         DiagnosticError: says what it is.
     """
     from postproc.cycle_time.source import looks_like_gcode
+    from toolpaths.cl.systems.recognise import recognised
     from toolpaths.diagnostics import DiagnosticError, error
     from toolpaths.input_files import first_bytes
 
-    if looks_like_gcode(first_bytes(file, 20_000)):
+    head = b"" if dialect else first_bytes(file, 20_000)
+    if looks_like_gcode(head) and not recognised(head):
         raise DiagnosticError([error("file.program", "this is G-code, a program of a control, not a CL file", file=str(file),
                                      hint="name the CL file that it was made from; postproc verify GCODE FILE compares the "
-                                     "two, postproc time GCODE estimates its time")])
+                                     "two, postproc time GCODE estimates its time; --dialect freecad reads FreeCAD's own")])
 
 
 @contextmanager

@@ -14,9 +14,9 @@ _LONGEST = 72
 """characters of an option with its choices that stand on one line of 80 columns"""
 
 
-def word_option(option: str, words: Any, said: str) -> Any:
+def word_option(option: str, words: Any, said: str, *others: str) -> Any:
     """An option that takes one of the values of a Literal; another is wrong use, and help shows the values: as choices,
-    or in its text where a narrow terminal would break them."""
+    or in its text where a narrow terminal would break them; `others` are further names of it."""
     known = {str(word): word for word in get_args(words)}
     shown = [word for word in known if word]
 
@@ -28,7 +28,8 @@ def word_option(option: str, words: Any, said: str) -> Any:
 
     choices = f"{{{','.join(shown)}}}"
     if len(option) + len(choices) > _LONGEST:
-        return typer.Option(option, parser=taken, metavar=option.strip("-").upper(), help=f"{said}: {', '.join(shown)}")
+        return typer.Option(option, *others, parser=taken, metavar=option.strip("-").upper(),
+                            help=f"{said}: {', '.join(shown)}")
     return typer.Option(option, parser=taken, metavar=choices, help=said)
 
 
@@ -40,8 +41,9 @@ ToleranceOption = Annotated[float, typer.Option("--tolerance", metavar="MM", min
 AxisToleranceOption = Annotated[float, typer.Option("--axis-tolerance", metavar="DEG", min=1e-6, max=10.0,
                                                help="largest deviation of the tool axis")]
 UnitsOption = Annotated[GivenUnit, word_option("--units", GivenUnit, "units of a CL file that states none")]
-DialectOption = Annotated[GivenDialect, word_option("--dialect", GivenDialect, "read the CL file as this dialect instead of "
-                                                    "the recognised one")]
+DialectOption = Annotated[GivenDialect, word_option(
+    "--dialect", GivenDialect, "read the CL file as this dialect instead of the recognised one (--axis-from tlaxis: "
+    "a .clt that lacks the ROTABL which turn its frame back)", "--axis-from")]
 ControllerName = Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER",
                                              help="name from `postproc controller list`, or a TOML file")]
 MaxTilt = Annotated[float, typer.Option("--max-tilt", metavar="DEG", min=0.0, max=120.0, help="largest angle of "

@@ -109,7 +109,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     spec = read_value(load_controller(controller))
     planner = read_value(load_model(model or model_name(controller, spec.writer))).of_machine(machine)
     data = read_file(file)
-    if looks_like_gcode(data):
+    if not options.dialect and looks_like_gcode(data):
         setup = read_value(load_setup(options.setup or None))
         blocks, found = from_gcode(data, machine, spec, setup, str(file), NeighbourFiles(file), override)
         return blocks, planner, None, found

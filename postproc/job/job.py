@@ -346,7 +346,7 @@ def _refused(toolpath: Toolpath) -> list[Diagnostic]:
     result = []
     turning = [op for op in toolpath.operations if op.turning]
     if turning:
-        named = ", ".join(op.name or f"the operation in line {op.line}" for op in turning[:3])
+        named = ", ".join(op.name or (f"the operation in line {op.line}" if op.line else "all of it") for op in turning[:3])
         whole = "this is a turning file" if len(turning) == len(toolpath.operations) else "turning stands between milling"
         result.append(error("convert.turning", f"{whole} ({named}): milling alone is converted", file=toolpath.file,
                             lines=[op.line for op in turning][:6], count=len(turning),

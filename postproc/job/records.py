@@ -42,7 +42,7 @@ def job_records(toolpath: Toolpath, machine: Machine, controller: ControllerFile
     toolpath, found = checked_records(toolpath, controller)
     diagnostics += found
     if not any(d.severity is Severity.ERROR and d.code.split(".")[0] in ("spindle", "insert") for d in diagnostics):
-        diagnostics += [*standing_cuts(toolpath), *too_fast(toolpath, machine.largest_speed)]
+        diagnostics += [*standing_cuts(toolpath), *too_fast(toolpath, machine.largest_spindle_speed)]
     toolpath = by_rule(toolpath, controller, machine.length_register, machine.radius_register)
     toolpath, found = own_registers(toolpath, controller)
     return JobRecords(toolpath, stated, cutcom), _of_milling(toolpath, [*diagnostics, *found])

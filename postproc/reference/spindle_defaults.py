@@ -242,7 +242,7 @@ def too_fast(toolpath: Toolpath, largest: float) -> list[Diagnostic]:
     if not asked:
         return []
     return [error("spindle.too_fast", f"the spindle would turn at {max(asked)[0]:g} rev/min, the machine has at most "
-                  f"{largest:g} ([control] largest_speed)", file=toolpath.file,
+                  f"{largest:g} ([control] largest_spindle_speed)", file=toolpath.file,
                   lines=sorted({line for _, line in asked if line > 0})[:6], count=len(asked),
                   hint=f"state at most {largest:g} in SPINDL, or in the set-up's spindle, and feeds that go with it")]
 

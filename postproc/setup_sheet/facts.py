@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import count
@@ -25,7 +26,7 @@ from postproc.setup.spindle import Direction
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.toolpath import Event, Kind, Role, Tool, Toolpath
 
-TRIAL = {"output": {"feed": 100.0, "spindle": {"rpm": 1000.0}}}
+TRIAL_FEED, TRIAL_SPEED = 100.0, 1000.0
 """what stands in for open values while the rest is looked at; never written"""
 
 
@@ -78,6 +79,8 @@ class SheetFacts:
     without_feed: int
     feed_lines: tuple[int, ...]
     refused: tuple[Diagnostic, ...]
+    largest_speed: float = math.inf
+    """rev/min, of the machine's spindle"""
 
     @property
     def numbers(self) -> dict[str, int]:
@@ -97,13 +100,15 @@ def facts_of(toolpath: Toolpath, machine: Machine, controller: ControllerFile, o
     numbers = {one.name: one.number for one in named}
     path, _ = numbered(toolpath, SetupFile(tool_numbers=numbers))
     path, _ = plain_records(path, controller)
-    trial = SetupFile.model_validate({**TRIAL, "tool_numbers": numbers})
+    largest = machine.largest_spindle_speed
+    output = {"feed": TRIAL_FEED, "spindle": {"rpm": min(TRIAL_SPEED, largest)}}
+    trial = SetupFile.model_validate({"output": output, "tool_numbers": numbers})
     _, found = prepare(toolpath, machine, controller, trial, options)
     errors = [d for d in found if d.severity is Severity.ERROR]
     rows = np.flatnonzero(without_feed(path))
     return SheetFacts(named, tuple(_tools(path)), any(d.code == "tool.length" for d in errors), len(rows),
                       tuple(np.unique(path.line[rows])[:3].tolist()),
-                      tuple(d for d in errors if d.code not in OF_SETUP))
+                      tuple(d for d in errors if d.code not in OF_SETUP), largest)
 
 
 def taken_numbers(toolpath: Toolpath) -> set[int]:

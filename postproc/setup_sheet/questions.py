@@ -38,6 +38,7 @@ class Question:
         text: what is asked, without its unit
         default: taken where the answer is empty, None where there is none
         assumed: what --yes takes, None: nothing, the key is left out
+        largest: what is taken at most, where the machine says
     """
 
     kind: QuestionKind
@@ -46,6 +47,7 @@ class Question:
     default: float | str | None
     assumed: float | str | None
     name: str = ""
+    largest: float = math.inf
 
     @property
     def key(self) -> str:
@@ -118,8 +120,9 @@ def questions_of(facts: SheetFacts) -> list[Question]:
             result.append(Question("gauge_length", tool.number, f"{tool.called}: gauge length, from the gauge point of the "
                                    "spindle to the tip", None, _length(tool)))
         if not tool.speed:
-            result.append(Question("spindle", tool.number, f"{tool.called}: spindle speed, {tool.direction}", None,
-                                   ASSUMED_SPEED))
+            most = "" if math.isinf(facts.largest_speed) else f", at most {facts.largest_speed:g}"
+            result.append(Question("spindle", tool.number, f"{tool.called}: spindle speed, {tool.direction}{most}", None,
+                                   min(ASSUMED_SPEED, facts.largest_speed), largest=facts.largest_speed))
     if facts.without_feed:
         result.append(Question("feed", 0, f"feed of {facts.without_feed} moves that cut without one", None, ASSUMED_FEED))
     if not any(tool.coolant for tool in facts.tools):
@@ -150,8 +153,9 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
         return None, f"{text!r} is not a number"
     if question.kind == "tool_number" and value != int(value):
         return None, f"{text} is not a whole number"
-    if not 0.0 < value <= _LARGEST[question.kind]:
-        return None, f"{text} is not above 0 and at most {_LARGEST[question.kind]:g} {question.unit}"
+    largest = min(_LARGEST[question.kind], question.largest)
+    if not 0.0 < value <= largest:
+        return None, f"{text} is not above 0 and at most {largest:g} {question.unit}"
     return value, ""
 
 

@@ -13,8 +13,9 @@ import postproc.witness.cycles as cycles
 from postproc.witness.commanded import KINDS, OFF, OWN, SIDES, UNFOLLOWED, Commanded, unit
 from postproc.witness.dialect import ALL, dialect_of, scale_of
 from postproc.witness.execution import Execution, Z
+from postproc.witness.other_forms import other_text
 from postproc.witness.rows import assembled
-from postproc.witness.text import Record, read
+from postproc.witness.text import Array, Record, read
 
 _NAN3 = (math.nan,) * 3
 FEEDS = {"MMPM": (1.0, False), "IPM": (25.4, False), "FPM": (304.8, False), "MPM": (1000.0, False), "MMPS": (60.0, False),
@@ -40,9 +41,9 @@ def commanded(data: bytes, units: str | None = None, dialect: str | None = None)
 
     What is not understood is in `unread`, and the positions that it touches are not known.
     """
-    text = read(data)
-    spoken = ALL.get(dialect, None) if dialect else None
-    spoken = spoken or dialect_of(text.records, data)
+    other = other_text(data, dialect)
+    name, text = other or (dialect or "", read(data))
+    spoken = ALL.get(name) or dialect_of(text.records, data)
     scale = {"mm": 1.0, "inch": 25.4}.get(units or "", 0.0) or scale_of(text.records)
     e = Execution(text, spoken, scale)
     if spoken.unread:
@@ -113,6 +114,8 @@ def _gohome(e: Execution, r: Record, line: int) -> None:
 def _tlaxis(e: Execution, r: Record, line: int) -> None:
     if len(r.numbers) == 3:
         e.upright = tuple(r.numbers)
+        if e.dialect.name == "tlaxis" and (e.turn != np.eye(3)).any():
+            _stand(e, np.eye(3))
         if (e.turn == np.eye(3)).all():
             e.axes[e.row] = e.upright
 
@@ -161,7 +164,7 @@ def _turned(e: Execution, r: Record, line: int) -> None:
     """TRANS, ROTATE, ROTABL that do something: where positions are from here on is not decided by this reader."""
     moving = any(abs(v) > 0.0 for v in r.numbers)
     number = next((k for k, names in enumerate(_ABOUT) if r.has(*names)), -1)
-    if r.major == "ROTABL" and e.dialect.name == "solidworks-clt" and not r.has("ATANGL") and number >= 0:
+    if r.major == "ROTABL" and e.dialect.name in ("solidworks-clt", "tlaxis") and not r.has("ATANGL") and number >= 0:
         _turn_frame(e, number, r.numbers[0] * (-1.0 if r.has("CLW") else 1.0))
     elif moving and (r.major == "TRANS" or e.dialect.local_three):
         e.lost(r.major, line)
@@ -177,10 +180,12 @@ def _turn_frame(e: Execution, number: int, angle: float) -> None:
     c, s, i, j = math.cos(angle), math.sin(angle), (number + 1) % 3, (number + 2) % 3
     turn = np.eye(3)
     turn[i, i], turn[j, j], turn[i, j], turn[j, i] = c, c, -s, s
-    e.turn = e.turn @ turn
-    upright = bool(np.abs(e.turn - np.eye(3)).max() < 1e-5)
-    if upright:
-        e.turn = np.eye(3)
+    _stand(e, e.turn @ turn)
+
+
+def _stand(e: Execution, turn: Array) -> None:
+    upright = bool(np.abs(turn - np.eye(3)).max() < 1e-5)
+    e.turn = np.eye(3) if upright else turn
     e.frames.append((e.turn, np.zeros(3)))
     e.frame.set(e.row, len(e.frames) - 1)
     e.axes[e.row] = e.upright if upright else Z

@@ -27,7 +27,8 @@ GENERIC = WitnessDialect("generic")
 ALL = {d.name: d for d in (
     GENERIC, WitnessDialect("nx", -1, -1, whole=False, axis_back=True), WitnessDialect("makino", -1, whole=False),
     WitnessDialect("creo", local_three=True), WitnessDialect("solidworks", local_three=True),
-    WitnessDialect("solidworks-clt", 0, local_three=True), WitnessDialect("catia"), WitnessDialect("ncl"),
+    WitnessDialect("solidworks-clt", 0, local_three=True), WitnessDialect("tlaxis", 0, local_three=True),
+    *(WitnessDialect(name) for name in ("catia", "ncl", "nci", "freecad", "step-nc")),
     *(WitnessDialect(name, unread=True) for name in ("camplete", "mfgsuite", "autodesk-iso", "hsmworks", "own")))}
 _WORDS = {
     "own": ("$$->TOOLPATH",), "camplete": ("MCS",), "mfgsuite": ("MCSYS",),

@@ -73,6 +73,28 @@ class ClText:
     lines: list[int]
 
 
+class Saying:
+    """What a file of another form says, as records and the lines that they stand in."""
+
+    line = 0
+
+    def __init__(self) -> None:
+        self.said, self.lines = list[Record](), list[int]()
+
+    def read(self, text: str) -> None:
+        """The whole of a file."""
+
+    def say(self, major: str, *words: Word) -> None:
+        """A record of its word and parameters."""
+        self.said.append(Record(major, ",".join(map(str, words)), words))
+        self.lines.append(self.line)
+
+    def text(self, major: str, body: str) -> None:
+        """A record of a text."""
+        self.said.append(Record(major, body, ()))
+        self.lines.append(self.line)
+
+
 def read(data: bytes) -> ClText:
     """Records and points of a CL file in the order in which they are executed."""
     text = _plain(data)
@@ -110,6 +132,17 @@ def _lines_of_points(text: bytes, spans: list[tuple[int, int]], ends: Array, lin
 
 def _plain(data: bytes) -> bytes:
     """ASCII with LF, without comments but data comments at the start of a line, continued lines joined by JOIN."""
+    data = without_carriage_returns(data)
+    if b"*CATIA0" in data:
+        data = _CATIA.sub(_catia_system, data)
+    if b"$" not in data:
+        return data
+    data = _COMMENT.sub(_without_comment, data)
+    return _joined(data) if b"$" in data else data
+
+
+def without_carriage_returns(data: bytes) -> bytes:
+    """UTF-8 or single bytes with LF, without NULs."""
     for bom, encoding in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"),
                           (codecs.BOM_UTF16_BE, "utf-16")):
         if data.startswith(bom):
@@ -117,12 +150,7 @@ def _plain(data: bytes) -> bytes:
     for old, new in ((b"\r\n", b"\n"), (b"\r", b"\n"), (b"\x00", b" "), (b"\x1a", b" ")):
         if old in data:
             data = data.replace(old, new)
-    if b"*CATIA0" in data:
-        data = _CATIA.sub(_catia_system, data)
-    if b"$" not in data:
-        return data
-    data = _COMMENT.sub(_without_comment, data)
-    return _joined(data) if b"$" in data else data
+    return data
 
 
 def _joined(data: bytes) -> bytes:

@@ -27,6 +27,15 @@ def _in(old: str, new: str) -> Edit:
 
 NX = "UNITS/MM\nTOOL PATH/A,TOOL,T\nMSYS/0,0,0,1,0,0,0,1,0\nLOAD/TOOL,1\nFEDRAT/MMPM,100\n"
 ARCS = "".join(f"GOTO/{x},0,0\nCIRCLE/{x},5,0,0,0,1,5\nGOTO/{x - 5},5,0\n" for x in range(0, 200, 20))
+STEP = (
+    "ISO-10303-21;\nDATA;\n#1=PROJECT('P',#2,(),$,$,$);\n#2=WORKPLAN('W',(#3),$,$,$);\n"
+    "#3=MACHINING_WORKINGSTEP('S',#20,#4,#5,$);\n#4=TOOLPATH_FEATURE('F',$,(#5),$,$);\n#5=F(#6,$,'O',$,$,#8,#9,#10,$,$,$,$);\n"
+    "#6=TOOLPATH_LIST((#7));\n#7=CUTTER_LOCATION_TRAJECTORY(.T.,.TRAJECTORY_PATH.,$,$,$,.T.,#11,$,$);\n"
+    "#8=MILLING_CUTTING_TOOL('EM10',#14,(),$,$,$);\n#14=TAPERED_ENDMILL(#15,4,.RIGHT.,.F.,$,$);\n"
+    "#15=MILLING_TOOL_DIMENSION(10.,$,$,$,$,$,$);\n#9=MILLING_TECHNOLOGY(0.01,.TCP.,$,-50.,$,.F.,.F.,.F.,$);\n"
+    "#10=MILLING_MACHINE_FUNCTIONS(.F.,$,$,.F.,$,(),.F.,$,$,());\n#11=POLYLINE('',(#12,#13));\n"
+    "#12=CARTESIAN_POINT('',(0.,0.,5.));\n#13=CARTESIAN_POINT('',(9.,0.,5.));\n#20=PLANE('',#21);\n"
+    "#21=AXIS2_PLACEMENT_3D('',#22,$,$);\n#22=CARTESIAN_POINT('',(0.,0.,40.));\nENDSEC;\nEND-ISO-10303-21;\n")
 GENERIC = "UNITS/MM\nFEDRAT/100,MMPM\nGOTO/0,0,0\n"
 CATIA = "$$ CATIA APT\nUNITS/MM\nFEDRAT/600\n"
 HOLE = "GOTO/1,2,3\nCYCLE/OFF\n"
@@ -221,6 +230,21 @@ CL_WORDS = [
         GENERIC + "CALSUB/7\n",
         "(DEFSUB/7) and (ENDSUB)",
         _in("CALSUB/7\n", r"\1\nGOTO/1,2,3\n\2\nCALSUB/7\n"),
+    ),
+    _whole(
+        "cl.rotabl-open",
+        "UNITS/ MM\nCUTTER/ 6,0,3,0,0,0,80,\nFEDRAT/ MMPM,100\nTLAXIS/ 0,-1,0\nOPFEATSTART/A\n"
+        "ROTABL/ 1.570796,AAXIS,TABLE,CCLW\nGOTO/ 1,2,3\n"
+        "OPFEATEND/A\nTLAXIS/ 0,0,1\nOPFEATSTART/B\nGOTO/ 4,5,6\nOPFEATEND/B\nFINI\n",
+        "(--axis-from tlaxis)",
+        Edit(COMMAND, "", r" \1"),
+    ),
+    HintCase(
+        "cl.step-nc",
+        "inspect part.stp",
+        {"part.stp": STEP.replace("#5=F(#6,", "#5=F($,")},
+        r"explicit tool paths \(CUTTER_LOCATION_TRAJECTORY\)",
+        (Edit("part.stp", "#5=F($,", "#5=F(#6,"),),
     ),
     _whole(
         "cl.subprogram",

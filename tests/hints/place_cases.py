@@ -14,7 +14,7 @@ ODD = "RAPID\nGOTO/0,0,5\nGOTO/0,0,0\nGOTO/9,0,0\nGOTO/9,9,0\nGOTO/4000,9,0\nGOT
 _REACH = [
     convert("path.odd_record", START + ODD, "correct the record there", part("4000", "0"), stops=()),
     convert("spindle.too_fast", FAST + CUT, r"state at most ([0-9]+) in SPINDL", part("9000", r"\1"),
-            m=machine_text("mill-3axis") + "\n[control]\nlargest_speed = 8000\n"),
+            m=machine_text("mill-3axis") + "\n[control]\nlargest_spindle_speed = 8000\n"),
     convert("reach.position", START + CUT, r"\(part\.(origin)\)", sheet("", "[part]\norigin = [0.0, 0.0, -750.0]\n"),
             machine="h4a-c-table"),
     convert("singular.distance", START + CUT, "state another (joints).(singular_distance)",

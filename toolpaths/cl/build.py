@@ -150,6 +150,8 @@ class ToolpathBuilder:
     def _start_turned_and_called(self) -> None:
         self.calls: list[tuple[int, int]] = []
         self.table = [0.0, 0.0, 0.0]
+        self.turned_at = 0
+        """row at which ROTABL has last turned the frame of the points"""
         self.turned: Floats = np.eye(3)
         self.table_turn: Floats = np.eye(3)
         """turned machine to part, by ROTATE alone (Creo)"""

@@ -238,10 +238,24 @@ def _turn(b: ToolpathBuilder, axis: int, angle: float, incremental: bool) -> Non
         indexing.turn_table(b, axis, step)
         refresh(b)
     elif step != 0.0:
-        b.turned = b.turned @ rotation(np.eye(3)[axis], np.array([step]))[0]
+        b.turned, b.turned_at = b.turned @ rotation(np.eye(3)[axis], np.array([step]))[0], b.row
         refresh(b)
     if b.dialect.frame_turns:
         use_world_axis(b)
+
+
+def turn_back(b: ToolpathBuilder) -> None:
+    """A frame in which points stand is still turned where the next operation begins: the ROTABL that turn it back are
+    missing, which is an error, or made up for (`tlaxis_upright`)."""
+    if b.row == b.turned_at or np.abs(b.turned - np.eye(3)).max() <= _SAME_FRAME:
+        return
+    if b.dialect.tlaxis_upright:
+        b.table, b.turned = [0.0, 0.0, 0.0], np.eye(3)
+        refresh(b)
+    else:
+        b.log.error("cl.rotabl-open", "the frame of the points is still turned where the next operation begins: the ROTABL "
+                    "that turn it back are missing", b.line, "--axis-from tlaxis begins each TLAXIS with the frame upright; "
+                    "else write the file again in the CAM system")
 
 
 def use_world_axis(b: ToolpathBuilder) -> None:

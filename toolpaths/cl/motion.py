@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from toolpaths.cl.build import NO_NUMBERS, ToolpathBuilder, Triple
-from toolpaths.cl.frames import use_world_axis
+from toolpaths.cl.frames import turn_back, use_world_axis
 from toolpaths.cl.text.dialects import Planes
 from toolpaths.cl.text.statements import Statement
 from toolpaths.toolpath import Role
@@ -100,6 +100,7 @@ def tlaxis(b: ToolpathBuilder, s: Statement) -> None:
         b.log.error("cl.tlaxis", f"TLAXIS/{s.body}: only three numbers are understood", b.line,
                     "write TLAXIS/i,j,k")
     elif b.dialect.frame_turns:
+        turn_back(b)
         b.world_axes.append((b.row, _triple(s.numbers, 0), b.line))
         use_world_axis(b)
     else:

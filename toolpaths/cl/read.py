@@ -16,9 +16,10 @@ from toolpaths.cl.interpret import HANDLERS, known, report_others, run
 from toolpaths.cl.rapid_heights import low_rapids
 from toolpaths.cl.records import counted
 from toolpaths.cl.structure import open_paths
+from toolpaths.cl.systems.recognise import read_form, recognised
 from toolpaths.cl.text.dialects import DIALECTS, Dialect, detect, units_said
 from toolpaths.cl.text.log import DiagnosticLog
-from toolpaths.cl.text.other_formats import HEAD, other_format
+from toolpaths.cl.text.other_formats import other_format
 from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, ReadProgress, scan
 from toolpaths.cl.text.source import normalise
 from toolpaths.cl.text.statements import Lexer, StatementList
@@ -80,35 +81,40 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     _check_options(units, dialect)
     allow_unknown = frozenset(allow_unknown)
     log = DiagnosticLog(file)
-    other = other_format(data if isinstance(data, bytes) else data[:HEAD].encode("utf-8", "replace"))
+    raw = data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data)
+    other = None if recognised(raw) else other_format(raw)
     if other:
         log.error("cl.format", f"this is {other[0]}", hint=other[1])
         return ReadResult(_with_faults(_empty(file), log.diagnostics()), log.diagnostics())
-    plain = normalise(data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data), log)
+    plain = normalise(raw, log)
     largest = LARGEST_OWN if plain.startswith(_OWN_HEAD) else LARGEST
-    parts = scan(plain, progress, largest)
-    program = Lexer(plain, parts, log, known, largest).program()
+    form = read_form(plain, dialect, log)
+    if form:
+        program, points, lines, found, evidence = form.program, form.points, form.lines, DIALECTS[form.name], form.evidence
+    else:
+        parts = scan(plain, progress, largest)
+        program, points, lines = Lexer(plain, parts, log, known, largest).program(), parts.points, parts.lines
+        found, evidence = (DIALECTS[dialect], "given") if dialect else detect(program)
     del plain
-    found, evidence = (DIALECTS[dialect], "given") if dialect else detect(program)
-    b = ToolpathBuilder(program, parts.points, found, _units(program, units, log), log, allow_unknown)
+    b = ToolpathBuilder(program, points, found, _units(program, units, log), log, allow_unknown)
     run(b, 0, len(program.statements))
     b.finish_rows()
     open_paths(b)
-    if file:
-        _cut_off(data, parts.lines, log)
+    if file and not form:
+        _cut_off(raw, lines, log)
     counts = report_others(b)
     if b.row == 0:
         log.error("cl.empty", "the file has no points", hint="a CL file has GOTO records")
     toolpath = assemble(b)
     _check_rapids(b, toolpath)
-    check_forms(program, log, b.allow_unknown, found)
+    if not form:
+        check_forms(program, log, b.allow_unknown, found)
     records = counted(b, frozenset(HANDLERS))
     diagnostics = log.diagnostics()
     read = replace(_with_faults(toolpath, diagnostics), records=records)
-    raw = data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data)
     object.__setattr__(read, "source", ClSource(raw, units or "", dialect or ""))
     return ReadResult(read, diagnostics, counts, found.name, evidence,
-                      b.arc_records, b.cycle_records, parts.lines)
+                      b.arc_records, b.cycle_records, lines)
 
 
 def _check_rapids(b: ToolpathBuilder, toolpath: Toolpath) -> None:
@@ -120,10 +126,9 @@ def _check_rapids(b: ToolpathBuilder, toolpath: Toolpath) -> None:
                TRANS_HINT if indexed else "look at the point in the CAM system")
 
 
-def _cut_off(data: bytes | str, lines: int, log: DiagnosticLog) -> None:
+def _cut_off(data: bytes, lines: int, log: DiagnosticLog) -> None:
     """A warning where the last line has no end and is not one that ends a file."""
-    tail = data[-_TAIL:].encode("utf-8", "replace") if isinstance(data, str) else bytes(data[-_TAIL:])
-    *before, last = (line.strip() for line in tail.replace(b"\r", b"\n").rstrip(b"\x1a\x00").split(b"\n"))
+    *before, last = (line.strip() for line in data[-_TAIL:].replace(b"\r", b"\n").rstrip(b"\x1a\x00").split(b"\n"))
     ended = next((line for line in reversed(before) if line), b"").upper().startswith(_ENDS)
     text = ended and b"/" not in last and len(last.split()) >= _SENTENCE
     if last and not text and not last.upper().startswith((*_ENDS, b"$$")):

@@ -57,7 +57,7 @@ def test_the_code_is_that_of_kind_and_place() -> None:
             reader.read_bytes(data)
         return raised.value
 
-    first, again, other = fault(TypeError, None), fault(TypeError, 1.5), fault(AttributeError, [999])
+    first, again, other = fault(TypeError, None), fault(TypeError, 1.5), fault(ValueError, [999])
     assert fingerprint(first) == fingerprint(again) != fingerprint(other)
     assert fingerprint(ValueError()) != fingerprint(KeyError())
 

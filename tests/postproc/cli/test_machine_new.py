@@ -41,7 +41,7 @@ def test_the_questions_make_the_sheet_and_the_machine(folder: Path) -> None:
     assert asked.structure == typed.structure
     assert [(j.name, j.point.tolist(), j.direction.tolist()) for j in asked.kinematics.chain if j.rotary] == [
         (j.name, j.point.tolist(), j.direction.tolist()) for j in typed.kinematics.chain if j.rotary]
-    assert (asked.largest_speed, typed.largest_speed) == (8100.0, math.inf)
+    assert (asked.largest_spindle_speed, typed.largest_spindle_speed) == (8100.0, math.inf)
     assert (asked.limits.lower == typed.limits.lower).all() and (asked.limits.velocity == typed.limits.velocity).all()
 
 

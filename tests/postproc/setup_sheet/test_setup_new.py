@@ -275,6 +275,19 @@ def test_answers_are_numbers_within_limits() -> None:
     assert parsed(coolant, "oil")[0] is None
 
 
+def test_the_largest_speed_of_the_machine_is_asked_and_taken_at_most() -> None:
+    path, _ = toolpaths.read_bytes("UNITS/MM\nLOADTL/1\nFEDRAT/MMPM,100\nGOTO/0,0,5\nGOTO/1,0,5\n")
+    slow = replace(machine("mill-3axis"), largest_spindle_speed=900.0)
+    spec, _ = load_controller("linuxcnc")
+    assert spec is not None
+    facts = facts_of(path, slow, spec, Options())
+    (speed,) = [q for q in questions_of(facts) if q.kind == "spindle"]
+    assert not facts.refused and speed.assumed == 900 and "at most 900" in speed.prompt()
+    assert parsed(speed, "900") == (900.0, "") and "at most 900" in parsed(speed, "901")[1]
+    stated, _ = toolpaths.read_bytes("UNITS/MM\nLOADTL/1\nSPINDL/RPM,901,CLW\nFEDRAT/MMPM,100\nGOTO/0,0,5\nGOTO/1,0,5\n")
+    assert "spindle.too_fast" in [d.code for d in facts_of(stated, slow, spec, Options()).refused]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo terminals are of Unix")
 def test_a_question_on_a_terminal_stays_on_its_line(tmp_path: Path) -> None:
     """A progress bar that is redrawn ten times a second wiped it out."""

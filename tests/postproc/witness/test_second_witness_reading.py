@@ -23,6 +23,7 @@ from toolpaths.toolpath import Kind, Role
 ROOT = Path(__file__).parents[3]
 FILES = sorted(p for folder in ("samples", "tests/golden") for p in (ROOT / folder).rglob("*")
                if p.suffix in (".cls", ".apt", ".ncl", ".as", ".clt", ".aptsource"))
+FILES += sorted((ROOT / "samples" / "other_forms").iterdir())
 TEXTS = {
     "arcs of generic files": "GOTO/10,0,0\nCIRCLE/0,0,0,0,0,1,10\nGOTO/0,10,0\nCIRCLE/0,0,0,0,0,-1,10\nGOTO/10,0,0\nFINI\n",
     "MOVARC": "GOTO/10,0,0\nMOVARC/0,0,0,0,0,1,10,ANGLE,90\nGOTO/0,10,0\nFINI\n",
@@ -38,6 +39,15 @@ TEXTS = {
     "subroutine called twice": ("DEFSUB/1\nGOTO/1,2,3\nGOTO/4,5,6\nENDSUB\nGOTO/0,0,9\nCALSUB/1\nGOTO/0,0,9\nCALSUB/1\n"
                                 "GOTO/7,8,9\n"),
     "inches by their feeds": "FEDRAT/10,IPM\nGOTO/1,2,3\n",
+    "NCI: holes, a dwell, coolant and compensation": (
+        "1050\n9 2\n1001\n1 1 1 7 0 0 0 -900. 0. 2\n0\n40 1. 2. 9. -2. 200000\n4\n0.5 -900.\n"
+        "2\n42 0 3. 2. 2. 2. 8. 90. 0 0\n1004\n0\n"
+        "81\n3 5. 5. -9. 0.3 450. 0 0 0 0 12. 3. 1. 0 5. 5. 12. 0 0\n"
+        "100\n0 8. 5. -9. 12. 14. 0.3 450. 8. 5. 12. 0 0\n"
+        "1000\n1 1 1 7 0 0 0 0 0. 0\n1\n0 8. 5. 13. 90. 0\n1003\n0\n"),
+    "FreeCAD: steps, modal motion, a mixture of retracts": (
+        "(Exported by FreeCAD)\n(Post Processor: linuxcnc)\nG20 G90\nT1 M6\nS900 M4\nG0 Z1\nX1 Y1\nG91 G1 X1 F3\nY-.5\nG90\n"
+        "G3 X4 Y.5 I1 J0\nG4 P.5\nG99 G82 X4 Y1 Z-1 R.2 P.3 F2\nS800\nX5\nG98 G73 X6 Q.1\nG80\nG1 Z2\nM0\nM1\nM2\n"),
     "points in the common system": ("$$-> FEATNO / 1\n$$-> CSYS / 1,0,0,5, $\n0,0.8,-0.6,6, $\n0,0.6,0.8,7\nGOTO/1,2,3\n"
                                     "GOTO/1,2,3,0,0.6,0.8\nGOTO/4,5,6\nMULTAX/ON\nGOTO/7,8,9,0,0,1\n"),
 }

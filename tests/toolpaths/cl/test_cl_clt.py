@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import toolpaths
+from postproc.witness.clfile import commanded
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.diagnostics import Severity
 
@@ -50,6 +51,33 @@ def test_turns_about_two_axes_follow_each_other() -> None:
 @pytest.mark.parametrize("axis", ["0.0,1.0,0.0", "0.0,0.0,1.0"])
 def test_an_axis_that_contradicts_rotabl_is_refused(axis: str) -> None:
     read(feature(axis, (math.pi / 2, 0.0, 0.0), "GOTO/ 1.0,2.0,3.0 \n"), "cl.tlaxis")
+
+
+def unclosed(text: str) -> str:
+    """The text without the second three of its ROTABL in each operation, which turn the frame back."""
+    lines, count = [], 0
+    for line in text.splitlines(keepends=True):
+        count = 0 if line.startswith("TLAXIS") else count + line.startswith("ROTABL")
+        lines += [line] if count <= 3 or not line.startswith("ROTABL") else []
+    return "".join(lines)
+
+
+def test_a_frame_that_is_not_turned_back_is_refused_and_read_by_tlaxis() -> None:
+    """Turned by 90 and by -90 degrees: without the closing records the second frame would be upright, unseen."""
+    whole = (feature("0.0,-1.0,0.0", (math.pi / 2, 0.0, 0.0), "GOTO/ 67.5,120.5,25.0 \n")
+             + feature("0.0,1.0,0.0", (-math.pi / 2, 0.0, 0.0), "GOTO/ 1.0,2.0,3.0 \n"))
+    right = read(whole).toolpath
+    text = HEAD + unclosed(whole) + "FINI \n"
+    assert text.count("ROTABL") == 6
+    refused = [d for d in read_bytes(text).diagnostics if d.severity is Severity.ERROR]
+    assert [d.code for d in refused] == ["cl.rotabl-open"] and "--axis-from tlaxis" in refused[0].hint
+    asked = read_bytes(text, dialect="tlaxis")
+    assert not [d for d in asked.diagnostics if d.severity is not Severity.INFO]
+    assert asked.toolpath.tip.tolist() == right.tip.tolist() and asked.toolpath.axis == pytest.approx(right.axis, abs=1e-12)
+    again = read_bytes(HEAD + whole + "FINI \n", dialect="tlaxis").toolpath
+    assert again.tip.tolist() == right.tip.tolist()
+    seen = commanded(text.encode(), None, "tlaxis")
+    assert seen.tip == pytest.approx(right.tip, abs=1e-4) and seen.known.all() and not seen.unread
 
 
 def test_a_tool_axis_without_a_turned_table_holds_as_it_stands() -> None:

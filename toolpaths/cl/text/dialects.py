@@ -37,6 +37,7 @@ class Dialect:
         insert_is_comment: INSERT is for people
         rotabl_radians: angles of ROTABL are rad
         frame_turns: ROTABL turns the frame of the points by its angle, not the table
+        tlaxis_upright: each TLAXIS begins with the frame upright, whatever ROTABL has left behind
         table_frames: under ROTATE and TRANS points stand about the rotation axis (`indexing`)
         axis_reset: the axis is the local z again at each operation
         six_sizes: CUTTER may have six numbers
@@ -58,6 +59,7 @@ class Dialect:
     insert_is_comment: bool = False
     rotabl_radians: bool = False
     frame_turns: bool = False
+    tlaxis_upright: bool = False
     table_frames: bool = False
     axis_reset: bool = False
     six_sizes: bool = False
@@ -78,12 +80,17 @@ DIALECTS: dict[DialectName, Dialect] = {d.name: d for d in (
             trntyp_begins=True),
     Dialect("solidworks-clt", "SolidWorks CAM .clt", arc_sense=0, six_common=True, insert_is_comment=True,
             rotabl_radians=True, frame_turns=True),
+    Dialect("tlaxis", "SolidWorks CAM .clt without closing ROTABL", arc_sense=0, six_common=True, insert_is_comment=True,
+            rotabl_radians=True, frame_turns=True, tlaxis_upright=True),
     Dialect("catia", "CATIA", cycles_by_table=True, operations_in_comments=True, multax_off_keeps=True),
     Dialect("ncl", "NCL", six_sizes=True),
     Dialect("camplete", "Autodesk APT for CAMplete or MANUSnc", arc_sense=-1, planes=Planes.HEIGHTS),
     Dialect("mfgsuite", "Autodesk APT for MfgSuite", planes=Planes.DOWN),
     Dialect("autodesk-iso", "Autodesk Common ISO 4343 APT", planes=Planes.BOTTOM),
     Dialect("hsmworks", "HSMWorks Generative Machining APT", planes=Planes.OVER_BOTTOM),
+    Dialect("nci", "Mastercam NCI"),
+    Dialect("freecad", "FreeCAD"),
+    Dialect("step-nc", "STEP-NC of ISO 14649"),
 )}
 
 _MAJORS: tuple[tuple[DialectName, tuple[str, ...]], ...] = (

@@ -1,0 +1,209 @@
+"""G-code of FreeCAD's CAM (Path) workbench as statements: its own form, and what its posts for mills make of it.
+
+Source: FreeCAD's documentation, wiki pages "CAM scripting" (The FreeCAD Internal G-code Format) and src/Mod/CAM/
+GCode-description.md: mm always, X Y Z absolute unless G91, I J K from the last point, coordinates left out stay. Feeds are
+mm/s in its own form (its unit of velocity); posts (src/Mod/CAM/Path/Post/scripts, header "(Exported by FreeCAD)") write
+mm/min under G21 and in/min under G20. Rotary words A, B, C are positions of a machine, which the file does not describe:
+refused.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+from toolpaths.cl.systems.as_statements import AsStatements, signed
+from toolpaths.cl.text.log import DiagnosticLog
+
+EXPORTED = "(Exported by FreeCAD)"
+_COMMENT = re.compile(r"\(([^()]*)\)|;(.*)")
+_WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)", re.IGNORECASE)
+_BEGIN = re.compile(r"begin operation:\s*(.*)", re.IGNORECASE)
+_POST = re.compile(r"Post Processor:\s*(\S+)")
+_MOTIONS = {0.0, 1.0, 2.0, 3.0, 73.0, 81.0, 82.0, 83.0}
+_HOLES = {81.0: "DRILL", 82.0: "DRILL", 83.0: "DEEP", 73.0: "BRKCHP"}
+_SILENT_G = frozenset({17.0, 21.0, 40.0, 43.0, 49.0, 91.1, 94.0})
+"""plane XY, mm, no radius compensation, length of the tool, arcs from their start, feed per minute"""
+_OFFSETS = frozenset(float(f"{n / 10:g}") for n in (*range(540, 600, 10), *range(591, 600)))
+_M = {0.0: "STOP", 1.0: "OPSTOP", 2.0: "FINI", 30.0: "FINI", 5.0: "SPINDL/OFF", 7.0: "COOLNT/MIST", 8.0: "COOLNT/FLOOD",
+      9.0: "COOLNT/OFF"}
+_TURNING = frozenset("ABC")
+_LETTERS = frozenset("ABCDFGHIJKMNPQRSTXYZ")
+
+
+class FreeCadReader:
+    """Carries out the commands of one file; None stands for a coordinate that nothing has stated yet."""
+
+    def __init__(self, text: str, log: DiagnosticLog):
+        self.out, self.log, self.text, self.line = AsStatements(), log, text, 0
+        self.native = EXPORTED not in text[:4000]
+        post = _POST.search(text[:4000])
+        self.seconds = self.native or (post is not None and "linuxcnc" in post[1])
+        self.at: list[float | None] = [None, None, None]
+        self.motion, self.relative, self.initial, self.plane = -1.0, False, True, 17.0
+        self.speed, self.sense, self.tool, self.sticky, self.cycle = 0.0, "", 0.0, dict[str, float](), ""
+        self.level: float | None = None
+        self.feed, self.stated = math.nan, math.nan
+
+    def read(self) -> AsStatements:
+        """All lines; an error in the log where one holds what is no command."""
+        if self.native:
+            self.out.add(0, "UNITS/MM")
+        for number, raw in enumerate(self.text.split("\n"), 1):
+            self.line = number
+            self._say(raw)
+            bare = _COMMENT.sub(" ", raw).strip()
+            found = _WORD.findall(bare)
+            if _WORD.sub("", bare).strip(" %\t/"):
+                self.log.error("cl.text", f"no command: {bare[:60]!r}", number, "commands are G or M with words of a letter "
+                               "and a number; write others as comments")
+            elif found:
+                self._line([(letter.upper(), float(value)) for letter, value in found if letter.upper() != "N"])
+        return self.out
+
+    def _say(self, raw: str) -> None:
+        for one, other in _COMMENT.findall(raw):
+            begins = _BEGIN.match(one.strip())
+            self.out.say(self.line, "OPNAME" if begins else "REMARK", begins[1] if begins else one or other)
+
+    def _line(self, words: list[tuple[str, float]]) -> None:
+        values = {letter: value for letter, value in words if letter not in "GM"}
+        moves = not values.keys().isdisjoint("XYZ")
+        letters = [letter for letter, _ in words]
+        strange = next((letter for letter in letters if letter not in _LETTERS), "")
+        twice = len(values) + letters.count("G") + letters.count("M") < len(words)
+        if strange or twice or (moves and "M" in letters):
+            why = f"{strange} is no word of a command" if strange else "a word stands twice, or M next to a move"
+            self.log.error("cl.text", why, self.line, "write one command in each line")
+        if _TURNING & values.keys() and any(values.get(a) for a in _TURNING):
+            self.log.error("cl.axis", "A, B or C turn the part on a machine that the file does not describe", self.line,
+                           "export positions of the part, or APT from another system")
+        self.tool = values.get("T", self.tool)
+        if values.get("S", self.speed) != self.speed:
+            self.speed = values["S"]
+            if self.sense and "M" not in letters:
+                self._turn(self.sense)
+        for letter, code in words:
+            if letter == "G":
+                self._g(code, values)
+            elif letter == "M":
+                self._m(code)
+        if moves:
+            self._move(values)
+
+    def _g(self, code: float, values: dict[str, float]) -> None:
+        if code in _MOTIONS:
+            self.motion = code
+        elif code in (90.0, 91.0):
+            self.relative = code == 91.0
+        elif code in (98.0, 99.0):
+            self.initial = code == 98.0
+        elif code == 80.0:
+            self._no_cycle()
+            self.motion = -1.0
+        elif code == 4.0 and self.seconds and "P" in values:
+            self.out.add(self.line, f"DELAY/{signed(values['P'])}")
+        elif code in _OFFSETS:
+            self.out.add(self.line, f"ZERO/{code:g}")
+        elif code in (20.0, 21.0) and not self.native:
+            self.out.add(self.line, "UNITS/INCHES" if code == 20.0 else "UNITS/MM")
+        elif code == 43.0 and values.get("H", self.tool) != self.tool:
+            self.log.error("cl.length-register", f"length register H{values['H']:g} of T{self.tool:g}", self.line,
+                           "let FreeCAD take the number of the tool, or name the register in the set-up")
+        elif code not in _SILENT_G:
+            self.out.add(self.line, f"G{code:g}/")
+
+    def _turn(self, sense: str) -> None:
+        self.sense = sense
+        self.out.add(self.line, f"SPINDL/{signed(self.speed)},RPM,{sense}" if self.speed > 0.0 else f"SPINDL/{sense}")
+
+    def _m(self, code: float) -> None:
+        if code in (3.0, 4.0):
+            self._turn("CLW" if code == 3.0 else "CCLW")
+        elif code == 6.0:
+            self.out.add(self.line, f"LOADTL/{self.tool:g}")
+        else:
+            self.sense = "" if code == 5.0 else self.sense
+            self.out.add(self.line, _M.get(code, f"M{code:g}/"))
+
+    def _no_cycle(self) -> None:
+        if self.cycle:
+            self.cycle, self.level = "", None
+            self.out.add(self.line, "CYCLE/OFF")
+
+    def _target(self, values: dict[str, float]) -> list[float | None]:
+        found = []
+        for letter, now in zip("XYZ", self.at, strict=True):
+            value = values.get(letter)
+            found.append(now if value is None else value + (now or 0.0) if self.relative else value)
+        return found
+
+    def _move(self, values: dict[str, float]) -> None:
+        if self.motion in _HOLES:
+            self._hole(values)
+            return
+        self._no_cycle()
+        start, end = self.at, self._target(values)
+        self.at = end
+        x, y, z = end
+        if x is None or y is None or z is None:
+            if self.motion != 0.0:
+                self.log.error("cl.goto", "a move before X, Y and Z are known", self.line, "begin with G0 and X, Y, Z")
+            return
+        if self.motion == 0.0:
+            self.out.add(self.line, "RAPID")
+            self.feed = math.nan if "F" in values else self.feed
+        else:
+            self._state_feed(values)
+        if self.motion in (2.0, 3.0):
+            self._arc(start, (x, y, z), values)
+        elif self.motion in (0.0, 1.0):
+            self.out.point(self.line, (x, y, z))
+        else:
+            self.log.error("cl.unknown-motion", "coordinates without a command of motion", self.line,
+                           "write G0 or G1 before them")
+
+    def _state_feed(self, values: dict[str, float]) -> None:
+        """F of this command or the last one that cut; F of a G0 is the speed of rapids and leaves none behind."""
+        self.feed = values.get("F", self.feed)
+        if math.isnan(self.feed):
+            self.log.error("cl.feed", "a cut without F", self.line,
+                           "write F with the first cut, and after a G0 that has one")
+        elif self.feed != self.stated:
+            self.stated = self.feed
+            self.out.add(self.line, f"FEDRAT/{signed(self.feed)},{'MMPS' if self.native else 'PERMIN'}")
+
+    def _arc(self, start: list[float | None], end: tuple[float, ...], values: dict[str, float]) -> None:
+        x, y, z = start
+        if x is None or y is None or z is None or not values.keys() & set("IJ") or values.get("K"):
+            self.log.error("cl.circle", "an arc without a point before it, without I and J, or with K", self.line,
+                           "arcs state their centre by I and J from where they begin")
+            return
+        centre = (x + values.get("I", 0.0), y + values.get("J", 0.0), z)
+        self.out.arc(self.line, centre, (0.0, 0.0, 1.0 if self.motion == 3.0 else -1.0), end)
+
+    def _hole(self, values: dict[str, float]) -> None:
+        """A hole from the plane R to Z: R is taken as its top, so that depth and pecks count from where the feed begins."""
+        if self.level is None:
+            self.level = self.at[2]
+        self.sticky.update({k: v for k, v in values.items() if k in "ZRQP"})
+        self.feed = values.get("F", self.feed)
+        held, f = self.sticky, self.feed
+        x, y, _ = self._target({k: v for k, v in values.items() if k in "XY"})
+        z, r = held.get("Z"), held.get("R")
+        late = held.get("P") and self.motion != 81.0 and not self.seconds
+        if x is None or y is None or z is None or r is None or math.isnan(f) or self.relative or late:
+            self.log.error("cl.cycle-value", "a hole needs X, Y, Z, R and F in absolute coordinates, and a dwell in seconds",
+                           self.line, "let FreeCAD write the moves of the cycle, or state what is missing")
+            return
+        back = r if not self.initial or self.level is None else max(self.level, r)
+        unit = "MMPS" if self.native else "PERMIN"
+        words = [f"CYCLE/{_HOLES[self.motion]},FEDTO,{signed(r - z)},{unit},{signed(f)},RAPTO,0.0,RTRCTO,{signed(back - r)}"]
+        words += [f"STEP,{signed(held['Q'])}"] if self.motion in (83.0, 73.0) and "Q" in held else []
+        words += [f"DWELL,{signed(held['P'])}"] if held.get("P") and self.motion != 81.0 else []
+        cycle = ",".join(words)
+        if cycle != self.cycle:
+            self.cycle = cycle
+            self.out.add(self.line, cycle)
+        self.out.point(self.line, (x, y, r))
+        self.at = [x, y, back]

@@ -1,0 +1,64 @@
+"""Which of the forms of `systems` a file is, by its first bytes or as asked for, and its statements."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from toolpaths.choices import DialectName
+from toolpaths.cl.systems.freecad import EXPORTED, FreeCadReader
+from toolpaths.cl.systems.nci import NciReader
+from toolpaths.cl.systems.step_nc import StepNcReader
+from toolpaths.cl.text.log import DiagnosticLog
+from toolpaths.cl.text.scan import Points
+from toolpaths.cl.text.source import text_of
+from toolpaths.cl.text.statements import StatementList
+
+_HEAD = 20_000
+"""bytes that are looked at"""
+_NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_NCI = re.compile(rb"\s*\d{1,5}[ \t]*\r?\n[ \t]*" + _NUMBER + rb"(?:[ \t]+\S+)*[ \t]*\r?\n\s*\d{1,5}[ \t]*\r?\n")
+"""a code alone in its line, its values in the next, again a code"""
+
+
+@dataclass(frozen=True)
+class Form:
+    """A file of another form: which it is, by what that was seen, its statements, points and count of lines."""
+
+    name: DialectName
+    evidence: str
+    program: StatementList
+    points: Points
+    lines: int
+
+
+def recognised(data: bytes) -> tuple[DialectName, str] | None:
+    """(form, evidence) by the first bytes; None for APT text and all else."""
+    head = data[:_HEAD]
+    if EXPORTED.encode() in head[:400] and b"GOTO" not in head:
+        return "freecad", EXPORTED
+    if head.lstrip().startswith(b"ISO-10303-21") and b"MACHINING_WORKINGSTEP" in data and b"MACHINING_WORKPLAN" not in data:
+        return "step-nc", "MACHINING_WORKINGSTEP of ISO 14649"
+    if _NCI.match(head) and b"/" not in head[:200]:
+        return "nci", "codes and parameters in turns"
+    return None
+
+
+def read_form(plain: bytes, given: DialectName | None, log: DiagnosticLog) -> Form | None:
+    """A file of one of the forms as statements; None where it is APT text.
+
+    Args:
+        plain: with LF line ends
+        given: the dialect that was asked for
+    """
+    found = recognised(plain) if given is None else (given, "given")
+    if found is None or found[0] not in ("nci", "freecad", "step-nc"):
+        return None
+    text = text_of(plain)
+    if found[0] == "nci":
+        said = NciReader(log).read(text)
+    elif found[0] == "freecad":
+        said = FreeCadReader(text, log).read()
+    else:
+        said = StepNcReader(text, log).read()
+    return Form(*found, said.program, said.points(), plain.count(b"\n") + (not plain.endswith(b"\n")))
