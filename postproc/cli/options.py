@@ -42,6 +42,8 @@ AxisToleranceOption = Annotated[float, typer.Option("--axis-tolerance", metavar=
 UnitsOption = Annotated[GivenUnit, word_option("--units", GivenUnit, "units of a CL file that states none")]
 DialectOption = Annotated[GivenDialect, word_option("--dialect", GivenDialect, "read the CL file as this dialect instead of "
                                                     "the recognised one")]
+HooksFile = Annotated[str, typer.Option("--hooks", metavar="FILE", help="TOML file whose [hooks] are blocks of the shop; "
+                                       "those of the set-up go before them")]
 ControllerName = Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER",
                                              help="name from `postproc controller list`, or a TOML file")]
 MaxTilt = Annotated[float, typer.Option("--max-tilt", metavar="DEG", min=0.0, max=120.0, help="largest angle of "
