@@ -74,7 +74,7 @@ def align(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
         large: takes a part that is farther off than a fixture's stops allow
         found: what reading the CL file found
     """
-    spec, setup = read_value(load_controller(controller)), read_value(load_setup(options.setup or None))
+    spec, setup = read_value(load_controller(controller)), read_value(load_setup(options.setup or None, options.hooks))
     spec = with_shop(spec.divided(setup.output.files), machine, setup)
     known = [*found, *(d for d in toolpath.faults if d not in found)]
     if has_errors(known):

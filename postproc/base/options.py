@@ -45,6 +45,8 @@ class Options:
     """True: programs whose deviation is not bounded in every block are refused"""
     setup_mark: str = ""
     """fingerprint of the set-up that was given, as a file or as a SetupFile; put here by what reads it"""
+    hooks: str = ""
+    """file whose [hooks] are blocks of the shop, under those of the set-up"""
     name: str = ""
     """of the program and its subprograms' files; default: that of the CL file"""
 

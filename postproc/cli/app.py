@@ -34,6 +34,7 @@ from postproc.cli.options import (
     ClFile,
     ControllerName,
     DialectOption,
+    HooksFile,
     MachineName,
     MaxTilt,
     Orient,
@@ -118,7 +119,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             feed_mode: FeedModeOption = "auto", output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
             feed: FeedOption = "programmed", merge_feeds: MergeFeeds = 0.0, smooth: SmoothOption = False,
-            setup: Setup = "", tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
+            setup: Setup = "", hooks: HooksFile = "", tolerance: ToleranceOption = 0.01,
+            axis_tolerance: AxisToleranceOption = 0.05,
             units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
             error_model: Errors = "", beyond: Beyond = False, residuals: ResidualFiles = None,
             check_program: CheckProgram = None,
@@ -126,14 +128,15 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
                       output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth, error_model=error_model,
-                      error_beyond=beyond, orient=orient, max_tilt=max_tilt, name=output.stem, require_proof=require_proof)
+                      hooks=hooks, error_beyond=beyond, orient=orient, max_tilt=max_tilt, name=output.stem,
+                      require_proof=require_proof)
     only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
     refuse_overwriting({"-o": str(output), "--json": json, "--proof": f"{output}.proof.json" if proof else "",
                         "--check-program": str(check_program or ""),
                         **{f"--residuals {name}": str(name) for name in fields}},
-                       inputs := {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
-                                  **own_files(machine, controller)})
+                       inputs := {"the CL file": str(file), "the set-up": setup, "the hooks": hooks,
+                                  "the error model": error_model, **own_files(machine, controller)})
     from postproc.cycle_time.conversion import estimate_of
     from postproc.pipeline.check_program import checked_file
     from postproc.pipeline.convert import convert as run
@@ -166,19 +169,20 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
 
 @app.command(epilog="Example: postproc verify part.ngc part.cls -m mikron-ucp710 -c linuxcnc")
 def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code file")], file: ClFile,
-           machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: ToleranceOption = 0.01,
-           axis_tolerance: AxisToleranceOption = 0.05, units: UnitsOption = "", dialect: DialectOption = "",
+           machine: MachineName, controller: ControllerName, setup: Setup = "", hooks: HooksFile = "",
+           tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
+           units: UnitsOption = "", dialect: DialectOption = "",
            allow_unknown: Allow = None,
            error_model: ErrorsOfProgram = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
            require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTableOption = "",
            json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
-                      error_model=error_model, error_beyond=beyond, orient=orient, max_tilt=max_tilt,
+                      error_model=error_model, hooks=hooks, error_beyond=beyond, orient=orient, max_tilt=max_tilt,
                       require_proof=require_proof)
     only_with_errors(beyond, error_model)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the G-code file": str(gcode), "the set-up": setup,
-                                         "the error model": error_model, "the tool table": tool_table,
+                                         "the hooks": hooks, "the error model": error_model, "the tool table": tool_table,
                                          "the proof file": proof or f"{gcode}.proof.json",
                                          **own_files(machine, controller)})
     from postproc.pipeline.convert import verify as run
@@ -199,18 +203,18 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
 
 @app.command(epilog="Example: postproc trace part.cls --line 120 -m mikron-ucp710 -c linuxcnc")
 def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L", min=1, help="line of the CL file")],
-          machine: MachineName, controller: ControllerName, setup: Setup = "", tolerance: ToleranceOption = 0.01,
-          axis_tolerance: AxisToleranceOption = 0.05, units: UnitsOption = "", dialect: DialectOption = "",
-          allow_unknown: Allow = None,
+          machine: MachineName, controller: ControllerName, setup: Setup = "", hooks: HooksFile = "",
+          tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
+          units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
           error_model: Errors = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
           json: Json = "") -> None:
     """Show one point of a CL file through every stage, from its record to its blocks and back."""
     only_with_errors(beyond, error_model)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
-                      error_model=error_model, error_beyond=beyond, orient=orient,
+                      error_model=error_model, hooks=hooks, error_beyond=beyond, orient=orient,
                       max_tilt=max_tilt)
-    refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup, "the error model": error_model,
-                                         **own_files(machine, controller)})
+    refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup, "the hooks": hooks,
+                                         "the error model": error_model, **own_files(machine, controller)})
     from postproc.pipeline.convert import convert as run
     from postproc.report.trace import as_text, trace_line
 

@@ -44,6 +44,8 @@ UnitsOption = Annotated[GivenUnit, word_option("--units", GivenUnit, "units of a
 DialectOption = Annotated[GivenDialect, word_option(
     "--dialect", GivenDialect, "read the CL file as this dialect instead of the recognised one (--axis-from tlaxis: "
     "a .clt that lacks the ROTABL which turn its frame back)", "--axis-from")]
+HooksFile = Annotated[str, typer.Option("--hooks", metavar="FILE", help="TOML file whose [hooks] are blocks of the shop; "
+                                        "those of the set-up go before them")]
 ControllerName = Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER",
                                              help="name from `postproc controller list`, or a TOML file")]
 MaxTilt = Annotated[float, typer.Option("--max-tilt", metavar="DEG", min=0.0, max=120.0, help="largest angle of "

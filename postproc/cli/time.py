@@ -13,6 +13,7 @@ from postproc.cli.options import (
     Beyond,
     ControllerName,
     DialectOption,
+    HooksFile,
     MachineName,
     ToleranceOption,
     UnitsOption,
@@ -46,6 +47,7 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
                                                  "feeds at PERCENT of what is programmed, rapids and taps as they are; "
                                                  "with --calibrate, at which the run was measured")] = 100.0,
          setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools")] = "",
+         hooks: HooksFile = "",
          tolerance: ToleranceOption = 0.01,
          axis_tolerance: AxisToleranceOption = 0.05,
          units: UnitsOption = "",
@@ -57,14 +59,15 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
     """Estimate how long a program takes, with a band, and where the time goes."""
     _check(output, calibrate)
     only_with_errors(beyond, error_model)
-    refuse_overwriting({"-o": output, "--json": json}, {"the file": str(file), "the set-up": setup, "the log": calibrate,
+    refuse_overwriting({"-o": output, "--json": json}, {"the file": str(file), "the set-up": setup, "the hooks": hooks,
+                                                        "the log": calibrate,
                                                         "the error model": error_model, **own_files(machine, controller),
                                                         "the model": model if Path(model).suffix else ""})
     from postproc.base.options import Options
     from postproc.cycle_time import report as figures
     from postproc.cycle_time.estimate import estimate, measure_first
 
-    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model,
+    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model, hooks=hooks,
                       error_beyond=beyond)
     share = override / 100.0
     values: dict[str, Any] = {}
@@ -110,7 +113,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     planner = read_value(load_model(model or model_name(controller, spec.writer))).of_machine(machine)
     data = read_file(file)
     if not options.dialect and looks_like_gcode(data):
-        setup = read_value(load_setup(options.setup or None))
+        setup = read_value(load_setup(options.setup or None, options.hooks))
         blocks, found = from_gcode(data, machine, spec, setup, str(file), NeighbourFiles(file), override)
         return blocks, planner, None, found
     import toolpaths

@@ -68,7 +68,7 @@ def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup
     if not isinstance(setup, SetupFile):
         if setup is not None:
             options = replace(options, setup=str(setup))
-        setup = read_value(load_setup(options.setup or None))
+        setup = read_value(load_setup(options.setup or None, options.hooks))
     setup = alone(setup)
     given = bool(options.setup) or setup != SetupFile()
     options = replace(options, setup_mark=fingerprint(setup, options.setup) if given else "")

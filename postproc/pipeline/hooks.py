@@ -14,8 +14,9 @@ from postproc.readback.dialects.readers import reader_for
 from postproc.readback.text.canonical import STATEMENT
 from postproc.readback.text.clamps import clamp_numbers
 from postproc.readback.text.modal import drop_passive
+from postproc.setup.model import load_hooks
 from postproc.writing.state import NUMBER_ROOM
-from toolpaths.diagnostics import Diagnostic, error, has_errors
+from toolpaths.diagnostics import Diagnostic, error, has_errors, read_value
 
 _CODE = re.compile(r"(?<![A-Z0-9_$.{])([GM])(\d+(?:\.\d+)?)(?![A-Z0-9_$.])")
 _FIRST = re.compile(r"\s*([A-Z$][A-Z_$]+[A-Z0-9_$]*(?: (?:[A-Z]{2,}|\d+(?:\.\d+)?)(?![A-Z0-9=_{]))*)")
@@ -47,7 +48,11 @@ def _offsets(job: Job) -> list[str]:
 
 def _file(job: Job, key: str) -> str:
     """The file that states a key of [hooks]."""
-    return job.options.setup if key in job.setup.hooks.model_fields_set else job.machine.file
+    given = job.options
+    if given.hooks and key in (own := read_value(load_hooks(given.hooks))).model_fields_set and getattr(own, key) == getattr(
+            job.setup.hooks, key):
+        return given.hooks
+    return given.setup if key in job.setup.hooks.model_fields_set else job.machine.file
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,9 @@ def input_hashes(machine: str, controller: str, options: Options) -> dict[ProofI
     Raises:
         OSError: where a file cannot be read any more.
     """
-    return {"setup": _with_files(options.setup, {}, _meshes) if options.setup else (),
+    setup = (*(_with_files(options.setup, {}, _meshes) if options.setup else ()),
+             *(_with_files(options.hooks, {}, _none) if options.hooks else ()))
+    return {"setup": setup,
             "machine": _with_files(machine, builtin(), _kind),
             "controller": _with_files(controller, builtin_files(), _none),
             "error_model": _with_files(options.error_model, {}, _tables) if options.error_model else ()}

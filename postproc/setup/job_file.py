@@ -7,11 +7,12 @@ from typing import Annotated
 
 from pydantic import Field
 
+from machines.hooks import HooksModel
 from machines.user_file import UserModel, read_toml, validate
 from toolpaths.choices import DialectName, LengthUnit
 from toolpaths.diagnostics import Diagnostic
 
-_FILES = ("setup", "error_model")
+_FILES = ("setup", "hooks", "error_model")
 """keys that name a file"""
 _NAMES = ("machine", "controller")
 """keys that name a file where they end in .toml, else a built-in one"""
@@ -26,6 +27,8 @@ class JobFile(UserModel):
     """as -c"""
     setup: Annotated[str, Field(min_length=1)] | None = None
     """as --setup"""
+    hooks: HooksModel | Annotated[str, Field(min_length=1)] | None = None
+    """as --hooks: a file whose [hooks] hold, or the [hooks] themselves, for every set-up of the job"""
     error_model: Annotated[str, Field(min_length=1)] | None = None
     """as --error-model"""
     tolerance: float | None = Field(default=None, ge=1e-6, le=10.0)
@@ -47,6 +50,8 @@ def load_job_file(file: Path) -> tuple[dict[str, str | float | list[str]] | None
     if job is None:
         return None, found
     stated = {key: value for key, value in job.model_dump().items() if value is not None}
+    if isinstance(job.hooks, HooksModel):
+        stated["hooks"] = file.name
     for key in (*_FILES, *_NAMES):
         if key in stated and (key in _FILES or stated[key].lower().endswith(".toml")):
             stated[key] = str(file.parent / stated[key])

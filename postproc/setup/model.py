@@ -330,12 +330,27 @@ class Placement:
         return bool((self.rotation == np.eye(3)).all() and (self.origin == 0.0).all())
 
 
-def load_setup(path: str | Path | None) -> tuple[SetupFile | None, list[Diagnostic]]:
-    """The set-up of a file, or the default without one."""
-    if path is None:
-        return SetupFile(), []
-    file, found = read_toml(path, kind="set-up")
-    return (None, found) if file is None else validate(seen_from_here(file), SetupFile)
+def load_setup(path: str | Path | None, hooks: str = "") -> tuple[SetupFile | None, list[Diagnostic]]:
+    """The set-up of a file, or the default without one; under its own blocks of the shop those of the file `hooks`."""
+    under, found = load_hooks(hooks) if hooks else (None, [])
+    file, more = read_toml(path, kind="set-up") if path else (None, [])
+    setup, faults = (None if path else SetupFile(), more) if file is None else validate(seen_from_here(file), SetupFile)
+    if setup is None or found:
+        return None, [*found, *faults]
+    return (setup if under is None else setup.model_copy(update={"hooks": under.under(setup.hooks)})), faults
+
+
+class _HooksOfFile(BaseModel):
+    """A file with [hooks]: one of its own, a job file, or a set-up; what else is in it is not looked at here."""
+
+    hooks: HooksModel
+
+
+def load_hooks(file: str) -> tuple[HooksModel | None, list[Diagnostic]]:
+    """The [hooks] of a file."""
+    values, found = read_toml(file, kind="hooks")
+    model, faults = (None, found) if values is None else validate(values, _HooksOfFile)
+    return (None if model is None else model.hooks), faults
 
 
 def part_placement(setup: SetupFile, file: str = "") -> tuple[Placement | None, list[Diagnostic]]:

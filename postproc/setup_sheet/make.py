@@ -14,9 +14,9 @@ from postproc.base.progress import Progress
 from postproc.controllers.model import load_controller
 from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import NumberedTool, SheetFacts, facts_of, named_tools, taken_numbers
-from postproc.setup_sheet.place import Fit, fitted
+from postproc.setup_sheet.place import Fit, below_origin, fitted
 from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, number_questions, questions_of
-from postproc.setup_sheet.text import TOOL_NUMBERS, SheetHeader, sheet_text, sheet_values
+from postproc.setup_sheet.text import ORIGIN, TOOL_NUMBERS, SheetHeader, sheet_text, sheet_values
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
 
@@ -79,6 +79,8 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
                           machine.name)
     setup = SetupFile.model_validate({**values, "work_offset": toolpath.frames[0].name})
     fit = fitted(toolpath, machine, controller, setup, options, found, progress)
+    if below_origin(fit):
+        fit = replace(fit, setup=fit.setup.model_copy(update={"assumed": [*fit.setup.assumed, ORIGIN]}))
     made = SetupSheet("", tuple(known), facts, tuple(questions), tuple(answers.items()), fit)
     if not fit.result.ok:
         return _with(made, _not_fitted(fit), text="")
@@ -168,7 +170,11 @@ def _assumed(made: SetupSheet, fit: Fit) -> list[Diagnostic]:
     numbers = ", ".join(f"{one.name} = T{one.number}" for one in named if one.assumed)
     return [warning("setup.assumed", f"{key} = {values[key].value} {keys[key].unit} is assumed: nobody has stated it",
                     hint=f"state it by {keys[key].option}, or in the file, and take its name out of `assumed`")
-            for key in fit.setup.assumed if key != TOOL_NUMBERS] + ([
+            for key in fit.setup.assumed if key in keys] + ([
+                warning("setup.assumed", f"{ORIGIN} is assumed: cuts reach {below_origin(fit):g} mm below the table's "
+                        "origin, where nobody has stated that there is room",
+                        hint="state in [part] where the part stands, and take "
+                        f"`{ORIGIN}` out of `assumed`")] if ORIGIN in fit.setup.assumed else []) + ([
                 warning("setup.assumed", f"{TOOL_NUMBERS}: {numbers} is assumed: nobody has stated it", hint="see that the "
                         "magazine holds them so, or put in its numbers, and take `tool_numbers` out of `assumed`")]
                 if numbers else [])

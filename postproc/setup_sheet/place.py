@@ -11,6 +11,7 @@ import numpy as np
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.base.progress import Progress
+from postproc.control.modes import table_axes
 from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.path.links import safe_space
 from postproc.pipeline.convert import convert
@@ -24,7 +25,7 @@ from postproc.setup_sheet.attitudes import Attitude, attitudes_of
 from postproc.setup_sheet.odd_record import odd_record
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, Severity, info
-from toolpaths.toolpath import Toolpath
+from toolpaths.toolpath import Kind, Toolpath
 from toolpaths.units import DEG
 
 PLACES = frozenset({*BEYOND, "link.blocked", "path.jump", "reach.axis", "singular.distance", "verify.link", "verify.travel",
@@ -91,6 +92,16 @@ def fitted(toolpath: Toolpath, machine: Machine, controller: str | Path, setup: 
         if tried > _PROOFS:
             break
     return Fit(placed_at(setup, begin), first, begin, tried, tuple(lacks))
+
+
+def below_origin(fit: Fit) -> float:
+    """mm that cuts reach below the origin of a table that turns, where the part was put on it; 0 elsewhere: a part on a
+    table that does not turn is found by its work offset alone."""
+    job = fit.result.job
+    if job is None or not len(table_axes(job.control)) or fit.place is None or not np.isnan(fit.place.margin):
+        return 0.0
+    cuts = job.moves.tip[job.moves.kind != Kind.RAPID]
+    return max(0.0, -float((cuts @ job.machine.home_axis).min(initial=0.0)))
 
 
 def placed_at(setup: SetupFile, place: FoundPlace) -> SetupFile:

@@ -17,6 +17,7 @@ from toolpaths.toolpath import Toolpath
 
 _ASSUMED = "ASSUMED, nobody has stated it: put in yours, and take its name out of `assumed`"
 _COLUMN = 48
+ORIGIN = "part.origin"
 TOOL_NUMBERS = "tool_numbers"
 """key of numbers that no file states: the wrong tool is loaded where the magazine holds another under them"""
 
@@ -101,7 +102,7 @@ def _part(fit: Fit) -> Iterator[str]:
     part, place = fit.setup.part, fit.place
     yield "[part]    # where the CL file's absolute frame stands on the table: set the part up so, or see postproc place"
     why = place.why if place is not None else "as stated"
-    yield _line("origin", _vector(part.origin), f"mm; {why}")
+    yield _line("origin", _vector(part.origin), f"mm; {why}" + f"; {_ASSUMED}" * (ORIGIN in fit.setup.assumed))
     turned = part.x_axis != (1.0, 0.0, 0.0) or part.y_axis != (0.0, 1.0, 0.0)
     by = f"by the tool axes of the cuts: {place.attitude.why}" if place is not None else "as stated"
     yield _line("x_axis", _vector(part.x_axis), by if turned else f"{by}, which the machine reaches" if place else by)

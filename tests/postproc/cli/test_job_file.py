@@ -62,6 +62,25 @@ def test_the_nearest_counts_and_without_one_nothing_changes(part: Path, tmp_path
     assert run("convert", part, "-o", tmp_path / "p.nc").exit_code == 2
 
 
+def test_hooks_of_the_job_hold_under_those_of_the_set_up_and_are_part_of_the_proof(part: Path, tmp_path: Path) -> None:
+    job, out = tmp_path / "job" / "postproc.toml", tmp_path / "job" / "p.nc"
+    job.write_text(JOB + '[hooks]\nbefore_tool = ["M31"]\nbefore_stop = ["M32"]\npassive = ["M31", "M32", "M33"]\n')
+    assert run("convert", part, "-o", out, "--proof").exit_code == 0
+    assert "M31\n" in out.read_text() and run("verify", out, part).exit_code == 0 and run("time", out).exit_code == 0
+    job.write_text(job.read_text().replace("M31", "M33"))
+    got = run("verify", out, part)
+    assert got.exit_code == 1 and "[verify.setup]" in got.stderr and "[proof.setup]" in got.stderr
+    (tmp_path / "job" / "s.toml").write_text('[tools.1]\ngauge_length = 100.0\n[hooks]\nbefore_tool = ["M32"]\n')
+    assert run("convert", part, "-o", out).exit_code == 0 and "M33" not in out.read_text() and "M32" in out.read_text()
+    own = tmp_path / "own.toml"
+    own.write_text('[hooks]\nafter_tool = ["M34"]\npassive = ["M34", "M32"]\n')
+    assert run("convert", part, "-o", out, "--hooks", own).exit_code == 0 and "M34" in out.read_text()
+    own.write_text('[hooks]\nafter_tool = ["G91"]\npassive = ["M32"]\n')
+    assert f"{own}: error [hooks.code]" in run("convert", part, "-o", out, "--hooks", own).stderr
+    job.write_text(JOB + "hooks = true\n")
+    assert "hooks" in run("convert", part, "-o", out).stderr
+
+
 def test_faults_of_the_file_have_their_line_and_json(part: Path, tmp_path: Path) -> None:
     (tmp_path / "job" / "postproc.toml").write_text(JOB + "tolerence = 0.01\n")
     got = run("convert", part, "-o", tmp_path / "p.nc", "--json", "-")

@@ -82,6 +82,9 @@ def test_what_is_written_converts(shape: str, case: str, name: str, controller: 
     setup = tomllib.loads(made.text)
     assumed = {key for key, answer in made.answers if answer.source == "assumed" and answer.value != "off"}
     assumed |= {"tool_numbers"} if any(one.assumed for one in made.facts.named) else set()
+    x, y = (np.array(setup["part"][key]) for key in ("x_axis", "y_axis"))
+    low = (toolpaths.read(file)[0].tip @ [x[2], y[2], np.cross(x, y)[2]]).min()
+    assumed |= {"part.origin"} if name != "mill-3axis" and low < 0.0 and not any(setup["part"]["origin"]) else set()
     assert set(setup.get("assumed", [])) == assumed
     assert {d.message.split(" = ")[0] for d in result.diagnostics if d.code == "setup.assumed"} == assumed
     assert result.text.count("ASSUMED") == len(assumed)
@@ -154,7 +157,7 @@ def test_questions_are_asked_and_answered(tmp_path: Path) -> None:
     setup = tomllib.loads(out.read_text())
     assert setup["tools"]["1"]["spindle"] == {"rpm": 8000, "direction": "clockwise"}
     assert setup["output"] == {"default": "auto", "feed": 350, "coolant": "flood", "operations": {"SLOT": "auto"}}
-    assert "assumed" not in setup and setup["tool_numbers"] == {"EM10": 1}
+    assert setup.get("assumed", []) == ["part.origin"] and setup["tool_numbers"] == {"EM10": 1}
     assert "ASSUMED: the CL file states none" in out.read_text()  # the units
     before = out.read_text()
     assert run(*words, "--yes", code=2).stderr and out.read_text() == before, "no file is replaced without --force"
