@@ -85,11 +85,11 @@ def _distinct(points: Floats) -> Floats:
 
 
 def held_axis_rates(kin: Kinematics, q: Floats, near: Floats | None = None) -> Floats:
-    """G (N, J, 3): joint rates per rate of the tip, rotary joints at rest and the tool axis kept.
+    """G (N, J, 3): joint rates per rate of the tip, the tool axis kept and joints at rest that are not to move the tip.
 
-    NaN where the linear joints cannot move the tip in every direction without turning the axis.
+    NaN where the others cannot move the tip in every direction without turning the axis.
     """
-    linear = np.flatnonzero(~np.array(kin.rotary))
+    linear = np.flatnonzero(kin.drives_tip)
     jacobian = kin.jacobian(q, near)[:, :, linear]
     good: Bools = np.asarray(np.isfinite(jacobian).all(axis=(1, 2)) & np.isfinite(q).all(axis=1))
     result = np.full((len(q), kin.joints, 3), np.nan)
@@ -108,7 +108,7 @@ def held_axis_polytope(kin: Kinematics, q: Floats, limit: Floats, near: Floats |
     `limit` in mm and rad per s, s2 or s3; infinite entries bound nothing.
     """
     rates = held_axis_rates(kin, q, near)
-    joints = np.flatnonzero(np.isfinite(limit) & ~np.array(kin.rotary))
+    joints = np.flatnonzero(np.isfinite(limit) & np.array(kin.drives_tip))
     normals = np.concatenate([rates[:, joints], -rates[:, joints]], axis=1)
     offsets = np.tile(np.concatenate([limit[joints], limit[joints]]), (len(q), 1))
     return Polytope(normals, offsets, np.concatenate([joints, joints]))

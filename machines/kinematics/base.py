@@ -149,6 +149,11 @@ class Kinematics(ABC):
         return (True,) * self.joints
 
     @property
+    def drives_tip(self) -> tuple[bool, ...]:
+        """(J,) True for joints that move the tip while the others rest: linear ones, and cranks of platforms."""
+        return tuple(not rotary for rotary in self.rotary)
+
+    @property
     def slides_turn_tool(self) -> bool:
         """True where a linear joint may turn the tool (`turns_tool`): standing rotary joints then do not hold its axis."""
         return any(turns and not rotary for turns, rotary in zip(self.turns_tool, self.rotary, strict=True))

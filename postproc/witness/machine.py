@@ -127,6 +127,7 @@ class Rods:
     carries: str = ""
     sense: float = 1.0
     carriers: dict[str, Array] = field(default_factory=dict)
+    held: Array = field(default_factory=lambda: np.zeros(3))
 
     def misfit(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array, length: Array) -> Array:
         """(N,) mm: the worst of rods off their length, and of the axis off what the platform can do (times
@@ -148,7 +149,8 @@ class Rods:
             spin = -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)
             platform = platform @ rotations(np.array([0.0, 0.0, 1.0]), np.where(np.isfinite(spin), spin, 0.0))
             off, slope = self._legs(q, letters, above, platform)
-        return np.asarray(np.maximum(1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0)))
+        aside = np.abs((above - apply(platform, self.pivot[None])) * self.held).max(axis=1)
+        return np.asarray(np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0))
 
     def _legs(self, q: Array, letters: tuple[str, ...], above: Array, platform: Array) -> tuple[Array, Array]:
         """(mm by which each rod misses its length, how that changes as the platform turns about its own z) (K, N)."""
@@ -204,7 +206,8 @@ def rods(table: dict[str, Any]) -> Rods:
         leg[1] = unit(leg[1])
     if kinematics.get("kind") == "legs":
         return Rods(legs, "".join(sorted(set(kinematics["freedoms"]) & set("abc"))), 0.0, rows(kinematics, "gauge")[0],
-                    carriers={name: unit(rows(one, "direction")[0]) for name, one in carriers.items()})
+                    carriers={name: unit(rows(one, "direction")[0]) for name, one in carriers.items()},
+                    held=np.array([float(letter not in kinematics["freedoms"]) for letter in "xyz"]))
     return Rods(legs, "a" if rotary else "", float(kinematics.get("gauge", 0.0)), rows(rotary, "pivot")[0],
                 rotary.get("letter", ""), rotary.get("carries", ""), float(rotary.get("positive", 1)))
 

@@ -49,7 +49,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     "feeds": ("postproc/reference/test_moves.py", "postproc/writing/test_writer.py",
               "postproc/writing/test_golden_programs.py", "postproc/pipeline/test_whole_conversions.py"),
     "kinematics": ("laws/test_kinematics_laws.py", "machines/kinematics/test_serial_known.py",
-                   "machines/kinematics/test_delta_linear.py"),
+                   "machines/kinematics/test_delta_linear.py", "machines/kinematics/test_legs.py"),
     "linearising": ("postproc/path/test_linearise.py", "postproc/pipeline/test_whole_conversions.py",
                     "postproc/writing/test_golden_programs.py"),
     "links": ("postproc/path/test_links.py", "postproc/pipeline/test_whole_conversions.py",

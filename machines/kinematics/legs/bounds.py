@@ -92,7 +92,7 @@ class MovingLoops:
         curved = np.where(drives.arm, s * s, 0.0)[:, :, None] * -self._drive_arms
         second = self._solved((drives.stretch * s) ** 2 - dot(rod_rates, rod_rates) + dot(r, curved - cross(w, turns)))
         spin, bend, third = self._bounds(lengths(rod_rates), lengths(first[:, 3:]))
-        return PlatformJets(self.place, self.turn, first, second, spin, bend, third, self.loops.lever)
+        return PlatformJets(self.place, self.turn, first, second, spin, bend, third, self._lever)
 
     @cached_property
     def _arms(self) -> Floats:
@@ -117,6 +117,11 @@ class MovingLoops:
         x[~np.isfinite(right).all(axis=1)] = np.nan
         return self.loops.twists(x)
 
+    @property
+    def _lever(self) -> float:
+        """mm per rad, of a platform that does not turn without end."""
+        return self.loops.lever if self.loops.turns else np.inf
+
     @cached_property
     def _reach(self) -> Floats:
         """(K,) mm: |b|, 0 of a platform that does not turn."""
@@ -138,7 +143,7 @@ class MovingLoops:
     def _bounds(self, rod_speed: Floats, rate: Floats) -> tuple[Floats, Floats, Floats]:
         """Bounds (N,) of |w|, |w'| and |(v'', lever w'')| from |r'| (N, K) and |w| (N,) in the middle; UNBOUNDED where
         none."""
-        lever, speed, spin = self.loops.lever, rod_speed * _GROWTH, rate * _GROWTH
+        lever, speed, spin = self._lever, rod_speed * _GROWTH, rate * _GROWTH
         least = np.linalg.svd(np.nan_to_num(self._jx), compute_uv=False)[:, -1]
         result = np.full((3, len(rate)), UNBOUNDED)
         for _ in range(_ROUNDS):
@@ -153,7 +158,7 @@ class MovingLoops:
     def _second(self, speed: Floats, spin: Floats, least: Floats) -> tuple[Floats, Floats, Floats]:
         """(|(v', lever w')| (N,), |r''| (N, K), 1 / least singular value of Jx (N,)) at most while |r'| <= speed (N, K) and
         |w| <= spin (N,); NaN where Jx might become singular."""
-        reach, longest, lever, t = self._reach, self._longest, self.loops.lever, spin[:, None]
+        reach, longest, lever, t = self._reach, self._longest, self._lever, spin[:, None]
         stretch, curved, _ = self._drive
         rows = np.hypot(speed, reach * (speed + t * longest) / lever)
         left = least - 0.5 * np.sqrt((rows**2).sum(axis=1))
@@ -164,6 +169,6 @@ class MovingLoops:
 
     def _third(self, speed: Floats, spin: Floats, bend: Floats, rod_bend: Floats, grip: Floats) -> Floats:
         """Bound (N,) of |(v'', lever w'')|."""
-        turning = (3.0 * spin * bend / self.loops.lever + spin**3)[:, None] * self._reach
+        turning = (3.0 * spin * bend / self._lever + spin**3)[:, None] * self._reach
         right = 3.0 * speed * rod_bend + self._longest * (turning + self._drive[2])
         return np.asarray(grip * np.sqrt((right**2).sum(axis=1)), dtype=np.float64)

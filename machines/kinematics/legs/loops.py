@@ -57,7 +57,7 @@ class Loops:
         """R b (N, K, 3) mm of turns (N, 3, 3)."""
         if not self.turns:
             return np.broadcast_to(self.joints, (len(turn), *self.joints.shape))
-        return np.asarray(np.einsum("nij,kj->nki", turn, self.joints), dtype=np.float64)
+        return np.asarray(self.joints @ np.swapaxes(turn, 1, 2), dtype=np.float64)
 
     def ends(self, place: Floats, turn: Floats) -> Floats:
         """B (N, K, 3) mm."""

@@ -94,6 +94,11 @@ class OnLegs(Kinematics):
         return tuple(j in self.legs_at and self.tilts for j in range(self.joints))
 
     @property
+    def drives_tip(self) -> tuple[bool, ...]:
+        """All, arms too."""
+        return (True,) * self.joints
+
+    @property
     def tilts(self) -> bool:
         """True where the platform turns the tool axis."""
         return self.loops.turns not in ("", "c")
@@ -214,7 +219,8 @@ class OnLegs(Kinematics):
     def _near(self, pose: Floats, q: Floats) -> PlatformPose:
         axis = self._within(unit(pose[:, 3:]))
         turn = self.turn_of(axis, np.zeros(len(axis)))
-        return pose[:, :3] + self.tool_length * axis - turn @ self.gauge - q[:, self.carriers_at] @ self.carriers, turn
+        place = pose[:, :3] + self.tool_length * axis - turn @ self.gauge - q[:, self.carriers_at] @ self.carriers
+        return place * self.loops.basis[:3].any(axis=1), turn
 
     def _from_home(self, own: Floats) -> tuple[Floats, Floats, Bools]:
         """The same by small steps from the home joints, where no larger one leads to the home mode."""
@@ -267,6 +273,10 @@ class OnLegs(Kinematics):
 
     def twist_jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
         """(v at the tip, omega) per joint rate (N, 6, J)."""
+        return self._twist(q, near)[0]
+
+    def _twist(self, q: Floats, near: Floats | None) -> tuple[Floats, Floats]:
+        """The same, and R (N, 3, 3)."""
         q = as_points(q, self.joints, "q")
         place, turn = self._platform(q, near)
         result = np.zeros((len(q), 6, self.joints))
@@ -274,11 +284,11 @@ class OnLegs(Kinematics):
         arm = turn @ (self.gauge - self.tool_length * UP)
         result[:, :3] += np.cross(result[:, 3:], arm[:, :, None], axis=1)
         result[:, :3, self.carriers_at] = self.carriers.T
-        return result
+        return result, turn
 
     def jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
         """d(tip, axis)/dq (N, 6, J): the axis turns with omega."""
-        twist, (_, turn) = self.twist_jacobian(q, near), self._platform(q, near)
+        twist, turn = self._twist(q, near)
         return np.concatenate([twist[:, :3], np.cross(twist[:, 3:], turn[:, :, 2:], axis=1)], axis=1)
 
     def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
