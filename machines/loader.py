@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -31,7 +31,8 @@ KIND, OLDER = ("kinematics", "kind"), ("kinematics", "family")
 """the key that names the kind of machine, and the older word for it, which files may still have"""
 
 
-def builtin() -> dict[str, Path]:
+@cache
+def builtin() -> Mapping[str, Path]:
     """The built-in machine files by name: models, then the catalogue."""
     return {path.stem: path for folder in (DATA, CATALOGUE) for path in sorted(folder.glob("*.toml"))}
 

@@ -107,14 +107,24 @@ def base_chain(source: str | FilePath, builtin: Mapping[str, FilePath] | None = 
         if path in found:
             break
         found.append(path)
-        name = tomllib.loads(read_input(path).decode("utf-8-sig")).get("base")
+        name = values_of(path).get("base")
     return found
+
+
+def values_of(path: FilePath) -> Values:
+    """What a TOML file itself says; whoever changes it takes a copy.
+
+    Raises:
+        OSError, UnicodeDecodeError, tomllib.TOMLDecodeError: where it cannot be read.
+    """
+    return _parsed_once(read_input(path).decode("utf-8-sig").replace("\r\n", "\n"))[0]
 
 
 def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]]:
     """`file` as a `model`; None and one diagnostic per fault where it does not fit."""
+    text = json.dumps(file.values, default=str)
     try:
-        return model.model_validate_json(json.dumps(file.values, default=str)), []
+        return (_kept_model if len(text) < _SHORT else _model_of)(model, text), []
     except ValidationError as found:
         return None, [_diagnostic(file, model, fault) for fault in _faults(file.values, model, found)]
 
@@ -162,7 +172,7 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
         return None, [problem] if problem else []
     name = source if source in builtin else path.stem
     try:
-        values, lines = (_kept if len(text) < _SHORT else _parsed)(text)
+        values, lines = _parsed_once(text)
     except tomllib.TOMLDecodeError as fault:
         return None, [_syntax(fault, str(path), text)]
     except (ValueError, RecursionError) as fault:  # of Python's own: digits of a number, depth of lists
@@ -178,8 +188,16 @@ def _parsed(text: str) -> tuple[Values, dict[KeyPath, int]]:
     return tomllib.loads(text), key_lines(text)
 
 
-_kept = lru_cache(maxsize=64)(_parsed)
-"""texts of built-in files and set-ups, which one process reads over and over; long tables of errors are not kept"""
+def _model_of(model: type[M], text: str) -> M:
+    return model.model_validate_json(text)
+
+
+_kept, _kept_model = lru_cache(maxsize=64)(_parsed), lru_cache(maxsize=64)(_model_of)
+"""of built-in files and set-ups, which one process reads over and over; long tables of errors are not kept"""
+
+
+def _parsed_once(text: str) -> tuple[Values, dict[KeyPath, int]]:
+    return (_kept if len(text) < _SHORT else _parsed)(text)
 
 
 def _resolve(source: str, builtin: Mapping[str, FilePath], wanted_by: UserFile | None) -> FilePath:

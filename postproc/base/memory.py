@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import sys
 
+MANY = 20_000
+"""moves or blocks from which on it pays: looking through what is free takes milliseconds, whatever is found"""
 
-def give_back() -> None:
-    """Ask the C library for it where it keeps what is free between blocks in use: glibc, malloc_trim(3)."""
-    if sys.platform != "linux":
+
+def give_back(rows: int) -> None:
+    """Ask the C library for it where it keeps what is free between blocks in use: glibc, malloc_trim(3).
+
+    `rows`: moves or blocks that the stage has worked on.
+    """
+    if rows < MANY or sys.platform != "linux":
         return
     import ctypes
 

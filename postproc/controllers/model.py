@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
@@ -287,7 +289,8 @@ class ControllerFile(UserModel):
         return self.model_copy(update={"subprograms": self.subprogram_files}) if files else self
 
 
-def builtin_files() -> dict[str, Path]:
+@cache
+def builtin_files() -> Mapping[str, Path]:
     """Controller files of the product by name."""
     folder = Path(str(resources.files("postproc.controllers")))
     return {p.stem: p for p in sorted(folder.glob("*.toml"))}

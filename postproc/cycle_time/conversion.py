@@ -21,9 +21,10 @@ def estimate_of(result: PostResult) -> Estimate | None:
     if not result.ok:
         return None
     model = read_value(load_model(model_name(result.controller_name, result.controller.writer)))
-    give_back()
+    rows = len(result.path) if result.path is not None else 0
+    give_back(rows)
     blocks = from_conversion(result)
-    give_back()
+    give_back(rows)
     return estimate(blocks, result.machine, model, with_band=len(blocks) <= BAND_UP_TO) if len(blocks) else None
 
 

@@ -85,7 +85,7 @@ def linuxcnc(blocks: MotionBlocks, settings: Settings | None = None) -> BlockTim
     settings = settings or Settings()
     s = segments(blocks, settings.override, settings.rapid)
     row = in_a_row(s, settings.cycle)
-    give_back()
+    give_back(len(s))
     return _timed(blocks, s, row, settings)
 
 

@@ -90,7 +90,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     _add_end(out, modes, stand, space, len(moves) - 1)
     out.begin[len(moves)] = out.count
     columns = out.joined()
-    give_back()
+    give_back(len(moves))
     path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst)
     diagnostics += joint_faults.planned(plan, machine, given, file)
     diagnostics += cost(modes.tcp_code, longer, file)

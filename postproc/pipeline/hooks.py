@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 from machines.hooks import HOOK_VALUES, NAMES, filled
 from postproc.controllers.model import ControllerFile
@@ -131,10 +132,10 @@ def _executed(reader: Reader, job: Job) -> list[Diagnostic]:
     """Passive codes that this control carries out; the shop's controller file may name those of its smoothing."""
     clamps = {float(v) for v in clamp_numbers(job.machine.clamp_codes)}
     found = []
-    known = {own: carried_out(reader, job.controller, clamps, own) for own in (True, False)}
+    known = cache(lambda own: carried_out(reader, job.controller, clamps, own))
     for code in job.controller.program.passive:
         shop = code in job.hooks.passive
-        what = known[not shop].by(code)
+        what = known(not shop).by(code)
         if what:
             said = "this control carries it out" if what == code else f"this control carries out {what}"
             found.append(error("hooks.passive", f"{code} is named as passive: {said}, and what follows depends on it",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from functools import cache
 from pathlib import Path
 
 from postproc.setup.files import file_keys, value_at
@@ -23,15 +24,21 @@ _LATER_OF_TOOLS = (*TOOL_LIMITS, "compensation", "contour", "called")
 """likewise, of each tool"""
 
 
+@cache
+def _defaults() -> list[tuple[tuple[str, ...], object]]:
+    """The keys of `_LATER` with their defaults."""
+    values = SetupFile().model_dump(mode="json")
+    return [(path, value_at(values, path)) for path in _LATER]
+
+
 def fingerprint(setup: SetupFile, file: str) -> str:
     """The same for set-ups that say the same, whatever their names, comments, bases, order and folders.
 
     Meshes count by what they hold, not by their names. `file` is that of the set-up, whose folder meshes are named from.
     """
     values = setup.model_dump(mode="json", exclude=_ASIDE)
-    default = SetupFile().model_dump(mode="json")
-    for path in _LATER:
-        if value_at(values, path) == value_at(default, path):
+    for path, default in _defaults():
+        if value_at(values, path) == default:
             del value_at(values, path[:-1])[path[-1]]
     for tool in values["tools"].values():
         for name in _LATER_OF_TOOLS:

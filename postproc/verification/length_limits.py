@@ -125,7 +125,7 @@ class _Ends:
     def follow(self, tool: Ints, speed: Floats, room: _Room, what: str) -> None:
         """Places (N,) with a speed (N,) mm or rad per mm, of a clearance: as far as is left, again and again."""
         goes = np.flatnonzero(speed > LEAST)
-        for sign, direction in enumerate(_SIGNS):
+        for sign, direction in enumerate(_SIGNS if len(goes) else ()):
             x, k = np.zeros(len(goes)), np.arange(len(goes))
             most = self.mm[tool[goes], sign]
             for _ in range(_ROUNDS):
@@ -307,12 +307,12 @@ class _Look:
             for t in self.executed.times(self.motion, rows):
                 q, other = self.executed.joints(self.motion, rows, t), self.longer.joints(self.again, rows, t)
                 slope = (other - q) / STEP
-                for sign, direction in enumerate(_SIGNS):
-                    for j, name in enumerate(names):
+                for j in np.flatnonzero((np.abs(slope) > LEAST).any(axis=0)).tolist():
+                    for sign, direction in enumerate(_SIGNS):
                         goes = direction * slope[:, j]
                         k = np.flatnonzero(np.abs(goes) > LEAST)
                         room = np.where(goes[k] > 0.0, limits.upper[j] - q[k, j], q[k, j] - limits.lower[j])
-                        self.ends.add(tool[k], sign, (room + TRAVEL_SLACK) / np.abs(goes[k]), f"travel {name}")
+                        self.ends.add(tool[k], sign, (room + TRAVEL_SLACK) / np.abs(goes[k]), f"travel {names[j]}")
 
     def bounds_of_reach(self) -> None:
         """Bounds of a parallel machine's workspace and joints, where those go with the length."""

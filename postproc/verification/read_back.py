@@ -86,7 +86,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     `others`: files of its subprograms, by the names that the program calls them by; `of_cl`: the lines of the CL file that a
     line of the program is written from, where that is known.
     """
-    give_back()
+    give_back(len(job.moves))
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls,
@@ -105,7 +105,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
                       job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack, _others(job, reader),
                       radii, job.controller.cutter_compensation.corners)
     motion, found = run(code, machine.axis_names, offsets, gcode)
-    give_back()
+    give_back(len(motion))
     faults = Faults(job.toolpath.file, gcode)
     unseen, whole = check_start(code, job, faults), code
     code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))

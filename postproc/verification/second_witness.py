@@ -13,7 +13,7 @@ import numpy as np
 
 from machines.loader import builtin
 from machines.machine import Machine
-from machines.user_file import base_chain
+from machines.user_file import base_chain, values_of
 from postproc.base.options import Options
 from postproc.control.control import Control
 from postproc.job.job import Job
@@ -41,7 +41,7 @@ def machine_tables(machine: Machine) -> list[dict[str, Any]]:
     path = Path(machine.file) if machine.file else known.get(machine.name)
     if path is None or not path.is_file():
         return []
-    tables = [tomllib.loads(read_input(file).decode("utf-8-sig")) for file in base_chain(path, known)]
+    tables = [values_of(file) for file in base_chain(path, known)]
     return tables if machine.limits is machine.stated else [{"axes": _limits_table(machine)}, *tables]
 
 

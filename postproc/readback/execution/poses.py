@@ -37,8 +37,7 @@ class BlockPoses:
     before: Floats | None = None
     _asked: list[tuple[Motion, Ints, BlockMotions]] = field(default_factory=list, init=False, repr=False,
                                                             compare=False)
-    _ahead: list[tuple[Motion, Ints, float | Floats, Floats]] = field(default_factory=list, init=False, repr=False,
-                                                                      compare=False)
+    _ahead: list[_Ahead] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def _approaches(self, motion: Motion, rows: Ints) -> BlockMotions:
         """Those of the blocks asked for last are kept: the same ones are asked for at several fractions."""
@@ -48,6 +47,13 @@ class BlockPoses:
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
+        for ahead in self._ahead:
+            k = ahead.number(motion, rows, t)
+            if k >= 0:
+                if not ahead.poses:
+                    every = np.concatenate(ahead.positions), np.tile(rows, len(ahead.times))
+                    ahead.poses.extend(a.reshape(-1, len(rows), 3) for a in self._placed(motion, every[1], every[0]))
+                return ahead.poses[0][k], ahead.poses[1][k]
         return self._placed(motion, rows, self._position(motion, rows, t))
 
     def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[float | Floats]) -> None:
@@ -58,14 +64,14 @@ class BlockPoses:
         if 0 < len(rows) * len(between) <= FEW:
             shares = np.concatenate([np.broadcast_to(np.asarray(t), len(rows)) for t in between])
             found = BlockMotions.of(motion, self.control, np.tile(rows, len(between))).at(shares)
-            parts = found.reshape(len(between), len(rows), -1)
-            self._ahead.extend((motion, rows, t, part) for t, part in zip(between, parts, strict=True))
+            parts = iter(found.reshape(len(between), len(rows), -1))
+            self._ahead.append(_Ahead(motion, rows, times, [motion.end[rows] if _whole(t) else next(parts) for t in times]))
 
     def _position(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """Machine coordinates (K, J) of the blocks `rows` at fraction t."""
         if _whole(t):
             return motion.end[rows]
-        known = (at for there, kept, time, at in self._ahead if there is motion and kept is rows and time is t)
+        known = (ahead.positions[k] for ahead in self._ahead if (k := ahead.number(motion, rows, t)) >= 0)
         found = next(known, None)
         return self._approaches(motion, rows).at(t) if found is None else found
 
@@ -191,6 +197,24 @@ class BlockPoses:
         unit = self.control.unit
         pose = assembly.walk(kin, begins(motion, rows) / unit, position / unit, near)
         return pose[:, :3], pose[:, 3:]
+
+
+@dataclass(frozen=True)
+class _Ahead:
+    """Machine coordinates, each (K, J), of blocks `rows` (K,) at several fractions, and poses there once one is asked for."""
+
+    motion: Motion
+    rows: Ints
+    times: Sequence[float | Floats]
+    positions: list[Floats]
+    poses: list[Floats] = field(default_factory=list)
+    """none, or tips and axes (T, K, 3)"""
+
+    def number(self, motion: Motion, rows: Ints, t: float | Floats) -> int:
+        """Which of the fractions t is; -1 for none, or where these are others' blocks."""
+        if self.motion is not motion or self.rows is not rows:
+            return -1
+        return next((k for k, time in enumerate(self.times) if time is t), -1)
 
 
 def poses_before(motion: Motion, control: Control) -> Floats | None:
