@@ -16,11 +16,12 @@ ReadProgress = Callable[[int, int], None]
 
 
 def read(path: str | Path, *, units: LengthUnit | None = None, dialect: DialectName | None = None,
-         allow_unknown: Iterable[str] = (),
-         progress: ReadProgress | None = None) -> tuple[Toolpath, list[Diagnostic]]:
+         allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None,
+         tolerance: float = 0.0) -> tuple[Toolpath, list[Diagnostic]]:
     """The toolpath of a CL file, and what reading it showed; see `toolpaths.cl.read.read_bytes` for the options."""
     from toolpaths.cl.read import read_file
-    result = read_file(path, units=units, dialect=dialect, allow_unknown=allow_unknown, progress=progress)
+    result = read_file(path, units=units, dialect=dialect, allow_unknown=allow_unknown, progress=progress,
+                       tolerance=tolerance)
     return result.toolpath, result.diagnostics
 
 

@@ -308,7 +308,8 @@ def _read(file: Path, options: Options, progress: Progress) -> tuple[Toolpath, l
 
     no_program(file, options.dialect)
     return toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
-                          allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
+                          allow_unknown=options.allow_unknown, tolerance=options.tolerance,
+                          progress=lambda at, total: progress("reading", at, total))
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from postproc.path.model import ARC, FEED, JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.shapes import arrays
 
 CODE = "CUTTER_COMPENSATION"
 STILL = 1e-7
@@ -53,6 +54,7 @@ class _Refused(ValueError):
 
 
 @dataclass(frozen=True)
+@arrays(dropped="K", center="K 3")
 class ContourWords:
     """Words, blocks that are none of the contour (K,), centres (K, 3) from where a block begins."""
 
@@ -141,6 +143,7 @@ def _stretch(job: Job, path: JointPath, made: ContourWords, first: int, last: in
 
 
 @dataclass(frozen=True)
+@arrays(sense="N")
 class _Pieces:
     """N + 1 moves of the tool's centre: the first leads to the contour, the last away; centres NaN for lines, sense 1
     counter-clockwise; radius > 0 where the tool is left of its path."""

@@ -248,7 +248,8 @@ def with_shop(controller: ControllerFile, machine: Machine, setup: SetupFile) ->
 def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, setup: SetupFile,
             options: Options, refused: Refused = frozenset()) -> tuple[Job | None, list[Diagnostic]]:
     """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`:
-    output modes that "auto" passes over."""
+    output modes that "auto" passes over. What arcs and chords in the place of splines take is off its tolerance."""
+    options = replace(options, tolerance=options.tolerance - toolpath.spline_slack)
     records, diagnostics = job_records(toolpath, machine, controller, setup, options.setup)
     toolpath = records.toolpath
     diagnostics += [*work_offset(controller, setup, options), *called_tools(controller, options.setup),

@@ -161,7 +161,7 @@ def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage
         return handed_on(CorrectedStage, made, nominal=None, compensation=None), []
     from postproc.correction.compensation import compensate
 
-    options, file, moves = made.options, made.toolpath.file, made.moves
+    options, file, moves = job.options, made.toolpath.file, made.moves
     far = check_travel(path, job.moves, job.control, job.kinematics, file)[0]
     far += check_reach(path, job.moves, job.control, file)
     if has_errors(far):

@@ -1,4 +1,4 @@
-"""Where the tolerance goes: the control's smoothing, rounding, geometric errors, moved points, linearising."""
+"""Where the tolerance goes: splines, the control's smoothing, rounding, geometric errors, moved points, linearising."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
         shares |= {"geometric_errors": SHARE * tolerance, "axis_geometric_errors": SHARE * axis}
         for name in ("linearising", "axis_linearising"):
             shares[name] -= shares[name.replace("linearising", "geometric_errors")]
+    if job.toolpath.spline_slack:
+        shares["splines"] = job.toolpath.spline_slack
     if job.options.smooth:
         for name in ("linearising", "axis_linearising"):
             shares[name.replace("linearising", "points")] = POINTS * shares[name]

@@ -216,12 +216,13 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None) -
         return f"nothing written; {output} is left as it was" if there_is(output) else "nothing written"
     d = as_dict(result, output, estimate)
     shares = d["tolerance_shares"]
+    splines = f", arcs and chords for splines {shares['splines']:.4f}" if "splines" in shares else ""
     lines = [f"{output}: {d['blocks_out']} blocks from {d['points_in']} points ({d['points_added']} added) for "
              f"{d['machine']}, {d['controller']}",
              *_proof(result),
              *witness_lines(result.witness),
              f"tolerance: linearising {shares['linearising']:.4f}, control's smoothing {shares['smoothing']:.4f}, "
-             f"rounding at most {shares['rounding']:.5f} mm"]
+             f"rounding at most {shares['rounding']:.5f}{splines} mm"]
     if result.toolpath.records.total:
         lines.append(f"read: {result.toolpath.records}")
     fallen_back = any(found.code == "output.next_mode" for found in result.diagnostics)

@@ -98,7 +98,7 @@ FAULTS = (
           "self.program.feed[hole.drill]", "self.program.feed[max(hole.drill - 1, 0)]"),
     Fault("tool change without its number", "writer of haas", "Writer.change_tool",
           "tool_change.format(number=self.tool_said(number))", "tool_change.format(number='1')"),
-    Fault("arcs read in the other direction", "reader of linuxcnc", "_rows", "ccw=motion == 3", "ccw=motion == 2"),
+    Fault("arcs read in the other direction", "reader of linuxcnc", "_rows", "(motion == 3)", "(motion == 2)"),
     Fault("G43 H not read", "reader of linuxcnc", "IsoReader.tools", "np.where(code == 43,", "np.where(code == 0,"),
     Fault("dwell read in ms", "reader of linuxcnc", "IsoReader.seconds", "return float(words.value[low + here[0]])",
           "return 0.001 * float(words.value[low + here[0]])", ("helix linuxcnc", "helix iso")),

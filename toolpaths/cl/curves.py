@@ -14,7 +14,9 @@ from toolpaths.cl.text.statements import COMMENT, TEXT, Statement, Word, words_o
 from toolpaths.toolpath import Role
 
 SPLINE_CHORD = 0.001
-"""mm: a spline is followed by arcs, or chords, no further from it than this"""
+"""mm: a spline is followed by arcs, or chords, no further from it than this, or than SPLINE_SHARE of the tolerance"""
+SPLINE_SHARE = 0.25
+"""of the tolerance, which the program must not be off those by (`Toolpath.spline_slack`)"""
 _DEGREE = 3
 _MOST_CHORDS = 10000
 _LEAST_PLACES = 16
@@ -175,8 +177,9 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
                     "have the CAM system write the curve as points (GOTO)")
         return
     curve = np.array([start, *control])
-    chords = spline_points(curve, inner, SPLINE_CHORD / b.scale)
-    arcs = spline_arcs(curve, inner, SPLINE_CHORD / b.scale, b.splines)
+    chord = max(SPLINE_CHORD, b.spline_slack) / b.scale
+    chords = spline_points(curve, inner, chord)
+    arcs = spline_arcs(curve, inner, chord, b.splines)
     b.splines += 1
     pieces = arcs if 0 < len(arcs) < len(chords) else [(x, y, z, ()) for x, y, z in chords.tolist()]
     for n, (x, y, z, arc) in enumerate(pieces, 1):

@@ -10,6 +10,7 @@ from pathlib import Path
 from toolpaths.choices import DialectName, LengthUnit
 from toolpaths.cl.assemble import assemble
 from toolpaths.cl.build import ToolpathBuilder
+from toolpaths.cl.curves import SPLINE_SHARE
 from toolpaths.cl.forms import check_forms
 from toolpaths.cl.indexing import TRANS_HINT
 from toolpaths.cl.interpret import HANDLERS, known, report_others, run
@@ -53,7 +54,8 @@ class ReadResult:
 
 
 def read_file(path: str | Path, *, units: LengthUnit | None = None, dialect: DialectName | None = None,
-              allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None) -> ReadResult:
+              allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None,
+              tolerance: float = 0.0) -> ReadResult:
     """Read the file at `path` (- for standard input); see `read_bytes`. A file that cannot be opened is a diagnostic too."""
     try:
         data = read_input(path, standard_input=True)
@@ -61,11 +63,12 @@ def read_file(path: str | Path, *, units: LengthUnit | None = None, dialect: Dia
         diagnostics = [unreadable(fault, "cl.open", path, "name a CL file (APT text)")]
         return ReadResult(_with_faults(_empty(str(path)), diagnostics), diagnostics)
     return read_bytes(data, file=str(path), units=units, dialect=dialect, allow_unknown=allow_unknown,
-                      progress=progress)
+                      progress=progress, tolerance=tolerance)
 
 
 def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = None, dialect: DialectName | None = None,
-               allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None) -> ReadResult:
+               allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None,
+               tolerance: float = 0.0) -> ReadResult:
     """Read the text of a CL file.
 
     Args:
@@ -74,6 +77,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         dialect: one of `DIALECTS`, used instead of the recognised one
         allow_unknown: words that may be left out although they look like motion
         progress: called with (bytes read, bytes in all)
+        tolerance: mm of the program; a share of it may go to arcs and chords in the place of splines
 
     Raises:
         ValueError: for a dialect or unit that does not exist (wrong use; faults of the file are diagnostics).
@@ -96,7 +100,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         program, points, lines = Lexer(plain, parts, log, known, largest).program(), parts.points, parts.lines
         found, evidence = (DIALECTS[dialect], "given") if dialect else detect(program)
     del plain
-    b = ToolpathBuilder(program, points, found, _units(program, units, log), log, allow_unknown)
+    b = ToolpathBuilder(program, points, found, _units(program, units, log), log, allow_unknown, SPLINE_SHARE * tolerance)
     run(b, 0, len(program.statements))
     b.finish_rows()
     open_paths(b)

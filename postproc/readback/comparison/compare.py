@@ -135,9 +135,10 @@ def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gco
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_reach_bounds(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
-    return Comparison(job.moves, worst_tip, worst_axis, tip_line, axis_line, tip, axis, match, owner, tuple(diagnostics),
-                      max(bound.tip, worst_tip), max(bound.axis, worst_axis), bound.unbounded, *_cuts(moves, owner, bound),
-                      (code, motion), executed, planned)
+    slack = job.toolpath.spline_slack
+    return Comparison(job.moves, worst_tip + slack, worst_axis, tip_line, axis_line, tip, axis, match, owner,
+                      tuple(diagnostics), max(bound.tip, worst_tip) + slack, max(bound.axis, worst_axis), bound.unbounded,
+                      *_cuts(moves, owner, bound), (code, motion), executed, planned)
 
 
 def _cuts(moves: Moves, owner: Ints, bound: DeviationBound) -> tuple[int, int]:

@@ -69,8 +69,8 @@ def _rows(section: BlockSection, frame: ExecutionFrame, number: int, start: Floa
     end = ends[line]
     motion = section.motion[line]
     kind = np.where(motion == 0, 0, np.where(among(motion, (2, 3)), 2, 1)).astype(np.int8)
-    rows = MotionRows(line + section.first, kind, end, *(repeated(one, len(line)) for one in (
-        np.zeros(3), number, False, np.nan, 0.0)), ccw=motion == 3, contour=repeated(np.zeros(4), len(line)))
+    rows = MotionRows(line + section.first, kind, end, *[*(repeated(one, len(line)) for one in (
+        np.zeros(3), number, False, np.nan, 0.0)), np.asarray(motion == 3), repeated(np.zeros(4), len(line))])
     if spelt:
         rows = _with_legs(rows, line, spelt)
     rows = _with_arcs(rows, state, line, code.line, file, found)

@@ -74,6 +74,22 @@ def test_the_words_are_the_contour_and_the_tool_runs_as_the_file_says(name: str,
     assert ("NORM G450 CFTCP" in head) == (controller == "siemens-840d")
 
 
+def mirrored(line: str) -> str:
+    """A record seen in the plane X Z: left becomes right, counter-clockwise clockwise."""
+    word, _, numbers = line.replace("LEFT", "RIGHT").partition("/")
+    if word not in ("GOTO", "CIRCLE"):
+        return f"{word}/{numbers}" if numbers else word
+    values = [-float(v) if k in (1, 5) else float(v) for k, v in enumerate(numbers.split(","))]
+    return f"{word}/" + ",".join(f"{v:g}" for v in values)
+
+
+@pytest.mark.parametrize(("name", "controller"), [("rounded", "siemens-840d"), ("notch", "fanuc-30i")])
+def test_the_tool_right_of_the_contour(name: str, controller: str) -> None:
+    lines = [mirrored(line) for line in [*BEFORE, ON, *PATHS[name], OFF, *AFTER]]
+    text = good(convert(toolpath(*lines), "mill-3axis", controller, setup())).text
+    assert "G42" in text and ("X-20 Y-10" if name == "rounded" else "X35. Y-35.") in text
+
+
 @pytest.mark.parametrize(("lines", "controller", "said"), [
     (PATHS["pocket"], "linuxcnc", "does not begin square"), (PATHS["pocket"], "generic-iso", "does not begin square"),
     (PATHS["rounded"], "fanuc-30i", "outside corner"), (PATHS["rounded"], "haas-ngc", "outside corner"),
