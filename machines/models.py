@@ -167,8 +167,8 @@ class ControlModel(UserModel):
     """codes that this machine puts in force before every program (Fanuc parameter 3402), next to those of the controller
     file ([start] codes)"""
     settings: tuple[Annotated[str, Field(min_length=4)], ...] = ()
-    """parameters and settings that are as programs need them, each by words of its "needs ..." line in the header, which then
-    leaves it out: settings = ["5006#6 TOS = 1", "rotary values of 0"]"""
+    """parameters and settings that are as programs need them, each by words of its "needs ..." line in the header, which
+    then leaves it out: settings = ["5006#6 TOS = 1", "rotary values of 0"]"""
     rapids: Rapids | None = None
     """path of rapids that move several axes: "straight" or "dog-leg", each axis at its own speed. Fanuc: parameter 1401#1
     LRP; Haas: setting 335; Siemens: RTLION, RTLIOF. Default: what the controller file has ([kinematics] rapids)"""

@@ -1,4 +1,4 @@
-"""docs/controls.md: each word of its first table is the controller file's, the writer's or the reader's, each test is there."""
+"""docs/controls.md: each word of its first table is the controller file's or the writer's, each test is there."""
 
 from __future__ import annotations
 

@@ -102,8 +102,9 @@ class _Writing:
         while self.starts:
             move, operation = self.starts[0]
             named = self.toolpath.operations[operation]
-            if before is not None and (move > self.first_move[before.index] or (
-                    move == self.first_move[before.index] and not self._within(before, named.line, int(self.moves.row[move])))):
+            first = move if before is None else int(self.first_move[before.index])
+            if before is not None and (move > first or (
+                    move == first and not self._within(before, named.line, int(self.moves.row[move])))):
                 return
             self.starts.pop(0)
             self.compensation.off_before(move)

@@ -92,8 +92,8 @@ class Job:
 
     @property
     def stock(self) -> Floats | None:
-        """(2, 3) least and greatest X, Y, Z of the set-up's stock, at all places, in the first work offset, rotary axes at 0,
-        mm; None without."""
+        """(2, 3) least and greatest X, Y, Z of the set-up's stock, at all places, in the first work offset, rotary axes
+        at 0, mm; None without."""
         corners = self.stock_corners
         if corners is None or self.control.plane is not None:
             return None

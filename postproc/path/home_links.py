@@ -98,7 +98,8 @@ def _poses(some: Sequence[SolvedRun], rows: Sequence[int], tools: Sequence[Kinem
 
 def _raised(space: SafeSpace, poses: _Poses, turning: Bools) -> _Poses:
     """The poses lifted along their tool axes to their safe planes; left where they are already above."""
-    lift = space.planes(poses.axis, turning) + np.where(turning, RISE, 0.0) - np.einsum("ni,ni->n", poses.axis, poses.tip - space.centre)
+    height = np.einsum("ni,ni->n", poses.axis, poses.tip - space.centre)
+    lift = space.planes(poses.axis, turning) + np.where(turning, RISE, 0.0) - height
     tip, q = poses.tip + np.maximum(lift, 0.0)[:, None] * poses.axis, poses.q.copy()
     for kin, k in poses.each_tool():
         q[k] = nearest_solution(kin, tip[k], poses.axis[k], poses.q[k])

@@ -77,8 +77,8 @@ class Chain:
         return linear, np.stack(moved, axis=2)
 
     def turned(self, place: tuple[Array, Array], turn: dict[str, float]) -> tuple[Array, Array]:
-        """On the table at zero: a place (rotation, origin) as it stands in the machine, tables turned by `turn` (degrees)."""
-        q = np.radians([np.zeros(len(self.letters)), [turn.get(name, 0.0) for name in self.letters]])
+        """On the table at zero: a place (rotation, origin) as it stands with tables turned by `turn` (degrees)."""
+        q = np.radians(np.array([[0.0] * len(self.letters), [turn.get(name, 0.0) for name in self.letters]]))
         at, (_, slides) = self.pose(q, self.letters, np.zeros(2))[0], self.slides(q, self.letters)
         rotation = slides[1] @ np.linalg.inv(slides[0])
         return rotation @ place[0], rotation @ (place[1] - at[0]) + at[1]

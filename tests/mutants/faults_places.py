@@ -1,13 +1,15 @@
-"""Faults in options of the control, in parts at several places, and in what is worked out beside the program: lengths, measured parts, pivots checked."""
+"""Faults in options of the control, in parts at several places, and in what is worked out next to the program."""
 
 from __future__ import annotations
 
 from tests.mutants.plant import Fault
 
+REFUSED = "the read-back refuses the mode by the machine file (verify.option), and the next one is taken"
 FAULTS = (
     Fault("tilted planes that are not fitted", "options", "_fitted_modes",
-          'None if options.absent("tilted_planes") else tilted', "tilted"),
-    Fault("tip control that is not fitted", "options", "_fitted_modes", 'None if options.absent("tip_control") else tcp', "tcp"),
+          'None if options.absent("tilted_planes") else tilted', "tilted", why=REFUSED),
+    Fault("tip control that is not fitted", "options", "_fitted_modes",
+          'None if options.absent("tip_control") else tcp', "tcp", why=REFUSED),
     Fault("smoothing that is not fitted", "options", "_fitted_program", 'if options.absent("smoothing"):', "if False:"),
     Fault("helices that are not fitted", "options", "_fitted_arcs", 'if options.absent("helical"):', "if False:"),
     Fault("rigid taps that are not fitted", "options", "fitted", 'if options.absent("rigid_tapping"):', "if False:"),
@@ -18,14 +20,16 @@ FAULTS = (
     Fault("work offset of a place 0.5 mm off", "places", "control_at", "origin=origin", "origin=origin + 0.5"),
     Fault("centres of arcs at the first place", "places", "_moved", "move(given.center) for move in points",
           "given.center for move in points"),
-    Fault("work offset of the next place not called", "places", "with_sections", "if other else ()),", "if False else ()),"),
+    Fault("work offset of the next place not called", "places", "with_sections", "if other else ()),",
+          "if False else ()),"),
     Fault("work offset of the place before", "places", "with_sections", "float(section.place)", "float(old.place)"),
     Fault("states of the place before", "places", "_events", "if again:", "if False:", ("places haas",)),
-    Fault("records at the first place alone", "places", "_events", "for event in own:", "for event in own if n == 0 else ():"),
+    Fault("records at the first place alone", "places", "_events", "for event in own:",
+          "for event in own if n == 0 else ():"),
     Fault("order by tool for order by part", "places", "repeated", 'if order == "tool" else', 'if order != "tool" else',
           ("places fanuc", "places order")),
-    Fault("a face of the tombstone not turned", "places", "turned", "placement if turn is None else", "placement if True else",
-          ("places haas",)),
+    Fault("a face of the tombstone not turned", "places", "turned", "placement if turn is None else",
+          "placement if True else", ("places haas",)),
     Fault("turned tables of a register forgotten", "places", "control_at", "standing=places[k].standing", "standing=()",
           ("places haas",)),
     Fault("plane of a corrected run at the first place", "places", "framed", "modes.at(place).plane", "modes.plane",
@@ -33,7 +37,8 @@ FAULTS = (
     Fault("header: every register holds the first", "places", "_work_offsets", "job.control_at(k)", "job.control_at(0)"),
     Fault("lengths: twice what they may differ by", "lengths at the machine", "_Places.of", "(b - a) / STEP",
           "(b - a) / (2.0 * STEP)"),
-    Fault("lengths: a tolerance left behind", "lengths at the machine", "_first_zero", "inside = at > 0.0", "inside = at > -1.0"),
+    Fault("lengths: a tolerance left behind", "lengths at the machine", "_first_zero", "inside = at > 0.0",
+          "inside = at > -1.0"),
     Fault("lengths: longer for shorter", "lengths at the machine", "_margin", "(shorter, longer), (why, so)",
           "(longer, shorter), (why, so)"),
     Fault("lengths: tried on shorter tools", "lengths at the machine", "LengthTrial.executed",
@@ -49,6 +54,7 @@ FAULTS = (
     Fault("check: readings above the ball", "check program", "_readings", "3 * k + 1", "3 * k"),
     Fault("check: readings 0.01 off", "check program", "_readings", "path.q[blocks] * job.control.unit)",
           "path.q[blocks] * job.control.unit + 0.01)"),
-    Fault("check: the ball beside the work offset", "check program", "_text", "part - origin", "part"),
-    Fault("check: axes of the table for those of the part", "check program", "_text", "placement.directions(points)", "points"),
+    Fault("check: readings of other poses", "check program", "_readings", "enumerate(q, 1)", "enumerate(q[::-1], 1)"),
+    Fault("check: the ball not at one point", "check program", "_text", "point + _CLEAR * axis, point))",
+          "point + _CLEAR * axis, point + 0.1 * axis))"),
 )

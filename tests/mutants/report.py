@@ -104,7 +104,8 @@ def programs_page(programs: list[Found]) -> str:
     for control in dict.fromkeys(p.name.split()[-1] for p in programs):
         own = [p for p in programs if p.name.split()[-1] == control]
         warned = sum(p.harmless[WARNED] for p in own)
-        lines.append(f"| {control} | {len(own)} | {sum(p.count for p in own)} | {sum(p.caught.total() for p in own)} | {warned} | "
+        lines.append(f"| {control} | {len(own)} | {sum(p.count for p in own)} | {sum(p.caught.total() for p in own)} | "
+                     f"{warned} | "
                      f"{sum(p.harmless.total() for p in own) - warned} | {sum(len(p.survivors) for p in own)} |")
     lines += ["", "Kinds of change: " + ", ".join(f"{kind.strip()} {n}" for kind, n in kinds.most_common()) + ".",
               "Refused by: " + ", ".join(f"{code}.* {n}" for code, n in caught.most_common()) + ".",

@@ -105,7 +105,7 @@ def _line_done(tip: Any, axis: Any, start: Any, end: Any, axis0: Any, axis1: Any
 @loop(alone=True)
 def _approach(tip: Any, axis: Any, after: Any, axis_after: Any, end: Any, axis1: Any, grain: float,
               axis_grain: float) -> int:
-    """1: the pose after comes nearer to the end of the move, 0: it is as near, -1: it leaves it, or the pose before was there.
+    """1: the pose after comes nearer to the end of the move, 0: as near, -1: it leaves it, or the pose before was there.
 
     A tenth of the last decimal is nothing: standing tips of two poses differ by the arithmetic of the kinematics.
     """
@@ -157,7 +157,7 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
             for r in range(j + 1, count):
                 owner[r] = i
             return match, owner
-        # Several blocks may end within the tolerance of the end: the move keeps those up to the last that comes nearer to it.
+        # Several blocks may end within the tolerance of the end: the move keeps those up to the last that comes nearer.
         j = k - 1
         step = 0
         while k < count and step >= 0:

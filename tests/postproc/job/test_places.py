@@ -137,7 +137,7 @@ def test_stops_and_dwells_stand_at_every_place(order: PlaceOrder) -> None:
 
 @pytest.mark.parametrize("order", ["tool", "part"])
 def test_records_at_the_end_of_a_place_stand_before_the_next_operation(order: PlaceOrder) -> None:
-    """Its lines are behind those with which the next place begins: neither a stop of its own is missed nor a label too early."""
+    """Its lines are behind those with which the next place begins: no stop of its own is missed, no label too early."""
     lines = ["UNITS/MM"]
     for n in (1, 2):
         lines += [f"TOOL PATH/OP{n},TOOL,T{n}", "MSYS/0,0,0,1,0,0,0,1,0", f"LOAD/TOOL,{n}", "SPINDL/RPM,1000,CLW",
@@ -154,8 +154,8 @@ def test_records_at_the_end_of_a_place_stand_before_the_next_operation(order: Pl
 def test_distance_counts_from_the_middle_of_each_place() -> None:
     """The safe plane is the highest of those of the places alone, and the program retracts to it."""
     path, found = toolpaths.read_bytes("\n".join([
-        "UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600", "RAPID", "GOTO/0,0,20", "GOTO/0,0,-1", "GOTO/5,0,-1",
-        "RAPID", "GOTO/5,0,20", "FINI"]), file="one.apt")
+        "UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600", "RAPID", "GOTO/0,0,20", "GOTO/0,0,-1",
+        "GOTO/5,0,-1", "RAPID", "GOTO/5,0,20", "FINI"]), file="one.apt")
     far = SetupFile.model_validate({"tools": TOOLS, "clearance": {"distance": 70.0, "between": "plane"},
                                     "places": [TWO[0], TWO[1] | {"origin": (90.0, -10.0, -60.0)}]})
 

@@ -156,7 +156,8 @@ def test_what_no_mode_converts_fails_once_with_what_to_do(monkeypatch: pytest.Mo
 
 @pytest.mark.covering
 @pytest.mark.parametrize("controller", ["fanuc-30i", "heidenhain-tnc640", "haas-ngc"])
-@pytest.mark.parametrize(("sample", "machine"), [("five_faces.cls", "trunnion-bc"), ("joints/singular_pass.cls", "head-table")])
+@pytest.mark.parametrize(("sample", "machine"), [
+    ("five_faces.cls", "trunnion-bc"), ("joints/singular_pass.cls", "head-table")])
 def test_auto_converts_what_another_mode_converts(sample: str, machine: str, controller: str) -> None:
     path, setup = read(sample), SAMPLES / "tools.setup.toml"
     auto = postproc.convert(path, machine, controller, setup)

@@ -312,7 +312,8 @@ def test_blocks_that_come_nearer_to_the_end_are_the_moves_own() -> None:
 def test_blocks_that_turn_alone_on_the_way_to_the_end_are_the_moves_own() -> None:
     """Near a pole the rotary words go on by one decimal at a time; a standing tip differs in the last bits."""
     x = [5.0, 9.993, 9.993 - 1e-15, 9.993, 9.998, 10.0, 10.3]
-    tip, axis = np.array([[v, 0, 0] for v in x]), np.array([[0, np.sin(a), np.cos(a)] for a in [4e-4, 3e-4, 2e-4, 2e-4, 1e-4, 0, 0]])
+    turn = [4e-4, 3e-4, 2e-4, 2e-4, 1e-4, 0, 0]
+    tip, axis = np.array([[v, 0, 0] for v in x]), np.array([[0, np.sin(a), np.cos(a)] for a in turn])
     match, owner = align.align(tip, axis, np.full(7, np.nan), line_move(axis[-1]), np.array([False]), 0.01, 1e-3)
     assert match.tolist() == [5] and owner.tolist() == [0] * 6 + [1]
 
