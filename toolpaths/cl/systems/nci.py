@@ -137,7 +137,7 @@ class NciReader:
         self._no_cycle()
         for plane, first in self.frames.items():
             if max(abs(a - b) for a, b in zip(first, _UPRIGHT, strict=False)) > _SAME_PLACE:
-                self.log.error("cl.frame", f"5-axis moves under a turned plane (code {plane}): nothing documents in "
+                self.log.error("cl.frame", f"5-axis moves under a tilted work plane (code {plane}): nothing documents in "
                                "which system they stand", self.line, "write 5-axis moves in the top plane")
         axis = np.array(v[3:6]) - v[:3]
         length = float(np.linalg.norm(axis))
