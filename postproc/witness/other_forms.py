@@ -256,7 +256,7 @@ class StepNc(Saying):
         self.at: Array | None = None
         self.axis, self.before = np.array([0.0, 0.0, 1.0]), dict[str, Any]()
         self.say("UNITS", "MM")
-        self._plan(next(values[1] for name, values, _ in self.of.values() if name == "PROJECT"))
+        self._plan(next((values[1] for name, values, _ in self.of.values() if name == "PROJECT"), ""))
 
     def _kept(self, found: re.Match[str]) -> str:
         """A text by its number, without brackets and commas, its lines kept."""
@@ -353,7 +353,7 @@ class StepNc(Saying):
                 legs = _turned(legs) if same == ".F." else legs
                 whole += legs[1:] if whole else legs
             return whole
-        first, last = (self._numbers(next(w for w in ends if w.startswith("#"))) for ends in v[2:4])
+        first, last = (self._numbers(next((w for w in ends if w.startswith("#")), "")) for ends in v[2:4])
         basis, b, _ = self.of[v[1]]
         if basis == "LINE":
             return [(first, None, None), (last, None, None)]

@@ -46,6 +46,11 @@ def test_holes_begin_at_r_and_end_at_z() -> None:
         (11, "COOLNT", ("OFF",)), (11, "SPINDL", ("OFF",))]
 
 
+def test_comments_behind_a_semicolon_name_operations_too() -> None:
+    p = read_bytes("\n".join(f";{line}" if line.startswith("(") else line for line in PLATE.split("\n"))).toolpath
+    assert [op.name for op in p.operations] == [op.name for op in plate().toolpath.operations]
+
+
 def test_inches_of_a_post_are_inches() -> None:
     p = read_bytes(PLATE.replace("G21", "G20")).toolpath
     assert p.units == "inch" and p.tip[0, 0] == 254 and p.feed[2] * 60 == pytest.approx(120 * 25.4)

@@ -63,8 +63,9 @@ class FreeCadReader:
 
     def _say(self, raw: str) -> None:
         for one, other in _COMMENT.findall(raw):
-            begins = _BEGIN.match(one.strip())
-            self.out.say(self.line, "OPNAME" if begins else "REMARK", begins[1] if begins else one or other)
+            text = (one or other).strip(" ()")
+            begins = _BEGIN.match(text)
+            self.out.say(self.line, "OPNAME" if begins else "REMARK", begins[1] if begins else text)
 
     def _line(self, words: list[tuple[str, float]]) -> None:
         values = {letter: value for letter, value in words if letter not in "GM"}

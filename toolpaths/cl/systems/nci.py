@@ -145,7 +145,11 @@ class NciReader:
             self.log.error("cl.axis", "the tool axis of code 11 has no length", self.line,
                            "have Mastercam write the file again")
             return
-        self._flags(v[8] if len(v) > 8 else 0.0)
+        flags = v[8] if len(v) > 8 else 0.0
+        if max(int(flags) // 100 % 10, int(flags) // 1000 % 10) > 1:
+            self.log.error("cl.form", f"flags {flags:g}: cutter compensation of 5-axis moves is not carried out", self.line,
+                           "have Mastercam compensate (compensation in the computer)")
+        self._flags(flags)
         self._feed(v[6], code)
         self.at = tuple(v[:3])
         self.out.point(self.line, self.at, (axis / length).tolist())

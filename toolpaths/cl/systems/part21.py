@@ -49,11 +49,15 @@ def instances(text: str) -> dict[int, Instance]:
     Raises:
         ValueError: says the line that is no instance.
     """
-    found, line, item, begun = dict[int, Instance](), 1, list[str](), 0
+    found, line, item, begun, at = dict[int, Instance](), 1, list[str](), 0, 0
     for match in _TOKEN.finditer(text):
-        token = match[0]
+        token, gap, at = match[0], text[at:match.start()], match.end()
+        if gap.strip():
+            raise ValueError(f"line {line}: {gap.strip()[:20]!r} is no part of an instance")
         if token == ";":
-            if len(item) > 2 and item[1] == "=":
+            if "=" in item:
+                if item[1] != "=" or not item[0].startswith("#") or int(item[0][1:]) in found:
+                    raise ValueError(f"line {begun}: {' '.join(item)[:60]!r} is no instance, or one twice")
                 found[int(item[0][1:])] = _instance(item[2:], begun)
             item = []
         elif token != "\n" and not token.startswith("/*"):
@@ -72,7 +76,7 @@ def _instance(tokens: list[str], line: int) -> Instance:
         values, end = _values(tokens, 2, 0)
     except (IndexError, ValueError) as fault:
         raise ValueError(f"line {line}: {' '.join(tokens)[:60]!r} is no instance") from fault
-    if tokens[1] != "(" or end != len(tokens):
+    if "-" in tokens[0] or tokens[1] != "(" or end != len(tokens):
         raise ValueError(f"line {line}: {' '.join(tokens)[:60]!r} is no instance")
     return Instance(tokens[0].upper(), values, line)
 
@@ -83,13 +87,15 @@ def _values(tokens: list[str], at: int, deep: int) -> tuple[tuple[Value, ...], i
         raise ValueError("too many brackets")
     found: list[Value] = []
     while tokens[at] != ")":
+        if found:
+            if tokens[at] != ",":
+                raise ValueError("a comma is missing")
+            at += 1
         token, at = tokens[at], at + 1
-        if token == ",":
-            continue
         if token == "(":
             inner, at = _values(tokens, at, deep + 1)
             found.append(inner)
-        elif tokens[at] == "(":
+        elif tokens[at] == "(" and token[0].isalpha():
             inner, at = _values(tokens, at + 1, deep + 1)
             found.append(Typed(token.upper(), inner))
         else:
@@ -98,7 +104,7 @@ def _values(tokens: list[str], at: int, deep: int) -> tuple[tuple[Value, ...], i
 
 
 def _value(token: str) -> Value:
-    if token in "$*":
+    if token in ("$", "*"):
         return None
     if token[0] == "#":
         return Reference(int(token[1:]))

@@ -14,6 +14,8 @@ from toolpaths.cl.text.scan import Points
 from toolpaths.cl.text.source import text_of
 from toolpaths.cl.text.statements import StatementList
 
+FORMS: tuple[DialectName, ...] = ("nci", "freecad", "step-nc")
+"""dialects that are no APT text"""
 _HEAD = 20_000
 """bytes that are looked at"""
 _NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -52,7 +54,7 @@ def read_form(plain: bytes, given: DialectName | None, log: DiagnosticLog) -> Fo
         given: the dialect that was asked for
     """
     found = recognised(plain) if given is None else (given, "given")
-    if found is None or found[0] not in ("nci", "freecad", "step-nc"):
+    if found is None or found[0] not in FORMS:
         return None
     text = text_of(plain)
     if found[0] == "nci":

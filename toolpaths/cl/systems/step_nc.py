@@ -120,7 +120,7 @@ class StepNcReader:
         if operation.value(9) is not None or operation.value(10) is not None:
             raise Unread("strategies of approach and retract are not carried out", operation.line)
         axis = self._tool_axis(operation.value(1), operation)
-        self._tool(self._of(operation.value(5), operation))
+        self._tool(self._of(operation.value(5), operation, "MILLING_CUTTING_TOOL"))
         first = True
         paths = self._of(operation.value(0), operation, "TOOLPATH_LIST")
         for path in self._listed(paths.value(0), paths):
