@@ -44,6 +44,28 @@ class PivotSheet(UserModel):
     """by the control's name: "MRZP", "I2", "Trans 1", "19700"; with form "machine" by letter of the axis"""
 
 
+class TouchReading(UserModel):
+    """One reading: where the rotary axes stood, and what the control showed."""
+
+    A: float = 0.0
+    """degrees"""
+    B: float = 0.0
+    """degrees"""
+    C: float = 0.0
+    """degrees"""
+    at: Vector
+    """machine coordinates X, Y, Z of the gauge point, mm"""
+
+
+class TouchedSheet(UserModel):
+    """The `[touched]` table: one ball on the table, touched by a probe with the rotary axes turned differently."""
+
+    probe_length: float = Field(ge=0.0)
+    """mm from the gauge point to the middle of the probe's ball"""
+    readings: tuple[TouchReading, ...] = Field(min_length=2)
+    """each rotary axis is turned in one of them at least"""
+
+
 class TimingSheet(UserModel):
     """The `[times]` table."""
 
@@ -82,6 +104,8 @@ class DataSheet(UserModel):
     """axis C"""
     pivots: PivotSheet | None = None
     """where the rotary axes lie"""
+    touched: TouchedSheet | None = None
+    """readings that prove pivots and signs: by them one point of the table must stay one point"""
     times: TimingSheet = TimingSheet()
     """times that no axis gives"""
 

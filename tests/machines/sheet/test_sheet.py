@@ -231,3 +231,34 @@ def test_the_sheet_of_the_readme_is_one(tmp_path: Path) -> None:
     page = (Path(machines.__file__).parent / "sheet" / "README.md").read_text("utf-8")
     text = page.split("```toml\n")[1].split("```")[0]
     assert tomllib.loads(text) and made(tmp_path, text).machine is not None
+
+
+def readings_of(machine: Machine, length: float = 150.0) -> str:
+    """A ball that stands on the table, as the control shows it in four poses, with its digits."""
+    kin = machine.kinematics.with_tool(length)
+    ball = np.array([[-300.0, -200.0, -450.0]])
+    lines = []
+    for b, c in ((0, 0), (60, 0), (0, 90), (30, -120)):
+        q = np.array([[0.0, 0.0, 0.0, np.radians(b), np.radians(c)]])
+        for _ in range(3):  # slides are straight: the place where the tip meets the ball
+            tip, _ = kin.forward(q)
+            jacobian = kin.jacobian(q)[0, :3, :3]
+            q[0, :3] += np.linalg.solve(jacobian, (ball - tip)[0])
+        lines.append(f"{{ B = {b}, C = {c}, at = [{', '.join(f'{v:.3f}' for v in q[0, :3])}] }}")
+    return f"\n[touched]\nprobe_length = {length}\nreadings = [{', '.join(lines)}]\n"
+
+
+def test_readings_of_one_ball_find_a_wrong_sign_that_no_rule_sees(tmp_path: Path) -> None:
+    """Signs of a second pivot 0.4 and 0.8 mm beside the first, an axis that counts against its jog."""
+    text = TRUNNION.replace("[-381.05, -254.11, -500.2]", "[-381.05, -254.11, -557.6]").replace('"haas"', '"fanuc"').replace(
+        '"MRZP"', '"19700"').replace('"MRZP second" = [-381.05, -254.11, -557.6]', '"19703" = [-0.4, 0.8, 0]')
+    touched = readings_of(machine_of(tmp_path, text))
+    assert made(tmp_path, text + touched).diagnostics == []
+    for old, new, says in (("0.8, 0]", "-0.8, 0]", "Y of 19703 0.8"), ("[-0.4", "[0.4", "X of 19703 -0.4"),
+                           ("anti-clockwise", "clockwise", "jog = 'anti-clockwise' under [C]")):
+        slip = text.replace(old, new, 1)
+        assert made(tmp_path, slip).diagnostics == [], "plausible by itself"
+        [fault] = made(tmp_path, slip + touched).diagnostics
+        assert fault.code == "sheet.figure" and says in fault.hint and "one point" in fault.message and fault.lines
+    [fault] = made(tmp_path, text + touched.replace("C = 90", "C = 0").replace("C = -120", "C = 0")).diagnostics
+    assert "no reading turns C" in fault.message
