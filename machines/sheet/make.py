@@ -12,6 +12,7 @@ from machines.machine import Machine
 from machines.sheet.file_text import FileValue, machine_text, nested
 from machines.sheet.jog import sense
 from machines.sheet.model import AxisSheet, DataSheet
+from machines.sheet.pivot_text import read_pivots
 from machines.sheet.pivots import points_of
 from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
 from machines.sheet.touched import AGREE, apart_by, wrong_sign
@@ -230,8 +231,13 @@ def _points(making: _Making, sheet: DataSheet) -> dict[str, list[float]]:
         making.fault(("table",), f"where {' and '.join(sheet.rotary)} lie is not stated",
                      'add [pivots] form = "haas", "siemens", "heidenhain", "fanuc" or "machine", and its numbers')
         return {}
+    read, unread = read_pivots(sheet.pivots.form, sheet.pivots.text) if sheet.pivots.text else ({}, [])
+    for one in unread:
+        making.fault(("pivots", "text"), f"[pivots] text: {one}", "as the control puts it out, with decimal points")
+    if unread:
+        return {}
     try:
-        points, wrong = points_of(sheet.pivots.form, sheet.table, sheet.head, sheet.pivots.points)
+        points, wrong = points_of(sheet.pivots.form, sheet.table, sheet.head, {**read, **sheet.pivots.points})
     except WrongFigureError as fault:
         making.fault(("pivots", "form"), fault.says, fault.hint)
         return {}

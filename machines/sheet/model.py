@@ -42,6 +42,8 @@ class PivotSheet(UserModel):
     L52), machine (points of the lines themselves)"""
     points: dict[str, Vector] = Field(default_factory=dict)
     """by the control's name: "MRZP", "I2", "Trans 1", "19700"; with form "machine" by letter of the axis"""
+    text: str = ""
+    """the same as the control puts it out: fanuc, blocks of G10 L52 or the list of parameters; siemens, lines of $TC_CARR"""
 
 
 class TouchReading(UserModel):

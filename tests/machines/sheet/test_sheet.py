@@ -262,3 +262,18 @@ def test_readings_of_one_ball_find_a_wrong_sign_that_no_rule_sees(tmp_path: Path
         assert fault.code == "sheet.figure" and says in fault.hint and "one point" in fault.message and fault.lines
     [fault] = made(tmp_path, text + touched.replace("C = 90", "C = 0").replace("C = -120", "C = 0")).diagnostics
     assert "no reading turns C" in fault.message
+
+
+G10 = "G10 L52\nN19700 R-381.02\nN19701 P1 R-254.11\nN19702Q1L1P-558.4\nN19680 R2\n{c}N19704 R0.0\nG11"
+CARR = "$TC_CARR4[1]=-381.02\n$TC_CARR5[1]=-254.11\nN5 $TC_CARR6[1]=-558.4\n$TC_CARR15[1]=-0.03\n$TC_CARR23[1]=\"P\""
+
+
+def test_pivots_as_a_control_puts_them_out(tmp_path: Path) -> None:
+    points = 'points = { "MRZP" = [-381.02, -254.11, -558.4], "MRZP second" = [-381.05, -254.11, -500.2] }'
+    for form, text in (("fanuc", G10.format(c="N19703 R-0.03\n")), ("siemens", CARR)):
+        sheet = TRUNNION.replace('"haas"', f'"{form}"').replace(points, f"text = \'\'\'\n{text}\n\'\'\'")
+        chain = {joint.name: joint.point for joint in machine_of(tmp_path, sheet).kinematics.chain}
+        np.testing.assert_allclose([chain["B"], chain["C"]], [[-381.02, -254.11, -558.4], [-381.05, -254.11, -558.4]])
+    [fault] = made(tmp_path, TRUNNION.replace('"haas"', '"fanuc"').replace(
+        points, f"text = \'\'\'\n{G10.format(c='N19703 R-30')}\n\'\'\'")).diagnostics
+    assert "decimal point" in fault.message and "N19703" in fault.message
