@@ -19,6 +19,7 @@ READERS = {
 FILES = {
     "toolpaths.interrupted_runs": "names of temporary files", "toolpaths.shapes": "tables of shapes",
     "machines.toml_lines": "lines of TOML files", "machines.value_words": "values in TOML files",
+    "machines.sheet.pivot_text": "pivot numbers as controls put them out",
     "machines.sheet.quantity": "figures of data sheets with their units",
     "machines.hooks": "blocks of the shop in machine files and set-ups",
     "machines.serial_models": "structures of machines (ISO 10791-6)",

@@ -12,8 +12,10 @@ from machines.machine import Machine
 from machines.sheet.file_text import FileValue, machine_text, nested
 from machines.sheet.jog import sense
 from machines.sheet.model import AxisSheet, DataSheet
+from machines.sheet.pivot_text import read_pivots
 from machines.sheet.pivots import points_of
 from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
+from machines.sheet.touched import AGREE, apart_by, wrong_sign
 from machines.toml_lines import KeyPath
 from machines.user_file import UserFile, ValueSource, read_toml, validate
 from toolpaths.diagnostics import Diagnostic, has_errors
@@ -97,6 +99,27 @@ def new_machine(source: str | Path, name: str = "") -> NewMachine:
     sheet, more = validate(file, DataSheet) if file is not None else (None, [])
     if file is None or sheet is None:
         return NewMachine(None, "", [*found, *more])
+    made = _made(file, sheet, name)
+    return made if made.machine is None else _compared(made, file, sheet)
+
+
+def _compared(made: NewMachine, file: UserFile, sheet: DataSheet) -> NewMachine:
+    """The machine, where the readings of [touched] are of one point by it; else what would make them so."""
+    if sheet.touched is None or made.machine is None:
+        return made
+    letters = [letter for letter in sheet.rotary if len({getattr(one, letter) for one in sheet.touched.readings}) == 1]
+    apart = apart_by(made.machine, sheet.touched)
+    if not letters and apart <= AGREE:
+        return made
+    said = f"[touched]: no reading turns {' and '.join(letters)}" if letters else (
+        f"[touched]: the readings are of one point, and by pivots and signs of the sheet they are {apart:.3f} mm apart")
+    hint = "add a reading in which it stands elsewhere" if letters else wrong_sign(
+        sheet, lambda other: _made(file, other, "").machine)
+    return NewMachine(None, "", [*made.diagnostics, file.problem("sheet.figure", ("touched",), said, hint)])
+
+
+def _made(file: UserFile, sheet: DataSheet, name: str) -> NewMachine:
+    """The machine of a sheet, its readings aside."""
     making = _Making(file)
     _header(making, sheet)
     for letter, axis in sheet.axes.items():
@@ -110,7 +133,7 @@ def new_machine(source: str | Path, name: str = "") -> NewMachine:
     if model is None or has_errors(faults):
         return NewMachine(None, "", faults)
     machine = assemble(whole, model)
-    return NewMachine(machine, machine_text(making.figures, Path(source).name), [*faults, *as_warnings(whole, machine)])
+    return NewMachine(machine, machine_text(making.figures, Path(file.file).name), [*faults, *as_warnings(whole, machine)])
 
 
 def _header(making: _Making, sheet: DataSheet) -> None:
@@ -208,8 +231,13 @@ def _points(making: _Making, sheet: DataSheet) -> dict[str, list[float]]:
         making.fault(("table",), f"where {' and '.join(sheet.rotary)} lie is not stated",
                      'add [pivots] form = "haas", "siemens", "heidenhain", "fanuc" or "machine", and its numbers')
         return {}
+    read, unread = read_pivots(sheet.pivots.form, sheet.pivots.text) if sheet.pivots.text else ({}, [])
+    for one in unread:
+        making.fault(("pivots", "text"), f"[pivots] text: {one}", "as the control puts it out, with decimal points")
+    if unread:
+        return {}
     try:
-        points, wrong = points_of(sheet.pivots.form, sheet.table, sheet.head, sheet.pivots.points)
+        points, wrong = points_of(sheet.pivots.form, sheet.table, sheet.head, {**read, **sheet.pivots.points})
     except WrongFigureError as fault:
         making.fault(("pivots", "form"), fault.says, fault.hint)
         return {}

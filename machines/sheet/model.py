@@ -42,6 +42,30 @@ class PivotSheet(UserModel):
     L52), machine (points of the lines themselves)"""
     points: dict[str, Vector] = Field(default_factory=dict)
     """by the control's name: "MRZP", "I2", "Trans 1", "19700"; with form "machine" by letter of the axis"""
+    text: str = ""
+    """the same as the control puts it out: fanuc, blocks of G10 L52 or the list of parameters; siemens, lines of $TC_CARR"""
+
+
+class TouchReading(UserModel):
+    """One reading: where the rotary axes stood, and what the control showed."""
+
+    A: float = 0.0
+    """degrees"""
+    B: float = 0.0
+    """degrees"""
+    C: float = 0.0
+    """degrees"""
+    at: Vector
+    """machine coordinates X, Y, Z of the gauge point, mm"""
+
+
+class TouchedSheet(UserModel):
+    """The `[touched]` table: one ball on the table, touched by a probe with the rotary axes turned differently."""
+
+    probe_length: float = Field(ge=0.0)
+    """mm from the gauge point to the middle of the probe's ball"""
+    readings: tuple[TouchReading, ...] = Field(min_length=2)
+    """each rotary axis is turned in one of them at least"""
 
 
 class TimingSheet(UserModel):
@@ -82,6 +106,8 @@ class DataSheet(UserModel):
     """axis C"""
     pivots: PivotSheet | None = None
     """where the rotary axes lie"""
+    touched: TouchedSheet | None = None
+    """readings that prove pivots and signs: by them one point of the table must stay one point"""
     times: TimingSheet = TimingSheet()
     """times that no axis gives"""
 

@@ -26,7 +26,8 @@ ALIKE = 4
 """diagnostics of one code and one remedy up to which each is shown"""
 PLACED = frozenset({"travel.exceeded", "reach.axis", "reach.position", "link.blocked", "path.jump"})
 """codes whose remedy is that of `place.found`, where that is said"""
-FOLLOWS = {"cl.no-feed": ("feed.missing",), "setup.tool_unused": ("tool.number",), "place.found": ("path.odd_record",),
+FOLLOWS = {"cl.no-feed": ("feed.missing", "cl.feed"), "cl.no-units": ("cl.empty",), "cl.rapid-below": ("cl.cycle-depth",),
+           "setup.tool_unused": ("tool.number",), "place.found": ("path.odd_record",),
            "joints.chosen": ("travel.exceeded", "reach.axis", "path.odd_record"),
            **dict.fromkeys(PLACED, ("path.odd_record",))}
 """by code: its causes; where one of them is said, people read that alone"""

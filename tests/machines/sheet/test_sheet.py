@@ -231,3 +231,49 @@ def test_the_sheet_of_the_readme_is_one(tmp_path: Path) -> None:
     page = (Path(machines.__file__).parent / "sheet" / "README.md").read_text("utf-8")
     text = page.split("```toml\n")[1].split("```")[0]
     assert tomllib.loads(text) and made(tmp_path, text).machine is not None
+
+
+def readings_of(machine: Machine, length: float = 150.0) -> str:
+    """A ball that stands on the table, as the control shows it in four poses, with its digits."""
+    kin = machine.kinematics.with_tool(length)
+    ball = np.array([[-300.0, -200.0, -450.0]])
+    lines = []
+    for b, c in ((0, 0), (60, 0), (0, 90), (30, -120)):
+        q = np.array([[0.0, 0.0, 0.0, np.radians(b), np.radians(c)]])
+        for _ in range(3):  # slides are straight: the place where the tip meets the ball
+            tip, _ = kin.forward(q)
+            jacobian = kin.jacobian(q)[0, :3, :3]
+            q[0, :3] += np.linalg.solve(jacobian, (ball - tip)[0])
+        lines.append(f"{{ B = {b}, C = {c}, at = [{', '.join(f'{v:.3f}' for v in q[0, :3])}] }}")
+    return f"\n[touched]\nprobe_length = {length}\nreadings = [{', '.join(lines)}]\n"
+
+
+def test_readings_of_one_ball_find_a_wrong_sign_that_no_rule_sees(tmp_path: Path) -> None:
+    """Signs of a second pivot 0.4 and 0.8 mm beside the first, an axis that counts against its jog."""
+    text = TRUNNION.replace("[-381.05, -254.11, -500.2]", "[-381.05, -254.11, -557.6]").replace('"haas"', '"fanuc"').replace(
+        '"MRZP"', '"19700"').replace('"MRZP second" = [-381.05, -254.11, -557.6]', '"19703" = [-0.4, 0.8, 0]')
+    touched = readings_of(machine_of(tmp_path, text))
+    assert made(tmp_path, text + touched).diagnostics == []
+    for old, new, says in (("0.8, 0]", "-0.8, 0]", "Y of 19703 0.8"), ("[-0.4", "[0.4", "X of 19703 -0.4"),
+                           ("anti-clockwise", "clockwise", "jog = 'anti-clockwise' under [C]")):
+        slip = text.replace(old, new, 1)
+        assert made(tmp_path, slip).diagnostics == [], "plausible by itself"
+        [fault] = made(tmp_path, slip + touched).diagnostics
+        assert fault.code == "sheet.figure" and says in fault.hint and "one point" in fault.message and fault.lines
+    [fault] = made(tmp_path, text + touched.replace("C = 90", "C = 0").replace("C = -120", "C = 0")).diagnostics
+    assert "no reading turns C" in fault.message
+
+
+G10 = "G10 L52\nN19700 R-381.02\nN19701 P1 R-254.11\nN19702Q1L1P-558.4\nN19680 R2\n{c}N19704 R0.0\nG11"
+CARR = "$TC_CARR4[1]=-381.02\n$TC_CARR5[1]=-254.11\nN5 $TC_CARR6[1]=-558.4\n$TC_CARR15[1]=-0.03\n$TC_CARR23[1]=\"P\""
+
+
+def test_pivots_as_a_control_puts_them_out(tmp_path: Path) -> None:
+    points = 'points = { "MRZP" = [-381.02, -254.11, -558.4], "MRZP second" = [-381.05, -254.11, -500.2] }'
+    for form, text in (("fanuc", G10.format(c="N19703 R-0.03\n")), ("siemens", CARR)):
+        sheet = TRUNNION.replace('"haas"', f'"{form}"').replace(points, f"text = \'\'\'\n{text}\n\'\'\'")
+        chain = {joint.name: joint.point for joint in machine_of(tmp_path, sheet).kinematics.chain}
+        np.testing.assert_allclose([chain["B"], chain["C"]], [[-381.02, -254.11, -558.4], [-381.05, -254.11, -558.4]])
+    [fault] = made(tmp_path, TRUNNION.replace('"haas"', '"fanuc"').replace(
+        points, f"text = \'\'\'\n{G10.format(c='N19703 R-30')}\n\'\'\'")).diagnostics
+    assert "decimal point" in fault.message and "N19703" in fault.message

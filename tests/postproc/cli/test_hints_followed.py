@@ -76,3 +76,36 @@ def test_g_code_in_the_place_of_a_cl_file_is_named(tmp_path: Path) -> None:
         got = run(*words)
         assert got.exit_code == 1 and got.stderr.count("error [") == 1 and "this is G-code" in got.stderr, got.stderr
     assert toolpaths.read_bytes(b"UNITS/MM\nGOTO/1,2,3\n", file="x")[0].file == "x"
+
+
+SQUARE = ["RAPID", "GOTO/0,0,5", "GOTO/0,0,0", "GOTO/40,0,0", "GOTO/40,30,0", "GOTO/0,30,0", "GOTO/0,0,0", "RAPID",
+          "GOTO/0,0,5"]
+CAUSES = {"4000 for 40": ("GOTO/40,30", "GOTO/4000,30", "path.odd_record"),
+          "no feed": ("FEDRAT/MMPM,600", "", "feed.missing"),
+          "feed 0": ("MMPM,600", "MMPM,0", "cl.feed"), "no tool": ("LOADTL/1", "", "tool.number"),
+          "a turned axis": ("GOTO/40,30,0", "GOTO/40,30,0,0.6,0,-0.8", "path.odd_record"),
+          "fast": ("RPM,1000", "RPM,90000", "spindle.too_fast")}
+
+
+@pytest.mark.parametrize("what", CAUSES)
+def test_one_wrong_number_is_one_error(what: str, tmp_path: Path) -> None:
+    """What follows from it, and what nobody needs then, is in --json alone; the odd record is named with its line."""
+    old, new, code = CAUSES[what]
+    good = "\n".join([*START, *SQUARE, "FINI"]).replace("GOTO/0,0,0\nRAPID", "GOTO/0,0,0,0,0,1\nRAPID").replace(
+        "GOTO/0,30,0", "GOTO/0,30,0,0,0,1")
+    (tmp_path / "m.toml").write_text('base = "mikron-ucp710"\n[control]\nlargest_speed = 12000\n')
+    (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 120.0\n")
+    (tmp_path / "p.apt").write_text(good.replace(old, new))
+    got = run("convert", tmp_path / "p.apt", "-m", tmp_path / "m.toml", "-c", "linuxcnc", "-o", tmp_path / "p.ngc",
+              "--setup", tmp_path / "s.toml")
+    codes = re.findall(r"(?:error|warning|info) \[(\S+)\]", got.stderr)
+    assert got.exit_code == 1 and codes[0] == code and set(codes) <= {code, "setup.offered"}, got.stderr
+    line = next(k for k, text in enumerate(good.replace(old, new).splitlines(), 1) if new and new in text) if new else 0
+    assert code != "path.odd_record" or f"p.apt:{line}:" in got.stderr
+
+
+def test_a_file_that_is_far_larger_than_the_machine_has_no_odd_record(tmp_path: Path) -> None:
+    (tmp_path / "p.apt").write_text("\n".join([*START, *SQUARE, "FINI"]).replace("UNITS/MM", "UNITS/INCHES"))
+    got = run("convert", tmp_path / "p.apt", "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.ngc")
+    assert "odd_record" not in got.stderr and "travel.exceeded" in got.stderr
+    assert got.stderr.count("[part]") + got.stderr.count("more travel") == 1, "one remedy"
