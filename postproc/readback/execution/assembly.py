@@ -45,8 +45,8 @@ def ends(kin: Kinematics, q: Floats, home: Floats) -> Floats:
 def walk(kin: Kinematics, q0: Floats, q1: Floats, pose: Floats) -> Floats:
     """Pose (N, 6) at joints q1 (N, J), reached straight in the joints from q0 where it is `pose` (N, 6).
 
-    The rotary axes are outside the closed loops: no turn changes the mode, so that the steps are those of the
-    slides. Where a block leaves what the machine can reach the walk ends, NaN; so does one longer than any
+    Rotary axes outside the closed loops change no mode with their turns, so that the steps are those of slides and
+    cranks. Where a block leaves what the machine can reach the walk ends, NaN; so does one longer than any
     machine (LONGEST).
     """
     result, at = np.array(pose), np.array(q0)
@@ -63,8 +63,9 @@ def walk(kin: Kinematics, q0: Floats, q1: Floats, pose: Floats) -> Floats:
 
 
 def steps(kin: Kinematics, q0: Floats, q1: Floats, turn: float = ROTARY_STEP) -> Ints:
-    """(N,) steps of at most LINEAR_STEP mm and `turn` rad in which blocks are walked, 1 at least."""
-    longest = np.where(kin.rotary, turn, LINEAR_STEP)
+    """(N,) steps of at most LINEAR_STEP mm, ROTARY_STEP of cranks and `turn` rad of other rotary axes in which blocks are
+    walked, 1 at least."""
+    longest = np.where(kin.rotary, np.where(kin.drives_tip, ROTARY_STEP, turn), LINEAR_STEP)
     size = np.nan_to_num((np.abs(q1 - q0) / longest).max(axis=1, initial=0.0))
     return np.asarray(np.clip(np.ceil(size), 1, 1e15), dtype=np.int64)
 

@@ -18,6 +18,7 @@ from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from machines.loader import load_checked
+from postproc.readback.execution.assembly import steps
 from tests.machines.random_slides import poses_over_workspace, random_slides
 from toolpaths.arrays import Floats
 from toolpaths.rotations import rotation
@@ -108,6 +109,14 @@ def test_every_choice_of_roots_is_a_pose_of_the_machine() -> None:
         _, rods = kin.loops.matrix_at(tip - turn @ kin.gauge, turn, branch)
         np.testing.assert_allclose(np.linalg.norm(rods, axis=2), kin.legs.spans(branch), rtol=0, atol=1e-9)
     assert len({tuple(row) for row in np.sign(q[:, 0] - q[:, 0].mean(axis=0))}) == 64
+
+
+def test_cranks_turn_the_platform_so_their_blocks_are_walked_in_small_steps() -> None:
+    """Another mode cannot be mistaken for the one before: 3 degrees a step, of a table under the part none."""
+    one = np.radians([[0.0, 30.0, 0.0]])
+    assert steps(legs("planar-delta-z"), 0.0 * one, one, np.inf).tolist() == [10]
+    table = machines.load("h4a-c-table").kinematics
+    assert steps(table, np.zeros((1, 5)), np.array([[0.0, 0.0, 0.0, 0.0, 3.0]]), np.inf).tolist() == [1]
 
 
 BASE = {"hexapod": 'base = "hexapod"\n', "delta": """description = "own"
