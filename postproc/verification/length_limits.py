@@ -39,9 +39,9 @@ SHARE = 0.997
 """of a length that was found, which is then proved; of the proved one, which is stated: not on the edge"""
 NEAR = 1.02
 """of a length that is proved to one that is not, which is near enough"""
-FIRST = 0.02
-"""by how much less is tried where that is not proved"""
-_ROUNDS, _CLOSE, _PROOFS = 60, 1e-5, 12
+TRIED = (1.0, 0.98, 0.9653, 0.9506, 0.9359, 0.9212, *(0.9212 * 0.82 * 0.5**k for k in range(8)))
+"""of a length that was found, tried in this order until one is proved: from the third to the sixth it is near enough then"""
+_ROUNDS, _CLOSE = 60, 1e-5
 _FEW, _FARTHER = 16, 4.0
 _SIGNS = -1.0, 1.0
 
@@ -335,20 +335,19 @@ class _Look:
 def _prove(trial: LengthTrial, c: Comparison, ends: _Ends) -> None:
     """Lengths at which the bound of every cut keeps the tolerances: those that were found, else less.
 
-    `low` is proved, `high` is not: a little less first, as places lie near to each other, then half between.
+    `low` is proved, `high` is not: less and less first, as places lie near to each other, then half between.
     """
     for sign, direction in enumerate(_SIGNS):
         by_place = np.array([what[sign].endswith("tolerance") for what in ends.what])
         found = np.where(by_place, SHARE, 1.0) * ends.mm[:, sign]
-        low, high, next_, less = np.zeros(len(found)), np.array(found), np.array(found), FIRST
-        for _ in range(_PROOFS):
+        low, high, next_ = np.zeros(len(found)), np.array(found), np.array(found)
+        for share in TRIED[1:]:
             k = np.flatnonzero((high > low) & (high > NEAR * low))
             if not len(k):
                 break
             kept = _keeps(trial, c, ends.numbers[k], direction * next_[k])
             low[k[kept]], high[k[~kept]] = next_[k[kept]], next_[k[~kept]]
-            next_ = high - (high - low) * np.where(low > 0.0, 0.5, less)
-            less = min(3.0 * less, 0.5)
+            next_ = np.where(low > 0.0, 0.5 * (low + high), share * found)
         short = low < found
         for t in np.flatnonzero(short).tolist():
             ends.what[t][sign] = "tolerance"
