@@ -10,8 +10,8 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import Field
 
 from machines.key_problem import KeyProblem
-from machines.toml_lines import KeyPath
-from machines.user_file import UserFile, UserModel, Values
+from machines.toml_lines import KeyPath, Values
+from machines.user_file import UserFile, UserModel
 
 K = TypeVar("K", bound=str)
 ASSUMED, SOURCE = "assumed", "source"

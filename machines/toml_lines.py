@@ -1,19 +1,42 @@
-"""Where each key of a TOML text stands: the line numbers that the standard parser does not keep.
+"""Values of a TOML text and where each key stands: the line numbers that the standard parser does not keep.
 
-Only for texts that `tomllib` has accepted, so the scanner need not check anything.
+The scanner only sees texts that `tomllib` has accepted, so it need not check anything.
 """
 
 from __future__ import annotations
 
 import re
+import tomllib
+from functools import lru_cache
+from typing import Any
 
+Values = dict[str, Any]
 KeyPath = tuple[str | int, ...]
 """keys and array indices from the root, as pydantic's error locations"""
 
+SHORT, KEPT = 50_000, 64
+"""characters and number of texts that are kept: built-in files and set-ups, which one process reads over and over; long
+tables of errors are not"""
 _BLANK = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _KEY_PART = re.compile(r"""[ \t]*(?:"((?:[^"\\]|\\.)*)"|'([^']*)'|([A-Za-z0-9_-]+))[ \t]*""")
 _STRING = re.compile(r'"{3}(?:[^\\]|\\.)*?"{3,5}|\'{3}.*?\'{3,5}|"(?:[^"\\]|\\.)*"|\'[^\']*\'', re.DOTALL)
 _SCALAR = re.compile(r"[^,\]}\n#]+")
+
+
+def parsed(text: str) -> tuple[Values, dict[KeyPath, int]]:
+    """Values of a TOML text and the line of each; whoever changes them takes a copy.
+
+    Raises:
+        tomllib.TOMLDecodeError: where it is none.
+    """
+    return (_kept if len(text) < SHORT else _parsed)(text)
+
+
+def _parsed(text: str) -> tuple[Values, dict[KeyPath, int]]:
+    return tomllib.loads(text), key_lines(text)
+
+
+_kept = lru_cache(maxsize=KEPT)(_parsed)
 
 
 def key_lines(text: str) -> dict[KeyPath, int]:

@@ -19,13 +19,11 @@ from typing import Any, TypeVar, Union, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from machines.toml_lines import KeyPath, key_lines
+from machines.toml_lines import KEPT, SHORT, KeyPath, Values, parsed
 from machines.value_words import POINT, advice, allowed, decimal_comma
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import advice as remedy
 from toolpaths.input_files import place, read_input, reason, shown
-
-Values = dict[str, Any]
 
 
 class UserModel(BaseModel):
@@ -36,7 +34,6 @@ class UserModel(BaseModel):
 
 
 M = TypeVar("M", bound=BaseModel)
-_SHORT = 50_000
 _HOW = "write key = value, text in quotes, each [table] and each key on a line of its own"
 
 
@@ -117,14 +114,14 @@ def values_of(path: FilePath) -> Values:
     Raises:
         OSError, UnicodeDecodeError, tomllib.TOMLDecodeError: where it cannot be read.
     """
-    return _parsed_once(read_input(path).decode("utf-8-sig").replace("\r\n", "\n"))[0]
+    return parsed(read_input(path).decode("utf-8-sig").replace("\r\n", "\n"))[0]
 
 
 def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]]:
     """`file` as a `model`; None and one diagnostic per fault where it does not fit."""
     text = json.dumps(file.values, default=str)
     try:
-        return (_kept_model if len(text) < _SHORT else _model_of)(model, text), []
+        return (_kept_model if len(text) < SHORT else _model_of)(model, text), []
     except ValidationError as found:
         return None, [_diagnostic(file, model, fault) for fault in _faults(file.values, model, found)]
 
@@ -172,7 +169,7 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
         return None, [problem] if problem else []
     name = source if source in builtin else path.stem
     try:
-        values, lines = _parsed_once(text)
+        values, lines = parsed(text)
     except tomllib.TOMLDecodeError as fault:
         return None, [_syntax(fault, str(path), text)]
     except (ValueError, RecursionError) as fault:  # of Python's own: digits of a number, depth of lists
@@ -183,21 +180,11 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
     return _with_base(UserFile(name, str(path), deepcopy(values), origins), builtin, kind, (*above, key))
 
 
-def _parsed(text: str) -> tuple[Values, dict[KeyPath, int]]:
-    """Values of a TOML text and the line of each; whoever changes them takes a copy."""
-    return tomllib.loads(text), key_lines(text)
-
-
 def _model_of(model: type[M], text: str) -> M:
     return model.model_validate_json(text)
 
 
-_kept, _kept_model = lru_cache(maxsize=64)(_parsed), lru_cache(maxsize=64)(_model_of)
-"""of built-in files and set-ups, which one process reads over and over; long tables of errors are not kept"""
-
-
-def _parsed_once(text: str) -> tuple[Values, dict[KeyPath, int]]:
-    return (_kept if len(text) < _SHORT else _parsed)(text)
+_kept_model = lru_cache(maxsize=KEPT)(_model_of)
 
 
 def _resolve(source: str, builtin: Mapping[str, FilePath], wanted_by: UserFile | None) -> FilePath:

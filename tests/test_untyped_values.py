@@ -29,8 +29,8 @@ BORDERS = {
     "postproc/controllers/model.py": "keys of a pydantic model that is copied with others",
     "machines/__init__.py": SCHEMA, "machines/loader.py": SCHEMA, "machines/calibration/measurement_file.py": SCHEMA,
     "machines/geometric_error/files/loader.py": SCHEMA,
-    "machines/figures.py": TABLES, "machines/user_file.py": TABLES, "machines/exchange/draft.py": TABLES,
-    "machines/sheet/file_text.py": TABLES,
+    "machines/figures.py": TABLES, "machines/toml_lines.py": TABLES, "machines/user_file.py": TABLES,
+    "machines/exchange/draft.py": TABLES, "machines/sheet/file_text.py": TABLES,
     "machines/value_words.py": "what pydantic says of a fault",
     "machines/analysis/report.py": FIGURES, "machines/geometric_error/exchange/survey.py": FIGURES,
     "postproc/report/places.py": FIGURES,
@@ -86,7 +86,7 @@ ANYTHING = {
 MAPPINGS = {"dict", "Mapping", "MutableMapping"}
 NAMES = (["str"], ["tuple[str, ...]"])
 ALIASES = {"Values"}
-"""names that stand for such a dictionary (machines/user_file.py)"""
+"""names that stand for such a dictionary (machines/toml_lines.py)"""
 
 
 def files() -> dict[str, str]:

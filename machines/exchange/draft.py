@@ -11,7 +11,8 @@ from typing import Literal
 
 from machines.loader import assemble, check
 from machines.machine import Machine
-from machines.user_file import UserFile, Values, ValueSource
+from machines.toml_lines import Values
+from machines.user_file import UserFile, ValueSource
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.input_files import shown
 

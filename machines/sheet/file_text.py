@@ -6,8 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 
 from machines.figures import SOURCE
-from machines.toml_lines import KeyPath
-from machines.user_file import Values
+from machines.toml_lines import KeyPath, Values
 
 FileValue = float | int | str | list[float] | list[str]
 """what a new machine file holds under one key"""

@@ -163,10 +163,11 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         if has_errors(more):
             return replace(begun, diagnostics=tuple(found))
         job = replace(job, setup=with_measured(job.setup, measured))
-    comparison, more = read_back(data, job, path.file, progress, str(gcode), NeighbourFiles(gcode))
+    comparison, more = read_back(data, job, path.file, progress, str(gcode), NeighbourFiles(gcode),
+                                 margins=bool(begun.measured))
     if begun.measured:
         begun = replace(begun, measured=_with_allowed(begun.measured, comparison, has_errors(more), lambda: read_back(
-            data, replace(job, setup=at_gauge), path.file, progress, str(gcode), NeighbourFiles(gcode))))
+            data, replace(job, setup=at_gauge), path.file, progress, str(gcode), NeighbourFiles(gcode), margins=True)))
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more,
              *check_header(data, replace(job, setup=at_gauge), str(gcode))]
     said = None

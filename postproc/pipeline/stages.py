@@ -249,7 +249,7 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
     comparison, found = read_back(made.text, job, made.toolpath.file, progress,
                                   others={name: text.encode() for name, text in made.files.items()},
                                   of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.program,
-                                                                                      made.controller))
+                                                                                      made.controller), margins=True)
     found = [*found, *check_header(made.text, job, "")]
     if comparison is not None and made.motion is not None and not has_errors(found):
         found = [*found, *check_planned(made.path, made.moves, on_written(made.compensation, made.motion.needed),

@@ -24,11 +24,8 @@ _LATER_OF_TOOLS = (*TOOL_LIMITS, "compensation", "contour", "called")
 """likewise, of each tool"""
 
 
-@cache
-def _defaults() -> list[tuple[tuple[str, ...], object]]:
-    """The keys of `_LATER` with their defaults."""
-    values = SetupFile().model_dump(mode="json")
-    return [(path, value_at(values, path)) for path in _LATER]
+_defaults = cache(lambda: SetupFile().model_dump(mode="json"))
+"""of a set-up"""
 
 
 def fingerprint(setup: SetupFile, file: str) -> str:
@@ -37,8 +34,8 @@ def fingerprint(setup: SetupFile, file: str) -> str:
     Meshes count by what they hold, not by their names. `file` is that of the set-up, whose folder meshes are named from.
     """
     values = setup.model_dump(mode="json", exclude=_ASIDE)
-    for path, default in _defaults():
-        if value_at(values, path) == default:
+    for path in _LATER:
+        if value_at(values, path) == value_at(_defaults(), path):
             del value_at(values, path[:-1])[path[-1]]
     for tool in values["tools"].values():
         for name in _LATER_OF_TOOLS:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -39,9 +40,9 @@ SHARE = 0.997
 """of a length that was found, which is then proved; of the proved one, which is stated: not on the edge"""
 NEAR = 1.02
 """of a length that is proved to one that is not, which is near enough"""
-FIRST = 0.02
-"""by how much less is tried where that is not proved"""
-_ROUNDS, _CLOSE, _PROOFS = 60, 1e-5, 12
+TRIED = (1.0, 0.98, 0.9653, 0.9506, 0.9359, 0.9212, *(0.9212 * 0.82 * 0.5**k for k in range(8)))
+"""of a length that was found, tried in this order until one is proved: from the third to the sixth it is near enough then"""
+_ROUNDS, _CLOSE = 60, 1e-5
 _FEW, _FARTHER = 16, 4.0
 _SIGNS = -1.0, 1.0
 
@@ -217,7 +218,7 @@ class _Look:
     ends: _Ends
     matters: bool
 
-    @property
+    @cached_property
     def moves(self) -> Moves:
         """What the program is compared with."""
         return self.job.moves.without_pecks()
@@ -250,37 +251,48 @@ class _Look:
         for rows in self._rows():
             run_by = self.moves.run_by(self.c.owner[rows])
             cuts, links = rows[run_by], rows[~run_by]
-            for which, look in ((cuts, self._cut), (links[links > 0], self._link)):
-                for t in self.executed.times(self.motion, which) if len(which) else ():
-                    look(which, t, self._poses(which, t))
+            for which, look in ((cuts, self._cuts), (links[links > 0], self._links)):
+                if len(which):
+                    look(which)
 
-    def _cut(self, rows: Ints, t: float | Floats, places: _Places) -> None:
+    def _times(self, rows: Ints) -> list[float | Floats]:
+        """Fractions at which blocks are looked at; poses with longer tools are made at once too."""
+        times = self.executed.times(self.motion, rows)
+        self.longer.look_ahead(self.again, rows, times)
+        return times
+
+    def _cuts(self, rows: Ints) -> None:
         moves, tolerance = self.moves, self.job.options.tolerance
         curves = moves.curves(self.c.owner[rows])
         begin, share = place_on_moves(self.motion, self.executed, rows, self.c.owner, moves)
-        guess, tool = np.minimum(begin + t * share, 1.0), self._tool(rows)
+        tool = self._tool(rows)
         level = (moves.phase[self.c.owner[rows]] == Phase.POSITION) & (self.motion.code[rows] == 0) & (
             self.executed.bent(self.motion, rows) | self.job.corrects)
-        speed, turn = lengths(places.d_tip), lengths(places.d_axis)
+        for t in self._times(rows):
+            places, guess = self._poses(rows, t), np.minimum(begin + t * share, 1.0)
 
-        def left(k: Ints, x: Floats) -> Floats:
-            some, (tip, axis) = curves.take(k), places.at(k, x)
-            off, _, _ = some.deviation(tip, axis, guess[k], tolerance)
-            return np.asarray(tolerance - np.where(level[k], off_level(some, tip), off))
+            def left(k: Ints, x: Floats, places: _Places = places, guess: Floats = guess) -> Floats:
+                some, (tip, axis) = curves.take(k), places.at(k, x)
+                off, _, _ = some.deviation(tip, axis, guess[k], tolerance)
+                return np.asarray(tolerance - np.where(level[k], off_level(some, tip), off))
 
-        def left_of_axis(k: Ints, x: Floats) -> Floats:
-            return np.asarray(self.job.axis_tolerance - curves.take(k).deviation(*places.at(k, x), guess[k], tolerance)[1])
+            def left_of_axis(k: Ints, x: Floats, places: _Places = places, guess: Floats = guess) -> Floats:
+                off = curves.take(k).deviation(*places.at(k, x), guess[k], tolerance)[1]
+                return np.asarray(self.job.axis_tolerance - off)
 
-        self.ends.leave(tool, speed, left, "tolerance")
-        self.ends.leave(tool, turn, left_of_axis, "axis tolerance")
+            self.ends.leave(tool, lengths(places.d_tip), left, "tolerance")
+            self.ends.leave(tool, lengths(places.d_axis), left_of_axis, "axis tolerance")
 
-    def _link(self, rows: Ints, t: float | Floats, places: _Places) -> None:
-        near = self.job.options.tolerance + self.executed.corrected_between(self.motion, rows)
+    def _links(self, rows: Ints) -> None:
+        near, moves = self.job.options.tolerance + self.executed.corrected_between(self.motion, rows), self.moves
+        tool, owner = self._tool(rows), self.c.owner[rows]
+        for t in self._times(rows):
+            places = self._poses(rows, t)
 
-        def left(k: Ints, x: Floats) -> Floats:
-            return _room(self.job, self.moves, self.c.owner[rows[k]], *places.at(k, x), near[k])
+            def left(k: Ints, x: Floats, places: _Places = places) -> Floats:
+                return _room(self.job, moves, owner[k], *places.at(k, x), near[k])
 
-        self.ends.follow(self._tool(rows), lengths(places.d_tip), left, "clearance")
+            self.ends.follow(tool, lengths(places.d_tip), left, "clearance")
 
     def points(self) -> None:
         """Points of the CL file, which blocks must come to within the tolerance."""
@@ -304,7 +316,7 @@ class _Look:
         for first in range(0, len(self.motion), CHUNK):
             rows = np.arange(first, min(first + CHUNK, len(self.motion)))
             tool = self._tool(rows)
-            for t in self.executed.times(self.motion, rows):
+            for t in self._times(rows):
                 q, other = self.executed.joints(self.motion, rows, t), self.longer.joints(self.again, rows, t)
                 slope = (other - q) / STEP
                 for j in np.flatnonzero((np.abs(slope) > LEAST).any(axis=0)).tolist():
@@ -335,20 +347,19 @@ class _Look:
 def _prove(trial: LengthTrial, c: Comparison, ends: _Ends) -> None:
     """Lengths at which the bound of every cut keeps the tolerances: those that were found, else less.
 
-    `low` is proved, `high` is not: a little less first, as places lie near to each other, then half between.
+    `low` is proved, `high` is not: less and less first, as places lie near to each other, then half between.
     """
     for sign, direction in enumerate(_SIGNS):
         by_place = np.array([what[sign].endswith("tolerance") for what in ends.what])
         found = np.where(by_place, SHARE, 1.0) * ends.mm[:, sign]
-        low, high, next_, less = np.zeros(len(found)), np.array(found), np.array(found), FIRST
-        for _ in range(_PROOFS):
+        low, high, next_ = np.zeros(len(found)), np.array(found), np.array(found)
+        for share in TRIED[1:]:
             k = np.flatnonzero((high > low) & (high > NEAR * low))
             if not len(k):
                 break
             kept = _keeps(trial, c, ends.numbers[k], direction * next_[k])
             low[k[kept]], high[k[~kept]] = next_[k[kept]], next_[k[~kept]]
-            next_ = high - (high - low) * np.where(low > 0.0, 0.5, less)
-            less = min(3.0 * less, 0.5)
+            next_ = np.where(low > 0.0, 0.5 * (low + high), share * found)
         short = low < found
         for t in np.flatnonzero(short).tolist():
             ends.what[t][sign] = "tolerance"

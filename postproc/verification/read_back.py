@@ -19,7 +19,6 @@ from postproc.readback.comparison.clamps import check_clamps, check_index
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.hooks import check_hooks
-from postproc.readback.comparison.length_margins import LengthMargin
 from postproc.readback.comparison.options import check_options
 from postproc.readback.comparison.slow_moves import planned_feeds
 from postproc.readback.comparison.starts import check_end, check_start
@@ -78,13 +77,14 @@ def other_setup(data: bytes, options: Options, off: bool, gcode: str) -> list[Di
 
 def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None = None,
               gcode: str = "", others: Mapping[str, bytes] | None = None,
-              of_cl: Callable[[int], tuple[int, ...]] | None = None) -> tuple[Comparison | None, list[Diagnostic]]:
+              of_cl: Callable[[int], tuple[int, ...]] | None = None,
+              margins: bool = False) -> tuple[Comparison | None, list[Diagnostic]]:
     """Execute a program on the job's machine and compare its motion with the job's CL file.
 
     A text becomes bytes only where it is read, so that memory holds it once.
 
     `others`: files of its subprograms, by the names that the program calls them by; `of_cl`: the lines of the CL file that a
-    line of the program is written from, where that is known.
+    line of the program is written from, where that is known; `margins`: by how much tools may differ is looked for too.
     """
     give_back(len(job.moves))
     machine, control = job.machine, job.control
@@ -133,18 +133,15 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         noted = [*(_of_model(header, job.errors, gcode, has_errors(noted)) if header.corrected is not None else
                    _uncorrected(header, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
-    margins = _margins(motion, executed, LengthTrial(whole, offsets, job), comparison)
-    return replace(comparison, lengths=margins), [*diagnostics, *noted]
+    if margins and not has_errors([*comparison.diagnostics]):
+        trial = LengthTrial(whole, offsets, job)
+        comparison = replace(comparison, lengths=length_margins(trial, motion, executed, comparison))
+    return comparison, [*diagnostics, *noted]
 
 
 def _others(job: Job, reader: Reader) -> tuple[tuple[float, Control], ...]:
     """The control with the work offset of every further place, by the number of its register."""
     return tuple(zip(registers_of(job, reader)[1:], job.modes.others, strict=True))
-
-
-def _margins(motion: Motion, executed: BlockPoses, trial: LengthTrial, c: Comparison) -> tuple[LengthMargin, ...]:
-    """How much tools may differ from their gauge lengths; () where the program fails."""
-    return () if has_errors([*c.diagnostics]) else length_margins(trial, motion, executed, c)
 
 
 def _unmeasured(motion: Motion, executed: BlockPoses, job: Job, faults: Faults) -> list[Diagnostic]:

@@ -17,6 +17,7 @@ from tests.linuxcnc.simulator import Run
 from tests.linuxcnc.test_motion import EXACT_STOP, cutting, deviations, poses, simulated
 from tests.linuxcnc.test_outputs import check_feeds, check_motion, check_text
 from tests.linuxcnc.test_simulator import TIGHT
+from tests.postproc.kit import few_sides
 from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Kind
 
@@ -43,9 +44,8 @@ FINI
 
 
 def converted(sample: str, machine: str, setup_name: str, controller: str | Path = "linuxcnc") -> PostResult:
-    path, found = toolpaths.read(SAMPLES / sample)
     setup, _ = load_setup(SAMPLES / f"{setup_name}.setup.toml")
-    result = postproc.convert(path, machines.load(machine), controller, setup, diagnostics=found)
+    result = postproc.convert(few_sides(sample), machines.load(machine), controller, setup)
     assert result.ok, result.diagnostics
     return result
 

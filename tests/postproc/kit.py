@@ -38,7 +38,8 @@ def toolpath(*lines: str, head: list[str] | None = None) -> Toolpath:
     return path
 
 
-SIDES = {"five_faces.cls": (0, 1, 2), "five_tilted.cls": (0, 1, 2), "h4a_indexed.cls": (0, 1, 4, 5, 6)}
+SIDES = {"five_faces.cls": (0, 1, 2), "five_tilted.cls": (0, 1, 2), "h4a_indexed.cls": (0, 1, 4, 5, 6),
+         "h4a_dome.cls": (0,)}
 """operations of samples with many sides alike that show each kind of work"""
 
 

@@ -201,7 +201,7 @@ class BlockPoses:
 
 @dataclass(frozen=True)
 class _Ahead:
-    """Machine coordinates, each (K, J), of blocks `rows` (K,) at several fractions, and poses there once one is asked for."""
+    """Machine coordinates, each (K, J), of blocks `rows` (K,) at several fractions, and poses there where asked for."""
 
     motion: Motion
     rows: Ints
