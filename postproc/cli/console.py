@@ -187,7 +187,8 @@ def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
         diagnostics = tuple(sorted((d for d in diagnostics if codes.isdisjoint(FOLLOWS.get(d.code, ()))),
                                    key=lambda d: -d.severity))
         if "place.found" in codes and least <= Severity.INFO:
-            diagnostics = tuple(replace(d, hint="") if d.code in PLACED else d for d in diagnostics)
+            diagnostics = tuple(replace(d, hint="") if d.code in PLACED and "system =" not in d.hint else d
+                                for d in diagnostics)
     groups: dict[tuple[Severity, str, str], list[Diagnostic]] = {}
     for d in diagnostics:
         if d.severity >= least:
