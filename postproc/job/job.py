@@ -92,10 +92,8 @@ class Job:
 
     @property
     def stock(self) -> Floats | None:
-        """(2, 3) least and greatest X, Y, Z of the set-up's stock, at all places, in the first work offset, rotary axes
-        at 0, mm; None without."""
-        corners = self.stock_corners
-        if corners is None or self.control.plane is not None:
+        """(2, 3) least and greatest X, Y, Z of the stock at all places, in the first work offset, tables at 0, mm; or None"""
+        if (corners := self.stock_corners) is None or self.control.plane is not None:
             return None
         placed = corners - self.control.origin
         return np.stack([placed.min(axis=0), placed.max(axis=0)])

@@ -15,7 +15,7 @@ from postproc.readback.dialects.readers import reader_for
 from postproc.readback.text.canonical import STATEMENT
 from postproc.readback.text.clamps import clamp_numbers
 from postproc.readback.text.modal import drop_passive
-from postproc.setup.model import load_hooks
+from postproc.setup.hooks_file import load_hooks
 from postproc.writing.state import NUMBER_ROOM
 from toolpaths.diagnostics import Diagnostic, error, has_errors, read_value
 

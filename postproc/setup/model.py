@@ -14,6 +14,7 @@ from machines.user_file import UserModel, read_toml, validate
 from postproc.base.options import OutputMode
 from postproc.setup.bodies import BodiesModel, ToolBody
 from postproc.setup.files import seen_from_here
+from postproc.setup.hooks_file import load_hooks
 from postproc.setup.orientation import OrientationLimits
 from postproc.setup.place import PlacementLimits
 from postproc.setup.places import REGISTER, PlaceOrder, PlaceSetup
@@ -338,19 +339,6 @@ def load_setup(path: str | Path | None, hooks: str = "") -> tuple[SetupFile | No
     if setup is None or found:
         return None, [*found, *faults]
     return (setup if under is None else setup.model_copy(update={"hooks": under.under(setup.hooks)})), faults
-
-
-class _HooksOfFile(BaseModel):
-    """A file with [hooks]: one of its own, a job file, or a set-up; what else is in it is not looked at here."""
-
-    hooks: HooksModel
-
-
-def load_hooks(file: str) -> tuple[HooksModel | None, list[Diagnostic]]:
-    """The [hooks] of a file."""
-    values, found = read_toml(file, kind="hooks")
-    model, faults = (None, found) if values is None else validate(values, _HooksOfFile)
-    return (None if model is None else model.hooks), faults
 
 
 def part_placement(setup: SetupFile, file: str = "") -> tuple[Placement | None, list[Diagnostic]]:
