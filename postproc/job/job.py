@@ -92,7 +92,7 @@ class Job:
 
     @property
     def stock(self) -> Floats | None:
-        """(2, 3) least and greatest X, Y, Z of the stock at all places, in the first work offset, tables at 0, mm; or None"""
+        """(2, 3) least and greatest X, Y, Z of the stock, all places, in the first work offset, tables at 0, mm; or None"""
         if (corners := self.stock_corners) is None or self.control.plane is not None:
             return None
         placed = corners - self.control.origin

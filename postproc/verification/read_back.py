@@ -35,6 +35,7 @@ from postproc.readback.execution.poses import BlockPoses
 from postproc.readback.text.canonical import placed
 from postproc.verification.executed import executed_poses
 from postproc.verification.length_limits import LengthTrial, length_margins
+from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
@@ -100,10 +101,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         diagnostics += placed([_located(d, job.toolpath.file, of_cl) for d in check_stated(code, reader, gcode)], code.files)
     if code is None or has_errors(diagnostics):
         return None, diagnostics
-    radii = tuple((tool.number, tool.radius) for tool in job.cutcom if tool.radius)
-    offsets = Offsets(control.work_offset, control.xyz, job.register_lengths(), home, control.length_on_z,
-                      job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack, _others(job, reader),
-                      radii, job.controller.cutter_compensation.corners)
+    offsets = _offsets(job, reader, home)
     motion, found = run(code, machine.axis_names, offsets, gcode)
     give_back(len(motion))
     faults = Faults(job.toolpath.file, gcode)
@@ -137,6 +135,14 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         trial = LengthTrial(whole, offsets, job)
         comparison = replace(comparison, lengths=length_margins(trial, motion, executed, comparison))
     return comparison, [*diagnostics, *noted]
+
+
+def _offsets(job: Job, reader: Reader, home: Floats) -> Offsets:
+    """What the control adds to the words of a program; `home` (J,): the words of the home position."""
+    radii = tuple((tool.number, tool.radius) for tool in job.cutcom if tool.radius)
+    return Offsets(job.control.work_offset, job.control.xyz, job.register_lengths(), home, job.control.length_on_z,
+                   job.controller.cycles.peck_relief, job.control, reader.rises_first, reader.arc_slack,
+                   _others(job, reader), radii, job.controller.cutter_compensation.corners)
 
 
 def _others(job: Job, reader: Reader) -> tuple[tuple[float, Control], ...]:
