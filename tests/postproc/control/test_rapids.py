@@ -97,7 +97,7 @@ def test_the_proof_knows_nothing_of_how_rapids_were_split(controller: str, writt
     text = converted(controller, written).text
     for output in ("auto", "axes", "tilted"):
         assert not errors(converted(controller, output), text), output
-        comparison, _ = read_back(text, converted(controller, output).job, "test.apt", gcode="edited.nc")
+        comparison, _ = read_back(text, converted(controller, output).job, "test.apt", gcode="edited.nc", margins=True)
         assert comparison is not None and comparison.lengths == converted(controller, written).comparison.lengths
 
 

@@ -15,10 +15,12 @@ import postproc.readback.execution.frames as frames
 import toolpaths
 from postproc.base.options import Options
 from postproc.control.control import MODE_NAMES, tool_frames
+from postproc.job.job import prepare
 from postproc.pipeline.next_modes import COARSER
 from postproc.pipeline.result import PostResult
 from postproc.readback.execution.frames import tool_frame
 from postproc.report.summary import output_modes
+from postproc.verification.read_back import read_back
 from tests.postproc.correction.test_compensation_holes import HEIGHTS, PLACES
 from tests.postproc.correction.test_compensation_points import both_directions_of_all
 from toolpaths.diagnostics import Severity, error, has_errors
@@ -203,5 +205,7 @@ def test_a_program_in_the_next_mode_is_verified_in_it(controller: str, tmp_path:
     program.write_text(result.text)
     verified = postproc.verify(program, path, "mikron-ucp710", controller, options=options)
     assert not has_errors(verified.diagnostics), [str(d) for d in verified.diagnostics]
-    assert verified.comparison is not None and result.comparison is not None
-    assert verified.comparison.lengths == result.comparison.lengths
+    job, _ = prepare(path, result.machine, result.controller, result.setup, result.options)
+    assert job is not None and result.comparison is not None and result.comparison.lengths
+    again, _ = read_back(result.text, job, path.file, gcode=str(program), margins=True)
+    assert again is not None and again.lengths == result.comparison.lengths
