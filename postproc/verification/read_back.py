@@ -192,11 +192,11 @@ def _of_model(header: ProgramHeader, errors: ErrorModel, gcode: str, off: bool) 
     if then == now or (not then and (same or not off)):
         return []
     marks = f" (fingerprint {then} then, {now} now)" if then else ""
-    if same:
-        return [warning("verify.error_model_changed", f"the error model {errors.name} has changed since the program was "
-                        f"written{marks}: the program corrects the errors as they were", file=gcode,
-                        hint="convert again, or verify with the model as it was")]
     note, so = (error, "what is off may follow from that alone") if off else (warning, "the program corrects other errors")
+    if same:
+        return [note("verify.error_model_changed", f"the error model {errors.name} has changed since the program was "
+                     f"written{marks}: the program corrects the errors as they were", file=gcode,
+                     hint="convert again, or verify with the model as it was")]
     return [note("verify.error_model", f"the header of the program names the error model {name}, it is verified with "
                  f"{errors.name}{marks}: {so}", file=gcode,
                  hint="verify with the model that the program was written with")]

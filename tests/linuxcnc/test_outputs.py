@@ -27,14 +27,16 @@ ROUNDED = 1e-4
 """mm and degrees: half a last decimal of a word, and what the rounding of an angle does to the slides"""
 RESIDUE = 2e-4
 """mm: shorter X, Y, Z moves next to a rotary one would set its speed"""
-MADE = {"bicubic.cls": ("mill-3axis",), "blade.cls": ("linuxcnc-xyzbc-trt",), "five_faces.cls": ("trunnion-bc",),
-        "five_tilted.cls": ("nutating-head",), "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
+MADE = {"bicubic.cls": ("mill-3axis", "planar-delta-z"), "blade.cls": ("linuxcnc-xyzbc-trt",),
+        "five_faces.cls": ("trunnion-bc",), "five_tilted.cls": ("nutating-head",), "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
         "inch_plate.apt": ("mill-4axis",), "indexed_4axis.cls": ("mill-4axis",),
         "pocket.cls": ("uranesx", "delta-cone", "delta-coplanar", "delta-hybrid", "linuxcnc-lineardelta"),
         "test_part.cls": ("delta-parallel-x", "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact",
                           "delta-star"),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
 """machines on which each sample is made: every sample, and every machine whose letters LinuxCNC's interpreter has"""
+ORIGINS = {"planar-delta-z": (-41.0, -30.0, -125.0)}
+"""mm, of the part on machines in whose middle it has no room"""
 MORE = {"bicubic.cls": ("uranesx",), "blade.cls": ("head-table",),
         "five_faces.cls": ("mikron-ucp710", "linuxcnc-xyzac-trt"),
         "five_tilted.cls": ("fork-head-ab", "linuxcnc-xyzbc-trt"), "inch_plate.apt": ("nutating-head",),
@@ -92,7 +94,8 @@ def convert(path: Toolpath, found: list, machine: str, setup: SetupFile | None =
 def all_outputs(interpret, sample: str, names: tuple[str, ...]) -> list[Output]:
     """The sample on each of the machines."""
     path, found = toolpaths.read(SAMPLES / sample)
-    made = [convert(path, found, name) for name in names]
+    made = [convert(path, found, name, setup_file().model_copy(update={"part": PartPlacement(origin=ORIGINS.get(
+        name, (0.0, 0.0, 0.0)))})) for name in names]
     assert all(r.ok for r in made), [(r.machine.name, [str(d) for d in r.diagnostics]) for r in made if not r.ok]
     with ThreadPoolExecutor(2) as pool:
         return list(pool.map(lambda r: outputs.output(r, interpret), made))

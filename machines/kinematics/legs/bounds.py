@@ -34,6 +34,7 @@ _ROUNDS, _GROWTH = 6, 1.02
 
 
 @dataclass(frozen=True)
+@arrays(place="N 3", turn="N 3 3", first="N 6", second="N 6", spin="N", bend="N", third="N")
 class PlatformJets:
     """A platform that moves: rates at the middle of the move, bounds over all of it; turns count by the lever.
 

@@ -200,6 +200,7 @@ class BlockPoses:
 
 
 @dataclass(frozen=True)
+@arrays(rows="K")
 class _Ahead:
     """Machine coordinates, each (K, J), of blocks `rows` (K,) at several fractions, and poses there where asked for."""
 

@@ -93,7 +93,7 @@ def test_one_wrong_number_is_one_error(what: str, tmp_path: Path) -> None:
     old, new, code = CAUSES[what]
     good = "\n".join([*START, *SQUARE, "FINI"]).replace("GOTO/0,0,0\nRAPID", "GOTO/0,0,0,0,0,1\nRAPID").replace(
         "GOTO/0,30,0", "GOTO/0,30,0,0,0,1")
-    (tmp_path / "m.toml").write_text('base = "mikron-ucp710"\n[control]\nlargest_speed = 12000\n')
+    (tmp_path / "m.toml").write_text('base = "mikron-ucp710"\n[control]\nlargest_spindle_speed = 12000\n')
     (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 120.0\n")
     (tmp_path / "p.apt").write_text(good.replace(old, new))
     got = run("convert", tmp_path / "p.apt", "-m", tmp_path / "m.toml", "-c", "linuxcnc", "-o", tmp_path / "p.ngc",
