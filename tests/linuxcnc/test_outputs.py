@@ -28,7 +28,8 @@ ROUNDED = 1e-4
 RESIDUE = 2e-4
 """mm: shorter X, Y, Z moves next to a rotary one would set its speed"""
 MADE = {"bicubic.cls": ("mill-3axis", "planar-delta-z"), "blade.cls": ("linuxcnc-xyzbc-trt",),
-        "five_faces.cls": ("trunnion-bc",), "five_tilted.cls": ("nutating-head",), "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
+        "five_faces.cls": ("trunnion-bc",), "five_tilted.cls": ("nutating-head",),
+        "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
         "inch_plate.apt": ("mill-4axis",), "indexed_4axis.cls": ("mill-4axis",),
         "pocket.cls": ("uranesx", "delta-cone", "delta-coplanar", "delta-hybrid", "linuxcnc-lineardelta"),
         "test_part.cls": ("delta-parallel-x", "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact",
