@@ -84,8 +84,12 @@ def page(found: list[Outcome], programs: list[Found]) -> str:
         if kind != "conversion":
             test = f"`{one.test}`" if one.test else ""
             said = {"verify": f"`verify` {test}", "tests": test, "nothing": "**nothing**"}.get(kind, kind)
-            text += f"| {one.fault.room} | {one.fault.name} | {said} | {one.fault.why or one.detail} |\n"
+            text += f"| {one.fault.room} | {one.fault.name} | {said} | {one.fault.why or _beside(one) or one.detail} |\n"
     return text + "\n" + programs_page(programs)
+
+
+def _beside(one: Outcome) -> str:
+    return "works beside the conversion, whose program it does not change" if one.fault.room in BESIDE else ""
 
 
 def programs_page(programs: list[Found]) -> str:

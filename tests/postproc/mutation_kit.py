@@ -18,6 +18,7 @@ from postproc.readback.comparison.checks import block_seconds
 from postproc.readback.comparison.compare import Comparison
 from postproc.verification.read_back import read_back
 from toolpaths.diagnostics import Severity
+from toolpaths.toolpath import Kind
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _WORD = re.compile(rf"(?:[A-Z]+\d*\s*=\s*{_NUMBER}|\$SC_[A-Z_]+=\d+|SP[ABC]{_NUMBER}|HSC-MODE:\d"
@@ -107,8 +108,8 @@ def verdict(job: Job, text: str, effect: Effect) -> str:
 
 @dataclass(frozen=True)
 class Effect:
-    """What a program does: rows that move, where they end, whether they link, what holds there and the rest behind each;
-    the move of the CL file that each is part of, and the seconds of all cuts of that move."""
+    """What a program does: rows that move, where they end, whether they link or begin a split rapid, what holds there and
+    the rest behind each; the move of the CL file that each is part of, and the seconds of all cuts of that move."""
 
     end: np.ndarray
     link: np.ndarray
@@ -122,7 +123,8 @@ class Effect:
         """Of a program as it was compared."""
         assert comparison.executed is not None
         motion, moves, owner = comparison.executed[1], job.moves.without_pecks(), comparison.owner
-        link = (owner >= len(moves)) | moves.link[np.minimum(owner, len(moves) - 1)]
+        split = (moves.kind == Kind.RAPID) & (np.append(moves.row[1:], -1) == moves.row)  # up and across, at any height
+        link = (owner >= len(moves)) | (moves.link | split)[np.minimum(owner, len(moves) - 1)]
         before = np.vstack([motion.start, motion.end[:-1]])
         full = motion.code == 2
         keep = (np.abs(motion.end - before) > STILL).any(axis=1) | full
