@@ -109,19 +109,19 @@ def base_chain(source: str | FilePath, builtin: Mapping[str, FilePath] | None = 
 
 
 def values_of(path: FilePath) -> Values:
-    """What a TOML file itself says; whoever changes it takes a copy.
+    """What a TOML file itself says.
 
     Raises:
         OSError, UnicodeDecodeError, tomllib.TOMLDecodeError: where it cannot be read.
     """
-    return parsed(read_input(path).decode("utf-8-sig").replace("\r\n", "\n"))[0]
+    return deepcopy(parsed(read_input(path).decode("utf-8-sig").replace("\r\n", "\n"))[0])
 
 
 def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]]:
     """`file` as a `model`; None and one diagnostic per fault where it does not fit."""
     text = json.dumps(file.values, default=str)
     try:
-        return (_kept_model if len(text) < SHORT else _model_of)(model, text), []
+        return (_kept_model(model, text).model_copy(deep=True) if len(text) < SHORT else _model_of(model, text)), []
     except ValidationError as found:
         return None, [_diagnostic(file, model, fault) for fault in _faults(file.values, model, found)]
 

@@ -26,10 +26,11 @@ def read(path: str | Path, *, units: LengthUnit | None = None, dialect: DialectN
 
 
 def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = None, dialect: DialectName | None = None,
-               allow_unknown: Iterable[str] = ()) -> tuple[Toolpath, list[Diagnostic]]:
+               allow_unknown: Iterable[str] = (), tolerance: float = 0.0) -> tuple[Toolpath, list[Diagnostic]]:
     """The same from the text of a CL file; `file` is its name in diagnostics."""
     from toolpaths.cl import read as reader
-    result = reader.read_bytes(data, file=file, units=units, dialect=dialect, allow_unknown=allow_unknown)
+    result = reader.read_bytes(data, file=file, units=units, dialect=dialect, allow_unknown=allow_unknown,
+                               tolerance=tolerance)
     return result.toolpath, result.diagnostics
 
 

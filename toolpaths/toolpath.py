@@ -231,9 +231,9 @@ class Toolpath:
     """errors that reading met: what they stand for is missing, so that nothing may be written from the path"""
     spin: Floats | None = None
     records: RecordCounts = field(default_factory=RecordCounts)
-    spline_slack: float = 0.0
-    """mm of the tolerance that arcs and chords in the place of splines take; 0: none was stated, they are within 0.001 mm"""
     """what became of the records of the file"""
+    spline_slack: float = 0.0
+    """mm that arcs and chords in the place of splines may be off them; 0 without splines"""
     source: ClSource | None = field(default=None, init=False, repr=False, compare=False)
     """where the path is exactly what reading a file gave: a path that is made otherwise, or changed, has none"""
 

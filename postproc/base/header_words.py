@@ -103,6 +103,7 @@ class ProgramHeader:
         by_control: True where it leaves geometric errors to the control
         axes: None where those of the CL file are kept
         setup: None where it names none
+        tolerance: mm that the program was converted with, 0 where none is stated
         planned: True where its feeds were planned
         feeds: fingerprint of its F words, "" where none is stated
     """
@@ -113,6 +114,7 @@ class ProgramHeader:
     by_control: bool
     axes: AxesNamed | None
     setup: SetupNamed | None
+    tolerance: float
     planned: bool
     feeds: str
 
@@ -123,6 +125,7 @@ _BY_CONTROL = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the 
 _AXES = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
 _SETUP = re.compile(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
 _OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
+_TOLERANCE = re.compile(rb"(?im)^[ \t(;\dN]*tolerance (\d[\d.e-]*) mm,")
 _PLANNED = re.compile(rb"(?im)^[ \t(;\d]*feed planned")
 _FEEDS = re.compile(rb"(?im)^[^\n]*" + FEEDS.encode("ascii") + rb" ([0-9a-f]{8})\b")
 _PLACE = re.compile(f"(?i){FEEDS} {UNKNOWN}")
@@ -132,12 +135,14 @@ def read_header(data: bytes) -> ProgramHeader:
     """The header of a program as values; data may be the whole program."""
     header = header_of(data)
     named, axes, setup = _CORRECTED.search(header), _AXES.search(header), _SETUP.search(header)
+    tolerance = _TOLERANCE.search(header)
     marks = [found[1].decode("ascii").lower() if (found := mark.search(header)) else "" for mark in (_MODEL, _FEEDS)]
     return ProgramHeader(
         ours=_OURS.search(header) is not None, by_control=_BY_CONTROL.search(header) is not None,
         corrected=named[1].decode("utf-8", "replace") if named else None, model=marks[0],
         axes=AxesNamed(*(text.decode("ascii", "replace").lower() for text in axes.groups())) if axes else None,
-        setup=_named(setup) if setup else None, planned=_PLANNED.search(header) is not None, feeds=marks[1])
+        setup=_named(setup) if setup else None, tolerance=float(tolerance[1]) if tolerance else 0.0,
+        planned=_PLANNED.search(header) is not None, feeds=marks[1])
 
 
 def _named(setup: re.Match[bytes]) -> SetupNamed:

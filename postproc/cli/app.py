@@ -185,13 +185,16 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
                                          "the hooks": hooks, "the error model": error_model, "the tool table": tool_table,
                                          "the proof file": proof or f"{gcode}.proof.json",
                                          **own_files(machine, controller)})
+    from postproc.base.header_words import HEADER, read_header
     from postproc.pipeline.convert import verify as run
     from postproc.proof import command
     from postproc.report import summary
+    from toolpaths.input_files import first_bytes
 
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
-        path, found = _read(file, options, progress)
+        stated = read_header(first_bytes(gcode, HEADER)).tolerance
+        path, found = _read(file, replace(options, tolerance=stated or tolerance), progress)
         result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress,
                      tool_table=tool_table)
         kept, more = command.compared_with(result, machine, controller, proof)

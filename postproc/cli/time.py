@@ -120,7 +120,7 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     from postproc.pipeline.convert import convert
 
     path, found = toolpaths.read_bytes(data, file=str(file), units=options.units or None,
-                                       dialect=options.dialect or None)
+                                       dialect=options.dialect or None, tolerance=options.tolerance)
     del data
     result = convert(path, machine, controller, options=options, diagnostics=found, progress=progress)
     if not result.ok:

@@ -39,9 +39,13 @@ _STRAIGHT = ("moves in X and Y alone from CUTCOM to CUTCOM/OFF: no holes, rapids
              "in G18 or G19")
 _CORNER = ("have the CAM system write outside corners as the control goes round them ([cutter_compensation] corners of the "
            'controller file: arc or intersection), or [tools.N] compensation = "wear"')
+_HELD = ("move STOP, OPSTOP, COOLNT, SPINDL, DELAY and the like before CUTCOM or behind CUTCOM/OFF: behind them the "
+         "control cannot see the next move, from which it reckons where this one ends")
+_HINTS = {"lead": _LEAD, "straight": _STRAIGHT, "corner": _CORNER, "held": _HELD}
 _SAID = {"lead": "its first or last move is none that every control makes alike", "straight": "a block that is no cut in "
          "the plane of X and Y", "corner": "an outside corner that this control does not go round as the CL file does",
          "inside": "an arc round a corner is smaller than the tool, or the contour would run backwards",
+         "held": "a record that is no move stands between its moves",
          "control": "this control does not begin square to the next move, or its manual does not say so"}
 
 
@@ -78,13 +82,13 @@ def contour_words(job: Job, moves: Moves, path: JointPath, words: WordRows,
         if rules.states:
             commands = {**commands, first: _stated(commands[first], rules.states)}
         try:
-            made = _stretch(job, path, made, first, last, side * radius)
+            made = _stretch(job, path, made, first, last, side * radius, sorted(commands))
         except _Refused as found:
             refused[found.why].append(int(moves.line[path.move[min(first + found.at, len(path) - 1)]]))
     return made, commands, [error(
         "cutcom.offset_back", f"the path under CUTCOM cannot be offset back to the contour: {_SAID[why]}",
-        file=job.toolpath.file, lines=lines[:6], count=len(lines), hint=_LEAD if why == "lead" else
-        _STRAIGHT if why == "straight" else _CORNER if why == "corner" else _WEAR) for why, lines in sorted(refused.items())]
+        file=job.toolpath.file, lines=lines[:6], count=len(lines), hint=_HINTS.get(why, _WEAR))
+        for why, lines in sorted(refused.items())]
 
 
 def _stretches(commands: Commands, count: int) -> list[tuple[int, int, float]]:
@@ -106,8 +110,10 @@ def _stated(group: tuple[Command, ...], text: str) -> tuple[Command, ...]:
     return (*group[:at], Command("INSERT", (text,), group[at].line), *group[at:])
 
 
-def _stretch(job: Job, path: JointPath, made: ContourWords, first: int, last: int, radius: float) -> ContourWords:
-    """The words of blocks `first` to before `last`, and of the block that leads away; radius > 0: the tool is left."""
+def _stretch(job: Job, path: JointPath, made: ContourWords, first: int, last: int, radius: float,
+             held: Sequence[int]) -> ContourWords:
+    """The words of blocks `first` to before `last`, and of the block that leads away; radius > 0: the tool is left;
+    `held`: blocks before which something is written that is no move."""
     rules, words, columns = job.controller.cutter_compensation, made.words, job.control.xyz[:2]
     if rules.start != "next" or (columns < 0).any():
         raise _Refused("control", 0)
@@ -125,6 +131,8 @@ def _stretch(job: Job, path: JointPath, made: ContourWords, first: int, last: in
     bad |= (words.end[rows][:, others] != words.start[rows][:, others]).any(axis=1)
     if bad.any():
         raise _Refused("straight", lead + int(np.argmax(bad)))
+    if (between := [k for k in held if rows[0] < k < last]):
+        raise _Refused("held", between[0] - first)
     center = np.where(arc, begin + path.center[rows][:, :2] @ np.array([1.0, 1j]), np.nan)
     pieces = _Pieces(begin, end, center, np.where(path.ccw[rows], 1.0, -1.0), radius, rules.corners, lead)
     joints, gone = pieces.contour()

@@ -24,7 +24,7 @@ from postproc.job.places import Place, at_all, modes_at, places_of
 from postproc.job.program_names import program_number, work_offset
 from postproc.job.rapids import safe_rapids
 from postproc.job.records import job_records
-from postproc.job.rounding import Rounding, helix_bound, rounding_bound
+from postproc.job.rounding import Rounding, helix_bound, rounding_bound, without_splines
 from postproc.job.smoothing import SmoothingPlan, smoothing_plan
 from postproc.job.tool_names import called_tools
 from postproc.job.units import other_units
@@ -247,10 +247,10 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
             options: Options, refused: Refused = frozenset()) -> tuple[Job | None, list[Diagnostic]]:
     """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`:
     output modes that "auto" passes over. What arcs and chords in the place of splines take is off its tolerance."""
-    options = replace(options, tolerance=options.tolerance - toolpath.spline_slack)
+    options, found = without_splines(options, toolpath)
     records, diagnostics = job_records(toolpath, machine, controller, setup, options.setup)
     toolpath = records.toolpath
-    diagnostics += [*work_offset(controller, setup, options), *called_tools(controller, options.setup),
+    diagnostics += [*found, *work_offset(controller, setup, options), *called_tools(controller, options.setup),
                     *other_units(controller, options.setup),
                     *smoothing_plan(controller, setup, options, toolpath, machine)[1]]
     toolpath, found = cut_operations(toolpath, setup.output.longest)

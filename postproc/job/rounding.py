@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
 from machines.kinematics.base import Kinematics
+from postproc.base.options import Options
 from postproc.control.control import Control, InterpolationMode
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 
 LEVER = 0.1
@@ -87,3 +89,14 @@ def rounding_problem(bound: Rounding, tolerance: float, axis_tolerance: float) -
                   "allowed in addition to the control's own smoothing",
                   hint="more decimals in the controller's [format], or a "
                   "wider --tolerance, --axis-tolerance")]
+
+
+def without_splines(options: Options, toolpath: Toolpath) -> tuple[Options, list[Diagnostic]]:
+    """The options with the tolerance that arcs and chords in the place of splines leave; an error where it is too little."""
+    slack = toolpath.spline_slack
+    if slack and not 2.0 * slack < options.tolerance:
+        return options, [error(
+            "tolerance.splines", f"arcs and chords in the place of splines are up to {slack:g} mm off them, the tolerance "
+            f"is {options.tolerance:g} mm", file=toolpath.file,
+            hint="read the CL file with the tolerance of the program: --tolerance, tolerance= of toolpaths.read")]
+    return replace(options, tolerance=options.tolerance - slack), []

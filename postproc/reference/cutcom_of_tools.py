@@ -10,6 +10,9 @@ from postproc.setup.model import Compensation, SetupFile, ToolSetup
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Event, Toolpath
 
+_SAME = 1e-3
+"""mm by which diameters of one tool may differ"""
+
 
 @dataclass(frozen=True)
 class CutcomOfTool:
@@ -25,9 +28,13 @@ class CutcomOfTool:
 
 
 def radius_of(number: int, tool: ToolSetup, toolpath: Toolpath) -> float:
-    """mm, half the diameter of set-up or CL file, 0 where neither states one."""
-    stated = (one.diameter for one in toolpath.tools if one.number == number and one.diameter)
-    return 0.5 * (tool.diameter or next(stated, 0.0))
+    """mm, half the diameter of CL file or set-up, 0 where neither states one."""
+    return 0.5 * (_diameter(number, toolpath) or tool.diameter or 0.0)
+
+
+def _diameter(number: int, toolpath: Toolpath) -> float:
+    """mm, that the CL file states; 0 without."""
+    return next((one.diameter for one in toolpath.tools if one.number == number and one.diameter), 0.0)
 
 
 def kind_of(tool: ToolSetup) -> Compensation:
@@ -67,7 +74,7 @@ def with_compensation(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, l
     found, bare = list[Diagnostic](), set[int]()
     for one in tools_under_cutcom(toolpath, setup):
         tool = setup.tools.get(str(one.number), ToolSetup())
-        if refused := _refusal(tool, one.radius):
+        if refused := _refusal(tool, one.radius, _diameter(one.number, toolpath)):
             found.append(error(f"cutcom.{refused[0]}", f"T{one.number}: {refused[1]}", file=toolpath.file,
                                lines=one.lines[:6], count=len(one.lines), hint=refused[2].format(number=one.number)))
         elif one.kind == "none":
@@ -81,8 +88,13 @@ def with_compensation(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, l
     return replace(toolpath, events=events), found
 
 
-def _refusal(tool: ToolSetup, radius: float) -> tuple[Literal["radius", "contour"], str, str] | None:
-    """(code, what is wrong, what to do) of a register that does not belong to what the CL file holds."""
+def _refusal(tool: ToolSetup, radius: float, stated: float) -> tuple[Literal["radius", "contour"], str, str] | None:
+    """(code, what is wrong, what to do) of a register that does not belong to what the CL file holds; `stated`: the
+    diameter that this states, mm, or 0."""
+    if _offset_back(tool) and stated and tool.diameter and abs(tool.diameter - stated) > _SAME:
+        return ("radius", f"the path of its centre is that of a tool of {stated:g} mm, the set-up says {tool.diameter:g} "
+                "mm: the register would hold another radius than the contour was made with",
+                f"[tools.{{number}}] diameter = {stated:g}; the register may hold the radius that was measured")
     if _offset_back(tool) and not radius > 0.0:
         return ("radius", 'compensation = "radius" for CL points of the tool\'s centre, and neither CL file nor set-up '
                 "states its diameter: how far the contour is from them is not known",

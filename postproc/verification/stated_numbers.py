@@ -15,7 +15,7 @@ from toolpaths.diagnostics import Diagnostic, error
 _MARK = re.compile(rf"(?i){SETUP_MARK} ([0-9a-f]{{8}})\b")
 _OFFSET = re.compile(r"(?i)work offset ([^:,]{1,60}?) in machine coordinates([^:,]*): ?((?:[A-Z]-?\d+\.?\d*(?: |$))*)")
 _STANDING = re.compile(r"(?i) with ([a-c]) at (-?[\d.e-]+)")
-_LENGTH = r"(?i)(?=\btool T{}\b(?:.*?)gauge length (-?[\d.]+|not stated))"
+_LENGTH = r"(?i)\btool T{}\b(?:(?!\btool T\d).)*?gauge length (-?[\d.]+|not stated)"
 _WORD = re.compile(r"([A-Za-z])(-?\d+\.?\d*)")
 _EDGES = re.compile(r"(?m)\)?[ \t]*(?:^|\n)[ \t]*(?:N?\d+[ \t]*)?[(;][ \t]*")
 """between two comments: a line of the header that is longer than a block goes on in the next"""
@@ -68,8 +68,9 @@ def _lengths(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
     """The same of the gauge length of each tool that moves."""
     for number in sorted({job.number_of(k) for k in np.unique(job.moves.tool).tolist()}):
         right, said = job.length_of(number) / job.controller.lengths.unit, re.findall(_LENGTH.format(number), text)
-        if number > (-1 if job.setup.output.tool_call else 0) and not any(_same(one, right) for one in said):
-            yield f"gauge length of T{number}", said[-1] if said else NOTHING, f"{right:.4f}"
+        off = [one for one in said or [NOTHING] if not _same(one, right)]
+        if number > (-1 if job.setup.output.tool_call else 0) and off:
+            yield f"gauge length of T{number}", off[0], f"{right:.4f}"
 
 
 def _same(said: str, right: float) -> bool:

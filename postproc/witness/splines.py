@@ -8,8 +8,6 @@ from postproc.witness.text import Array
 
 CHORD = 2e-4
 """mm that the chords are from the curve"""
-REPLACED = 0.001
-"""mm that arcs or chords in the place of a spline may be from it"""
 _AT_ONCE, _LOOKS = 200, 64
 
 
@@ -58,13 +56,13 @@ def off_chords(tip: Array, points: Array) -> Array:
     away = np.empty(len(tip))
     for first in range(0, len(tip), _AT_ONCE):
         away[first:first + _AT_ONCE] = _chords(tip[first:first + _AT_ONCE], points)[0].min(axis=1)
-    return np.maximum(away - REPLACED - CHORD, 0.0)
+    return np.maximum(away - CHORD, 0.0)
 
 
 def goes_back(tip: Array, points: Array, tolerance: float) -> bool:
     """True where tips (K, 3), which are on a spline, do not follow each other along it in their order."""
     tip = tip[np.unique(np.linspace(0, len(tip) - 1, _LOOKS).astype(int))] if len(tip) else tip
-    size, at, near = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)), 0.0, tolerance + REPLACED + CHORD
+    size, at, near = np.sqrt((np.diff(points, axis=0) ** 2).sum(axis=1)), 0.0, tolerance + CHORD
     before = np.cumsum(size) - size
     for away, share in zip(*_chords(tip, points), strict=True):
         places = (before + share * size)[away <= near]

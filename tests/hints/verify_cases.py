@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from tests.hints.case import Edit, HintCase
-from tests.hints.convert_cases import ARC, CUT, LEFT, LENGTH, START, TAP, TURNING
+from tests.hints.cl_cases import SPLINE
+from tests.hints.convert_cases import ARC, CUT, LEFT, LENGTH, START, TAP, TURNING, option
 from tests.hints.gcode_cases import ISO, TNC
 
+ON = "-m mill-3axis -c fanuc-30i --setup s.toml"
+BEGIN = "RAPID\nGOTO/0,0,50\nGOTO/0,0,0\n"
 DOWN = "RAPID\nGOTO/0,0,50\nGOTO/0,0,0\nGOTO/9,0,0\nRAPID\nGOTO/40,30,40\nGOTO/40,30,5\nGOTO/50,30,5\n"
 FED = LENGTH + "[output]\nrapids_as_feed = true\n"
 TILTED = "RAPID\nGOTO/0,0,50,0,0.5,0.866025404\nGOTO/0,0,5\nGOTO/9,0,5\nRAPID\nGOTO/9,0,50\n"
@@ -48,4 +51,10 @@ _EDITED = [
     HintCase("gcode.frame", "time p.h -m mill-3axis -c heidenhain-tnc640", {"p.h": TNC.replace("5 END PGM A MM\n", "")},
              "write 0 BEGIN PGM NAME MM ... (END PGM) NAME MM", (Edit("p.h", "", r"5 \1 A MM\n"),)),
 ]
-VERIFY = [*_EDITED]
+_SPLINES = [
+    HintCase("tolerance.splines", f"verify p.nc part.apt {ON} --tolerance 0.01",
+             {"part.apt": START + BEGIN + SPLINE + "\nRAPID\nGOTO/3,0,50\nFINI\n", "s.toml": LENGTH},
+             "the tolerance of the program: (--tolerance)", (option("--tolerance 0.1", "--tolerance 0.01"),),
+             first=(f"convert part.apt {ON} --tolerance 0.1 -o p.nc",)),
+]
+VERIFY = [*_EDITED, *_SPLINES]

@@ -7,7 +7,7 @@ import pytest
 from pydantic import Field
 
 from machines.toml_lines import key_lines
-from machines.user_file import UserModel, ValueSource, load_toml, read_toml, schema
+from machines.user_file import UserModel, ValueSource, load_toml, read_toml, schema, values_of
 
 
 class Axis(UserModel):
@@ -36,6 +36,16 @@ def write(folder: Path, text: str, name: str = "m.toml") -> Path:
     path = folder / name
     path.write_text(text)
     return path
+
+
+def test_what_a_caller_changes_is_changed_for_nobody_else(tmp_path: Path) -> None:
+    path = write(tmp_path, GOOD)
+    first, _ = load_toml(path, File)
+    values_of(path)["axes"].clear()
+    assert first is not None
+    first.axes.clear()
+    again, _ = load_toml(path, File)
+    assert again is not None and list(again.axes) == ["X"] and list(values_of(path)["axes"]) == ["X"]
 
 
 def only(folder: Path, text: str, **builtin: Path):

@@ -71,7 +71,7 @@ def assemble(b: ToolpathBuilder) -> Toolpath:
     return Toolpath(rows.tip, rows.axis, feed, mode, kind, role, arc, cycle, tool, operation, pass_, rows.line, arcs,
                     cycles, tools, operations, frames, tuple(events), normal, contact,
                     b.declared.units if b.declared else b.units, b.name, b.log.file,
-                    spline_slack=b.spline_slack if b.splines else 0.0)
+                    spline_slack=max(b.spline_slack if b.splines else 0.0, b.declared.spline_slack if b.declared else 0.0))
 
 
 def spread(track: ModalValue[T], n: int, dtype: type) -> Array:

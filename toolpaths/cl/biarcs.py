@@ -11,10 +11,11 @@ from toolpaths.arrays import Floats
 from toolpaths.compiled import chosen, loop
 
 PLANE = 1e-6
-"""of the size of a curve: control points this near to a plane lie in it"""
+"""of the size of a curve: control points this near to a plane lie in it, and FLAT of the tolerance at most"""
+FLAT = 0.1
 DENSER = 2.5
 """so many times as many places are looked at as chords of the same tolerance would need"""
-_SHARE = 0.8
+_SHARE = 0.7
 """of the tolerance at those places: between them an arc strays by less than the chord does, 1 / DENSER^2 of it"""
 _COMPILED = 40
 """curves that are as long interpreted (25 ms each) as the compiler takes"""
@@ -22,16 +23,17 @@ _STRAIGHT = 0.05
 """of the tolerance: an arc that bends less is a line"""
 
 
-def plane_of(control: Floats) -> tuple[Floats, Floats, Floats] | None:
-    """Unit vectors (3,) u, v along the plane of control points (N, 3) and its normal; None where they lie in none."""
+def plane_of(control: Floats, most: float) -> tuple[Floats, Floats, Floats] | None:
+    """Unit vectors (3,) u, v along the plane of control points (N, 3) and its normal; None where they lie in none, or
+    `most` off it."""
     span = control - control[0]
     size = np.ptp(control, axis=0)
     for k in (2, 0, 1):
-        if size[k] <= PLANE * size.max():
+        if size[k] <= min(PLANE * size.max(), most):
             eye = np.eye(3)
             return eye[(k + 1) % 3], eye[(k + 2) % 3], eye[k]
     _, _, axes = np.linalg.svd(span)
-    if np.abs(span @ axes[2]).max() > PLANE * size.max():
+    if np.abs(span @ axes[2]).max() > min(PLANE * size.max(), most):
         return None
     return axes[0], axes[1], np.cross(axes[0], axes[1])
 

@@ -59,6 +59,7 @@ class Declared:
     """Lists that text of our own writer states outright, and the tool index in use."""
 
     units: LengthUnit
+    spline_slack: float = 0.0
     frames: list[Frame] = field(default_factory=list)
     tools: list[Tool] = field(default_factory=list)
     operations: list[Operation] = field(default_factory=list)

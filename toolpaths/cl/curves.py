@@ -8,15 +8,15 @@ import re
 import numpy as np
 
 from toolpaths.arrays import Floats
-from toolpaths.cl.biarcs import DENSER, biarcs, plane_of
+from toolpaths.cl.biarcs import DENSER, FLAT, biarcs, plane_of
 from toolpaths.cl.build import ToolpathBuilder, Triple
 from toolpaths.cl.text.statements import COMMENT, TEXT, Statement, Word, words_of
 from toolpaths.toolpath import Role
 
 SPLINE_CHORD = 0.001
-"""mm: a spline is followed by arcs, or chords, no further from it than this, or than SPLINE_SHARE of the tolerance"""
+"""mm: a spline is followed by arcs, or chords, no further from it than this where no tolerance is given"""
 SPLINE_SHARE = 0.25
-"""of the tolerance, which the program must not be off those by (`Toolpath.spline_slack`)"""
+"""of the tolerance, else; what they may be off is no part of what the program may be off them (`Toolpath.spline_slack`)"""
 _DEGREE = 3
 _MOST_CHORDS = 10000
 _LEAST_PLACES = 16
@@ -177,7 +177,7 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
                     "have the CAM system write the curve as points (GOTO)")
         return
     curve = np.array([start, *control])
-    chord = max(SPLINE_CHORD, b.spline_slack) / b.scale
+    chord = b.spline_slack / b.scale
     chords = spline_points(curve, inner, chord)
     arcs = spline_arcs(curve, inner, chord, b.splines)
     b.splines += 1
@@ -222,7 +222,7 @@ def spline_arcs(control: Floats, inner: Floats, chord: float,
     """Ends of arcs and lines within `chord` of a clamped cubic in a plane (`spline_points`), each with its arc: centre,
     axis, radius, direction in which it begins, or () for a line; [] where it lies in no plane, has a corner or turns
     back. `before`: splines of the file so far."""
-    plane = plane_of(control)
+    plane = plane_of(control, FLAT * chord)
     knots = _knots(inner)
     if plane is None or (np.unique(inner[:-1], return_counts=True)[1] >= _DEGREE).any():
         return []

@@ -10,7 +10,7 @@ from pathlib import Path
 from toolpaths.choices import DialectName, LengthUnit
 from toolpaths.cl.assemble import assemble
 from toolpaths.cl.build import ToolpathBuilder
-from toolpaths.cl.curves import SPLINE_SHARE
+from toolpaths.cl.curves import SPLINE_CHORD, SPLINE_SHARE
 from toolpaths.cl.forms import check_forms
 from toolpaths.cl.indexing import TRANS_HINT
 from toolpaths.cl.interpret import HANDLERS, known, report_others, run
@@ -100,7 +100,8 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         program, points, lines = Lexer(plain, parts, log, known, largest).program(), parts.points, parts.lines
         found, evidence = (DIALECTS[dialect], "given") if dialect else detect(program)
     del plain
-    b = ToolpathBuilder(program, points, found, _units(program, units, log), log, allow_unknown, SPLINE_SHARE * tolerance)
+    b = ToolpathBuilder(program, points, found, _units(program, units, log), log, allow_unknown,
+                        SPLINE_SHARE * tolerance or SPLINE_CHORD)
     run(b, 0, len(program.statements))
     b.finish_rows()
     open_paths(b)

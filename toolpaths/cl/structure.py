@@ -172,7 +172,8 @@ def own_header(b: ToolpathBuilder, s: Statement) -> None:
     """$$-> TOOLPATH / {...}: text of our own writer; lists of frames, tools, operations follow."""
     found = _json(b, s)
     if found is not None:
-        b.declared = Declared("inch" if found.get("units") == "inch" else "mm")
+        slack = found.get("spline_slack", 0.0)
+        b.declared = Declared("inch" if found.get("units") == "inch" else "mm", slack if isinstance(slack, float) else 0.0)
 
 
 def _json(b: ToolpathBuilder, s: Statement) -> dict[str, object] | None:

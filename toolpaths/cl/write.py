@@ -48,7 +48,8 @@ def _check(p: Toolpath) -> None:
 
 
 def _header(p: Toolpath) -> Iterator[str]:
-    yield f"$$-> TOOLPATH / {json.dumps({'version': 1, 'units': p.units})}"
+    slack = {"spline_slack": p.spline_slack} if p.spline_slack else {}
+    yield f"$$-> TOOLPATH / {json.dumps({'version': 1, 'units': p.units} | slack)}"
     if p.name:
         yield f"PARTNO/{p.name}"
     yield "UNITS/MM"

@@ -13,7 +13,7 @@ from postproc.readback.execution.drilling import spell_holes
 from postproc.readback.execution.frames import ExecutionFrame
 from postproc.readback.execution.rows import BlockSection, MotionRows, SectionState
 from postproc.readback.execution.tool_radius import with_radius
-from postproc.readback.text.canonical import Canonical
+from postproc.readback.text.canonical import COOLANT, LOADED, REST, STATEMENT, Canonical
 from postproc.readback.text.cycles import CycleLeg
 from postproc.readback.text.modal import CYCLES
 from toolpaths.arrays import Bools, Floats, Ints, among, repeated, shared
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _STILL = 1e-6
 """degrees"""
+_OTHERS = f"MST{COOLANT}{LOADED}{REST}{STATEMENT}"
 _PART = 100_000
 """blocks that are run together, where nothing asks for what came long before"""
 
@@ -75,12 +76,24 @@ def _rows(section: BlockSection, frame: ExecutionFrame, number: int, start: Floa
         rows = _with_legs(rows, line, spelt)
     rows = _with_arcs(rows, state, line, code.line, file, found)
     if (shift := section.radius[rows.block - section.first]).any():
-        rows, faults = with_radius(rows, start, shift, offsets.xyz, offsets.corners)
+        rows, faults = with_radius(rows, start, shift, _held(section, rows, moving, code), offsets.xyz, offsets.corners)
         found += [error("gcode.compensation", f"cutter compensation by the radius: {said}", file=file,
                         lines=[int(code.line[rows.block[k]])], hint="write it as the post does, or state compensation = "
                         "\"wear\" in the set-up where the words are the path of the tool's centre")
                   for k, said in faults.items()]
     return replace(rows, end=frame.position(rows.end)), ends[-1]
+
+
+def _held(section: BlockSection, rows: MotionRows, moving: Bools, code: Canonical) -> Bools:
+    """(R,) rows before which, from the begin of the row before, something else than a move or a centre of arcs is stated:
+    the control does not see the row while it runs the one before."""
+    at, bad = code.words.line - section.first, np.zeros(len(moving), dtype=bool)
+    here = (at >= 0) & (at < len(bad))
+    bad[at[here]] = True  # comments, and CC, are blocks without words
+    bad &= ~(moving | np.isfinite(section.absolute).any(axis=1))
+    bad[at[here & among(code.words.letter, [ord(sign) for sign in _OTHERS])]] = True
+    count = np.concatenate([[0], np.cumsum(bad)])[rows.block - section.first]
+    return np.asarray(np.diff(count, prepend=count[:1]) > 0)
 
 
 def _state(section: BlockSection, start: Floats, frame: ExecutionFrame, offsets: Offsets) -> SectionState:

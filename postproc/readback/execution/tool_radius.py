@@ -27,12 +27,13 @@ NotExecutedRows = dict[int, str]
 """what is not executed, by row"""
 
 
-def with_radius(rows: MotionRows, start: Floats, radius: Floats, xyz: Ints,
+def with_radius(rows: MotionRows, start: Floats, radius: Floats, held: Bools, xyz: Ints,
                 rule: OutsideCorners) -> tuple[MotionRows, NotExecutedRows]:
     """Rows of the tool's centre, ends in coordinates, of rows of the contour that begin at `start` (J,).
 
-    radius (R,): mm to the left of the move, negative to the right, 0 where the words are the tool's centre; `rule`: how
-    outside corners are gone round.
+    radius (R,): mm to the left of the move, negative to the right, 0 where the words are the tool's centre; held (R,): rows
+    that the control does not see while it runs the row before, so that it cannot reckon where that ends (Fanuc B-63944EN-2
+    6.6.3: M00, M01 and what is not buffered, blocks without a move); `rule`: how outside corners are gone round.
     """
     faults, added = NotExecutedRows(), list[tuple[int, Floats]]()
     edges = np.flatnonzero(np.diff(np.concatenate([[0.0], radius, [0.0]])))
@@ -44,6 +45,7 @@ def with_radius(rows: MotionRows, start: Floats, radius: Floats, xyz: Ints,
         try:
             if b == len(radius) or radius[b]:
                 raise _NotExecuted("the radius stays on to the end, or changes sides", b - 1)
+            _check(held[a + 1:b], a + 1, "before it something stands that is no move")
             lead, at, vectors, corners = _stretch(rows, before, a, b, float(radius[a]), xyz[:2], rule)
             end[np.ix_(np.arange(lead, b), xyz[:2])], contour[lead:b + 1] = at, vectors
             added += [(lead + k, corner) for k, corner in corners]

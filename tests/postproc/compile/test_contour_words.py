@@ -97,6 +97,8 @@ def test_the_tool_right_of_the_contour(name: str, controller: str) -> None:
     ([*IN, "CIRCLE/-23,0,2,0,0,-1,2", "GOTO/-23,2,2", "GOTO/-10,2,2"], "siemens-840d", "smaller than the tool"),
     (["GOTO/-40,0,2", "GOTO/-40,20,2", "GOTO/-40,20,1", "GOTO/-40,40,1"], "fanuc-30i", "no cut in the plane"),
     (["GOTO/-40,0,2", "GOTO/-40,-20,2", "GOTO/-20,-40,2"], "fanuc-30i", "first or last move"),
+    ([*PATHS["pocket"][:4], "STOP", *PATHS["pocket"][4:]], "fanuc-30i", "no move stands between"),
+    ([*PATHS["pocket"][:2], "COOLNT/OFF", *PATHS["pocket"][2:]], "heidenhain-tnc640", "no move stands between"),
     (["GOTO/-40,0,2"], "fanuc-30i", "first or last move"),
     (["GOTO/-40,0,2", "CIRCLE/-20,0,2,0,0,-1,20", "GOTO/-20,20,2"], "heidenhain-tnc640", "first or last move")])
 def test_what_has_no_contour_is_refused(lines: list[str], controller: str, said: str) -> None:
@@ -110,6 +112,9 @@ def test_the_diameter_is_that_of_file_or_set_up() -> None:
     assert [c for c, _ in errors(convert(toolpath(*lines), "mill-3axis", "fanuc-30i", setup()))] == ["cutcom.radius"]
     text = good(convert(toolpath(*lines), "mill-3axis", "fanuc-30i", setup(diameter=8.0))).text
     assert "X20. Y-14." in text and "D1 HOLDS 4.0000 MM" in text
+    path = toolpath(*BEFORE, ON, *PATHS["pocket"], OFF, *AFTER)
+    both = errors(convert(path, "mill-3axis", "fanuc-30i", setup(diameter=12.0)))
+    assert [code for code, _ in both] == ["cutcom.radius"] and "10 mm, the set-up says 12 mm" in both[0][1]
 
 
 @pytest.mark.parametrize(("controller", "old", "new"), [
@@ -142,6 +147,8 @@ def test_the_radius_is_executed() -> None:
 @pytest.mark.parametrize(("controller", "old", "new", "said"), [
     ("siemens-840d", "G450", "G451", "G451"), ("siemens-840d", "X20 Y10\n", "X20 Y10\nZ2.5\nZ2\n", "does not cut"),
     ("siemens-840d", r"N\d+ G40\n", "", "stays on to the end"),
+    ("siemens-840d", "X20 Y10\n", "X20 Y10\nM8\n", "that is no move"),
+    ("siemens-840d", "X20 Y10\n", "X20 Y10 M0\n", "that is no move"),
     ("fanuc-30i", "X-30. Y35.", "X-28. Y35.\nY34.\nX-30. Y35.", "")])
 def test_what_the_reader_does_not_execute(controller: str, old: str, new: str, said: str) -> None:
     result = good(made("rounded" if controller == "siemens-840d" else "notch", controller))

@@ -91,6 +91,10 @@ def test_a_line_that_is_missing_is_found_and_a_folded_one_is_read(control: str, 
             k = next(n for n, line in enumerate(lines) if named.lower() in line.lower())
             found = headers(result, "".join(lines[:k] + lines[k + 1:]))
             assert by != control or (len(found) == 1 and found[0].startswith(f"the header says {said}")), found
+        tool = next(line for line in lines if "tool t1 " in line.lower())
+        twice = tool + re.sub(r"(?i)(?<=gauge length )[\d.]+", "99.0000", tool)
+        again = headers(result, result.text.replace(tool, twice, 1))
+        assert by != control or again[0].startswith("the header says gauge length of T1 99.0000")
         assert headers(result, result.text.replace("A0.0000", "", 1))[0].startswith("the header says A of work offset")
         moved = re.sub("(?i)Y-10.0000", "Y-11.0000", result.text)
         assert headers(result, moved)[0].startswith("the header says Y of work offset")
