@@ -173,15 +173,18 @@ class FreeCad(Saying):
         for self.line, block in enumerate(blocks, 1):
             words = [(letter, float(number)) for letter, number in _WORDS.findall(block)]
             said = {letter: number for letter, number in words if letter not in "GMN"}
-            for letter, number in words:
-                if letter == "G":
-                    self._command(number, said)
+            heads = [number for letter, number in words if letter == "G"]
+            for number in heads:
+                self._command(number, said)
             spoken = self.held.get("S", 0.0)
             self.held |= {a: b for a, b in said.items() if a in "ST" or (a in "ZRQP" and self.motion in _HOLES)}
             codes = [number for letter, number in words if letter == "M"]
-            for number in codes or ([self.turns] if self.turns and said.get("S", spoken) != spoken else []):
+            again = self.turns and said.get("S", spoken) != spoken and not set(codes) & {3.0, 4.0, 5.0}
+            for number in (*([self.turns] if again else []), *codes):
                 self._switch(number)
-            moves = bool(said.keys() & set("XYZ"))
+            moves = bool(said.keys() & set("XYZIJ" if self.motion in (2.0, 3.0) else "XYZ"))
+            if "F" in said:
+                self.fed = said["F"] if self.motion != 0.0 or not (moves or 0.0 in heads) else math.nan
             if self.cycle and (self.motion == 80.0 or (moves and self.motion not in _HOLES)):
                 self.cycle, self.level = (), math.nan
                 self.say("CYCLE", "OFF")
@@ -191,6 +194,7 @@ class FreeCad(Saying):
     def _command(self, number: float, said: dict[str, float]) -> None:
         if number in (0.0, 1.0, 2.0, 3.0, 80.0, *_HOLES):
             self.motion = number
+            self.held = self.held if number in _HOLES else {a: b for a, b in self.held.items() if a in "ST"}
         elif number in (90.0, 91.0):
             self.steps = number == 91.0
         elif number in (98.0, 99.0):
@@ -212,14 +216,12 @@ class FreeCad(Saying):
 
     def _move(self, said: dict[str, float]) -> None:
         before = dict(self.at)
-        self.at |= {a: said[a] + (before.get(a, 0.0) if self.steps else 0.0) for a in "XYZ" if a in said}
+        self.at |= {a: said[a] + (before.get(a, math.nan) if self.steps else 0.0) for a in "XYZ" if a in said}
         if len(self.at) < 3:
             return
         if self.motion == 0.0:
-            self.fed = math.nan if "F" in said else self.fed
             self.say("RAPID")
         else:
-            self.fed = said.get("F", self.fed)
             if self.fed != self.given:
                 self.given = self.fed
                 self.say("FEDRAT", self.fed, self.per)
@@ -231,7 +233,7 @@ class FreeCad(Saying):
     def _hole(self, said: dict[str, float]) -> None:
         self.level = self.at["Z"] if math.isnan(self.level) else self.level
         self.at |= {a: said[a] for a in "XY" if a in said}
-        self.fed, top = said.get("F", self.fed), self.held["R"]
+        top = self.held["R"]
         self.at["Z"] = max(self.level, top) if self.initial else top
         kind = {83.0: "DEEP", 73.0: "BRKCHP"}.get(self.motion, "DRILL")
         words: tuple[Word, ...] = (kind, "FEDTO", top - self.held["Z"], self.per, self.fed, "RAPTO", 0.0, "RTRCTO",
