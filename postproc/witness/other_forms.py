@@ -43,8 +43,8 @@ def _name(text: str) -> str:
     if "(EXPORTED BY FREECAD)" in head[:400].upper() and "GOTO" not in head:
         return "freecad"
     first = [line.split() for line in head.split("\n")[:3]]
-    pairs = len(first) == 3 and all(len(first[k]) == 1 and first[k][0].isdigit() for k in (0, 2))
-    return "nci" if pairs and first[1] and "/" not in head[:200] else ""
+    pairs = len(first) == 3 and all(len(first[k]) == 1 and first[k][0].isascii() and first[k][0].isdigit() for k in (0, 2))
+    return "nci" if pairs and first[1] and not any("/" in word for word in first[1]) else ""
 
 
 class Nci(Saying):
@@ -137,7 +137,7 @@ class Nci(Saying):
         self._cool(int(v[9]))
 
     def _other(self, code: int, body: str) -> None:
-        v = [float(w) for w in body.split()] if code in (4, 1013) else []
+        v = [float(w) for w in body.split()] if code in (4, 1013, 1014, 1027) else []
         if code == 80:
             self._off()
         elif code == 4:
@@ -149,6 +149,8 @@ class Nci(Saying):
             self.say("CUTCOM", "OFF")
         elif code == 1013 and v[1] > 0.0:
             self.say("CUTTER", v[1], v[2])
+        elif code in (1014, 1027) and np.abs(np.subtract(v[:12], [*np.eye(3).flat, 0, 0, 0][:len(v)])).max() > 1e-6:
+            self.say("MCS")
         elif code in (1006, 20001):
             self.text("INSERT" if code == 1006 else "TPRINT", body)
 
