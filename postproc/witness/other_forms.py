@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_left
 from typing import Any
 
 import numpy as np
@@ -137,7 +138,7 @@ class Nci(Saying):
         self._cool(int(v[9]))
 
     def _other(self, code: int, body: str) -> None:
-        v = [float(w) for w in body.split()] if code in (4, 1013, 1014, 1027) else []
+        v = [float(w) for w in body.split()[:9 if code == 1014 else 12]] if code in (4, 1013, 1014, 1027) else []
         if code == 80:
             self._off()
         elif code == 4:
@@ -149,7 +150,7 @@ class Nci(Saying):
             self.say("CUTCOM", "OFF")
         elif code == 1013 and v[1] > 0.0:
             self.say("CUTTER", v[1], v[2])
-        elif code in (1014, 1027) and np.abs(np.subtract(v[:12], [*np.eye(3).flat, 0, 0, 0][:len(v)])).max() > 1e-6:
+        elif code in (1014, 1027) and np.abs(np.subtract(v, [*np.eye(3).flat, 0, 0, 0][:len(v)])).max() > 1e-6:
             self.say("MCS")
         elif code in (1006, 20001):
             self.text("INSERT" if code == 1006 else "TPRINT", body)
@@ -255,7 +256,8 @@ class StepNc(Saying):
         """The project's workplan."""
         self.texts: list[str] = []
         text = _TEXT.sub(self._kept, _COMMENT.sub(lambda m: "\n" * m[0].count("\n"), text))
-        self.of = {f"#{m[1]}": (m[2].upper(), _nested(m[3]), text.count("\n", 0, m.start()) + 1)
+        breaks = [m.start() for m in re.finditer("\n", text)]
+        self.of = {f"#{m[1]}": (m[2].upper(), _nested(m[3]), bisect_left(breaks, m.start()) + 1)
                    for m in _INSTANCE.finditer(text)}
         self.at: Array | None = None
         self.axis, self.before = np.array([0.0, 0.0, 1.0]), dict[str, Any]()
