@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_left
 from typing import Any
 
 import numpy as np
@@ -43,8 +44,8 @@ def _name(text: str) -> str:
     if "(EXPORTED BY FREECAD)" in head[:400].upper() and "GOTO" not in head:
         return "freecad"
     first = [line.split() for line in head.split("\n")[:3]]
-    pairs = len(first) == 3 and all(len(first[k]) == 1 and first[k][0].isdigit() for k in (0, 2))
-    return "nci" if pairs and first[1] and "/" not in head[:200] else ""
+    pairs = len(first) == 3 and all(len(first[k]) == 1 and first[k][0].isascii() and first[k][0].isdigit() for k in (0, 2))
+    return "nci" if pairs and first[1] and not any("/" in word for word in first[1]) else ""
 
 
 class Nci(Saying):
@@ -137,7 +138,7 @@ class Nci(Saying):
         self._cool(int(v[9]))
 
     def _other(self, code: int, body: str) -> None:
-        v = [float(w) for w in body.split()] if code in (4, 1013) else []
+        v = [float(w) for w in body.split()[:9 if code == 1014 else 12]] if code in (4, 1013, 1014, 1027) else []
         if code == 80:
             self._off()
         elif code == 4:
@@ -149,6 +150,8 @@ class Nci(Saying):
             self.say("CUTCOM", "OFF")
         elif code == 1013 and v[1] > 0.0:
             self.say("CUTTER", v[1], v[2])
+        elif code in (1014, 1027) and np.abs(np.subtract(v, [*np.eye(3).flat, 0, 0, 0][:len(v)])).max() > 1e-6:
+            self.say("MCS")
         elif code in (1006, 20001):
             self.text("INSERT" if code == 1006 else "TPRINT", body)
 
@@ -173,15 +176,18 @@ class FreeCad(Saying):
         for self.line, block in enumerate(blocks, 1):
             words = [(letter, float(number)) for letter, number in _WORDS.findall(block)]
             said = {letter: number for letter, number in words if letter not in "GMN"}
-            for letter, number in words:
-                if letter == "G":
-                    self._command(number, said)
+            heads = [number for letter, number in words if letter == "G"]
+            for number in heads:
+                self._command(number, said)
             spoken = self.held.get("S", 0.0)
             self.held |= {a: b for a, b in said.items() if a in "ST" or (a in "ZRQP" and self.motion in _HOLES)}
             codes = [number for letter, number in words if letter == "M"]
-            for number in codes or ([self.turns] if self.turns and said.get("S", spoken) != spoken else []):
+            again = self.turns and said.get("S", spoken) != spoken and not set(codes) & {3.0, 4.0, 5.0}
+            for number in (*([self.turns] if again else []), *codes):
                 self._switch(number)
-            moves = bool(said.keys() & set("XYZ"))
+            moves = bool(said.keys() & set("XYZIJ" if self.motion in (2.0, 3.0) else "XYZ"))
+            if "F" in said:
+                self.fed = said["F"] if self.motion != 0.0 or not (moves or 0.0 in heads) else math.nan
             if self.cycle and (self.motion == 80.0 or (moves and self.motion not in _HOLES)):
                 self.cycle, self.level = (), math.nan
                 self.say("CYCLE", "OFF")
@@ -191,6 +197,7 @@ class FreeCad(Saying):
     def _command(self, number: float, said: dict[str, float]) -> None:
         if number in (0.0, 1.0, 2.0, 3.0, 80.0, *_HOLES):
             self.motion = number
+            self.held = self.held if number in _HOLES else {a: b for a, b in self.held.items() if a in "ST"}
         elif number in (90.0, 91.0):
             self.steps = number == 91.0
         elif number in (98.0, 99.0):
@@ -212,14 +219,12 @@ class FreeCad(Saying):
 
     def _move(self, said: dict[str, float]) -> None:
         before = dict(self.at)
-        self.at |= {a: said[a] + (before.get(a, 0.0) if self.steps else 0.0) for a in "XYZ" if a in said}
+        self.at |= {a: said[a] + (before.get(a, math.nan) if self.steps else 0.0) for a in "XYZ" if a in said}
         if len(self.at) < 3:
             return
         if self.motion == 0.0:
-            self.fed = math.nan if "F" in said else self.fed
             self.say("RAPID")
         else:
-            self.fed = said.get("F", self.fed)
             if self.fed != self.given:
                 self.given = self.fed
                 self.say("FEDRAT", self.fed, self.per)
@@ -231,7 +236,7 @@ class FreeCad(Saying):
     def _hole(self, said: dict[str, float]) -> None:
         self.level = self.at["Z"] if math.isnan(self.level) else self.level
         self.at |= {a: said[a] for a in "XY" if a in said}
-        self.fed, top = said.get("F", self.fed), self.held["R"]
+        top = self.held["R"]
         self.at["Z"] = max(self.level, top) if self.initial else top
         kind = {83.0: "DEEP", 73.0: "BRKCHP"}.get(self.motion, "DRILL")
         words: tuple[Word, ...] = (kind, "FEDTO", top - self.held["Z"], self.per, self.fed, "RAPTO", 0.0, "RTRCTO",
@@ -251,7 +256,8 @@ class StepNc(Saying):
         """The project's workplan."""
         self.texts: list[str] = []
         text = _TEXT.sub(self._kept, _COMMENT.sub(lambda m: "\n" * m[0].count("\n"), text))
-        self.of = {f"#{m[1]}": (m[2].upper(), _nested(m[3]), text.count("\n", 0, m.start()) + 1)
+        breaks = [m.start() for m in re.finditer("\n", text)]
+        self.of = {f"#{m[1]}": (m[2].upper(), _nested(m[3]), bisect_left(breaks, m.start()) + 1)
                    for m in _INSTANCE.finditer(text)}
         self.at: Array | None = None
         self.axis, self.before = np.array([0.0, 0.0, 1.0]), dict[str, Any]()

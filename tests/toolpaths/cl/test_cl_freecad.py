@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.witness.clfile import commanded
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Kind
@@ -71,7 +72,12 @@ def test_its_own_form_has_feeds_per_second_and_is_asked_for() -> None:
     ("G21\n", "G21\nG20\n", ("cl.units", (7,))), ("J-5.000 K0.000", "J-5.000 K1", ("cl.circle", (19,))),
     ("G1 X-5.000", "G1 X-5.000 M9", ("cl.text", (20,))), ("G1 X-5.000", "G1 X-5.000 L2", ("cl.text", (20,))),
     ("linuxcnc_post", "grbl_post", ("cl.cycle-value", (29,))),
-    (" R3.000\nG80\nG99", "\nG80\nG99", None)])
+    (" R3.000\nG80\nG99", "\nG80\nG99", None), ("G1 X-5.000", "G1 X-5.000 I2", ("cl.text", (20,))),
+    ("G1 X-5.000", "G1 X-5.000 R2 Q1 P1", ("cl.text", (20,))), ("P0.500 R3.000", "P0.500 R3.000 K3", ("cl.text", (29,))),
+    ("J-5.000 K0.000", "J-5.000 P3", ("cl.circle", (19,))), ("J-5.000 K0.000", "J-5.000 P1", None),
+    ("G17 G54 G40 G49 G80 G90\n", "G91\n", ("cl.goto", (14, 15))), ("G98\n", "/G98\n", ("cl.text", (24,))),
+    ("P0.500 R3.000", "P0.500", ("cl.cycle-value", (29,))), ("M9\n", "M2\n", ("cl.text", (35, 36, 37))),
+    (" Q4.000 R3.000\nG83 X-30", " R3.000\nG83 X-30", ("cl.cycle-value", (25,)))])
 def test_what_is_not_carried_out_is_refused(old: str, new: str, found: tuple[str, tuple[int, ...]] | None) -> None:
     """The last: R stays from hole to hole."""
     assert PLATE.count(old) == 1
@@ -81,10 +87,23 @@ def test_what_is_not_carried_out_is_refused(old: str, new: str, found: tuple[str
 
 def test_a_feed_of_a_rapid_is_none_of_a_cut_and_inches_are_none_of_its_own_form() -> None:
     assert ("cl.feed", (3,)) in errors("G0 X0 Y0 Z5\nG0 F100 Z2\nG1 Z0\n", dialect="freecad")
-    assert ("cl.unknown-word", (1,)) in errors("G20\n" + OWN, dialect="freecad")
+    for one in ("G20", "G21", "M30", "%"):
+        assert ("cl.units", (1,)) in errors(f"{one}\n" + OWN, dialect="freecad")
     assert [d.code for d in read_bytes(PLATE.replace("G21\n", "\n")).diagnostics] == ["cl.no-units"]
 
 
 def test_a_speed_alone_holds_where_the_spindle_turns() -> None:
     p = read_bytes(PLATE.replace("G98\n", "G98\nS900\n").replace("M3 S3000", "M4")).toolpath
     assert [(e.index, e.values) for e in p.events if e.word == "SPINDL"][:2] == [(0, ("CCLW",)), (7, (900.0, "RPM", "CCLW"))]
+
+
+def test_words_that_stand_without_a_move_hold_and_i_and_j_alone_are_a_whole_turn() -> None:
+    """F alone and with G1 alone, S beside M8; S beside M3 is said once."""
+    text = PLATE.replace("G1 X-5.000\n", "F100\nG1 X-5.000\nG1 F50\nX-6\nS500 M8\nG2 I10\n")
+    p = read_bytes(text).toolpath
+    assert (p.feed[5:8] * 60).round(6).tolist() == [100, 50, 50] and p.arcs.sweep[-1] == pytest.approx(2 * np.pi)
+    assert p.tip[6:8].tolist() == [[-6, 10, -2]] * 2
+    assert [(e.index, e.values) for e in p.events if e.word == "SPINDL"] == [
+        (0, (3000.0, "RPM", "CLW")), (7, (500.0, "RPM", "CLW")), (13, ("OFF",))]
+    seen = commanded(text.encode(), None, "freecad")
+    assert seen.tip == pytest.approx(p.tip) and seen.feed[5:8].tolist() == [100, 50, 50]

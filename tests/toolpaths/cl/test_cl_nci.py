@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.witness.clfile import commanded
 from toolpaths.cl.read import ReadResult, read_bytes
+from toolpaths.cl.systems.recognise import recognised
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Kind
 
@@ -73,13 +75,23 @@ def test_inches_are_asked_for() -> None:
     ("80\n0\n", "1018\n0\n", ("cl.unknown-word", (33,))), ("0. 6. 68. -2.", "0. 0. 60. -2.", ("cl.axis", (35,))),
     ("68. -2. 0 0 0", "68. -2. 0 200 0", ("cl.form", (35,))),
     ("1\n41 0. 0. -1. 250. 0", "1\n41 0. x -1. 250. 0", ("cl.form", (19,))), ("80\n0\n", "80\n", ("cl.text", (35,))),
-    ("1014\n1. 0. 0. 0. 1.", "1014\n1. 0. 0. 0. .8", ("cl.frame", (35, 37))),
+    ("1014\n1. 0. 0. 0. 1.", "1014\n1. 0. 0. 0. .8", ("cl.frame", (13,))),
     ("80\n0\n", "1014\n0. 1. 0. -1. 0. 0. 0. 0. 1.\n", ("cl.frame", (33,))),
     ("0\n0 0. 0. 2. -2. 0", "0\n0 0. 0. 2. 90. 0", ("cl.feed", (17,))),
-    ("0 4500. 250. 1", "0 4500. 250. 8", ("cl.form", (11,)))])
+    ("0 4500. 250. 1", "0 4500. 250. 8", ("cl.form", (11,))),
+    ("1\n41 0.", "1\n43 0.", ("cl.form", (19,))), ("1\n41 0.", "1\n-41 0.", ("cl.form", (19,))),
+    ("3\n0 0 30.", "3\n0 3 30.", ("cl.form", (23,))), ("1003\n0\n", "1003\n0\n\n1\n0\n", ("cl.text", (42,))),
+    ("1014\n1. 0. 0. 0. 1. 0. 0. 0. 1.", "1027\n1 0 0 0 1 0 0 0 1 100 0 0", ("cl.frame", (13,))),
+    ("80\n0\n", "\u00b2\n0\n", ("cl.text", (33,))), ("80\n0\n", "9" * 5000 + "\n0\n", ("cl.text", (33,)))])
 def test_what_is_not_carried_out_is_refused_at_its_line(old: str, new: str, found: tuple[str, tuple[int, ...]]) -> None:
     assert PLATE.count(old) == 1
     assert found in errors(PLATE.replace(old, new))
+
+
+def test_a_remark_with_strokes_leaves_the_form_as_it_is() -> None:
+    text = PLATE.replace("1012\n", "1005\n/ 6/7 GOTO/1\n1012\n")
+    assert (read_bytes(text, units="mm").dialect, recognised(text.encode())) == ("nci", recognised(PLATE.encode()))
+    assert commanded(text.encode(), "mm").tip == pytest.approx(plate().toolpath.tip)
 
 
 def test_turning_is_said_to_be_turning_and_a_missing_end_is_noted() -> None:

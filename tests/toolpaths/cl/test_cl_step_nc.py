@@ -55,6 +55,11 @@ def test_tools_states_and_rests() -> None:
     ("#80=MILLING_MACHINE_FUNCTIONS(.T.,$,$", "#80=MILLING_MACHINE_FUNCTIONS(.T.,$,.T.", "coolants at a time"),
     ("#70,#80,$,$,$,$)", "#70,#80,$,#9,$,$)", "approach"), ("#80=MILLING_MACHINE_FUNCTIONS(.T.,$,$,.F.,$,()",
     "#80=MILLING_MACHINE_FUNCTIONS(.T.,$,$,.F.,$,(#9)", "clamps"), ("-50.,$,.F.", "-50.,$,.T.", "the spindle drives"),
+    ("#107=", "#500=(CONVERSION_BASED_UNIT('INCH',#501)LENGTH_UNIT()NAMED_UNIT(#502));\n#107=", "not mm"),
+    ("CIRCLE('',#905,5.)", "CIRCLE('',#905,7.)", "2 mm off its CIRCLE"), ("(30.,-5.,-1.)", "(30.,-5.,1.)", "2 mm off"),
+    ("#93,#94,$", "#93,#94,#93", "normals"), ("#2=WORK", "#3=PROJECT('OTHER',#2,(#4),$,$,$);\n#2=WORK", "or several"),
+    ("SETUP('SETUP',#20", "SETUP('SETUP',#21", "placed away"),
+    ("#9,())", "#9,(#27));#27=WORKPIECE_SETUP(#4,#21,$,$,())", "placed away"),
     ("#901=COMPOSITE", "#901=(COMPOSITE", "names nothing")])
 def test_what_is_not_carried_out_is_refused(old: str, new: str, said: str) -> None:
     assert old in TILTED

@@ -11,6 +11,8 @@ from toolpaths.arrays import Floats
 from toolpaths.cl.systems.part21 import Instance, Reference, Value
 
 _DEEPEST = 20
+_OFF_CIRCLE = 0.01
+"""mm"""
 
 
 class Unread(Exception):
@@ -107,6 +109,10 @@ def _trimmed(found: Found, curve: Instance) -> list[Piece]:
     if basis.name != "CIRCLE":
         raise Unread(f"TRIMMED_CURVE of {basis.name}: read are LINE and CIRCLE", curve.line)
     centre, matrix = place(found, _of(found, basis.value(1), basis))
+    along, radius = (np.array(ends) - centre) @ matrix, basis.value(2)
+    off = np.hypot(np.hypot(*along.T[:2]) - (radius if isinstance(radius, float) else np.nan), along[:, 2]).max()
+    if not off <= _OFF_CIRCLE:
+        raise Unread(f"TRIMMED_CURVE whose ends lie {off:.4g} mm off its CIRCLE; {_OFF_CIRCLE:g} is allowed", curve.line)
     normal = matrix[:, 2] * (-1.0 if curve.value(4) == ".F." else 1.0)
     return [Piece(ends[0]), Piece(ends[1], tuple(centre.tolist()), tuple(normal.tolist()))]
 

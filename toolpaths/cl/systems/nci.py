@@ -18,8 +18,10 @@ from toolpaths.cl.text.log import DiagnosticLog
 _LEAST = {0: 5, 1: 5, 2: 8, 3: 8, 4: 1, 11: 7, 81: 17, 100: 11, 1000: 10, 1001: 10, 1002: 10, 1013: 3, 1014: 9, 1027: 12}
 """numbers that a code must have at least"""
 _KINDS = {0: "DRILL", 1: "DEEP", 2: "BRKCHP", 3: "TAP", 4: "REAM", 5: "BORE"}
-_SIDES = {40: "OFF", 140: "OFF", 41: "LEFT", 42: "RIGHT"}
-_COOLANT = {0: "OFF", 1: "FLOOD", 2: "MIST", 3: "THRU"}
+_DIGITS = 9
+"""of a code, at most"""
+_SIDES: dict[float, str] = {40: "OFF", 140: "OFF", 41: "LEFT", 42: "RIGHT"}
+_COOLANT: dict[float, str] = {0: "OFF", 1: "FLOOD", 2: "MIST", 3: "THRU"}
 _TEXTS = {1005: "PPRINT", 1006: "INSERT", 1007: "PPRINT", 1008: "PPRINT", 20001: "TPRINT"}
 _PARAMETERS = 10_000
 """codes from here on repeat what was chosen in dialogs"""
@@ -38,7 +40,6 @@ class NciReader:
         self.at: tuple[float, ...] = ()
         self.side, self.coolant, self.register = "OFF", "OFF", 0.0
         self.cycle, self.armed, self.drill = "", False, list[float]()
-        self.frames: dict[int, tuple[float, ...]] = {}
         self.name, self.operations, self.line = "", 0, 0
 
     def read(self, text: str) -> AsStatements:
@@ -47,17 +48,24 @@ class NciReader:
         for k in range(0, len(lines), 2):
             self.line = k + 1
             code, body = lines[k].strip(), lines[k + 1].strip() if k + 1 < len(lines) else ""
-            if not code.isdigit():
+            if not (code.isascii() and code.isdigit() and len(code) <= _DIGITS):
                 self.log.error("cl.text", f"no NCI code: {code[:60]!r}", self.line,
                                "codes stand alone in every other line; have Mastercam write the file again")
                 break
             self._one(int(code), body)
             if int(code) == 1003:
+                self._nothing_behind(lines, k + 2)
                 break
         else:
             self.log.warning("cl.cut-off", "the file ends without code 1003: it may be cut off", len(lines),
                              "compare its last line with Mastercam, or have it written again")
         return self.out
+
+    def _nothing_behind(self, lines: list[str], end: int) -> None:
+        behind = next((n for n, line in enumerate(lines[end:], end + 1) if line.strip()), 0)
+        if behind:
+            self.log.error("cl.text", f"text behind code 1003, which ends the file in line {end - 1}", behind,
+                           "write one NCI file for each program, or take the code 1003 out")
 
     def _one(self, code: int, body: str) -> None:
         if code in _TEXTS:
@@ -101,10 +109,10 @@ class NciReader:
         if digit:
             self._cool(digit - 1)
 
-    def _cool(self, kind: int) -> None:
+    def _cool(self, kind: float) -> None:
         word = _COOLANT.get(kind)
         if word is None:
-            self.log.error("cl.form", f"coolant {kind} is none of {', '.join(map(str, _COOLANT))}", self.line,
+            self.log.error("cl.form", f"coolant {kind:g} is none of {', '.join(map(str, _COOLANT))}", self.line,
                            "choose coolant off, flood, mist or through the tool in Mastercam")
         elif word != self.coolant:
             self.coolant = word
@@ -112,8 +120,11 @@ class NciReader:
 
     def _compensate(self, code: float) -> None:
         """Cutter compensation by the control: 0 as it is, 40 and 140 off, 41 left, 42 right."""
-        side = _SIDES.get(int(code), self.side)
-        if side != self.side:
+        side = _SIDES.get(code, self.side)
+        if code not in (0.0, *_SIDES):
+            self.log.error("cl.form", f"compensation {code:g} is none of 0, 40, 41, 42, 140", self.line,
+                           "have Mastercam write the file again, arcs in XY and compensation by these codes")
+        elif side != self.side:
             self.side = side
             register = f",{self.register:g}" if side != "OFF" and self.register > 0.0 else ""
             self.out.add(self.line, f"CUTCOM/{side}{register}")
@@ -135,10 +146,6 @@ class NciReader:
     def five_axes(self, code: int, v: list[float]) -> None:
         """11: tip, a point of the tool axis above it, feed, -, flags."""
         self._no_cycle()
-        for plane, first in self.frames.items():
-            if max(abs(a - b) for a, b in zip(first, _UPRIGHT, strict=False)) > _SAME_PLACE:
-                self.log.error("cl.frame", f"5-axis moves under a tilted work plane (code {plane}): nothing documents in "
-                               "which system they stand", self.line, "write 5-axis moves in the top plane")
         axis = np.array(v[3:6]) - v[:3]
         length = float(np.linalg.norm(axis))
         if not length > 0.0:
@@ -237,7 +244,7 @@ class NciReader:
         self.register = v[4]
         if v[7]:
             self._turn(v[7])
-        self._cool(int(v[9]))
+        self._cool(v[9])
 
     def cutter(self, code: int, v: list[float]) -> None:
         """1013: -, diameter, corner radius."""
@@ -245,12 +252,12 @@ class NciReader:
             self.out.add(self.line, f"CUTTER/{numbers(v[1:3])}")
 
     def frame(self, code: int, v: list[float]) -> None:
-        """1014, 1027: tool plane and work plane. Points are taken as written, in the first of each; another is refused."""
+        """1014, 1027: tool plane, and work plane with its origin. Upright and at the origin, or it is refused."""
         self.out.say(self.line, "REMARK", f"NCI {code}")
-        first = self.frames.setdefault(code, tuple(v[:_LEAST[code]]))
-        if max(abs(a - b) for a, b in zip(first, v, strict=False)) > _SAME_PLACE:
-            self.log.error("cl.frame", f"code {code}: the plane of the points changes, and in which sense it turns them is "
-                           "not documented", self.line, "write one NCI file for each plane, or 5-axis moves (code 11)")
+        if max(abs(a - b) for a, b in zip(_UPRIGHT, v, strict=False)) > _SAME_PLACE or any(v[9:_LEAST[code]]):
+            self.log.error("cl.frame", f"code {code}: a plane that is tilted, turned or away from the origin, and in which "
+                           "sense it moves the points is not documented", self.line,
+                           "write one NCI file for each plane as the top plane, or 5-axis moves (code 11)")
 
     def others(self, code: int, v: list[float]) -> None:
         """80 cycle off, 1003 end, 1004 compensation off, 200 and 201 threads of lathes."""

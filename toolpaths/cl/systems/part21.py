@@ -32,7 +32,7 @@ Value: TypeAlias = "float | str | Reference | Typed | tuple[Value, ...] | None"
 
 @dataclass(frozen=True)
 class Instance:
-    """#number=name(values); of several names in one (complex instances) none is read: name ""."""
+    """#number=name(values); several names in one (complex instances) have the name "" and all words as values."""
 
     name: str
     values: tuple[Value, ...]
@@ -71,7 +71,7 @@ def instances(text: str) -> dict[int, Instance]:
 
 def _instance(tokens: list[str], line: int) -> Instance:
     if tokens[0] == "(":
-        return Instance("", (), line)
+        return Instance("", tuple(word.upper() for word in tokens), line)
     try:
         values, end = _values(tokens, 2, 0)
     except (IndexError, ValueError) as fault:

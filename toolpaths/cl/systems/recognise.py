@@ -19,8 +19,8 @@ FORMS: tuple[DialectName, ...] = ("nci", "freecad", "step-nc")
 _HEAD = 20_000
 """bytes that are looked at"""
 _NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_NCI = re.compile(rb"\s*\d{1,5}[ \t]*\r?\n[ \t]*" + _NUMBER + rb"(?:[ \t]+\S+)*[ \t]*\r?\n\s*\d{1,5}[ \t]*\r?\n")
-"""a code alone in its line, its values in the next, again a code"""
+_NCI = re.compile(rb"\s*\d{1,5}[ \t]*\r?\n[ \t]*" + _NUMBER + rb"(?:[ \t]+[^\s/]+)*[ \t]*\r?\n\s*\d{1,5}[ \t]*\r?\n")
+"""a code alone in its line, its values (no /, as records have) in the next, again a code"""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def recognised(data: bytes) -> tuple[DialectName, str] | None:
         return "freecad", EXPORTED
     if head.lstrip().startswith(b"ISO-10303-21") and b"MACHINING_WORKINGSTEP" in data and b"MACHINING_WORKPLAN" not in data:
         return "step-nc", "MACHINING_WORKINGSTEP of ISO 14649"
-    if _NCI.match(head) and b"/" not in head[:200]:
+    if _NCI.match(head):
         return "nci", "codes and parameters in turns"
     return None
 

@@ -25,7 +25,7 @@ _MM_PER_M = 1000.0
 _TYPES = frozenset({".CONNECT.", ".TRAJECTORY_PATH.", ".APPROACH.", ".LIFT.", ".CONTACT.", ".NON_CONTACT.", ".NONCONTACT."})
 _STOPS = {"PROGRAM_STOP": "STOP", "OPTIONAL_STOP": "OPSTOP"}
 _TOOL_AXES = (None, "TWO_AXES", "THREE_AXES")
-_EXPORT = "have the CAM system write explicit tool paths (CUTTER_LOCATION_TRAJECTORY), or APT text"
+_EXPORT = "have the CAM system write explicit tool paths (CUTTER_LOCATION_TRAJECTORY) in mm from the origin, or APT text"
 
 
 @dataclass
@@ -47,9 +47,11 @@ class StepNcReader:
         self.out.add(1, "UNITS/MM")
         try:
             self.found = instances(self.text)
-            project = next((i for i in self.found.values() if i.name == "PROJECT"), None)
-            if project is None:
-                raise Unread("no PROJECT, which names the workplan", 1)
+            projects = [i for i in self.found.values() if i.name == "PROJECT"]
+            if len(projects) != 1:
+                raise Unread("no PROJECT, or several: one names the workplan", projects[1].line if projects else 1)
+            self._units()
+            project = projects[0]
             self.out.say(project.line, "PARTNO", str(project.value(0) or ""))
             self._plan(self._of(project.value(1), project), 0)
             self.out.add(project.line, "FINI")
@@ -58,6 +60,12 @@ class StepNcReader:
         except ValueError as fault:
             self.log.error("cl.step-nc", str(fault), 0, "write the file again in the CAM system")
         return self.out
+
+    def _units(self) -> None:
+        """Lengths are mm by ISO 14649; a file that states another unit is refused."""
+        for one in self.found.values():
+            if not one.name and "LENGTH_UNIT" in one.values and not {"SI_UNIT", ".MILLI.", ".METRE."} <= set(one.values):
+                raise Unread("a unit of length that is not mm", one.line)
 
     def _of(self, value: Value, owner: Instance, *names: str) -> Instance:
         """The instance that a parameter of `owner` names, of one of these names where some are given."""
@@ -77,6 +85,8 @@ class StepNcReader:
             raise Unread(f"{plan.name} in the place of a workplan", plan.line)
         if plan.value(3) is not None and self.setup not in (None, plan.value(3)):
             raise Unread("workplans of two set-ups: nothing says how they lie to each other", plan.line)
+        if plan.value(3) is not None and self.setup is None:
+            self._set_up(self._of(plan.value(3), plan, "SETUP"))
         self.setup = plan.value(3) or self.setup
         for one in self._listed(plan.value(1), plan):
             if one.name == "WORKPLAN":
@@ -89,6 +99,12 @@ class StepNcReader:
                 self.out.say(one.line, "PPRINT", str(one.value(1) or ""))
             else:
                 raise Unread(f"{one.name} in a workplan is not carried out", one.line)
+
+    def _set_up(self, setup: Instance) -> None:
+        """SETUP(id, place, security plane, (WORKPIECE_SETUP(workpiece, place, ...))): all at the origin."""
+        for one in (setup, *self._listed(setup.value(3) or (), setup)):
+            if one.value(1) is not None:
+                self._identity(self._of(one.value(1), one, "AXIS2_PLACEMENT_3D"), only_height=False)
 
     def _step(self, step: Instance) -> None:
         """MACHINING_WORKINGSTEP(id, security plane, feature, operation, effect)."""
@@ -192,6 +208,8 @@ class StepNcReader:
         if name not in ((None,), (".RAPID.",)) or kind not in _TYPES:
             raise Unread(f"path of type {kind} with the speed {speed}", path.line)
         rapid = kind == ".CONNECT." or name == (".RAPID.",)
+        if path.value(8) is not None:
+            raise Unread("normals of the surface are not carried out", path.line)
         run = pieces(self.found, self._of(path.value(6), path))
         axes = [axis] * len(run)
         if path.value(7) is not None:
