@@ -2,39 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import cos, sin
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from machines.models import NotNegative, Positive, Vector
+from machines.key_problem import KeyProblem
+from machines.models import Vector
 from machines.slider_models import Interval
 from machines.user_file import UserModel
 from toolpaths.units import DEG
 
+Drive = Literal["slide", "arm", "length"]
+Size = Annotated[float, Field(gt=-1e6, lt=1e6)]
+"""mm; no machine is a kilometre long"""
+Length = Annotated[float, Field(ge=0, lt=1e6)]
+Place = tuple[Size, Size, Size]
 _UP = (0.0, 0.0, 1.0)
+_GOES_WITH = {"direction": ("slide", "arm"), "lean": ("slide",), "arm": ("arm",), "root": ("slide", "arm"),
+              "rail_offset": ("slide",), "rail_ends": ("slide",)}
+"""keys that not every drive has"""
 
 
 class DriveModel(UserModel):
     """One `[kinematics.legs.LETTER]` table, mm and degrees; the order of the tables is that of the joints."""
 
-    drive: Literal["slide", "arm", "length"]
+    drive: Drive
     """what moves: the rod's foot along a slide, round an axis at the end of an arm, or the rod's length"""
-    point: Vector
+    point: Place
     """slide: the rod's foot at q = 0; arm: a point of the axis; length: the rod's foot. In the machine frame"""
     direction: Vector = (0.0, 0.0, 1.0)
     """unit vector; slide: of positive q; arm: axis about which q turns by the right hand"""
-    arm: Vector = (0.0, 0.0, 0.0)
+    arm: Place = (0.0, 0.0, 0.0)
     """arm: from the axis to the rod's foot at q = 0, square to the axis"""
-    joint: Vector
+    joint: Place
     """platform joint relative to the platform's reference point"""
-    rod: NotNegative
+    rod: Length
     """length of the rods; of a leg of changing length at q = 0"""
     root: Literal[1, -1] = 1
     """how the leg is assembled: 1 where the foot stands on the positive side of the platform joint, of an arm beyond it"""
-    rods: Annotated[tuple[Vector, ...], Field(max_length=2)] = ()
+    rods: Annotated[tuple[Place, ...], Field(max_length=2)] = ()
     """each rod's place next to the leg's line, the same at both ends: two for a pair of parallel rods"""
-    rail_offset: Vector = (0.0, 0.0, 0.0)
+    rail_offset: Place = (0.0, 0.0, 0.0)
     """from the line of the foot to the middle of the rail"""
     rail_ends: Interval | None = None
     """q of the rail's ends; without it the rail is left out of the clearances"""
@@ -49,34 +59,48 @@ class StarLayout(UserModel):
     """
 
     form: Literal["star"]
-    drive: Literal["slide", "arm", "length"]
+    drive: Drive
     """of all legs"""
     letters: tuple[str, ...]
     """of the drives, one a leg"""
     angles: tuple[float, ...] | None = None
     """degrees from x towards y; default: evenly from 0"""
-    radius: NotNegative
+    radius: Length
     """from z to the feet, or to the axes of the arms"""
-    height: float = 0.0
+    height: Size = 0.0
     """z of the feet"""
     lean: float = 0.0
     """degrees"""
-    aside: tuple[float, ...] = ()
+    aside: tuple[Size, ...] = ()
     """mm by which a foot and its platform joint stand next to their direction, one a leg; default: not at all"""
     joint_angles: tuple[float, ...] | None = None
     """degrees; default: as `angles`"""
-    joint_radius: NotNegative
+    joint_radius: Length
     """of the platform joints"""
-    joint_height: float = 0.0
+    joint_height: Size = 0.0
     """z of the platform joints from the reference point"""
-    arm: Positive = 1.0
+    arm: Annotated[float, Field(gt=0, lt=1e6)] | None = None
     """length of the arms"""
-    rod: NotNegative
+    rod: Length
     """length of the rods, of a leg of changing length at q = 0"""
-    pair: Positive | None = None
+    pair: Annotated[float, Field(gt=0, lt=1e6)] | None = None
     """mm between the two rods of a leg; default: single rods"""
     root: Literal[1, -1] = 1
-    """of all legs"""
+    """of all legs; of arms: -1 with their elbows outside, as rotary Deltas are built, 1 inside"""
+    rail_ends: Interval | None = None
+    """of all slides, as in the tables of legs"""
+
+    def problems(self) -> Iterator[KeyProblem]:
+        """Keys that do not go with the drive, an arm without its length, lists that are not one value a leg."""
+        yield from stray_keys(self, self.drive, ("layout",))
+        if self.drive == "arm" and self.arm is None:
+            yield KeyProblem("machine.geometry", ("layout", "arm"), "drive = 'arm' and no length of the arms",
+                             "write arm = mm from the axis to the elbow")
+        for key in ("angles", "joint_angles", "aside"):
+            values = getattr(self, key)
+            if key in self.model_fields_set and values is not None and len(values) != len(self.letters):
+                yield KeyProblem("machine.geometry", ("layout", key), f"{key}: {len(values)} values for "
+                                 f"{len(self.letters)} letters", "write one value a leg, or leave the key out")
 
     def legs(self) -> dict[str, DriveModel]:
         """By letter."""
@@ -92,8 +116,16 @@ class StarLayout(UserModel):
             drive=self.drive, rod=self.rod, root=self.root, direction=direction,
             point=_sum((self.radius, out), (aside, side), (self.height, _UP)),
             joint=_sum((self.joint_radius, joint_out), (aside, joint_side), (self.joint_height, _UP)),
-            arm=_sum((self.arm, out)) if self.drive == "arm" else (0.0, 0.0, 0.0),
+            arm=_sum((self.arm or 0.0, out)), rail_ends=self.rail_ends,
             rods=() if self.pair is None else tuple(_sum((half, side)) for half in (0.5 * self.pair, -0.5 * self.pair)))
+
+
+def stray_keys(table: DriveModel | StarLayout, drive: Drive, path: tuple[str, ...]) -> Iterator[KeyProblem]:
+    """Keys that a file states and the drive has no use for: nothing would obey them."""
+    for key in sorted(table.model_fields_set):
+        if drive not in _GOES_WITH.get(key, (drive,)):
+            yield KeyProblem("machine.geometry", (*path, key), f"{key} does not go with drive = {drive!r}",
+                             f"take {key} out; it goes with drive = {' or '.join(map(repr, _GOES_WITH[key]))}")
 
 
 def _ring(angle: float) -> tuple[Vector, Vector]:

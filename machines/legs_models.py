@@ -13,10 +13,10 @@ from machines.kinematics.chain import LINEAR, ROTARY
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import FREEDOMS, Loops
 from machines.kinematics.legs.on_legs import OnLegs
-from machines.leg_layouts import DriveModel, StarLayout
+from machines.leg_layouts import DriveModel, Place, StarLayout, stray_keys
 from machines.legs_mobility import leg_faults
 from machines.models import KinematicsModel, Vector
-from machines.slider_models import UNIT, ClearanceModel, WorkspaceModel, clearance_sizes
+from machines.slider_models import UNIT, ClearanceModel, WorkspaceModel, clearance_sizes, rail_problems
 from machines.user_file import UserModel
 from toolpaths.arrays import Floats
 
@@ -38,7 +38,7 @@ class LegsModel(KinematicsModel):
     kind: Literal["legs"]
     freedoms: tuple[Freedom, ...]
     """translations along x, y, z of the machine frame and turns about them that the legs leave the platform"""
-    gauge: Vector = (0.0, 0.0, 0.0)
+    gauge: Place = (0.0, 0.0, 0.0)
     """mm from the reference point of the level platform"""
     layout: StarLayout | None = None
     """legs in a ring, so that nobody types their coordinates"""
@@ -90,12 +90,15 @@ class LegsModel(KinematicsModel):
 
     def problems(self) -> Iterator[KeyProblem]:
         """Vectors that are no directions, letters, freedoms that do not go with the legs; faults over the workspace."""
-        found = [*self._table_problems(), *self._freedom_problems()]
+        found = list(self.layout.problems() if self.layout else ()) or [*self._table_problems(), *self._freedom_problems()]
         yield from found
         if not found:
             yield from leg_faults(self.build(), [_pair(leg) for leg in self.drives.values()])
 
     def _table_problems(self) -> Iterator[KeyProblem]:
+        for name, leg in self.legs.items():
+            yield from stray_keys(leg, leg.drive, ("legs", name))
+        yield from rail_problems(list(self.drives.values()), self.clearance)
         for name, leg in self.drives.items():
             yield from _letter(name, ("legs", name), ROTARY if leg.drive == "arm" else LINEAR, leg.drive)
             yield from _direction(leg.direction, ("legs", name, "direction"))
@@ -109,6 +112,9 @@ class LegsModel(KinematicsModel):
             if leg.drive != "length" and leg.rod == 0.0:
                 yield KeyProblem("machine.geometry", ("legs", name, "rod"), f"the rod of leg {name} has no length",
                                  "write it in mm")
+            if (pair := _pair(leg)) is not None and np.linalg.norm(pair) < UNIT:
+                yield KeyProblem("machine.geometry", ("legs", name, "rods"), f"the two rods of leg {name} coincide",
+                                 "write the place of each, or one rod")
         for name, carrier in self.carriers.items():
             yield from _letter(name, ("carriers", name), LINEAR, "carrier")
             yield from _direction(carrier.direction, ("carriers", name, "direction"))
@@ -133,10 +139,11 @@ class LegsModel(KinematicsModel):
                                                                 "the "
                              "platform moves it already", "a carrier adds a direction that the platform does not have")
         low, high = self.workspace.tilt
-        if not (low == 0.0 <= high < 90.0 if own.endswith("abc") else -90.0 < low <= 0.0 <= high < 90.0):
+        least, most = (0.0, 0.0) if own in ("xy", "xyz") else (0.0 if own.endswith("abc") else -90.0, 90.0)
+        if not (low == high == 0.0 or least <= low <= 0.0 <= high < most and low > -90.0):
             yield KeyProblem("machine.geometry", ("workspace", "tilt"), f"{[low, high]} degrees cannot be the tilt of "
-                                                                        "this platform",
-                             "write tilt = [0, largest], or [lower, upper] about one axis; less than 90 degrees")
+                             f"this platform, free in {' '.join(own)}", "write tilt = [0, largest] with a b c, [lower, upper] "
+                             "about one axis with a or b, less than 90 degrees; none without turns")
 
 
 def _pair(leg: DriveModel) -> Floats | None:

@@ -120,7 +120,7 @@ class SliderModel(KinematicsModel):
 
     def problems(self) -> Iterator[KeyProblem]:
         """Vectors that are no directions, a workspace out of reach, a platform that moves otherwise than the kind."""
-        found = list(self._leg_problems())
+        found = [*self._leg_problems(), *rail_problems(list(self.legs.values()), self.clearance)]
         yield from found
         if not found:
             yield from self.mobility_problems()
@@ -165,6 +165,13 @@ def clearance_sizes(legs: Sequence[RodsOfLeg], given: ClearanceModel) -> Clearan
         rail_offset=np.array([leg.rail_offset for leg in legs]),
         rail_ends=np.array([leg.rail_ends or (0.0, 0.0) for leg in legs]),
         carriage_angle=_radians(given.carriage_angle), platform_angle=_radians(given.platform_angle))
+
+
+def rail_problems(legs: Sequence[RodsOfLeg], given: ClearanceModel) -> Iterator[KeyProblem]:
+    """Rails that are to be kept clear of, where not every leg says where its rail ends."""
+    if given.rail_radius is not None and any(leg.rail_ends is None for leg in legs):
+        yield KeyProblem("machine.geometry", ("clearance", "rail_radius"), "rail_radius is stated, and not every leg has "
+                         "rail_ends: no rail would be looked at", "write rail_ends of each slide, or take rail_radius out")
 
 
 def _radians(degrees: float | None) -> float | None:

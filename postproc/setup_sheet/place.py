@@ -119,8 +119,7 @@ def found_place(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
     or the one record that no place puts right; nothing for other refusals. `toolpath` is as it was read."""
     if result.ok or not _beyond(result):
         return []
-    limits, slides = result.machine.limits, ~np.array(result.machine.rotary)
-    odd = odd_record(toolpath, float((limits.upper - limits.lower)[slides].max()))
+    odd = odd_record(toolpath, _largest(result.machine))
     if odd is not None:
         return [odd]
     if len(toolpath) > _MOST:
@@ -138,6 +137,14 @@ def found_place(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
     return [_note(f"travel allows another place: {place.why}",
                   f"[part] origin = {origin}, x_axis = {x}, y_axis = {y} in the set-up; postproc place finds the fastest "
                   "near it, postproc setup new writes and proves it")]
+
+
+def _largest(machine: Machine) -> float:
+    """mm: the longest travel of a slide; of a machine without slides the diagonal of its workspace, where it has one."""
+    limits, slides, box = machine.limits, ~np.array(machine.rotary), machine.kinematics.workspace
+    if slides.any():
+        return float((limits.upper - limits.lower)[slides].max())
+    return np.inf if box is None else float(np.linalg.norm(box.upper - box.lower))
 
 
 def _note(message: str, hint: str) -> Diagnostic:

@@ -94,8 +94,7 @@ def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gco
     tolerance, axis_tolerance = job.options.tolerance, job.axis_tolerance
     tip, axis = _ends(motion, executed)
     sweep, faults = arc_sweeps(motion, executed.control), Faults(job.toolpath.file, gcode)
-    words = job.controller.format
-    grain = max(1e-3, 1.5 * job.controller.grain), max(1e-6, 1.5 * DEG * 10.0**-words.rotary_decimals)
+    grain = _grain(job)
     number = rewinds(motion, tip, axis, job.commanded.without_pecks().tip, executed.control.rotary,
                      (2.0 * tolerance, 2.0 * axis_tolerance))
     ends = EndPoses(tip, axis, sweep, np.asarray(number >= 0))
@@ -146,6 +145,14 @@ def _cuts(moves: Moves, owner: Ints, bound: DeviationBound) -> tuple[int, int]:
     cutting = (moves.kind != Kind.RAPID) & ~moves.link
     without = np.unique(owner[bound.unbounded_rows])
     return int(cutting.sum()), int(cutting.sum() - cutting[without].sum())
+
+
+def _grain(job: Job) -> tuple[float, float]:
+    """mm and rad below which a move may have vanished in rounding; of cranks rounded angles move the tip."""
+    kin, tip = job.machine.kinematics, max(1e-3, 1.5 * job.controller.grain)
+    if any(turns and moves for turns, moves in zip(kin.rotary, kin.drives_tip, strict=True)):
+        tip = max(tip, min(2.0 * job.rounding.tip, job.options.tolerance))
+    return tip, max(1e-6, 1.5 * DEG * 10.0**-job.controller.format.rotary_decimals)
 
 
 def _ends(motion: Motion, executed: BlockPoses) -> tuple[Floats, Floats]:
