@@ -233,11 +233,15 @@ def _points(making: _Making, sheet: DataSheet) -> dict[str, list[float]]:
         return {}
     read, unread = read_pivots(sheet.pivots.form, sheet.pivots.text) if sheet.pivots.text else ({}, [])
     for one in unread:
-        making.fault(("pivots", "text"), f"[pivots] text: {one}", "as the control puts it out, with decimal points")
-    if unread:
+        making.fault(("pivots", "text"), f"[pivots] text: {one}",
+                     "as the control puts it out: all three numbers of each vector, of one carrier or path")
+    if twice := sorted(read.keys() & sheet.pivots.points):
+        making.fault(("pivots", "points"), f"[pivots]: {' and '.join(twice)} in `text` and in `points`",
+                     "give it in one of them")
+    if unread or twice:
         return {}
     try:
-        points, wrong = points_of(sheet.pivots.form, sheet.table, sheet.head, {**read, **sheet.pivots.points})
+        points, wrong = points_of(sheet.pivots.form, sheet.table, sheet.head, read | sheet.pivots.points)
     except WrongFigureError as fault:
         making.fault(("pivots", "form"), fault.says, fault.hint)
         return {}
