@@ -233,12 +233,15 @@ def test_the_sheet_of_the_readme_is_one(tmp_path: Path) -> None:
     assert tomllib.loads(text) and made(tmp_path, text).machine is not None
 
 
-def readings_of(machine: Machine, length: float = 150.0) -> str:
+TURNS = ((0, 0), (60, 0), (0, 90), (30, -120))
+
+
+def readings_of(machine: Machine, length: float = 150.0, turns: tuple[tuple[float, float], ...] = TURNS) -> str:
     """A ball that stands on the table, as the control shows it in four poses, with its digits."""
     kin = machine.kinematics.with_tool(length)
     ball = np.array([[-300.0, -200.0, -450.0]])
     lines = []
-    for b, c in ((0, 0), (60, 0), (0, 90), (30, -120)):
+    for b, c in turns:
         q = np.array([[0.0, 0.0, 0.0, np.radians(b), np.radians(c)]])
         for _ in range(3):  # slides are straight: the place where the tip meets the ball
             tip, _ = kin.forward(q)
@@ -262,6 +265,20 @@ def test_readings_of_one_ball_find_a_wrong_sign_that_no_rule_sees(tmp_path: Path
         assert fault.code == "sheet.figure" and says in fault.hint and "one point" in fault.message and fault.lines
     [fault] = made(tmp_path, text + touched.replace("C = 90", "C = 0").replace("C = -120", "C = 0")).diagnostics
     assert "no reading turns C" in fault.message
+
+
+@pytest.mark.parametrize(("turns", "old", "new", "says"), [
+    (((0, 0), (60, 0), (0, 180)), "", "", "agree with jog = 'clockwise' under [C] as well"),
+    (((0, 0), (0.01, 0), (0, 90)), "", "", "B 1 mm further in Z as well"),
+    (((0, 0), (60, 0), (0, 360)), "", "", "no reading turns C"),
+    (TURNS, "B = 60", "A = 40, B = 60", "A is no rotary axis of the sheet"),
+])
+def test_readings_that_prove_too_little_prove_nothing(tmp_path: Path, turns: tuple[tuple[float, float], ...], old: str,
+                                                      new: str, says: str) -> None:
+    text = TRUNNION.replace(', "MRZP second" = [-381.05, -254.11, -500.2]', "")
+    touched = readings_of(machine_of(tmp_path, text), turns=turns).replace(old, new)
+    [fault] = made(tmp_path, text + touched).diagnostics
+    assert says in fault.message and fault.hint and fault.lines
 
 
 G10 = "G10 L52\nN19700 R-381.02\nN19701 P1 R-254.11\nN19702Q1L1P-558.4\nN19680 R2\n{c}N19704 R.0\nN19705 R0.\nG11"
