@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,11 +12,11 @@ from machines.loader import as_warnings, assemble, check
 from machines.machine import Machine
 from machines.sheet.file_text import FileValue, machine_text, nested
 from machines.sheet.jog import sense
-from machines.sheet.model import AxisSheet, DataSheet
+from machines.sheet.model import AxisSheet, DataSheet, TouchedSheet
 from machines.sheet.pivot_text import read_pivots
 from machines.sheet.pivots import points_of
 from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
-from machines.sheet.touched import AGREE, apart_by, wrong_sign
+from machines.sheet.touched import AGREE, apart_by, strange_turns, untold, wrong_sign
 from machines.toml_lines import KeyPath
 from machines.user_file import UserFile, ValueSource, read_toml, validate
 from toolpaths.diagnostics import Diagnostic, has_errors
@@ -107,15 +108,26 @@ def _compared(made: NewMachine, file: UserFile, sheet: DataSheet) -> NewMachine:
     """The machine, where the readings of [touched] are of one point by it; else what would make them so."""
     if sheet.touched is None or made.machine is None:
         return made
-    letters = [letter for letter in sheet.rotary if len({getattr(one, letter) for one in sheet.touched.readings}) == 1]
-    apart = apart_by(made.machine, sheet.touched)
-    if not letters and apart <= AGREE:
-        return made
-    said = f"[touched]: no reading turns {' and '.join(letters)}" if letters else (
-        f"[touched]: the readings are of one point, and by pivots and signs of the sheet they are {apart:.3f} mm apart")
-    hint = "add a reading in which it stands elsewhere" if letters else wrong_sign(
-        sheet, lambda other: _made(file, other, "").machine)
-    return NewMachine(None, "", [*made.diagnostics, file.problem("sheet.figure", ("touched",), said, hint)])
+    says, hint = _against(made.machine, sheet, sheet.touched, lambda other: _made(file, other, "").machine)
+    return made if not says else NewMachine(None, "", [*made.diagnostics, file.problem(
+        "sheet.figure", ("touched",), f"[touched]: {says}", hint)])
+
+
+def _against(machine: Machine, sheet: DataSheet, touched: TouchedSheet,
+             made: Callable[[DataSheet], Machine | None]) -> tuple[str, str]:
+    """(what the readings say against pivots and signs of the sheet, or why they prove none, what to do); "" for nothing."""
+    still, strange = strange_turns(sheet, touched)
+    if strange:
+        return f"{' and '.join(strange)} is no rotary axis of the sheet", "name the axes that the machine has"
+    if still:
+        return f"no reading turns {' and '.join(still)}", "add a reading in which it stands elsewhere"
+    if (apart := apart_by(machine, touched)) > AGREE:
+        return (f"the readings are of one point, and by pivots and signs of the sheet they are {apart:.3f} mm apart",
+                wrong_sign(sheet, touched, made))
+    others = untold(sheet, touched, machine, made)
+    return ("", "") if not others else (
+        f"the readings prove too little: they agree with {' or with '.join(others[:3])} as well",
+        "add readings with each rotary axis turned by about 90 degrees")
 
 
 def _made(file: UserFile, sheet: DataSheet, name: str) -> NewMachine:
@@ -233,11 +245,15 @@ def _points(making: _Making, sheet: DataSheet) -> dict[str, list[float]]:
         return {}
     read, unread = read_pivots(sheet.pivots.form, sheet.pivots.text) if sheet.pivots.text else ({}, [])
     for one in unread:
-        making.fault(("pivots", "text"), f"[pivots] text: {one}", "as the control puts it out, with decimal points")
-    if unread:
+        making.fault(("pivots", "text"), f"[pivots] text: {one}",
+                     "as the control puts it out: all three numbers of each vector, of one carrier or path")
+    if twice := sorted(read.keys() & sheet.pivots.points):
+        making.fault(("pivots", "points"), f"[pivots]: {' and '.join(twice)} in `text` and in `points`",
+                     "give it in one of them")
+    if unread or twice:
         return {}
     try:
-        points, wrong = points_of(sheet.pivots.form, sheet.table, sheet.head, {**read, **sheet.pivots.points})
+        points, wrong = points_of(sheet.pivots.form, sheet.table, sheet.head, read | sheet.pivots.points)
     except WrongFigureError as fault:
         making.fault(("pivots", "form"), fault.says, fault.hint)
         return {}

@@ -233,12 +233,15 @@ def test_the_sheet_of_the_readme_is_one(tmp_path: Path) -> None:
     assert tomllib.loads(text) and made(tmp_path, text).machine is not None
 
 
-def readings_of(machine: Machine, length: float = 150.0) -> str:
+TURNS = ((0, 0), (60, 0), (0, 90), (30, -120))
+
+
+def readings_of(machine: Machine, length: float = 150.0, turns: tuple[tuple[float, float], ...] = TURNS) -> str:
     """A ball that stands on the table, as the control shows it in four poses, with its digits."""
     kin = machine.kinematics.with_tool(length)
     ball = np.array([[-300.0, -200.0, -450.0]])
     lines = []
-    for b, c in ((0, 0), (60, 0), (0, 90), (30, -120)):
+    for b, c in turns:
         q = np.array([[0.0, 0.0, 0.0, np.radians(b), np.radians(c)]])
         for _ in range(3):  # slides are straight: the place where the tip meets the ball
             tip, _ = kin.forward(q)
@@ -264,8 +267,23 @@ def test_readings_of_one_ball_find_a_wrong_sign_that_no_rule_sees(tmp_path: Path
     assert "no reading turns C" in fault.message
 
 
-G10 = "G10 L52\nN19700 R-381.02\nN19701 P1 R-254.11\nN19702Q1L1P-558.4\nN19680 R2\n{c}N19704 R0.0\nG11"
-CARR = "$TC_CARR4[1]=-381.02\n$TC_CARR5[1]=-254.11\nN5 $TC_CARR6[1]=-558.4\n$TC_CARR15[1]=-0.03\n$TC_CARR23[1]=\"P\""
+@pytest.mark.parametrize(("turns", "old", "new", "says"), [
+    (((0, 0), (60, 0), (0, 180)), "", "", "agree with jog = 'clockwise' under [C] as well"),
+    (((0, 0), (0.01, 0), (0, 90)), "", "", "B 1 mm further in Z as well"),
+    (((0, 0), (60, 0), (0, 360)), "", "", "no reading turns C"),
+    (TURNS, "B = 60", "A = 40, B = 60", "A is no rotary axis of the sheet"),
+])
+def test_readings_that_prove_too_little_prove_nothing(tmp_path: Path, turns: tuple[tuple[float, float], ...], old: str,
+                                                      new: str, says: str) -> None:
+    text = TRUNNION.replace(', "MRZP second" = [-381.05, -254.11, -500.2]', "")
+    touched = readings_of(machine_of(tmp_path, text), turns=turns).replace(old, new)
+    [fault] = made(tmp_path, text + touched).diagnostics
+    assert says in fault.message and fault.hint and fault.lines
+
+
+G10 = "G10 L52\nN19700 R-381.02\nN19701 P1 R-254.11\nN19702Q1L1P-558.4\nN19680 R2\n{c}N19704 R.0\nN19705 R0.\nG11"
+CARR = "$TC_CARR4[1]=-381.02\n$TC_CARR5[1]=-254.11\nN5 $TC_CARR6[1]=-558.4\n$TC_CARR15[1]=-0.03\n" \
+       "$TC_CARR16[1]=0\n$TC_CARR17[1]=0\n$TC_CARR23[2]=\"P\""
 
 
 def test_pivots_as_a_control_puts_them_out(tmp_path: Path) -> None:
@@ -274,6 +292,21 @@ def test_pivots_as_a_control_puts_them_out(tmp_path: Path) -> None:
         sheet = TRUNNION.replace('"haas"', f'"{form}"').replace(points, f"text = \'\'\'\n{text}\n\'\'\'")
         chain = {joint.name: joint.point for joint in machine_of(tmp_path, sheet).kinematics.chain}
         np.testing.assert_allclose([chain["B"], chain["C"]], [[-381.02, -254.11, -558.4], [-381.05, -254.11, -558.4]])
-    [fault] = made(tmp_path, TRUNNION.replace('"haas"', '"fanuc"').replace(
-        points, f"text = \'\'\'\n{G10.format(c='N19703 R-30')}\n\'\'\'")).diagnostics
-    assert "decimal point" in fault.message and "N19703" in fault.message
+
+
+@pytest.mark.parametrize(("form", "old", "new", "says"), [
+    ("fanuc", "R-0.03", "R-30", "'N19703 R-30': no number with a decimal point"),
+    ("fanuc", "R-381.02", "R.", "'N19700 R.': no number with a decimal point"),
+    ("fanuc", "N19701 P1 R", "N19701Q1L2P", "paths 1 and 2: give the lines of one"),
+    ("fanuc", "N19704 R.0\n", "", "N19704 is missing, Y of 19703"),
+    ("fanuc", "N19704", "N19703", "'N19703 R.0': -0.03 stands in a line before it"),
+    ("siemens", "$TC_CARR5[1]", "$TC_CARR5[2]", "carriers 1 and 2: give the lines of one"),
+    ("siemens", "$TC_CARR16[1]=0", "", "$TC_CARR16 is missing, Y of I3"),
+    ("siemens", "# end", "points = { I2 = [1, 2, 3] }", "I2 in `text` and in `points`"),
+])
+def test_numbers_of_a_control_that_cannot_be_one_machine(tmp_path: Path, form: str, old: str, new: str, says: str) -> None:
+    """Numbers of several carriers or paths, of no digits, twice, or not all of a vector: none is taken for 0."""
+    text = {"fanuc": G10.format(c="N19703 R-0.03\n"), "siemens": CARR}[form]
+    table = f"[pivots]\nform = \"{form}\"\ntext = '''\n{text}\n'''\n# end\n".replace(old, new, 1)
+    [fault] = made(tmp_path, TRUNNION.split("[pivots]")[0] + table).diagnostics
+    assert fault.code == "sheet.figure" and says in fault.message and fault.lines and fault.hint, str(fault)
