@@ -30,6 +30,8 @@ POINT = 1e-3
 """mm: an arc of the contour of no more than this radius is a corner"""
 SMALL = 1e-4
 """mm by which an outside corner rounded and one not rounded may differ where both are the same"""
+ROUGH = 0.7
+"""of the tolerance: what the radius makes of a contour that rounded words turn a little"""
 Complexes = npt.NDArray[np.complex128]
 
 _WEAR = '[tools.N] compensation = "wear": the words are the path of the tool\'s centre'
@@ -41,10 +43,12 @@ _CORNER = ("have the CAM system write outside corners as the control goes round 
            'controller file: arc or intersection), or [tools.N] compensation = "wear"')
 _HELD = ("move STOP, OPSTOP, COOLNT, SPINDL, DELAY and the like before CUTCOM or behind CUTCOM/OFF: behind them the "
          "control cannot see the next move, from which it reckons where this one ends")
-_HINTS = {"lead": _LEAD, "straight": _STRAIGHT, "corner": _CORNER, "held": _HELD}
+_SHORT = "have the CAM system write longer moves there, or arcs (CIRCLE), or " + _WEAR
+_HINTS = {"short": _SHORT, "lead": _LEAD, "straight": _STRAIGHT, "corner": _CORNER, "held": _HELD}
 _SAID = {"lead": "its first or last move is none that every control makes alike", "straight": "a block that is no cut in "
          "the plane of X and Y", "corner": "an outside corner that this control does not go round as the CL file does",
          "inside": "an arc round a corner is smaller than the tool, or the contour would run backwards",
+         "short": "a move is so short that rounded words turn it, and the radius takes the tool off by more than is allowed",
          "held": "a record that is no move stands between its moves",
          "control": "this control does not begin square to the next move, or its manual does not say so"}
 
@@ -139,6 +143,10 @@ def _stretch(job: Job, path: JointPath, made: ContourWords, first: int, last: in
     result, write = words.end.copy(), words.write.copy()
     result[np.ix_(rows[:n], columns)] = np.stack([joints.real, joints.imag], axis=1)
     result = job.grid.rounded(result)
+    rough = result[rows[:n]][:, columns] @ np.array([1.0, 1j])
+    swing = abs(radius) * np.abs(_ahead(rough) - _ahead(joints)) * np.isnan(center[1:n])
+    if (swing > ROUGH * job.options.tolerance).any():
+        raise _Refused("short", lead + 1 + int(np.argmax(swing)))
     start, kept = words.start.copy(), rows[:n][~gone]
     start[rows[1:]] = np.where(np.isin(np.arange(words.end.shape[1]), columns), result[rows[:n]], start[rows[1:]])
     write[np.ix_(rows, columns)] = True
@@ -148,6 +156,12 @@ def _stretch(job: Job, path: JointPath, made: ContourWords, first: int, last: in
     middle = np.stack([center.real, center.imag], axis=1)[:n][~gone]
     centers[kept, :2] = np.where(arc[:n][~gone][:, None], middle - start[kept][:, columns], centers[kept, :2])
     return ContourWords(replace(words, end=result, start=start, write=write), dropped, centers)
+
+
+def _ahead(at: Complexes) -> Complexes:
+    """Directions (N - 1,) from point to point (N,); 0 where two are one."""
+    chord = np.diff(at)
+    return np.asarray(chord / np.where(np.abs(chord) > STILL, np.abs(chord), np.inf))
 
 
 @dataclass(frozen=True)
