@@ -256,6 +256,7 @@ class StepNc(Saying):
         """The project's workplan."""
         self.texts: list[str] = []
         text = _TEXT.sub(self._kept, _COMMENT.sub(lambda m: "\n" * m[0].count("\n"), text))
+        text = re.sub(r"#0+(?=\d)", "#", text)
         breaks = [m.start() for m in re.finditer("\n", text)]
         self.of = {f"#{m[1]}": (m[2].upper(), _nested(m[3]), bisect_left(breaks, m.start()) + 1)
                    for m in _INSTANCE.finditer(text)}

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.witness.clfile import commanded
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.cl.systems.part21 import Reference, Typed, instances
 from toolpaths.toolpath import Kind
@@ -57,7 +58,8 @@ def test_tools_states_and_rests() -> None:
     "#80=MILLING_MACHINE_FUNCTIONS(.T.,$,$,.F.,$,(#9)", "clamps"), ("-50.,$,.F.", "-50.,$,.T.", "the spindle drives"),
     ("#107=", "#500=(CONVERSION_BASED_UNIT('INCH',#501)LENGTH_UNIT()NAMED_UNIT(#502));\n#107=", "not mm"),
     ("CIRCLE('',#905,5.)", "CIRCLE('',#905,7.)", "2 mm off its CIRCLE"), ("(30.,-5.,-1.)", "(30.,-5.,1.)", "2 mm off"),
-    ("#93,#94,$", "#93,#94,#93", "normals"), ("#2=WORK", "#3=PROJECT('OTHER',#2,(#4),$,$,$);\n#2=WORK", "or several"),
+    ("$,$,$,.T.,#93", "$,$,0,.T.,#93", "names nothing"), ("#93,#94,$", "#93,#94,#93", "normals"),
+    ("#2=WORK", "#3=PROJECT('OTHER',#2,(#4),$,$,$);\n#2=WORK", "or several"),
     ("SETUP('SETUP',#20", "SETUP('SETUP',#21", "placed away"),
     ("#9,())", "#9,(#27));#27=WORKPIECE_SETUP(#4,#21,$,$,())", "placed away"),
     ("#901=COMPOSITE", "#901=(COMPOSITE", "names nothing")])
@@ -65,6 +67,11 @@ def test_what_is_not_carried_out_is_refused(old: str, new: str, said: str) -> No
     assert old in TILTED
     found = [d for d in read_bytes(TILTED.replace(old, new)).diagnostics if d.code == "cl.step-nc"]
     assert len(found) == 1 and (said in found[0].message or said == "names nothing"), found
+
+
+def test_numbers_of_instances_may_begin_with_noughts() -> None:
+    seen = commanded(TILTED.replace("CIRCLE('',#905", "CIRCLE('',#0905").encode())
+    assert seen.tip == pytest.approx(tilted().toolpath.tip)
 
 
 def test_values_of_part_21() -> None:

@@ -31,7 +31,7 @@ _TURNING = frozenset("ABC")
 _ALWAYS = frozenset("XYZFSTABC")
 """words that need no command in their line"""
 _TAKEN = {2.0: "IJKP", 3.0: "IJKP", 81.0: "R", 82.0: "RP", 83.0: "RQP", 73.0: "RQP"}
-"""words of a move beside those"""
+"""words of a move in addition"""
 _OF_POSTS = frozenset({("G", 20.0), ("G", 21.0), ("M", 2.0), ("M", 30.0)})
 """what its own form never holds"""
 

@@ -140,8 +140,8 @@ class StepNcReader:
         first = True
         paths = self._of(operation.value(0), operation, "TOOLPATH_LIST")
         for path in self._listed(paths.value(0), paths):
-            self._machine(path.value(4) or operation.value(7), path)
-            self._technology(path.value(3) or operation.value(6), path)
+            self._machine(operation.value(7) if path.value(4) is None else path.value(4), path)
+            self._technology(operation.value(6) if path.value(3) is None else path.value(3), path)
             if path.name == "FEEDSTOP":
                 self.out.add(path.line, f"DELAY/{signed(_number(path.value(5), path))}")
                 continue
