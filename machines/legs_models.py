@@ -13,7 +13,7 @@ from machines.kinematics.chain import LINEAR, ROTARY
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import FREEDOMS, Loops
 from machines.kinematics.legs.on_legs import OnLegs
-from machines.leg_layouts import DriveModel, Place, StarLayout, stray_keys
+from machines.leg_layouts import BoundedVector, DriveModel, StarLayout, stray_keys
 from machines.legs_mobility import leg_faults, travel_faults
 from machines.models import KinematicsModel, Vector
 from machines.slider_models import UNIT, ClearanceModel, WorkspaceModel, clearance_sizes, rail_problems
@@ -38,7 +38,7 @@ class LegsModel(KinematicsModel):
     kind: Literal["legs"]
     freedoms: tuple[Freedom, ...]
     """translations along x, y, z of the machine frame and turns about them that the legs leave the platform"""
-    gauge: Place = (0.0, 0.0, 0.0)
+    gauge: BoundedVector = (0.0, 0.0, 0.0)
     """mm from the reference point of the level platform"""
     layout: StarLayout | None = None
     """legs in a ring, so that nobody types their coordinates"""
