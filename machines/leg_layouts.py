@@ -18,7 +18,7 @@ Drive = Literal["slide", "arm", "length"]
 Size = Annotated[float, Field(gt=-1e6, lt=1e6)]
 """mm; no machine is a kilometre long"""
 Length = Annotated[float, Field(ge=0, lt=1e6)]
-Place = tuple[Size, Size, Size]
+BoundedVector = tuple[Size, Size, Size]
 _UP = (0.0, 0.0, 1.0)
 _GOES_WITH = {"direction": ("slide", "arm"), "lean": ("slide",), "arm": ("arm",), "root": ("slide", "arm"),
               "rail_offset": ("slide",), "rail_ends": ("slide",)}
@@ -30,21 +30,21 @@ class DriveModel(UserModel):
 
     drive: Drive
     """what moves: the rod's foot along a slide, round an axis at the end of an arm, or the rod's length"""
-    point: Place
+    point: BoundedVector
     """slide: the rod's foot at q = 0; arm: a point of the axis; length: the rod's foot. In the machine frame"""
     direction: Vector = (0.0, 0.0, 1.0)
     """unit vector; slide: of positive q; arm: axis about which q turns by the right hand"""
-    arm: Place = (0.0, 0.0, 0.0)
+    arm: BoundedVector = (0.0, 0.0, 0.0)
     """arm: from the axis to the rod's foot at q = 0, square to the axis"""
-    joint: Place
+    joint: BoundedVector
     """platform joint relative to the platform's reference point"""
     rod: Length
     """length of the rods; of a leg of changing length at q = 0"""
     root: Literal[1, -1] = 1
     """how the leg is assembled: 1 where the foot stands on the positive side of the platform joint, of an arm beyond it"""
-    rods: Annotated[tuple[Place, ...], Field(max_length=2)] = ()
+    rods: Annotated[tuple[BoundedVector, ...], Field(max_length=2)] = ()
     """each rod's place next to the leg's line, the same at both ends: two for a pair of parallel rods"""
-    rail_offset: Place = (0.0, 0.0, 0.0)
+    rail_offset: BoundedVector = (0.0, 0.0, 0.0)
     """from the line of the foot to the middle of the rail"""
     rail_ends: Interval | None = None
     """q of the rail's ends; without it the rail is left out of the clearances"""

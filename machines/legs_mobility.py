@@ -18,6 +18,7 @@ from machines.kinematics.legs.on_legs import OnLegs
 from machines.mobility import LEAST, place_words, sign_fault
 from toolpaths.arrays import Floats
 from toolpaths.rotations import cross, unit
+from toolpaths.units import DEG
 
 GRID, HEADINGS, TILTS = (5, 5, 5), 12, 4
 """places per direction, faces included; where the tool tilts, directions from z"""
@@ -61,6 +62,30 @@ def leg_faults(kinematics: OnLegs, pairs: Sequence[Floats | None]) -> Iterator[K
     yield from _held(kinematics, pairs, unit(rods), loops.arms(turn))
 
 
+def travel_faults(kinematics: OnLegs, travel: Floats, home: Floats) -> Iterator[KeyProblem]:
+    """A home where the platform is nowhere, and travels (J, 2) in which no place of the workspace lies; mm and rad.
+
+    Angles count whole turns apart. Paths are those of the machine file.
+    """
+    hint = "flip `root` (a star of arms has the elbows outside with -1, inside with 1), or correct travel and home"
+    names, legs_at = kinematics.leg_names, kinematics.legs_at
+    if not np.isfinite(kinematics.forward(home[None])[0]).all():
+        yield KeyProblem("machine.home", ("axes", names[0], "home"), "the legs meet at no platform with all axes at "
+                         "home", hint)
+    place, turn, _ = examined(kinematics)
+    q = kinematics.legs.solve(kinematics.loops.ends(place, turn), kinematics.legs.roots)
+    (low, high), arms = travel[legs_at].T, np.array(kinematics.rotary)[legs_at]
+    first = np.where(np.isfinite(low), low, 0.0)
+    turned = np.where(arms, first + np.mod(q - first, 2.0 * np.pi), q)
+    inside = (turned >= low) & (turned <= high)
+    if not inside.all(axis=1).any():
+        k = int(inside.sum(axis=0).argmin())
+        size = DEG if arms[k] else 1.0
+        yield KeyProblem("machine.travel", ("axes", names[k], "travel"), "no place of the workspace has all legs inside "
+                         f"their travel: {names[k]} stands at {q[:, k].min() / size:.4g} to {q[:, k].max() / size:.4g}, "
+                         f"travel {low[k] / size:g} to {high[k] / size:g}", hint)
+
+
 def _held(kinematics: OnLegs, pairs: Sequence[Floats | None], rods: Floats, arms: Floats) -> Iterator[KeyProblem]:
     loops = kinematics.loops
     held = [cross(rods[:, k], np.broadcast_to(s / np.linalg.norm(s), rods[:, k].shape))
@@ -74,8 +99,10 @@ def _held(kinematics: OnLegs, pairs: Sequence[Floats | None], rods: Floats, arms
                                                                        "that "
                              "turn, or write one rod")
             return
+    apart = [float(np.linalg.norm(s)) / loops.lever for s in pairs if s is not None]
     rows = np.concatenate([np.concatenate([rods, cross(arms, rods) / loops.lever], axis=2),
-                           *(np.concatenate([0.0 * row, row], axis=1)[:, None] for row in held)], axis=1)
+                           *(np.concatenate([0.0 * row, size * row], axis=1)[:, None]
+                             for row, size in zip(held, apart, strict=True))], axis=1)
     columns = [0, 1, 2, 3, 4, 5] if "z" in loops.freedoms else [0, 1, 5]
     least = (np.linalg.svd(rows[:, :, columns], compute_uv=False)[:, -1] if rows.shape[1] >= len(columns) else np.zeros(1))
     if least.min() < LEAST:

@@ -13,8 +13,8 @@ from machines.kinematics.chain import LINEAR, ROTARY
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import FREEDOMS, Loops
 from machines.kinematics.legs.on_legs import OnLegs
-from machines.leg_layouts import DriveModel, Place, StarLayout, stray_keys
-from machines.legs_mobility import leg_faults
+from machines.leg_layouts import BoundedVector, DriveModel, StarLayout, stray_keys
+from machines.legs_mobility import leg_faults, travel_faults
 from machines.models import KinematicsModel, Vector
 from machines.slider_models import UNIT, ClearanceModel, WorkspaceModel, clearance_sizes, rail_problems
 from machines.user_file import UserModel
@@ -38,7 +38,7 @@ class LegsModel(KinematicsModel):
     kind: Literal["legs"]
     freedoms: tuple[Freedom, ...]
     """translations along x, y, z of the machine frame and turns about them that the legs leave the platform"""
-    gauge: Place = (0.0, 0.0, 0.0)
+    gauge: BoundedVector = (0.0, 0.0, 0.0)
     """mm from the reference point of the level platform"""
     layout: StarLayout | None = None
     """legs in a ring, so that nobody types their coordinates"""
@@ -95,6 +95,10 @@ class LegsModel(KinematicsModel):
         if not found:
             yield from leg_faults(self.build(), [_pair(leg) for leg in self.drives.values()])
 
+    def travel_problems(self, travel: Floats, home: Floats) -> Iterator[KeyProblem]:
+        """See the base class."""
+        yield from travel_faults(self.build(), travel, home)
+
     def _table_problems(self) -> Iterator[KeyProblem]:
         for name, leg in self.legs.items():
             yield from stray_keys(leg, leg.drive, ("legs", name))
@@ -140,10 +144,10 @@ class LegsModel(KinematicsModel):
                              "platform moves it already", "a carrier adds a direction that the platform does not have")
         low, high = self.workspace.tilt
         least, most = (0.0, 0.0) if own in ("xy", "xyz") else (0.0 if own.endswith("abc") else -90.0, 90.0)
-        if not (low == high == 0.0 or least <= low <= 0.0 <= high < most and low > -90.0):
+        if not (low == high == 0.0 or (least <= low <= 0.0 <= high < most and low > -90.0)):
             yield KeyProblem("machine.geometry", ("workspace", "tilt"), f"{[low, high]} degrees cannot be the tilt of "
-                             f"this platform, free in {' '.join(own)}", "write tilt = [0, largest] with a b c, [lower, upper] "
-                             "about one axis with a or b, less than 90 degrees; none without turns")
+                             f"this platform, free in {' '.join(own)}", "write tilt = [0, largest] with a b c, [lower, "
+                             "upper] about one axis with a or b, less than 90 degrees; none without turns")
 
 
 def _pair(leg: DriveModel) -> Floats | None:

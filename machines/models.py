@@ -6,6 +6,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Field
 
 from machines.choices import Park, Rapids, RolloverRule, Stop
@@ -15,6 +16,8 @@ from machines.key_problem import KeyProblem
 from machines.kinematics.base import Kinematics
 from machines.machine import ControlKinematics
 from machines.user_file import UserModel
+from toolpaths.arrays import Floats
+from toolpaths.units import DEG
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -59,6 +62,10 @@ class KinematicsModel(UserModel):
 
     def problems(self) -> Iterator[KeyProblem]:
         """What makes the geometry unusable; paths within this table."""
+        yield from ()
+
+    def travel_problems(self, travel: Floats, home: Floats) -> Iterator[KeyProblem]:
+        """What makes travels (J, 2) and home (J,), mm and rad, unusable with the geometry; paths from the file's top."""
         yield from ()
 
     def figures(self) -> list[FigureTable]:
@@ -217,12 +224,15 @@ class MachineModel(UserModel):
             return
         kinematics = self.kinematics.build()
         rotary = dict(zip(kinematics.axis_names, kinematics.rotary, strict=True))
-        yield from self._axis_problems(rotary)
-        if self.retract_axis is not None and rotary.get(self.retract_axis, True):
-            linear = ", ".join(name for name, turns in rotary.items() if not turns)
-            yield KeyProblem("machine.retract-axis", ("retract_axis",),
-                             f"retract_axis = {self.retract_axis!r} is not a linear axis of this machine",
-                             f"choose from {linear}")
+        axes = list(self._axis_problems(rotary)) or list(self._travel_problems(kinematics))
+        yield from axes
+        parts = kinematics.clearance_parts
+        held = () if parts is None else parts.leg_names
+        if self.retract_axis is not None and (rotary.get(self.retract_axis, True) or self.retract_axis in held):
+            slides = ", ".join(name for name, turns in rotary.items() if not turns and name not in held)
+            yield KeyProblem("machine.retract-axis", ("retract_axis",), f"retract_axis = {self.retract_axis!r} is not a "
+                             "linear axis of this machine" + " that lifts the tool by itself" * bool(held),
+                             f"choose from {slides}" if slides else "take retract_axis out: a leg moves the tool aside too")
         if self.control is not None:
             try:
                 self.control_kinematics()
@@ -244,6 +254,12 @@ class MachineModel(UserModel):
         if self.control is None or self.control.module == JOINTS_ARE_AXES:
             return None
         return self.kinematics.control(self.control.module)
+
+    def _travel_problems(self, kinematics: Kinematics) -> Iterator[KeyProblem]:
+        scale = np.where(kinematics.rotary, DEG, 1.0)
+        axes = [self.axes[name] for name in kinematics.axis_names]
+        travel, home = np.array([axis.range for axis in axes]), np.array([axis.home for axis in axes])
+        yield from self.kinematics.travel_problems(travel * scale[:, None], home * scale)
 
     def _axis_problems(self, rotary: dict[str, bool]) -> Iterator[KeyProblem]:
         for name in rotary.keys() - self.axes.keys():

@@ -60,9 +60,11 @@ def check_program(made: PostResult, controller: str | Path, name: str) -> PostRe
     job = made.job
     if job is None or not made.ok:
         raise ValueError("a conversion that has failed has no check program")
-    if not len(job.control.rotary):
-        raise DiagnosticError([error("check.no_rotary", f"{made.machine.name} has no rotary axis: there are no pivots to "
-                                     "check", file=made.toolpath.file, hint="convert without --check-program")])
+    kin = made.machine.kinematics
+    if not any(turns and tilts for turns, tilts in zip(kin.rotary, kin.turns_tool, strict=True)):
+        raise DiagnosticError([error("check.no_rotary", f"{made.machine.name} has no rotary axis that turns tool or part: "
+                                     "there are no pivots to check", file=made.toolpath.file,
+                                     hint="convert without --check-program")])
     why = "none is within travel"
     for lean, height in product(_LEANS, _HEIGHTS):
         axes = _poses(job, point := _point(job, height), lean)

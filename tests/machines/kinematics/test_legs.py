@@ -151,6 +151,9 @@ for old, new in zip("XYZ", "ABC", strict=True):
     ARMS = ARMS.replace(f"[axes.{old}]\ntravel = [600, 1600]", f"[axes.{new}]\ntravel = [-60, 110]").replace("1300\n", "0\n")
 
 
+BASE["arms"] = ARMS
+
+
 def faults(tmp_path: Path, text: str) -> list[str]:
     file = tmp_path / "own.toml"
     file.write_text(text)
@@ -206,10 +209,15 @@ def test_the_planar_delta_of_the_note() -> None:
     ("delta", "pair = 200", "pair = 200\naside = [10]", "machine.geometry", "aside: 1 values for 3 letters"),
     ("delta", "pair = 200", "pair = 200\narm = 333", "machine.geometry", "arm does not go with drive = 'slide'"),
     ("delta", '"slide"', '"arm"', "machine.geometry", "no length of the arms"),
+    ("delta", "pair = 200", "pair = 200\nroot = -1", "machine.travel", "no place of the workspace has all legs inside"),
+    ("arms", "root = -1", "root = 1", "machine.home", "the legs meet at no platform"),
+    ("arms", "root = -1", "root = 1", "machine.travel", "no place of the workspace has all legs inside"),
+    ("delta", "[kinematics]", "retract_axis = 'Z'\n[kinematics]", "machine.retract-axis", "take retract_axis out"),
+    ("delta", "pair = 200", "pair = 0.01", "machine.mobility", "do not hold the platform"),
     ("delta", "pair = 200", "pair = 1e-9", "machine.geometry", "the two rods of leg X coincide"),
     ("delta", "rod = 1300", "rod = 1e300", "file.range", "allowed: less than 1e+06"),
     ("delta", '["x", "y", "z"]', '["x", "y", "z"]\ngauge = [0, 0, 1e200]', "file.range", "allowed: less than 1e+06"),
-    ("delta", "[timing]", "[kinematics.clearance]\nrail_radius = 9\n[timing]", "machine.geometry", "no rail would be looked"),
+    ("delta", "[timing]", "[kinematics.clearance]\nrail_radius = 9\n[timing]", "machine.geometry", "no rail would be"),
     ("hexapod", "", "[kinematics.layout]\nlean = 40\n", "machine.geometry", "lean does not go with drive = 'length'"),
     ("hexapod", "", "[kinematics.workspace]\ntilt = [-9, 9]\n", "machine.geometry", "cannot be the tilt"),
     ("hexapod", "", "[kinematics.layout]\njoint_angles = [-10, 10, 110, 130, 230, 250]\n", "machine.singular", "det Jx"),

@@ -15,8 +15,8 @@ import postproc
 from machines.machine import Machine
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import PartPlacement, SetupFile
-from postproc.verification.read_back import read_back
 from postproc.setup_sheet.place import found_place
+from postproc.verification.read_back import read_back
 from tests.machines.kinematics.test_legs import ARMS
 from tests.postproc.kit import codes, good, goto, toolpath
 from toolpaths.toolpath import Toolpath
@@ -36,7 +36,7 @@ def rotary_delta() -> Machine:
 
 
 def path_of(points: np.ndarray) -> Toolpath:
-    return toolpath("RAPID", *goto(points[:1] + [0.0, 0.0, 20.0]), "FEDRAT/600,MMPM", *goto(points))
+    return toolpath("RAPID", *goto(points[:1] + np.array([0.0, 0.0, 20.0])), "FEDRAT/600,MMPM", *goto(points))
 
 
 def converted(points: np.ndarray) -> PostResult:
