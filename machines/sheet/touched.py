@@ -64,7 +64,7 @@ def _turning(machine: Machine) -> list[Joint]:
 
 
 def _moved(sheet: DataSheet, machine: Machine) -> Iterator[tuple[str, DataSheet]]:
-    """The sheet with one rotary axis 1 mm beside its line, and which."""
+    """The sheet with one rotary axis 1 mm off its line, and which."""
     points = {joint.name: joint.point for joint in _turning(machine)}
     for joint in _turning(machine):
         for k in np.flatnonzero(joint.direction == 0.0):

@@ -186,7 +186,7 @@ def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
         codes = {d.code for d in diagnostics}
         diagnostics = tuple(sorted((d for d in diagnostics if codes.isdisjoint(FOLLOWS.get(d.code, ()))),
                                    key=lambda d: -d.severity))
-        if "place.found" in codes and least <= Severity.INFO:
+        if least <= Severity.INFO and any(d.code == "place.found" and "[part]" in d.hint for d in diagnostics):
             diagnostics = tuple(replace(d, hint="") if d.code in PLACED and "system =" not in d.hint else d
                                 for d in diagnostics)
     groups: dict[tuple[Severity, str, str], list[Diagnostic]] = {}

@@ -112,6 +112,8 @@ def _approach(tip: Any, axis: Any, after: Any, axis_after: Any, end: Any, axis1:
     off, turn = _apart(tip, end), _angle(axis, axis1)
     off_after, turn_after = _apart(after, end), _angle(axis_after, axis1)
     there = off <= grain and turn <= axis_grain
+    if not math.isfinite(off + turn + off_after + turn_after):
+        return -1
     if there or off_after > max(off, grain) + 0.1 * grain or turn_after > max(turn, axis_grain) + 0.1 * axis_grain:
         return -1
     return 1 if off_after < off - 0.1 * grain or turn_after < turn - 0.1 * axis_grain else 0
@@ -158,9 +160,10 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
                 owner[r] = i
             return match, owner
         # Several blocks may end within the tolerance of the end: the move keeps those up to the last that comes nearer.
+        # An arc of more than half a turn is a cut of its own: its tips do not show how far it went from the end.
         j = k - 1
         step = 0
-        while k < count and step >= 0:
+        while k < count and step >= 0 and (math.isnan(swept[k]) or swept[k] <= math.pi):
             step = _approach(tip[j], axis[j], tip[k], axis[k], end[i], axis1[i], grain, axis_grain)
             if step > 0:
                 owner[j + 1:k + 1] = i

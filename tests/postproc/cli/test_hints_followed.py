@@ -109,3 +109,6 @@ def test_a_file_that_is_far_larger_than_the_machine_has_no_odd_record(tmp_path: 
     got = run("convert", tmp_path / "p.apt", "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.ngc")
     assert "odd_record" not in got.stderr and "travel.exceeded" in got.stderr
     assert got.stderr.count("[part]") + got.stderr.count("more travel") == 1, "one remedy"
+    (tmp_path / "p.apt").write_text("\n".join([*START, *SQUARE, "FINI"]).replace("GOTO/40,", "GOTO/3000,"))
+    got = run("convert", tmp_path / "p.apt", "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.ngc")
+    assert "no place of the part" in got.stderr and "(part.origin)" in got.stderr, "a note of no place takes no remedy away"

@@ -104,3 +104,16 @@ def test_a_walk_ends_where_the_machine_cannot_follow(far: float) -> None:
             return given(q, near)
     found = assembly.walk(Counted(), home, home + np.array([[far, 0.0, 0.0]]), pose)
     assert np.isnan(found).all() and count < 200
+
+
+def test_a_full_circle_is_no_part_of_the_move_before_it() -> None:
+    """Its tips are one, within the tolerance of the line's end; nor is a pose that is no number taken for one as near."""
+    up, none = np.tile([0.0, 0, 1], (4, 1)), np.zeros((3, 3))
+    tip = np.array([[-0.005, 0, 0], [-0.005, 0, 0], [-0.001, 0, 0], [0, 0, -5.0]])
+    start, end = none - [[20.0, 0, 0], [0, 0, 0], [0, 0, 0]], none - [[0, 0, 0], [0, 0, 0], [0, 0, 5.0]]
+    curves = Curves(start, end, up[:3], up[:3], np.array([False, True, False]), np.tile([10.0, 0, 0], (3, 1)), up[:3],
+                    np.array([0.0, 2 * np.pi, 0.0]))
+    turns = np.array([np.nan, 2 * np.pi, np.nan, np.nan])
+    assert align(tip, up, turns, curves, np.zeros(3, dtype=bool), 0.01, 1e-3)[0].tolist() == [0, 2, 3]
+    tip[1] = np.nan
+    assert align(tip, up, turns * np.nan, curves, np.zeros(3, dtype=bool), 0.01, 1e-3)[0][0] == 0
