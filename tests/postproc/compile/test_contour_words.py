@@ -99,7 +99,7 @@ def test_the_tool_right_of_the_contour(name: str, controller: str) -> None:
     (["GOTO/-40,0,2", "GOTO/-40,-20,2", "GOTO/-20,-40,2"], "fanuc-30i", "first or last move"),
     ([*PATHS["pocket"][:4], "STOP", *PATHS["pocket"][4:]], "fanuc-30i", "no move stands between"),
     ([*PATHS["pocket"][:2], "COOLNT/OFF", *PATHS["pocket"][2:]], "heidenhain-tnc640", "no move stands between"),
-    ([f"GOTO/{20 + 10 * np.sin(a):.6f},{-10 * np.cos(a):.6f},2" for a in np.linspace(0.0, np.pi, 151)], "haas-ngc", "so short"),
+    ([f"GOTO/{20 + 10*np.sin(a):.5f},{-10 * np.cos(a):.5f},2" for a in np.linspace(0, np.pi, 151)], "haas-ngc", "so short"),
     (["GOTO/-40,0,2"], "fanuc-30i", "first or last move"),
     (["GOTO/-40,0,2", "CIRCLE/-20,0,2,0,0,-1,20", "GOTO/-20,20,2"], "heidenhain-tnc640", "first or last move")])
 def test_what_has_no_contour_is_refused(lines: list[str], controller: str, said: str) -> None:
