@@ -21,7 +21,8 @@ def text(lines: list[str], style: str) -> bytes:
 
 @pytest.mark.parametrize("style", STYLES)
 def test_every_line_is_read_back(style: str) -> None:
-    lines = [*BEGIN, "tolerance 0.0005 mm, axis tolerance 0.05 degrees", words.feed_line("planned", 0.1), words.chosen_axes("per-pass", 60.0),
+    lines = [*BEGIN, "tolerance 0.0005 mm, axis tolerance 0.05 degrees", words.feed_line("planned", 0.1),
+             words.chosen_axes("per-pass", 60.0),
              words.setup_line("a b.toml", "0123abcd"), words.feeds_line(), words.corrected_here("mill.toml"),
              words.model_mark("89abcdef")]
     header = read_header(with_feeds_mark(text(lines, style).decode(), "00ff00ff").encode())
