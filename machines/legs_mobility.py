@@ -94,10 +94,8 @@ def _held(kinematics: OnLegs, pairs: Sequence[Floats | None], rods: Floats, arms
     for k, row in zip([k for k, s in enumerate(pairs) if s is not None], held, strict=True):
         if np.abs(row @ turns).max(initial=0.0) > STOPPED:
             yield KeyProblem("machine.mobility", ("legs", kinematics.leg_names[k], "rods"), "the pair of rods stops a "
-                                                                                            "turn that "
-                             f"freedoms = {list(loops.freedoms)} has", "let the joints of the pair lie along the axis of "
-                                                                       "that "
-                             "turn, or write one rod")
+                             f"turn that freedoms = {list(loops.freedoms)} has", "let the joints of the pair lie along the "
+                             "axis of that turn, or write one rod")
             return
     apart = [float(np.linalg.norm(s)) / loops.lever for s in pairs if s is not None]
     rows = np.concatenate([np.concatenate([rods, cross(arms, rods) / loops.lever], axis=2),
@@ -107,7 +105,6 @@ def _held(kinematics: OnLegs, pairs: Sequence[Floats | None], rods: Floats, arms
     least = (np.linalg.svd(rows[:, :, columns], compute_uv=False)[:, -1] if rows.shape[1] >= len(columns) else np.zeros(1))
     if least.min() < LEAST:
         yield KeyProblem("machine.mobility", ("legs",), f"{rods.shape[1]} legs and {len(held)} pairs of rods do not hold "
-                                                        "the "
-                         f"platform everywhere (least singular value {least.min():.3g}): it moves otherwise than freedoms = "
-                         f"{list(loops.freedoms)}", "give `rods` of the legs that are pairs, or the freedoms that the "
-                                                    "machine has")
+                         f"the platform everywhere (least singular value {least.min():.3g}): it moves otherwise than "
+                         f"freedoms = {list(loops.freedoms)}",
+                         "give `rods` of the legs that are pairs, or the freedoms that the machine has")

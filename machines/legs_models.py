@@ -64,8 +64,7 @@ class LegsModel(KinematicsModel):
     def describe(self) -> str:
         """How many legs of what, freedoms, and the count of Gruebler (spherical joints, of hinges along z in the plane)."""
         drives = [leg.drive for leg in self.drives.values()]
-        kinds = " and ".join(f"{drives.count(d)} legs on {d}s" if d != "length" else f"{drives.count(d)} legs of changing "
-                                                                                     "length"
+        kinds = " and ".join(f"{drives.count(d)} legs {'of changing length' if d == 'length' else f'on {d}s'}"
                              for d in dict.fromkeys(drives))
         count = len(drives) + (6 if "z" in self.freedoms else 3) - sum(max(len(leg.rods), 1) for leg in self.drives.values())
         carried = f", carried along {' '.join(self.carriers)}" if self.carriers else ""
@@ -107,8 +106,7 @@ class LegsModel(KinematicsModel):
             yield from _letter(name, ("legs", name), ROTARY if leg.drive == "arm" else LINEAR, leg.drive)
             yield from _direction(leg.direction, ("legs", name, "direction"))
             if leg.drive == "arm" and not 0.0 < np.linalg.norm(leg.arm) < 1e6:
-                yield KeyProblem("machine.geometry", ("legs", name), f"leg {name} has drive = 'arm' and arm = "
-                                                                     f"{list(leg.arm)}",
+                yield KeyProblem("machine.geometry", ("legs", name), f"the arm of leg {name} is {list(leg.arm)}",
                                  "write arm = [x, y, z], from the axis to the rod's foot at 0")
             if abs(float(np.dot(leg.arm, leg.direction))) > UNIT * max(float(np.linalg.norm(leg.arm)), 1.0):
                 yield KeyProblem("machine.geometry", ("legs", name, "arm"), f"{list(leg.arm)} is not square to the axis "
@@ -123,25 +121,24 @@ class LegsModel(KinematicsModel):
             yield from _letter(name, ("carriers", name), LINEAR, "carrier")
             yield from _direction(carrier.direction, ("carriers", name, "direction"))
             if name in self.drives:
-                yield KeyProblem("machine.axis-letter", ("carriers", name), f"{name} drives a leg too", "choose another "
-                                                                                                        "letter")
+                yield KeyProblem("machine.axis-letter", ("carriers", name), f"{name} drives a leg too",
+                                 "choose another letter")
 
     def _freedom_problems(self) -> Iterator[KeyProblem]:
         own = "".join(sorted(self.freedoms, key=FREEDOMS.index))
         if own not in PLATFORMS:
             yield KeyProblem("machine.geometry", ("freedoms",), f"{list(self.freedoms)} is none of "
-                             + ", ".join(" ".join(p) for p in PLATFORMS), "write the freedoms that the legs leave the "
-                                                                          "platform")
+                             + ", ".join(" ".join(p) for p in PLATFORMS), "write the freedoms that the legs leave "
+                             "the platform")
             return
         if len(self.drives) != len(own):
-            yield KeyProblem("machine.geometry", ("legs",), f"{len(self.drives)} legs for {len(own)} freedoms of the "
-                                                            "platform",
+            yield KeyProblem("machine.geometry", ("legs",), f"{len(self.drives)} legs for {len(own)} freedoms",
                              "write one [kinematics.legs.LETTER] table per freedom")
         moves = [np.eye(3)[i] for i in range(3) if "xyz"[i] in own] + [np.array(c.direction) for c in self.carriers.values()]
         if len(moves) > 3 or np.linalg.svd(np.array(moves), compute_uv=False)[-1] < 0.1:
-            yield KeyProblem("machine.geometry", ("carriers",), f"carriers {', '.join(self.carriers)} move the tool where "
-                                                                "the "
-                             "platform moves it already", "a carrier adds a direction that the platform does not have")
+            yield KeyProblem("machine.geometry", ("carriers",), f"carriers {', '.join(self.carriers)} move the tool "
+                             "where the platform moves it already",
+                             "a carrier adds a direction that the platform does not have")
         low, high = self.workspace.tilt
         least, most = (0.0, 0.0) if own in ("xy", "xyz") else (0.0 if own.endswith("abc") else -90.0, 90.0)
         if not (low == high == 0.0 or (least <= low <= 0.0 <= high < most and low > -90.0)):

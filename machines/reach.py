@@ -218,4 +218,3 @@ def segment_distance(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
     s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
     gap = w + s[:, None] * u - t[:, None] * v
     return np.asarray(np.linalg.norm(gap, axis=1), dtype=np.float64)
-

@@ -28,8 +28,8 @@ class CutcomOfTool:
 
 
 def radius_of(number: int, tool: ToolSetup, toolpath: Toolpath) -> float:
-    """mm, half the diameter of CL file or set-up, 0 where neither states one."""
-    return 0.5 * (_diameter(number, toolpath) or tool.diameter or 0.0)
+    """mm, half the diameter of set-up or CL file, 0 where neither states one."""
+    return 0.5 * (tool.diameter or _diameter(number, toolpath))
 
 
 def _diameter(number: int, toolpath: Toolpath) -> float:

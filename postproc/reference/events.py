@@ -84,7 +84,7 @@ def tool_changes(toolpath: Toolpath) -> list[ToolChange]:
 def stops_between(toolpath: Toolpath) -> list[ToolChange]:
     """The tool changes, but for the first, before which the file itself does not stop since the last cut:
     where `stop_between_tools` does."""
-    changes = {id(said): said for said in tool_changes(toolpath)[1:]}
+    changes = {id(said) for said in tool_changes(toolpath)[1:]}
     named = iter(said for said, _, _ in tool_loads(toolpath))
     cuts, result, stop = np.flatnonzero(cutting(toolpath)), list[ToolChange](), -1
     for event in toolpath.events:

@@ -62,6 +62,13 @@ def test_the_head_says_what_the_register_holds(controller: str) -> None:
     assert "t1: cutcom is not written, the words are the path of the tool's centre" in none
 
 
+def test_the_diameter_of_the_set_up_stands_before_that_of_the_cl_file() -> None:
+    thicker = SetupFile.model_validate({"tools": {"1": {"gauge_length": 90.0, "contour": True, "diameter": 12.0},
+                                                  "2": {"gauge_length": 90.0}}})
+    head = folded(good(convert(toolpath(*ROUND), "mill-3axis", "fanuc-30i", thicker)).text)
+    assert "d1 holds 6.0000 mm" in head and "5.0000 mm" not in head
+
+
 @pytest.mark.parametrize("controller", NAMES)
 def test_the_words_are_the_path_of_the_cl_file(controller: str) -> None:
     plain = bare(good(made(controller, "")).text)
