@@ -95,7 +95,7 @@ def _text(made: NewMachine, output: Path, drawing: str) -> str:
 
 
 def _understood(machine: Machine) -> list[str]:
-    """Travel and speed of each axis in both units that brochures print: what was mistaken is seen beside the other."""
+    """Travel and speed of each axis in both units that brochures print: a unit that was mistaken shows."""
     from toolpaths.units import DEG, MM_PER_INCH
 
     lines, limits = [], machine.limits

@@ -106,6 +106,18 @@ def test_samples_convert_with_what_is_written(sample: str, name: str, controller
     assert proved(SAMPLES / sample, made, name, controller, tmp_path).text
 
 
+@pytest.mark.parametrize(("case", "name", "controller"), [("far off", "delta-star", "linuxcnc"),
+                                                          ("complete", "hexaslide-cone", "generic-iso")])
+def test_parts_come_into_the_workspace_of_parallel_machines(case: str, name: str, controller: str, tmp_path: Path) -> None:
+    """Not where rods that hang the other way would reach, and by the length of platform and tool below it."""
+    made = sheet(file := bare(tmp_path, case), name, controller)
+    assert made.text and made.fit is not None and made.fit.tried == 2, [str(d) for d in made.diagnostics]
+    path, box = toolpaths.read(file)[0], machine(name).kinematics.workspace
+    assert box is not None
+    middle = made.fit.setup.part.origin + 0.5 * (path.tip.min(axis=0) + path.tip.max(axis=0))
+    assert (np.abs(middle - box.middle)[:2] < 100.0).all() and -400.0 < middle[2] - box.middle[2] < -40.0
+
+
 @pytest.mark.parametrize(("case", "name"), [("from below", "mikron-ucp710"), ("from the side", "mill-3axis"),
                                             ("from below", "mill-3axis")])
 def test_the_tool_comes_from_above(case: str, name: str, tmp_path: Path) -> None:
