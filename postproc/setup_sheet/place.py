@@ -216,7 +216,7 @@ def _platform_to_tip(work: PassContext) -> Floats:
 
 def _room(work: PassContext, space: Space, one: Attitude) -> tuple[Floats, Floats]:
     """Ends (3,) of where the part may stand in an attitude; with a workspace, where all of its tips come into that, its
-    middle first: rods that hang the other way reach places far from there too, in which the machine never is."""
+    middle first: rods on their other sides reach places far from there too, in which the machine never is."""
     low, high = space.room(angles_of(one.turn))
     kin = work.machine.kinematics
     if kin.straight_slides or kin.workspace is None:
