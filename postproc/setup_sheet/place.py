@@ -81,7 +81,7 @@ def fitted(toolpath: Toolpath, machine: Machine, controller: str | Path, setup: 
     attitudes = attitudes_of(toolpath, machine, options.axis_tolerance * DEG)
     begin = FoundPlace(_part(attitudes[0], np.zeros(3)), attitudes[0], np.nan)
     first = converted(placed_at(setup, begin))
-    if first.ok or not _beyond(first):
+    if first.ok or not beyond(first):
         return Fit(placed_at(setup, begin), first, begin, 1, ())
     tried, lacks = 1, list[str]()
     for place in _places(toolpath, machine, setup, options, attitudes, lacks):
@@ -109,7 +109,7 @@ def placed_at(setup: SetupFile, place: FoundPlace) -> SetupFile:
     return setup.model_copy(update={"part": place.part})
 
 
-def _beyond(result: PostResult) -> bool:
+def beyond(result: PostResult) -> bool:
     """True where every error may be one of the place."""
     return all(d.code in PLACES for d in result.diagnostics if d.severity is Severity.ERROR)
 
@@ -117,7 +117,7 @@ def _beyond(result: PostResult) -> bool:
 def found_place(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
     """What `place` would find for a conversion that is refused by travel or reach: a note with [part], or why no place fits,
     or the one record that no place puts right; nothing for other refusals. `toolpath` is as it was read."""
-    if result.ok or not _beyond(result):
+    if result.ok or not beyond(result):
         return []
     odd = odd_record(toolpath, _largest(result.machine))
     if odd is not None:

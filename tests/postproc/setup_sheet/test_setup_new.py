@@ -211,6 +211,24 @@ def test_gauge_lengths_are_asked_for_where_words_depend_on_them(tmp_path: Path) 
     assert "setup.no_such_tool" in got.stderr and "T1, T2" in got.stderr
 
 
+def test_gauge_lengths_are_asked_for_where_no_place_fits_without(tmp_path: Path) -> None:
+    """The table of this machine lies below the travel of its spindle, which would have to cut itself. Each is asked once."""
+    file = tmp_path / "part.cls"
+    lines = (SAMPLES / "five_faces.cls").read_text().splitlines()
+    file.write_text("\n".join(line for line in lines if not line.startswith("SPINDL")) + "\n")
+    path, found = toolpaths.read(file)
+    asked: list[str] = []
+
+    def answer(question: Question) -> float | str:
+        asked.append(question.key)
+        return 180.0 if question.kind == "gauge_length" else 900.0
+
+    typed = new_setup(path, machine("haas-umc-750"), "haas-ngc", Options(), GivenAnswers(), answer, False, found)
+    first = ["tools.1.spindle", "tools.2.spindle"]
+    assert asked == [*first, "tools.1.gauge_length", "tools.2.gauge_length"], asked
+    assert "gauge_length = 180 " in typed.text and "travel is checked with it" in typed.text
+
+
 def test_what_nobody_answers_is_one_list(tmp_path: Path) -> None:
     file, out = bare(tmp_path), tmp_path / "s.toml"
     got = run("setup", "new", file, "-m", "mill-3axis", "-o", out, "--json", "-", stdin="\n900\n", code=1)
