@@ -31,7 +31,8 @@ MADE = {"bicubic.cls": ("mill-3axis", "planar-delta-z"), "blade.cls": ("linuxcnc
         "five_faces.cls": ("trunnion-bc",), "five_tilted.cls": ("nutating-head",),
         "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
         "inch_plate.apt": ("mill-4axis",), "indexed_4axis.cls": ("mill-4axis",),
-        "pocket.cls": ("uranesx", "delta-cone", "delta-coplanar", "delta-hybrid", "linuxcnc-lineardelta"),
+        "pocket.cls": ("uranesx", "rotary-delta", "triaglide", "delta-cone", "delta-coplanar", "delta-hybrid",
+                       "linuxcnc-lineardelta"),
         "test_part.cls": ("delta-parallel-x", "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact",
                           "delta-star"),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
