@@ -37,7 +37,8 @@ MADE = {"bicubic.cls": ("mill-3axis", "planar-delta-z"), "blade.cls": ("linuxcnc
                           "delta-star"),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
 """machines on which each sample is made: every sample, and every machine whose letters LinuxCNC's interpreter has"""
-ORIGINS = {"planar-delta-z": (-41.0, -30.0, -125.0)}
+ORIGINS = {"planar-delta-z": (-41.0, -30.0, -125.0), "rotary-delta": (-40.0, -30.0, -200.0),
+           "triaglide": (-40.0, -30.0, -200.0)}
 """mm, of the part on machines in whose middle it has no room"""
 MORE = {"bicubic.cls": ("uranesx",), "blade.cls": ("head-table",),
         "five_faces.cls": ("mikron-ucp710", "linuxcnc-xyzac-trt"),
