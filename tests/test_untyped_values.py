@@ -70,6 +70,7 @@ ANYTHING = {
     "postproc/feedrate/kernels/tightening.py": LOOP, "postproc/readback/alignment/align.py": LOOP,
     "postproc/witness/assign_blocks.py": LOOP, "postproc/report/residual_figure.py": DRAWN,
     "machines/calibration/figures.py": DRAWN, "machines/geometric_error/exchange/figures.py": DRAWN,
+    "machines/analysis/machine_figure.py": DRAWN,
     "machines/geometric_error/__init__.py": LAZY, "postproc/__init__.py": LAZY,
     "machines/kinematics/base.py": "kinematics of a kind that only the form knows",
     "machines/models.py": "a value before pydantic checks it",

@@ -25,6 +25,9 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.units import DEG
 
+GRID, COARSE = (11, 11, 11, 7), (5, 5, 5, 3)
+"""places and tilts that a worst value is first looked for at; coarse where each is asked for in several directions of tilt"""
+
 
 def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, Any]:
     """Figures of a machine; a serial one, whose slides pass their speed on as it is, has no transmission.
@@ -66,10 +69,11 @@ def _proof_step(machine: Machine, floor: float) -> float | None:
 
 
 def _transmission(kinematics: Transmission) -> dict[str, Any]:
+    several = len(kinematics.headings) > 1
     found: dict[str, Any] = {
-        "condition_number": _largest(condition_number, kinematics),
-        "speed_transmission": _largest(speed_transmission, kinematics),
-        "force_transmission": _largest(force_transmission, kinematics)}
+        "condition_number": _largest(condition_number, kinematics, several),
+        "speed_transmission": _largest(speed_transmission, kinematics, several),
+        "force_transmission": _largest(force_transmission, kinematics, several)}
     return found | ({"turn_lever_mm": kinematics.lever} if kinematics.lever else {})
 
 
@@ -82,9 +86,9 @@ def _roots(machine: Machine) -> dict[str, Any]:
             "inverse_branches_at_home": int(np.isfinite(joints).all(axis=1).sum())}
 
 
-def _largest(measure: Any, parts: Transmission | RodPlatform) -> dict[str, Any]:
+def _largest(measure: Any, parts: Transmission | RodPlatform, several: bool = False) -> dict[str, Any]:
     bound: Measure = partial(measure, parts)
-    return _point(worst(bound, parts.workspace))
+    return _point(worst(bound, parts.workspace, COARSE if several else GRID))
 
 
 def _point(value: WorstValue) -> dict[str, Any]:

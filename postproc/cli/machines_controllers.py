@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from machines.machine import Machine
 from postproc.cli.console import (
     Json,
     controller_file,
@@ -26,8 +25,11 @@ from postproc.cli.options import figure_ending
 from postproc.cli.setup_align import EXAMPLES as ALIGNED
 from postproc.cli.setup_align import setup_align
 from postproc.cli.setup_new import EXAMPLES, setup_new
-from toolpaths.choices import FigureEnding
 from toolpaths.table_text import table_text
+
+if TYPE_CHECKING:
+    from machines.machine import Machine
+    from toolpaths.choices import FigureEnding
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                           help="Machines: new, list, show, check, analyse, import, export, schema.")

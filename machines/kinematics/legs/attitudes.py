@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from machines.kinematics.legs.loops import Turns
+from machines.kinematics.legs.loops import PlatformTurns
 from toolpaths.arrays import Floats
 from toolpaths.rotations import angle_between
 
@@ -13,7 +13,7 @@ ROUND_OFF = 1e-12
 """rad: directions nearer than this are the same"""
 
 
-def nearest_directions(turns: Turns, tilt: tuple[float, float], axis: Floats) -> Floats:
+def nearest_directions(turns: PlatformTurns, tilt: tuple[float, float], axis: Floats) -> Floats:
     """The nearest directions (N, 3) to `axis` (N, 3) that the platform can take; those that it can take to the last bit.
 
     Args:
@@ -42,13 +42,13 @@ def _about_one(axis: Floats, about: int, allowed: tuple[float, float]) -> Floats
     return np.where(keep[:, None], axis, nearest)
 
 
-def direction_of(turns: Turns, tilt: Floats, heading: Floats) -> Floats:
+def direction_of(turns: PlatformTurns, tilt: Floats, heading: Floats) -> Floats:
     """Tool axes (N, 3) of tilts (N,) rad, about the platform's one axis, else from z towards `heading` (N,) rad from x."""
     heading = np.full(len(tilt), -0.5 * np.pi) if turns == "a" else 0.0 * tilt if turns == "b" else heading
     return np.stack([np.sin(tilt) * np.cos(heading), np.sin(tilt) * np.sin(heading), np.cos(tilt)], axis=1)
 
 
-def tilt_of(turns: Turns, axis: Floats) -> Floats:
+def tilt_of(turns: PlatformTurns, axis: Floats) -> Floats:
     """Tilts (N,) rad of tool axes (N, 3): the inverse of `direction_of`, from z without a sign."""
     if turns == "a":
         return np.asarray(np.arctan2(-axis[:, 1], axis[:, 2]), dtype=np.float64)

@@ -21,7 +21,7 @@ from toolpaths.shapes import arrays
 
 STEPS, CLOSED = 30, 1e-13
 """of Newton; closure relative to the square of a rod's length, before its last step"""
-Turns = Literal["", "a", "b", "c", "abc"]
+PlatformTurns = Literal["", "a", "b", "c", "abc"]
 FREEDOMS = ("x", "y", "z", "a", "b", "c")
 """translations along x, y, z and turns about them"""
 
@@ -46,9 +46,9 @@ class Loops:
         return np.eye(6)[:, [FREEDOMS.index(name) for name in self.freedoms]]
 
     @property
-    def turns(self) -> Turns:
+    def turns(self) -> PlatformTurns:
         """The turns among the freedoms."""
-        return cast(Turns, "".join(name for name in self.freedoms if name in "abc"))
+        return cast(PlatformTurns, "".join(name for name in self.freedoms if name in "abc"))
 
     @cached_property
     def lever(self) -> float:
