@@ -26,7 +26,7 @@ from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.units import DEG
 
 GRID, COARSE = (11, 11, 11, 7), (5, 5, 5, 3)
-"""places and tilts that a worst value is first looked for at; coarse where each is asked for in several directions of tilt"""
+"""places and tilts at which a worst value is first looked for; coarse where a tilt has several directions"""
 
 
 def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, Any]:
