@@ -58,6 +58,8 @@ def test_legs_of_any_drive_transmit_as_their_jacobian_says(name: str) -> None:
     twist[:, :3] -= np.cross(twist[:, 3:], arm[:, :, None], axis=1)
     twist[:, 3:] *= kin.transmits.lever
     own = twist[:, kin.loops.basis.any(axis=1)] / kin.legs.size
+    widest = max(float(np.linalg.norm(a - b)) for a in kin.loops.joints for b in kin.loops.joints)
+    assert kin.transmits.lever == (pytest.approx(0.5 * widest) if kin.loops.turns else 0.0)
     np.testing.assert_allclose(rates(kin.transmits, place, tilt), own, atol=1e-9)
     assert (condition_number(kin.transmits, place, tilt) >= 0.999999 * np.linalg.cond(own)).all()
 
