@@ -30,6 +30,17 @@ ErrorForm = TypeVar("ErrorForm", covariant=True)
 UP = read_only([0.0, 0.0, 1.0])
 
 
+class PlatformPlaces(Protocol):
+    """A machine whose workspace is that of its platform."""
+
+    @property
+    def workspace(self) -> Workspace:
+        """Of the reference point and the tilt."""
+
+    def joints_at(self, platform: Floats, turn: Floats) -> Floats:
+        """Joints (N, J) of places and tilts of the platform (N, 4) and rotary axes (N, R)."""
+
+
 class ErrorForms(Protocol[ErrorForm]):
     """The paths to give a machine its geometric errors; `Kinematics.with_errors` takes the one that is the machine's."""
 
@@ -41,6 +52,9 @@ class ErrorForms(Protocol[ErrorForm]):
 
     def tilting_rods(self, kinematics: Any) -> ErrorForm:
         """Of one that tilts about x, with a rotary axis."""
+
+    def legs(self, kinematics: Any) -> ErrorForm:
+        """Of a platform on any legs."""
 
 
 class Kinematics(ABC):
@@ -68,6 +82,8 @@ class Kinematics(ABC):
     (product of exponentials, see `Serial`); () of any other"""
     on_rods: RodPlatform | None = None
     """the platform and its rods, where rods carry the tool"""
+    over_workspace: PlatformPlaces | None = None
+    """the joints at places of its platform, of a machine whose `workspace` is about those"""
     clearance_parts: ClearanceParts | None = None
     """rods, spindle and slides that may touch each other (`machines.reach`)"""
     workspace: Workspace | None = None

@@ -34,10 +34,12 @@ class Actual(ABC):
     """without errors, with its tool"""
     turns: int
     """R"""
+    held: int = 0
+    """coordinates behind the turns that no correction changes"""
 
     @abstractmethod
     def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
-        """w (N, 3 + R) of joints q (N, J); `near` as in `Kinematics.pose`."""
+        """w (N, 3 + R), and `held` more, of joints q (N, J); `near` as in `Kinematics.pose`."""
 
     @abstractmethod
     def joints(self, w: Floats) -> Floats:

@@ -14,7 +14,7 @@ from typing import Self
 
 import numpy as np
 
-from machines.kinematics.base import Kinematics, as_points
+from machines.kinematics.base import ErrorForm, ErrorForms, Kinematics, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about, tool_x
@@ -34,6 +34,8 @@ ROUND_OFF = 1e-12
 """rad: directions nearer than this are the same"""
 ASIDE = 1e-9
 """mm that a point may lie off what the slides and the platform can reach"""
+GOLDEN = 2.399963
+"""rad, so that no few directions repeat"""
 PARTS = 16
 """of the path from the home joints, where one Newton does not find the home mode"""
 PlatformPose = tuple[Floats, Floats]
@@ -77,6 +79,11 @@ class OnLegs(Kinematics):
     def leg_names(self) -> tuple[str, ...]:
         """See `ClearanceParts`."""
         return tuple(self.axis_names[j] for j in self.legs_at)
+
+    @property
+    def over_workspace(self) -> OnLegs:  # type: ignore[override]  # nothing assigns it
+        """Itself."""
+        return self
 
     @property
     def clearance_parts(self) -> OnLegs:  # type: ignore[override]  # nothing assigns it
@@ -268,6 +275,41 @@ class OnLegs(Kinematics):
     def singular(self, q: Floats) -> Bools:
         """False (N,): the spin is asked for, not free."""
         return np.zeros(len(q), dtype=np.bool_)
+
+    # ---- geometric errors ----------------------------------------------------------------------------------
+
+    @property
+    def axes_with_errors(self) -> tuple[str, ...]:
+        """The carriers."""
+        return tuple(self.axis_names[j] for j in self.carriers_at)
+
+    def with_errors(self, forms: ErrorForms[ErrorForm]) -> ErrorForm:
+        """See the base class."""
+        return forms.legs(self)
+
+    def axis_line(self, letter: str) -> tuple[Floats, Floats]:
+        """See the base class: of carriers.
+
+        Raises:
+            ValueError: of any other axis.
+        """
+        if letter not in self.axes_with_errors:
+            raise ValueError(f"{letter} drives a leg, it has no line of its own")
+        return np.array(self.carriers[self.axes_with_errors.index(letter)]), np.zeros(3)
+
+    def joints_at(self, platform: Floats, turn: Floats) -> Floats:
+        """Joints (N, J) of places and tilts of the platform (N, 4), as `RodPlatform` has them; `turn` (N, 0).
+
+        A platform that turns in every direction tilts in another one at every place, GOLDEN rad farther each.
+        """
+        tilt, heading = platform[:, 3], np.full(len(platform), 0.0 if self.loops.turns == "b" else -0.5 * np.pi)
+        if self.loops.turns == "abc":
+            heading = GOLDEN * np.arange(len(platform))
+        s = np.sin(tilt)
+        axis = np.column_stack([s * np.cos(heading), s * np.sin(heading), np.cos(tilt)])
+        axis = self._within(axis)
+        gauge = self.turn_of(axis, np.zeros(len(axis))) @ self.gauge
+        return np.asarray(self.inverse(platform[:, :3] + gauge - self.tool_length * axis, axis)[0])
 
     # ---- rates, bounds -------------------------------------------------------------------------------------
 
