@@ -13,10 +13,19 @@ from machines.kinematics.chain import LINEAR, ROTARY
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import FREEDOMS, Loops
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.sliders import Legs
 from machines.leg_layouts import BoundedVector, DriveModel, StarLayout, stray_keys
 from machines.legs_mobility import leg_faults, travel_faults
+from machines.machine import ControlKinematics
 from machines.models import KinematicsModel, Vector
-from machines.slider_models import UNIT, ClearanceModel, WorkspaceModel, clearance_sizes, rail_problems
+from machines.slider_models import (
+    UNIT,
+    ClearanceModel,
+    WorkspaceModel,
+    clearance_sizes,
+    lineardeltakins,
+    rail_problems,
+)
 from machines.user_file import UserModel
 from toolpaths.arrays import Floats
 
@@ -86,6 +95,21 @@ class LegsModel(KinematicsModel):
             np.array([names.index(name) for name in self.carriers], dtype=np.int64),
             np.array([c.direction for c in self.carriers.values()], dtype=np.float64).reshape(-1, 3),
             clearance_sizes(legs, self.clearance))
+
+    def control(self, module: str) -> ControlKinematics:
+        """Pins of LinuxCNC's lineardeltakins, where the machine is one: three slides X, Y, Z and no carrier.
+
+        Raises:
+            ValueError: where it is none; the message says what the module needs.
+        """
+        legs = list(self.drives.values())
+        if tuple(self.drives) != ("X", "Y", "Z") or self.carriers or {leg.drive for leg in legs} != {"slide"} \
+                or set(self.freedoms) != set("xyz"):
+            raise ValueError(f"module {module!r} is not known for this machine; a platform free in x y z on slides X, Y, Z "
+                             "has lineardeltakins")
+        rods = Legs(np.array([leg.point for leg in legs]), np.array([leg.direction for leg in legs]),
+                    np.array([float(leg.rod) for leg in legs]), np.array([float(leg.root) for leg in legs]))
+        return lineardeltakins(module, rods, np.array([leg.joint for leg in legs]) - np.array(self.gauge))
 
     def problems(self) -> Iterator[KeyProblem]:
         """Vectors that are no directions, letters, freedoms that do not go with the legs; faults over the workspace."""

@@ -82,8 +82,6 @@ class Kinematics(ABC):
     (product of exponentials, see `Serial`); () of any other"""
     on_rods: RodPlatform | None = None
     """the platform and its rods, where rods carry the tool"""
-    over_workspace: PlatformPlaces | None = None
-    """the joints at places of its platform, of a machine whose `workspace` is about those"""
     clearance_parts: ClearanceParts | None = None
     """rods, spindle and slides that may touch each other (`machines.reach`)"""
     workspace: Workspace | None = None
@@ -239,6 +237,11 @@ class Kinematics(ABC):
         gauge = tip + self.tool_length * axis
         none = np.zeros((len(q), 0, 3))
         return ClearanceGeometry(gauge, np.zeros(len(q)), none, none, gauge, axis)
+
+    @property
+    def over_workspace(self) -> PlatformPlaces | None:
+        """The joints at places of its platform, of a machine whose `workspace` is about those."""
+        return self.on_rods
 
     # ---- geometric errors, pivots --------------------------------------------------------------------------
 

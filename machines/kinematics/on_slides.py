@@ -31,11 +31,6 @@ class OnSlides(Kinematics):
         return self
 
     @property
-    def over_workspace(self) -> OnSlides:  # type: ignore[override]  # nothing assigns it
-        """Itself."""
-        return self
-
-    @property
     def clearance_parts(self) -> OnSlides:  # type: ignore[override]  # nothing assigns it
         """Itself."""
         return self

@@ -34,8 +34,11 @@ class Actual(ABC):
     """without errors, with its tool"""
     turns: int
     """R"""
-    held: int = 0
-    """coordinates behind the turns that no correction changes"""
+
+    @property
+    def held(self) -> int:
+        """Coordinates behind the turns that no correction changes."""
+        return 0
 
     @abstractmethod
     def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:

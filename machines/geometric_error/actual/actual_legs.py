@@ -49,7 +49,7 @@ class ActualLegs(Actual):
         return min(len(self.kinematics.loops.turns), 2) if self.kinematics.tilts else 0
 
     @property
-    def held(self) -> int:  # type: ignore[override]  # nothing assigns it
+    def held(self) -> int:
         """The spin, where there is one."""
         return int(self.turns == 2)
 

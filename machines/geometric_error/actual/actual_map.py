@@ -36,7 +36,7 @@ class ActualByMap(Actual):
         return self.nominal.turns
 
     @property
-    def held(self) -> int:  # type: ignore[override]  # nothing assigns it
+    def held(self) -> int:
         """Of the nominal machine."""
         return self.nominal.held
 

@@ -81,7 +81,7 @@ class OnLegs(Kinematics):
         return tuple(self.axis_names[j] for j in self.legs_at)
 
     @property
-    def over_workspace(self) -> OnLegs:  # type: ignore[override]  # nothing assigns it
+    def over_workspace(self) -> OnLegs:
         """Itself."""
         return self
 
