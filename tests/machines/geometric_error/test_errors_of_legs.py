@@ -16,6 +16,7 @@ import machines
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.correction import correct
 from machines.geometric_error.actual.leg_frame import frame_of
+from machines.geometric_error.actual.leg_rates import legs_motion
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.exchange.write_model import save
@@ -155,6 +156,22 @@ def _rod(kin: OnLegs, errors, r: int, q: Floats) -> tuple[Floats, Floats, float]
 def test_no_error_changes_faster_than_its_bound(name: str) -> None:
     kin = kinematics(name)
     assert 0.05 < worst_share(kin, model(name, 3), (1e-3, 0.3)) <= BOUND
+
+
+@pytest.mark.parametrize("name", ["hexapod", "hexaslide-cone", "arms"])
+def test_no_motion_of_the_platform_changes_by_more_than_its_bound(name: str) -> None:
+    """d(place, turn)/dq at places in reach, one drive alone and all: arms bend it, legs of changing length stretch it."""
+    kin, frame = kinematics(name), frame_of(kinematics(name))
+    assert frame is not None
+    q, loops, worst = joints(kin, 20, 5), frame.loops(frame.zero), 0.0
+    alone = np.eye(q.shape[1])[np.arange(20) % q.shape[1]]
+    for size in (0.002 * alone, np.full(q.shape, 0.0005)) if name == "arms" else (1.0 * alone, np.full(q.shape, 0.3)):
+        near, far = (legs_motion(loops, frame.leg, x, kin._platform(x), size) for x in (q, q + size))
+        moved = np.hypot(np.linalg.norm(far.shift - near.shift, axis=1),
+                         loops.lever * np.linalg.norm(far.turn - near.turn, axis=1))
+        assert (near.shift_change < 1e3).all()
+        worst = max(worst, float((moved / (near.shift_change + 1e-12)).max()))
+    assert 0.1 < worst <= 1.0
 
 
 def test_carriers_and_rods_that_share_have_no_bound() -> None:
