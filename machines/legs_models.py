@@ -14,11 +14,20 @@ from machines.kinematics.chain import LINEAR, ROTARY
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import FREEDOMS, Loops
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from machines.leg_layouts import BoundedVector, DriveModel, StarLayout, stray_keys
 from machines.legs_mobility import leg_faults, travel_faults
+from machines.machine import ControlKinematics
 from machines.models import KinematicsModel, Vector
-from machines.slider_models import UNIT, ClearanceModel, WorkspaceModel, clearance_sizes, rail_problems
+from machines.slider_models import (
+    UNIT,
+    ClearanceModel,
+    WorkspaceModel,
+    clearance_sizes,
+    lineardeltakins,
+    rail_problems,
+)
 from machines.user_file import UserModel
 from toolpaths.arrays import Floats
 
@@ -95,6 +104,21 @@ class LegsModel(KinematicsModel):
         moves = "z" in self.freedoms or any(carrier.direction[2] for carrier in self.carriers.values())
         flat = np.array([1.0, 1.0, 0.0])
         return space if moves else replace(space, lower=space.lower * flat, upper=space.upper * flat)
+
+    def control(self, module: str) -> ControlKinematics:
+        """Pins of LinuxCNC's lineardeltakins, where the machine is one: three slides X, Y, Z and no carrier.
+
+        Raises:
+            ValueError: where it is none; the message says what the module needs.
+        """
+        legs = list(self.drives.values())
+        if tuple(self.drives) != ("X", "Y", "Z") or self.carriers or {leg.drive for leg in legs} != {"slide"} \
+                or set(self.freedoms) != set("xyz"):
+            raise ValueError(f"module {module!r} is not known for this machine; a platform free in x y z on slides X, Y, Z "
+                             "has lineardeltakins")
+        rods = Legs(np.array([leg.point for leg in legs]), np.array([leg.direction for leg in legs]),
+                    np.array([float(leg.rod) for leg in legs]), np.array([float(leg.root) for leg in legs]))
+        return lineardeltakins(module, rods, np.array([leg.joint for leg in legs]) - np.array(self.gauge))
 
     def problems(self) -> Iterator[KeyProblem]:
         """Vectors that are no directions, letters, freedoms that do not go with the legs; faults over the workspace."""

@@ -18,9 +18,8 @@ from machines.kinematics.legs.on_legs import OnLegs
 from machines.machine import ControlKinematics
 from machines.mobility import delta_faults, h4_faults, reach_faults
 from machines.models import NotNegative, Vector, blanks
-from machines.slider_models import SliderModel
+from machines.slider_models import SliderModel, lineardeltakins
 from machines.user_file import UserModel
-from toolpaths.units import DEG
 
 
 class LinearDeltaModel(SliderModel):
@@ -67,21 +66,7 @@ class LinearDeltaModel(SliderModel):
 
         Its joints stand at 90, 210 and 330 degrees, equal rods above the platform, whose size is taken off R.
         """
-        if module != "lineardeltakins":
-            raise ValueError(f"module {module!r} is not known for linear Deltas; known: lineardeltakins")
-        legs = self.build_legs()
-        feet = legs.points - self.platform_joints()
-        radius = float(np.hypot(*feet[0, :2]))
-        turn = np.array([90.0, 210.0, 330.0]) * DEG
-        wanted = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0.0 * turn], axis=1)
-        if not np.allclose(feet, wanted, atol=1e-9):
-            raise ValueError(f"{module} needs slide - joint of the legs at 90, 210, 330 degrees and z = 0")
-        if not np.array_equal(legs.directions, np.tile([0.0, 0.0, 1.0], (3, 1))):
-            raise ValueError(f"{module} needs slides along [0, 0, 1]")
-        if len(set(legs.lengths)) > 1 or np.any(legs.roots < 0):
-            raise ValueError(f"{module} needs rods of one length and root = 1")
-        pins = {"lineardeltakins.L": float(legs.lengths[0]), "lineardeltakins.R": radius}
-        return ControlKinematics(module, pins)
+        return lineardeltakins(module, self.build_legs(), self.platform_joints())
 
 
 class RotaryModel(UserModel):

@@ -14,6 +14,7 @@ from machines.kinematics.chain import LINEAR
 from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
+from machines.machine import ControlKinematics
 from machines.models import KinematicsModel, NotNegative, Positive, Vector
 from machines.user_file import UserModel
 from toolpaths.arrays import Floats
@@ -176,3 +177,29 @@ def rail_problems(legs: Sequence[RodsOfLeg], given: ClearanceModel) -> Iterator[
 
 def _radians(degrees: float | None) -> float | None:
     return None if degrees is None else degrees * DEG
+
+
+def lineardeltakins(module: str, legs: Legs, joints: Floats) -> ControlKinematics:
+    """Pins L and R of LinuxCNC's lineardeltakins: three slides along z at R from the z axis, 120 degrees apart.
+
+    Its joints stand at 90, 210 and 330 degrees, equal rods above the platform, whose size is taken off R.
+
+    Args:
+        joints: (3, 3) mm, of the platform seen from the gauge point
+
+    Raises:
+        ValueError: where the legs are others, or the module; the message says what it needs.
+    """
+    if module != "lineardeltakins":
+        raise ValueError(f"module {module!r} is not known for linear Deltas; known: lineardeltakins")
+    feet = legs.points - joints
+    radius = float(np.hypot(*feet[0, :2]))
+    turn = np.array([90.0, 210.0, 330.0]) * DEG
+    wanted = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0.0 * turn], axis=1)
+    if not np.allclose(feet, wanted, atol=1e-9):
+        raise ValueError(f"{module} needs slide - joint of the legs at 90, 210, 330 degrees and z = 0")
+    if not np.allclose(legs.directions, np.tile([0.0, 0.0, 1.0], (3, 1)), atol=1e-12, rtol=0.0):
+        raise ValueError(f"{module} needs slides along [0, 0, 1]")
+    if len(set(legs.lengths)) > 1 or np.any(legs.roots < 0):
+        raise ValueError(f"{module} needs rods of one length and root = 1")
+    return ControlKinematics(module, {"lineardeltakins.L": float(legs.lengths[0]), "lineardeltakins.R": radius})

@@ -27,7 +27,7 @@ FROM_FILES = {
     "machines/geometric_error/files/": "letters of names of parameters",
     "machines/geometric_error/exchange/imports.py": "letters of axes", "machines/serial_models.py": "letters of axes",
     "machines/exchange/": "words of files of others",
-    "machines/parallel_models.py": "names of LinuxCNC's modules"}
+    "machines/slider_models.py": "names of LinuxCNC's modules"}
 """texts that others wrote; what is made of them is a Literal"""
 WORDS_OF_FILES = {"Event.word", "Statement.major", "Statement.body", "Record.major", "Record.body", "DialectStatement.name",
                   "Instance.name"}

@@ -30,6 +30,17 @@ ErrorForm = TypeVar("ErrorForm", covariant=True)
 UP = read_only([0.0, 0.0, 1.0])
 
 
+class PlatformPlaces(Protocol):
+    """A machine whose workspace is that of its platform."""
+
+    @property
+    def workspace(self) -> Workspace:
+        """Of the reference point and the tilt."""
+
+    def joints_at(self, platform: Floats, turn: Floats) -> Floats:
+        """Joints (N, J) of places and tilts of the platform (N, 4) and rotary axes (N, R)."""
+
+
 class ErrorForms(Protocol[ErrorForm]):
     """The paths to give a machine its geometric errors; `Kinematics.with_errors` takes the one that is the machine's."""
 
@@ -41,6 +52,9 @@ class ErrorForms(Protocol[ErrorForm]):
 
     def tilting_rods(self, kinematics: Any) -> ErrorForm:
         """Of one that tilts about x, with a rotary axis."""
+
+    def legs(self, kinematics: Any) -> ErrorForm:
+        """Of a platform on any legs."""
 
 
 class Kinematics(ABC):
@@ -236,6 +250,11 @@ class Kinematics(ABC):
         gauge = tip + self.tool_length * axis
         none = np.zeros((len(q), 0, 3))
         return ClearanceGeometry(gauge, np.zeros(len(q)), none, none, gauge, axis)
+
+    @property
+    def over_workspace(self) -> PlatformPlaces | None:
+        """The joints at places of its platform, of a machine whose `workspace` is about those."""
+        return self.on_rods
 
     # ---- geometric errors, pivots --------------------------------------------------------------------------
 

@@ -110,8 +110,7 @@ def chain(table: dict[str, Any]) -> Chain:
         along = np.array(own.get("direction", _ALONG[name]), np.float64)
         direction[name] = unit(along) * float(own.get("positive", 1))
         point[name] = np.array(own.get("point", (0.0, 0.0, 0.0)), np.float64)
-    return Chain(tuple(names), direction, point,
-                 unit(np.array(kinematics.get("tool_axis", (0.0, 0.0, 1.0)), np.float64)))
+    return Chain(tuple(names), direction, point, unit(np.array(kinematics.get("tool_axis", (0.0, 0.0, 1.0)), np.float64)))
 
 
 @dataclass(frozen=True)
@@ -128,6 +127,8 @@ class Rods:
     sense: float = 1.0
     carriers: dict[str, Array] = field(default_factory=dict)
     held: Array = field(default_factory=lambda: np.zeros(3))
+    wrong: bool = False
+    """every rod is a leg of its own, the platform turns as it must; of two pairs in a plane the mean of each counts"""
 
     def misfit(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array, length: Array) -> Array:
         """(N,) mm: the worst of rods off their length, and of the axis off what the platform can do (times
@@ -139,7 +140,7 @@ class Rods:
         s, c = (np.sin(turn), np.cos(turn)) if self.carries == "spindle" else (np.zeros(len(q)), np.ones(len(q)))
         for name, along in self.carriers.items():
             tip = tip - q[:, letters.index(name)][:, None] * along
-        k, sign, spins = int(self.turns != "b"), 1.0 if self.turns == "b" else -1.0, self.turns == "abc"
+        k, sign, spins = int(self.turns != "b"), 1.0 if self.turns == "b" else -1.0, self.wrong or self.turns == "abc"
         tilt = np.arctan2(sign * axis[:, k], axis[:, 2]) * bool(self.turns)
         platform = least_turns(axis) if spins else rotations(np.eye(3)[1 - k], tilt)
         expected = axis if spins else apply(platform, np.stack([s, 0.0 * s, c], axis=1))
@@ -149,6 +150,8 @@ class Rods:
             spin = -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)
             platform = platform @ rotations(np.array([0.0, 0.0, 1.0]), np.where(np.isfinite(spin), spin, 0.0))
             off, slope = self._legs(q, letters, above, platform)
+        if self.wrong and self.held.any():
+            off = 0.5 * (off[::2] + off[1::2])
         aside = np.abs((above - apply(platform, self.pivot[None])) * self.held).max(axis=1)
         return np.asarray(np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0))
 
@@ -190,18 +193,21 @@ def ring(layout: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return found
 
 
+def legs_of(kinematics: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The tables of all legs, by letter."""
+    return {**(ring(kinematics["layout"]) if "layout" in kinematics else {}), **kinematics.get("legs", {})}
+
+
 def rods(table: dict[str, Any]) -> Rods:
     """The rods of a machine file of kind "legs", "linear-delta" or "h4-linear"."""
     kinematics = table["kinematics"]
     rotary, carriers = kinematics.get("rotary", {}), kinematics.get("carriers", {})
-    tables = {**(ring(kinematics["layout"]) if "layout" in kinematics else {}), **kinematics.get("legs", {})}
-
 
     def rows(leg: dict[str, Any], *keys: str) -> Array:
         return np.array([leg.get(key, (0.0, 0.0, float(key == "direction"))) for key in keys], np.float64)
 
     legs = tuple((name, leg.get("drive", "slide"), rows({"point": leg.get("slide"), **leg}, "point", "direction", "joint",
-                  "arm"), float(leg["rod"]), float(leg.get("root", 1))) for name, leg in tables.items())
+                  "arm"), float(leg["rod"]), float(leg.get("root", 1))) for name, leg in legs_of(kinematics).items())
     for _, _, leg, _, _ in legs:
         leg[1] = unit(leg[1])
     if kinematics.get("kind") == "legs":

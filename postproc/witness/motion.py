@@ -171,8 +171,7 @@ def _low(w: Walked, rows: Array, cut: Cut | None, margin: float, bent: bool, tur
     cuts = (w.code[rows] > 0) & is_cut(w.kind[rows]) & ~w.gap[rows] & (w.owner[rows] != np.append(w.owner, m + 1)[rows + 1])
     for t in (0.25, 0.5, 0.75, 1.0):
         tip, axis = w.poses.at(rows, t)
-        line = np.fmin(_above(tip, w.targets.tip[before], w.targets.axis[before]),
-                       _above(tip, w.tip[here], w.axis[here]))
+        line = np.fmin(_above(tip, w.targets.tip[before], w.targets.axis[before]), _above(tip, w.tip[here], w.axis[here]))
         line = np.fmin(line, _above(tip, w.tip[left], w.axis[left]))
         line = np.where(begins, np.inf, line)
         line = np.fmin(line, np.where(ends, np.inf, _above(tip, w.targets.tip[to], w.targets.axis[to])))

@@ -40,8 +40,7 @@ def assembled(e: Execution) -> Commanded:
         move = step[0] * axis[row] if len(step) == 1 else matrix @ np.array(step)
         tip[row] = tip[row - 1] + e.scale * move if row else np.nan
     kind, cycle = np.full(n, LINE, np.int8), e.cycle.column(n, np.int64)
-    arc, centre, normal, sweep, uncertain = arcs.resolved(e.arcs, tip, place, common, e.frames,
-                                                          e.scale, e.dialect)
+    arc, centre, normal, sweep, uncertain = arcs.resolved(e.arcs, tip, place, common, e.frames, e.scale, e.dialect)
     kind[list(e.arcs.keys() & set(range(n)))] = ARC
     cycle[arc >= 0] = -1
     start = np.array(sorted(e.start), np.int64)

@@ -19,14 +19,7 @@ from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.rests import check_rests
 from postproc.witness.sides import check_sides
-from postproc.witness.states import (
-    check_feeds,
-    check_holes,
-    check_states,
-    check_velocities,
-    tools_of,
-    with_spindle,
-)
+from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities, tools_of, with_spindle
 from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
 from postproc.witness.text import Array
 from postproc.witness.turning import check_turning
@@ -55,15 +48,13 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
         return _nothing("no position was understood", began, missing)
     machine = _machine(case, table)
     if machine is None:
-        missing.append(NotCompared("kinematics", "parallel machine with geometric errors: poses of the read-back"
+        missing.append(NotCompared("kinematics", "rods with such geometric errors: poses of the read-back"
                                    if case.errors else "no machine file of a known kind: poses of the read-back"))
-    poses = Poses(case, executed, machine, [],
-                  max(int(tools_of(c, case.setup).max(initial=0)), 0))
+    poses = Poses(case, executed, machine, [], max(int(tools_of(c, case.setup).max(initial=0)), 0))
     with np.errstate(all="ignore"):
         found, worst, counts, silent = _compare(case, executed, c, place, poses, table)
     compared = tuple(Compared(what, n) for what, n in counts.items() if n)
-    return Testimony(compared, (*missing, *silent), tuple(found), int(c.known.sum()), *worst,
-                     process_time() - began)
+    return Testimony(compared, (*missing, *silent), tuple(found), int(c.known.sum()), *worst, process_time() - began)
 
 
 def _reoriented(c: Commanded, axes: Array) -> Commanded:
@@ -133,8 +124,7 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     faults, turned = check_turning(case, executed)
     found += faults
     feeding = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
-    faults, clamped = check_clamps(case, executed,
-                                   w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
+    faults, clamped = check_clamps(case, executed, w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
     found += faults
     if case.limits is not None:
         found += [Finding("limits", what, 0, 0) for what in other_limits(table, executed.letters, case.limits)]

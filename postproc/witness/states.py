@@ -187,10 +187,8 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     row = w.targets.row[w.owner[rows] - w.returns[rows]]
     tool, coolant = tools_of(c, case.setup)[row], _coolants(c, case.setup)[row]
     own = np.where(tool >= 0, tool + (register_beyond(case.machine) if case.registers else 0), tool)
-    register = np.where((c.register[row] == OWN) | (c.register[row] == tool) | (not case.registers), own,
-                        c.register[row])
-    register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)),
-                        -1, register)
+    register = np.where((c.register[row] == OWN) | (c.register[row] == tool) | (not case.registers), own, c.register[row])
+    register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)), -1, register)
     direction, rpm = c.spindle[row], c.rpm[row]
     if not (case.setup.get("output") or {}).get("tool_call", True):
         tool = np.full(len(rows), -1)

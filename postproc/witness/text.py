@@ -20,11 +20,9 @@ _PLAIN = rb"[ \t]*GOTO[ \t]*/" + _THREE + rb"(?:," + _THREE + rb")?"
 _OTHER = re.compile(rb"^(?!" + _PLAIN + rb"$)[^\n]*", re.MULTILINE)
 _COMMENT = re.compile(rb"\$\$[^\n]*")
 _GOES_ON = re.compile(rb"(?<!\$)\$(?!\$)([^\n]*)\n(?:[ \t]*\n)*")
-_SUBROUTINE = re.compile(rb"^[ \t]*DEFSUB[ \t]*/([^\n$]*)\n(.*?)^[ \t]*ENDSUB[^\n]*$",
-                         re.MULTILINE | re.DOTALL)
+_SUBROUTINE = re.compile(rb"^[ \t]*DEFSUB[ \t]*/([^\n$]*)\n(.*?)^[ \t]*ENDSUB[^\n]*$", re.MULTILINE | re.DOTALL)
 _CALL = re.compile(rb"^[ \t]*CALSUB[ \t]*/([^\n$]*)$", re.MULTILINE)
-_CATIA = re.compile(rb"^[ \t]*\$\$\*CATIA0[^\n]*\n[ \t]*\$\$[^\n]*\n((?:[ \t]*\$\$[^\n]*\n){3})",
-                    re.MULTILINE)
+_CATIA = re.compile(rb"^[ \t]*\$\$\*CATIA0[^\n]*\n[ \t]*\$\$[^\n]*\n((?:[ \t]*\$\$[^\n]*\n){3})", re.MULTILINE)
 _MAJOR = re.compile(r"(\$\$->\s*[\w-]+|[^/]*)/?(.*)", re.DOTALL)
 TEXT_WORDS = ("PARTNO", "PPRINT", "INSERT", "REMARK", "TPRINT", "LPRINT", "PPLABEL", "LETTER")
 _BARE = re.compile("|".join(TEXT_WORDS), re.IGNORECASE)
@@ -143,8 +141,7 @@ def _plain(data: bytes) -> bytes:
 
 def without_carriage_returns(data: bytes) -> bytes:
     """UTF-8 or single bytes with LF, without NULs."""
-    for bom, encoding in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"),
-                          (codecs.BOM_UTF16_BE, "utf-16")):
+    for bom, encoding in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
         if data.startswith(bom):
             data = data.decode(encoding, "replace").encode("utf-8")
     for old, new in ((b"\r\n", b"\n"), (b"\r", b"\n"), (b"\x00", b" "), (b"\x1a", b" ")):

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import machines
+from machines.geometric_error.actual.leg_frame import frame_of
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
 from machines.geometric_error.actual.serial_errors import Component, ErrorFrame, SerialErrors
@@ -58,10 +59,15 @@ def serial(name: str, seed: int) -> ErrorModel:
 def parallel(name: str, seed: int) -> ErrorModel:
     """A machine on rods: every dimension off by some 10 um, guides by some 5 arcsec."""
     kinematics, rng = machines.load(name).kinematics, np.random.default_rng(seed)
-    frame = rod_frame(kinematics.on_rods)
-    slides = kinematics.axis_names[: len(frame.rail)]
-    zero = RodErrors.none(slides, rod_names(frame, slides))
+    own = frame_of(kinematics)
+    if own is None:
+        frame = rod_frame(kinematics.on_rods)
+        slides = kinematics.axis_names[: len(frame.rail)]
+        zero, guides = RodErrors.none(slides, rod_names(frame, slides)), np.ones(len(slides))
+    else:
+        zero, guides = own.zero, 1.0 - own.machine.legs.stretch  # a leg that changes its length has no guide
     size = [5 * ARCSEC if angular(n) else 0.008 for n in zero.names]
+    size = [s * (guides[zero.legs.index(n[0])] if ".guide." in n else 1.0) for s, n in zip(size, zero.names, strict=True)]
     unit = [ARCSEC if angular(n) else 0.001 for n in zero.names]
     values = np.round(rng.normal(size=len(size)) * np.divide(size, unit), 1) * unit
     return with_uncertainty(ErrorModel(rods=zero.with_values(values), name=name, machine=name))
@@ -104,7 +110,7 @@ def main() -> None:
     """Write all."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
     for made in (serial("mikron-ucp710", 1), serial("linuxcnc-xyzac-trt", 2), parallel("uranesx", 3),
-                 parallel("h4a-c-table", 4)):
+                 parallel("h4a-c-table", 4), parallel("hexapod", 7), parallel("planar-delta-z", 8)):
         save(made, folder, f"invented errors of {made.machine}, 10 to 50 um and 5 to 20 arcsec")
     (folder / "runs-mill-3axis-X.csv").write_text(runs(np.random.default_rng(5)), encoding="utf-8")
     (folder / "map-mikron-ucp710.csv").write_text(measured_map(np.random.default_rng(6)), encoding="utf-8")

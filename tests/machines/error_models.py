@@ -7,12 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from machines.geometric_error.actual.axis_motion import effect
+from machines.geometric_error.actual.leg_frame import frame_of
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
 from machines.geometric_error.actual.serial_errors import Component, SerialErrors
+from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.curves import Fourier, Polynomial, TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, parse
 from machines.kinematics.base import Kinematics
+from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.serial import Serial
 from tests.machines.random_slides import random_slides
 from toolpaths.arrays import Floats
@@ -52,7 +55,10 @@ def _curve(rng: np.random.Generator, rotary: bool, k: int, size: float) -> Table
 def rod_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01,
                angle: float = 3.0 * ARCSEC) -> RodErrors:
     """All dimensions of a machine on rods."""
-    rng = np.random.default_rng(seed)
+    rng, own = np.random.default_rng(seed), frame_of(kinematics)
+    if own is not None:
+        return own.zero.with_values(rng.normal(size=len(own.zero.names)) * [angle if angular(n) else length
+                                                                           for n in own.zero.names])
     frame = rod_frame(kinematics.on_rods)
     slides = kinematics.axis_names[: len(frame.rail)]
     zero = RodErrors.none(slides, rod_names(frame, slides))
@@ -64,7 +70,7 @@ def model(kinematics: Kinematics, seed: int = 0) -> ErrorModel:
     if isinstance(kinematics, Serial):
         return ErrorModel(serial_errors(kinematics, seed))
     rng, chain = np.random.default_rng(seed), SerialErrors(constants={"EA0S": 4.0 * ARCSEC, "EX0S": 0.02})
-    if any(kinematics.rotary):
+    if any(kinematics.rotary) and not isinstance(kinematics, OnLegs):
         letter = kinematics.axis_names[-1]
         parts = tuple(Component(parse(f"E{d}{letter}"), _curve(rng, True, k, 3.0 * ARCSEC if k >= 3 else 0.01))
                       for k, d in enumerate(DIRECTIONS))
@@ -80,6 +86,10 @@ def joints(kinematics: Kinematics, n: int, seed: int = 0) -> Floats:
         turning = np.array(kinematics.rotary)
         q[:, turning] = rng.uniform(-2.0, 2.0, (n, int(turning.sum())))
         return q
+    if isinstance(kinematics, OnLegs):
+        box = kinematics.workspace
+        places = rng.uniform([*box.lower, box.tilt[0]], [*box.upper, box.tilt[1]], (n, 4))
+        return kinematics.joints_at(places, np.zeros((n, 0)))
     slides = random_slides(kinematics, rng, n)
     return slides if not any(kinematics.rotary) else np.column_stack([slides, rng.uniform(-1.0, 1.0, n)])
 

@@ -35,9 +35,14 @@ class Actual(ABC):
     turns: int
     """R"""
 
+    @property
+    def held(self) -> int:
+        """Coordinates behind the turns that no correction changes."""
+        return 0
+
     @abstractmethod
     def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
-        """w (N, 3 + R) of joints q (N, J); `near` as in `Kinematics.pose`."""
+        """w (N, 3 + R), and `held` more, of joints q (N, J); `near` as in `Kinematics.pose`."""
 
     @abstractmethod
     def joints(self, w: Floats) -> Floats:

@@ -35,6 +35,11 @@ class ActualByMap(Actual):
         """Of the nominal machine."""
         return self.nominal.turns
 
+    @property
+    def held(self) -> int:
+        """Of the nominal machine."""
+        return self.nominal.held
+
     def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
         """See the base class."""
         return self.nominal.coordinates(q, near)

@@ -96,12 +96,12 @@ def correct(actual: Actual, q: Floats, tip: Floats, axis: Floats, *, group: Ints
         gap = tip[rows] - at_tip[rows] - np.einsum("nij,nj->ni", rates[rows, :3, 3:], turned)
         step = np.concatenate([np.einsum("nij,nj->ni", slides[rows], gap), turned], axis=1)
         closed = np.abs(step) <= np.where(np.arange(step.shape[1]) < 3, *CLOSED)
-        open_ = ~np.all(closed | np.isnan(w[rows]), axis=1)
+        open_ = ~np.all(closed | np.isnan(w[rows, : step.shape[1]]), axis=1)
         if steps == STEPS or not open_.any():
             break
         if group is None:
             rows, step = np.arange(len(w))[rows][open_], step[open_]
-        w[rows] += step
+        w[rows, : step.shape[1]] += step
         at_tip[rows], at_axis[rows] = actual.aim(w[rows], None if direction is None else direction[rows])
         steps += 1
     partial = np.zeros(len(q), dtype=np.bool_) if turns is None else np.asarray(np.any(turns.weak, axis=1))

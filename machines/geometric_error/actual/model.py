@@ -8,9 +8,11 @@ from typing import Literal, Self
 import numpy as np
 
 from machines.geometric_error.actual.actual import Actual
+from machines.geometric_error.actual.actual_legs import ActualLegs
 from machines.geometric_error.actual.actual_map import ActualByMap
 from machines.geometric_error.actual.actual_rods import ActualDelta, ActualH4, rods_of
 from machines.geometric_error.actual.actual_serial import ActualSerial
+from machines.geometric_error.actual.leg_frame import leg_frame
 from machines.geometric_error.actual.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.tables.curves import least_apart
@@ -130,15 +132,26 @@ class Forms:
         """See `ErrorForms`."""
         return ActualH4(self._rods_of(kinematics), self.axes, kinematics=kinematics)
 
+    def legs(self, kinematics: OnLegs) -> Actual:
+        """See `ErrorForms`."""
+        zero = leg_frame(kinematics).zero
+        rods = zero if self.rods is None else self.rods
+        _same_rods(rods, zero.legs, zero.rods)
+        return ActualLegs(kinematics, rods, self.axes)
+
     def _rods_of(self, platform: RodPlatform) -> RodErrors:
         rods, slides = self.rods, platform.axis_names[: len(platform.legs.points)]
         none = (1.0,) * len(slides)  # no errors: any will do
         pairs = () if gives_rods(platform) else none if rods is None else rods.pairs
         own = rod_names(rod_frame(platform, pairs), slides)
         rods = RodErrors.none(slides, own, pairs) if rods is None else rods
-        if rods.legs != slides or rods.rods != own:
-            raise ValueError(f"the model's legs are {', '.join(rods.legs)}, those of this machine {', '.join(slides)}")
+        _same_rods(rods, slides, own)
         return rods
+
+
+def _same_rods(rods: RodErrors, legs: tuple[str, ...], own: tuple[str, ...]) -> None:
+    if rods.legs != legs or rods.rods != own:
+        raise ValueError(f"the model's legs are {', '.join(rods.legs)}, those of this machine {', '.join(legs)}")
 
 
 def _check_axes(kinematics: Kinematics, axes: SerialErrors) -> None:

@@ -83,18 +83,20 @@ def platform_motion(frame: RodFrame, errors: RodErrors, q: Floats, pose: tuple[F
     columns = inverted(rows) @ (np.einsum("nri,ri->nr", rods, along)[:, :, None] * own)
     shift, turn = columns[:, :3], columns[:, 3:] / lever
     rates = shift[:, None] + np.cross(turn[:, None], ends[:, :, :, None], axis=2) - (along[:, :, None] * own[:, None])
-    loops = _Loops(np.linalg.svd(np.nan_to_num(rows), compute_uv=False)[:, -1], np.linalg.norm(rates, axis=2),
-                   np.linalg.norm(turn, axis=1), np.linalg.norm(joints, axis=1), frame.length + errors.length, lever, reach)
+    loops = HeldLoops(np.linalg.svd(np.nan_to_num(rows), compute_uv=False)[:, -1], np.linalg.norm(rates, axis=2),
+                   np.linalg.norm(turn, axis=1), np.linalg.norm(joints, axis=1),
+                      np.broadcast_to(frame.length + errors.length, rods.shape[:2]), lever, reach,
+                      np.zeros(rods.shape[:2]), np.zeros(rates.shape[:2] + reach.shape[1:]))
     change, swing = loops.held()
     return PlatformMotion(place, turned, shift, turn, change, change / lever, swing)
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(least="N", rates="N R K", turn="N K", arm="R", length="R", reach="N K")
-class _Loops:
+@arrays(least="N", rates="N R K", turn="N K", arm="R", length="N R", reach="N K", bend="N R", gain="N R K")
+class HeldLoops:
     """What bounds need of N platforms: least singular value of W (N,), mm that each rod's vector changes by
-    per mm of each slide (N, 6, K), rad of the platform (N, K), arms and lengths (6,), the lever, how far the
-    slides go (N, K)."""
+    per mm of each slide (N, R, K), rad of the platform (N, K), arms (R,) and lengths (N, R) at most, the lever,
+    how far the slides go (N, K); what drives that are no slides do besides to rods (N, R) and to D (N, R, K)."""
 
     least: Floats
     rates: Floats
@@ -103,6 +105,8 @@ class _Loops:
     length: Floats
     lever: float
     reach: Floats
+    bend: Floats
+    gain: Floats
 
     def held(self) -> tuple[Floats, Floats]:
         """(by how much columns of J change at most (N, K), turns times the lever; rad that the platform turns
@@ -125,11 +129,11 @@ class _Loops:
             swing = ((self.turn + assumed / self.lever) * self.reach).sum(axis=1)
             drift = (assumed * self.reach).sum(axis=1)[:, None] * np.hypot(1.0, self.arm / self.lever)
             away = (self.turn * self.reach).sum(axis=1)[:, None] * self.arm * swing[:, None]
-            rod = (self.rates * self.reach[:, None]).sum(axis=2) + drift + away
+            rod = (self.rates * self.reach[:, None]).sum(axis=2) + drift + away + self.bend
             arm = self.arm * swing[:, None]
             off = np.linalg.norm(np.hypot(rod, (self.arm * rod + arm * self.length) / self.lever), axis=1)
             grip = 1.0 / np.where(off < self.least, self.least - off, np.nan)
-            wrong = rod[:, :, None] * self.rates + (self.length * arm)[:, :, None] * self.turn[:, None]
+            wrong = rod[:, :, None] * self.rates + (self.length * arm)[:, :, None] * self.turn[:, None] + self.gain
             return grip[:, None] * np.linalg.norm(wrong, axis=1), swing
 
 

@@ -13,7 +13,7 @@ which no longer only translates or tilts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -35,18 +35,19 @@ LEAST_GAIN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(rail="#legs 3", guide="#legs 3", carriage="6 3", platform="6 3", length="6")
+@arrays(rail="#legs 3", guide="#legs 3", carriage="#rods 3", platform="#rods 3", length="#rods", drive="_")
 class RodErrors:
-    """Errors of K legs and six rods, mm and rad; the order of the parameters is that of E-14.
+    """Errors of K legs and R rods, six but of kind "legs", mm and rad; the order of the parameters is that of E-14.
 
     Attributes:
         rail: (K, 3) dP, machine frame
         guide: (K, 3) turns of the slide about x, y, z of the machine frame
-        carriage: (6, 3) dA, guide frame
-        platform: (6, 3) dB, platform frame
-        length: (6,) dl
+        carriage: (R, 3) dA, guide frame
+        platform: (R, 3) dB, platform frame
+        length: (R,) dl
         legs, rods: names of the legs, and of the rods ("X1", "X2" ...)
         pairs: (K,) mm, half the distance of the rods of each leg where the machine file gives none, else empty
+        drive: (K,) by which the drive stands farther than it counts, mm or rad, of kind "legs"; else empty
     """
 
     rail: Floats
@@ -57,33 +58,35 @@ class RodErrors:
     legs: tuple[str, ...]
     rods: tuple[str, ...]
     pairs: tuple[float, ...] = ()
+    drive: Floats = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def none(cls, legs: tuple[str, ...], rods: tuple[str, ...], pairs: tuple[float, ...] = ()) -> Self:
         """All zero."""
-        k = len(legs)
-        return cls(np.zeros((k, 3)), np.zeros((k, 3)), np.zeros((RODS, 3)), np.zeros((RODS, 3)), np.zeros(RODS), legs, rods,
-                   pairs)
+        k, r = len(legs), len(rods)
+        return cls(np.zeros((k, 3)), np.zeros((k, 3)), np.zeros((r, 3)), np.zeros((r, 3)), np.zeros(r), legs, rods, pairs)
 
     @property
     def names(self) -> list[str]:
-        """X.rail.x ..., X.guide.x ..., X1.carriage.x ..., X1.platform.x ..., X1.length ..."""
+        """X.rail.x ..., X.guide.x ..., X1.carriage.x ..., X1.platform.x ..., X1.length ..., X.drive ..."""
         return [f"{who}.{what}.{letter}" for what, group in (("rail", self.legs), ("guide", self.legs),
                                                              ("carriage", self.rods), ("platform", self.rods))
-                for who in group for letter in "xyz"] + [f"{rod}.length" for rod in self.rods]
+                for who in group for letter in "xyz"] + [f"{rod}.length" for rod in self.rods] + [
+                                                                 f"{leg}.drive" for leg in self.legs[:len(self.drive)]]
 
     @property
     def values(self) -> Floats:
-        """(6 K + 42,): 60 for a Delta (E-14), 66 for an H4."""
-        return np.concatenate([getattr(self, name).ravel() for name in ("rail", "guide", "carriage", "platform", "length")])
+        """(6 K + 7 R,) and K of the drives: 60 for a Delta (E-14), 66 for an H4."""
+        return np.concatenate([getattr(self, name).ravel() for name in ("rail", "guide", "carriage", "platform", "length",
+                                                                        "drive")])
 
     def with_values(self, values: Floats) -> Self:
         """The same machine with other parameters (P,)."""
-        k = len(self.legs)
-        rail, guide, carriage, platform, length = np.split(np.asarray(values, dtype=np.float64),
-                                                           np.cumsum([3 * k, 3 * k, 3 * RODS, 3 * RODS]))
-        return replace(self, rail=rail.reshape(k, 3), guide=guide.reshape(k, 3), carriage=carriage.reshape(RODS, 3),
-                       platform=platform.reshape(RODS, 3), length=length)
+        k, r = len(self.legs), len(self.rods)
+        rail, guide, carriage, platform, length, drive = np.split(np.asarray(values, dtype=np.float64),
+                                                                  np.cumsum([3 * k, 3 * k, 3 * r, 3 * r, r]))
+        return replace(self, rail=rail.reshape(k, 3), guide=guide.reshape(k, 3), carriage=carriage.reshape(r, 3),
+                       platform=platform.reshape(r, 3), length=length, drive=drive)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +232,7 @@ def rod_frame(kinematics: RodPlatform, pairs: tuple[float, ...] = ()) -> RodFram
         raise ValueError(f"the machine file gives {0 if rods is None else len(rods.leg)} rods, a platform needs {RODS}; "
                          "write rods = [[x, y, z], [x, y, z]] in its leg tables")
     rail = legs.points + offset
-    guide = np.stack([_guide(u, -o, kinematics.workspace.middle - p)
+    guide = np.stack([guide_frame(u, -o, kinematics.workspace.middle - p)
                       for u, o, p in zip(legs.directions, offset, rail, strict=True)])
     return RodFrame(leg, rail, legs.directions, shift - offset[leg], platform[leg] + shift,
                     legs.lengths[leg], guide)
@@ -251,7 +254,7 @@ def rod_names(frame: RodFrame, legs: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(f"{legs[leg]}{number}" for leg, number in zip(frame.leg, count, strict=True))
 
 
-def _guide(direction: Floats, *towards: Floats) -> Floats:
+def guide_frame(direction: Floats, *towards: Floats) -> Floats:
     """Columns x, y, z of a guide frame: z along the slide, x across it, from the rail to the joint, else to the middle."""
     across = [v - (v @ direction) * direction for v in (*towards, np.eye(3)[int(np.argmin(np.abs(direction)))])]
     x = next(v for v in across if np.linalg.norm(v) > 1e-9)

@@ -49,7 +49,7 @@ def samples(model: ErrorModel, machine: Machine, actual: Actual, count: int) -> 
     """Coordinates w (N, 3 + R), N <= count, spread over the volume and at its corners; only where the model holds."""
     lower, upper = ranges(model, machine)
     if np.any(lower > upper):
-        return np.zeros((0, 3 + actual.turns))
+        return np.zeros((0, 3 + actual.turns + actual.held))
     w = actual.coordinates(_joints(machine, lower, upper, np.random.default_rng(0), count))
     w = w[np.isfinite(actual.aim(w)[0]).all(axis=1)]
     return np.asarray(w[~actual.outside(w, INSIDE).any(axis=1)])
@@ -58,7 +58,7 @@ def samples(model: ErrorModel, machine: Machine, actual: Actual, count: int) -> 
 def middle(machine: Machine) -> Floats:
     """(J,) joints in the middle of the workspace of a machine on rods, at 0 within travel of a serial one."""
     zero, platform = np.clip(np.zeros(len(machine.axis_names)), machine.limits.lower, machine.limits.upper), \
-        machine.kinematics.on_rods
+        machine.kinematics.over_workspace
     if platform is None:
         return zero
     box = platform.workspace
@@ -68,7 +68,7 @@ def middle(machine: Machine) -> Floats:
 
 def corners(machine: Machine, lower: Floats, upper: Floats, fixed: Floats) -> Floats:
     """Joints (M, J) with the slides at their ends, or the platform at the corners of its box; the rest as `fixed` (J,)."""
-    platform = machine.kinematics.on_rods
+    platform = machine.kinematics.over_workspace
     if platform is not None:
         ends = np.array(list(product(*zip(platform.workspace.lower, platform.workspace.upper, strict=True))))
         tilt = np.full((len(ends), 1), np.clip(0.0, *platform.workspace.tilt))
@@ -82,7 +82,7 @@ def section(machine: Machine, lower: Floats, upper: Floats, across: int, up: int
             count: int) -> tuple[Floats, Floats, Floats]:
     """Joints (count^2, J) over two slides, or two directions of the platform (0, 1, 2 for x, y, z), the rest
     in the middle; and the positions (count,) of both, mm."""
-    platform, rest = machine.kinematics.on_rods, middle(machine)
+    platform, rest = machine.kinematics.over_workspace, middle(machine)
     box = platform.workspace if platform is not None else None
     j = [across, up] if box else [machine.axis_names.index("XYZ"[k]) for k in (across, up)]
     ends = (box.lower, box.upper) if box else (lower, upper)
@@ -96,7 +96,7 @@ def section(machine: Machine, lower: Floats, upper: Floats, across: int, up: int
 
 
 def _joints(machine: Machine, lower: Floats, upper: Floats, rng: np.random.Generator, count: int) -> Floats:
-    platform = machine.kinematics.on_rods
+    platform = machine.kinematics.over_workspace
     if platform is None:
         return _spread(lower, upper, rng, count)
     box = platform.workspace

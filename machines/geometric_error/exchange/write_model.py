@@ -158,6 +158,8 @@ def _leg_lines(rods: RodErrors) -> list[str]:
         lines += [f"{what} = [{', '.join(_list(getattr(rods, what)[r] / length) for r in mine)}]"
                   for what in ("carriage", "platform")]
         lines.append(f"length = {_list(rods.length[mine] / length)}")
+        if len(rods.drive):
+            lines.append(f"drive = {_number(rods.drive[k] / (angle if leg in ROTARY else length))}")
     return lines
 
 

@@ -12,6 +12,7 @@ from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.files.file_models import ErrorFileModel
 from machines.geometric_error.tables.csv_table import UNITS, read_text
 from machines.geometric_error.tables.names import parse
+from machines.kinematics.chain import ROTARY
 from machines.user_file import UserFile, nearest
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, Severity, error
@@ -29,6 +30,8 @@ def angular(name: str) -> bool:
     part = name.split(".")[-2] if name.count(".") > 1 else ""
     if part:
         return part == "guide"
+    if name.endswith(".drive"):
+        return name[0] in ROTARY
     if "]." in name:
         return name.rsplit(".", 1)[1].startswith("r")
     known = parse(name.split("[")[0].split(".")[0])

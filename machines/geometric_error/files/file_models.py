@@ -91,6 +91,8 @@ class LegErrorModel(UserModel):
     """per rod: joint on the platform, platform frame"""
     length: tuple[float, ...] = ()
     """per rod"""
+    drive: float = 0.0
+    """kind "legs": by how much the drive stands farther than it counts; of an arm an angle"""
 
 
 class MapModel(UserModel):

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from machines.geometric_error.actual.actual_map import part_side
 from machines.geometric_error.actual.axis_motion import effect
+from machines.geometric_error.actual.leg_frame import LegFrame, frame_of
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.actual.serial_errors import Component, ErrorFrame, SerialErrors
 from machines.geometric_error.files.covariance import covariance_of
-from machines.geometric_error.files.file_models import CurveModel, ErrorFileModel
+from machines.geometric_error.files.file_models import CurveModel, ErrorFileModel, LegErrorModel
 from machines.geometric_error.files.implausible_errors import too_large
 from machines.geometric_error.tables.csv_table import UNITS, CsvTable, read_csv
 from machines.geometric_error.tables.curves import EVERYWHERE, Curve, Fourier, Polynomial
@@ -29,6 +31,8 @@ from toolpaths.diagnostics import Diagnostic, Severity, has_errors, read_value, 
 from toolpaths.units import DEG
 
 KIND = "error model"
+DIMENSIONS = ("rail", "guide", "carriage", "platform", "length")
+"""of legs and rods, in the order of their parameters"""
 
 
 def load(source: str | Path, machine: Machine) -> ErrorModel:
@@ -105,6 +109,10 @@ class _Loader:
         for table, names in (("components", self.checked.components), ("location", self.checked.location)):
             for text in names:
                 if (name := parse(text)) and name.axis not in (*known, SPINDLE):
+                    if not whole and name.axis in self.machine.axis_names:
+                        self._problem("error-model.axis", (table, text), f"{name.axis} moves a leg of {self.machine.name}",
+                                      f"slides and arms are in [legs], here as [legs.{name.axis}]")
+                        continue
                     kind = "axis" if whole else "rotary axis"
                     self._problem("error-model.axis", (table, text), f"{self.machine.name} has no {kind} {name.axis!r}",
                                   f"it has {', '.join(known) or 'none'}" + ("" if whole else "; slides are in [legs]"))
@@ -204,7 +212,9 @@ class _Loader:
     # ---- parallel machines, maps ---------------------------------------------------------------------------
 
     def _rods(self) -> RodErrors | None:
-        kinematics = self.machine.kinematics.on_rods
+        kinematics, own = self.machine.kinematics.on_rods, frame_of(self.machine.kinematics)
+        if own is not None:
+            return self._legs(own)
         if kinematics is None:
             for letter in self.checked.legs:
                 self._problem("error-model.legs", ("legs", letter), f"{self.machine.name} has no legs",
@@ -216,18 +226,12 @@ class _Loader:
             return None
         frame = rod_frame(kinematics, pairs)
         zero = RodErrors.none(slides, rod_names(frame, slides), pairs)
-        parts = {what: np.array(getattr(zero, what)) for what in ("rail", "guide", "carriage", "platform", "length")}
+        parts = {what: np.array(getattr(zero, what)) for what in DIMENSIONS}
+        self._dimensions(parts, slides, frame.leg)
         for letter, given in self.checked.legs.items():
-            if letter not in slides:
-                self._problem("error-model.legs", ("legs", letter), f"{self.machine.name} has no leg {letter!r}",
-                              "its legs are " + ", ".join(slides))
-                continue
-            leg = slides.index(letter)
-            mine = np.flatnonzero(frame.leg == leg)
-            parts["rail"][leg] = np.multiply(given.rail, self.length)
-            parts["guide"][leg] = np.multiply(given.guide, self.angle)
-            for what in ("carriage", "platform", "length"):
-                self._per_rod(letter, what, getattr(given, what), parts[what], mine)
+            if given.drive:
+                self._problem("error-model.legs", ("legs", letter, "drive"), f"{self.machine.name} is of no kind \"legs\"",
+                              "write it as the carriage's third number, along the slide, of every rod")
         return RodErrors(**parts, legs=slides, rods=zero.rods, pairs=pairs)
 
     def _pairs(self, slides: tuple[str, ...], given: bool) -> tuple[float, ...] | None:
@@ -246,6 +250,33 @@ class _Loader:
                               "every [legs] table, or rods in the machine file")
             return None
         return tuple(stated[letter] for letter in slides)
+
+    def _legs(self, frame: LegFrame) -> RodErrors:
+        """Of a machine of kind "legs"."""
+        zero, drives = frame.zero, frame.machine.legs
+        parts: dict[str, Any] = {what: np.array(getattr(zero, what)) for what in (*DIMENSIONS, "drive")}
+        self._pairs(zero.legs, True)
+        self._dimensions(parts, zero.legs, frame.leg)
+        for k, letter in enumerate(zero.legs):
+            given = self.checked.legs.get(letter, LegErrorModel())
+            parts["drive"][k] = given.drive * (self.angle if drives.arm[k] else self.length)
+            if drives.stretch[k] and any(given.guide):
+                self._problem("error-model.legs", ("legs", letter, "guide"), f"leg {letter} changes its length: it has no "
+                              "guide to be turned", "take guide out; its foot is moved by rail")
+        return replace(zero, **parts)
+
+    def _dimensions(self, parts: dict[str, Floats], legs: tuple[str, ...], leg_of: Ints) -> None:
+        """The `[legs]` tables into arrays by DIMENSIONS, of rods by their legs (R,)."""
+        for letter, given in self.checked.legs.items():
+            if letter not in legs:
+                self._problem("error-model.legs", ("legs", letter), f"{self.machine.name} has no leg {letter!r}",
+                              "its legs are " + ", ".join(legs))
+                continue
+            leg = legs.index(letter)
+            parts["rail"][leg] = np.multiply(given.rail, self.length)
+            parts["guide"][leg] = np.multiply(given.guide, self.angle)
+            for what in ("carriage", "platform", "length"):
+                self._per_rod(letter, what, getattr(given, what), parts[what], np.flatnonzero(leg_of == leg))
 
     def _per_rod(self, letter: str, what: str, given: tuple[object, ...], into: Floats, rods: Ints) -> None:
         if given and len(given) != len(rods):

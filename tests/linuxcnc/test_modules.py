@@ -1,0 +1,100 @@
+"""LinuxCNC's own kinematics modules, loaded as they are installed, and our inverse: the same joints within 1e-6 mm.
+
+A module asks its host for memory and pins alone (`kins_host.c`), so that no simulator runs. Its pose is the controlled point
+and a, b, c in degrees, turns about x, then y, then z; its joints are in mm and degrees. pentakins has no machine here: its
+five struts end on rings that turn about the tool, which no fixed joint of a platform does.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+import numpy as np
+import pytest
+
+import machines
+from machines.kinematics.legs.on_legs import OnLegs
+from machines.loader import load_checked
+from tests.linuxcnc.config import MODULES
+from tests.machines.error_models import joints
+from tests.machines.kinematics.test_legs import ARMS
+from tests.postproc.control.test_tip_programs_of_legs import LINEAR_DELTA
+from toolpaths.arrays import Floats
+
+pytestmark = pytest.mark.skipif(not Path(MODULES, "genhexkins.so").exists() or shutil.which("gcc") is None,
+                                reason="LinuxCNC's modules and gcc are needed (Debian: apt-get install linuxcnc-uspace gcc)")
+SAME = 1e-6
+"""mm or degrees"""
+
+
+@cache
+def host() -> ctypes.CDLL:
+    folder = Path(mkdtemp(prefix="kins-host-"))
+    try:
+        subprocess.run(["gcc", "-O1", "-shared", "-fPIC", "-w", "-o", folder / "host.so",
+                        Path(__file__).parent / "kins_host.c"], check=True)
+        found = ctypes.CDLL(str(folder / "host.so"), mode=ctypes.RTLD_GLOBAL)
+    finally:
+        shutil.rmtree(folder)
+    found.host_pin.restype = ctypes.POINTER(ctypes.c_double)
+    return found
+
+
+def inverse(module: str, pins: dict[str, float], poses: Floats, count: int) -> Floats:
+    """(N, count) joints that the module gives for poses (N, 6): x, y, z in mm, a, b, c in degrees."""
+    own, library = host(), ctypes.CDLL(str(Path(MODULES, f"{module}.so")))
+    assert library.rtapi_app_main() == 0
+    for name, value in pins.items():
+        pin = own.host_pin(f"{module}.{name}".encode())
+        assert pin, name
+        pin[0] = value
+    result, flags = np.empty((len(poses), count)), (ctypes.c_ulong * 1)(0)
+    for row, pose in zip(result, poses, strict=True):
+        found = (ctypes.c_double * 16)()
+        assert library.kinematicsInverse((ctypes.c_double * 9)(*pose), found, flags, flags) == 0
+        row[:] = found[:count]
+    return result
+
+
+def test_genhexkins_gives_the_lengths_of_the_hexapod() -> None:
+    kin = machines.load("hexapod").kinematics
+    assert isinstance(kin, OnLegs)
+    q = joints(kin, 200)
+    tip, axis, spin = kin.pose(q)
+    turn = kin.turn_of(axis, spin)
+    abc = np.degrees(np.column_stack([np.arctan2(turn[:, 2, 1], turn[:, 2, 2]), -np.arcsin(turn[:, 2, 0]),
+                                      np.arctan2(turn[:, 1, 0], turn[:, 0, 0])]))
+    ends = {"base": kin.legs.points, "platform": kin.loops.joints - kin.gauge}
+    pins = {f"{what}.{k}.{letter}": value for what, points in ends.items() for k, point in enumerate(points)
+            for letter, value in zip("xyz", point.tolist(), strict=True)}
+    theirs = inverse("genhexkins", pins, np.column_stack([tip, abc]), 6)
+    assert np.abs(theirs - (kin.legs.lengths + q)).max() < SAME
+
+
+def test_rotarydeltakins_gives_the_angles_of_a_rotary_delta(tmp_path: Path) -> None:
+    """Its joint 0 stands at -y, 1 at 30 and 2 at 150 degrees, as the letters C and B of the file."""
+    (tmp_path / "arms.toml").write_text(ARMS)
+    machine, _ = load_checked(tmp_path / "arms.toml")
+    assert machine is not None
+    q = joints(machine.kinematics, 200)
+    tip = machine.kinematics.forward(q)[0]
+    pins = {"platformradius": 250.0, "thighlength": 350.0, "shinlength": 800.0, "footradius": 80.0}
+    theirs = inverse("rotarydeltakins", pins, np.column_stack([tip, 0.0 * tip]), 3)
+    assert np.abs(theirs - np.degrees(q)[:, [0, 2, 1]]).max() < SAME
+
+
+@pytest.mark.parametrize("legs", [False, True])
+def test_lineardeltakins_gives_the_slides_of_a_linear_delta(legs: bool, tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text(LINEAR_DELTA if legs else 'base = "linuxcnc-lineardelta"\n')
+    machine = machines.load(tmp_path / "own.toml")
+    kin, control = machine.kinematics, machine.control_kinematics
+    assert control is not None and kin.workspace is not None
+    tip = np.random.default_rng(0).uniform(kin.workspace.lower, kin.workspace.upper, (200, 3)) - [0.0, 0.0, 20.0 * legs]
+    ours = kin.inverse(tip, np.tile([0.0, 0.0, 1.0], (200, 1)))[0]
+    pins = {key.split(".", 1)[1]: value for key, value in control.pins.items()}
+    assert np.abs(inverse("lineardeltakins", pins, np.column_stack([tip, 0.0 * tip]), 3) - ours).max() < SAME

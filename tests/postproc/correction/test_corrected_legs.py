@@ -1,0 +1,72 @@
+"""Programs for platforms on legs with their geometric errors: corrected, proved by the read-back and the second witness."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import machines
+from machines.geometric_error.files.loader import load
+from machines.kinematics.legs.on_legs import OnLegs
+from postproc.pipeline.result import PostResult
+from postproc.verification.residual_errors import after_formatting
+from postproc.witness.errors import error_chain
+from postproc.witness.machine import Rods, merged
+from tests.machines.error_models import joints
+from tests.postproc.kit import convert, good, setup_of, toolpath
+
+ERRORS = Path("samples/errors")
+TILTED = [",0.099504,0,0.995037", ",0.099504,0.099015,0.990099", ",-0.099504,0.196116,0.975519"]
+CUTS = {"hexapod": TILTED, "hexaslide-cone": ["", "", ""], "uranesx": ["", "", ""], "planar-delta-z": ["", "", ""]}
+"""tool axes of the cuts"""
+
+
+def model_of(name: str, folder: Path) -> Path:
+    """That of the samples; the hexaslides take the numbers of the hexapod."""
+    if (ERRORS / f"{name}.toml").exists():
+        return ERRORS / f"{name}.toml"
+    (folder / "own.toml").write_text((ERRORS / "hexapod.toml").read_text().replace('machine = "hexapod"', ""))
+    return folder / "own.toml"
+
+
+@cache
+def converted(name: str, model: Path) -> PostResult:
+    """Two cuts and their approach; the part stands in the middle of the workspace."""
+    kin, (one, two, three) = machines.load(name).kinematics, CUTS[name]
+    x, y, z = kin.workspace.middle + (kin.gauge if isinstance(kin, OnLegs) else 0.0) - [0.0, 0.0, 80.0]
+    setup = setup_of(f"[part]\norigin = [{x}, {y}, {z}]\n[tools.1]\ngauge_length = 80\n[clearance]\nmargin = 20\n")
+    path = toolpath("MULTAX/ON" if one else "MULTAX/OFF", "LOADTL/1", "SPINDL/RPM,8000,CLW", "RAPID", f"GOTO/-20,10,5{one}",
+                    "FEDRAT/MMPM,1500", f"GOTO/-20,10,-2{one}", f"GOTO/15,10,-1{two}", f"GOTO/15,-10,-4{three}", "RAPID",
+                    f"GOTO/15,-10,20{three}")
+    return good(convert(path, name, setup=setup, error_model=str(model)))
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_the_words_bring_the_tool_where_it_should_be(name: str, tmp_path: Path) -> None:
+    """Errors of some 0.01 to 0.1 mm; the written words leave what rounding leaves, by both witnesses."""
+    result = converted(name, model_of(name, tmp_path))
+    found = after_formatting(result)
+    assert result.compensation is not None and result.compensation.tip_before > 0.005
+    assert found is not None and found.tip.max() < found.tip_bound < 1e-3
+    assert result.witness is not None and not result.witness.findings and not result.witness.not_compared
+
+
+@pytest.mark.parametrize("name", CUTS)
+def test_the_rods_of_the_second_witness_are_those_of_the_model(name: str, tmp_path: Path) -> None:
+    """It finds 1e-6 mm where the machine with errors has its tool, and as much as is put in where it has not."""
+    path, machine = model_of(name, tmp_path), machines.load(name)
+    found = load(path, machine)
+    kin = machine.kinematics.with_tool(60.0)
+    actual, q = found.on(kin), joints(machine.kinematics, 8, 3)
+    tip, axis = actual.aim(actual.coordinates(q))
+    base = [tomllib.loads((Path("machines/data") / f"{name}.toml").read_text())]
+    rods = error_chain(merged(base), tomllib.loads(path.read_text()), {})
+    assert isinstance(rods, Rods) and rods.wrong
+    length = np.full(len(q), 60.0)
+    assert rods.misfit(q, machine.axis_names, tip, axis, length).max() < 2e-6
+    for way in (0.005 * np.eye(3)):
+        assert rods.misfit(q, machine.axis_names, tip + way, axis, length).min() > 1e-4
