@@ -106,8 +106,8 @@ class OutputModes:
 
     @property
     def plane_from_home(self) -> bool:
-        """True where a tilted plane is stated at the height of home on the way from there: no length may be in force where it
-        is, and off its home the tool would come down under one for nothing."""
+        """True where a tilted plane is stated at the height of home on travel from there, since no length may be in force
+        where it is stated."""
         mode = self.controller.modes.tilted
         return mode is not None and mode.length == "off"
 

@@ -205,7 +205,7 @@ class _Legs:
     entry: ZeroEntry | None = None
     """where the mode that it goes to is entered with the tables at zero"""
     down: bool = False
-    """the way down from home, the last of `Link.index`, is in the plane that it goes to"""
+    """the travel down from home, the last of `Link.index`, is in the plane that it goes to"""
 
 
 def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs) -> None:

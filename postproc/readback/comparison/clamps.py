@@ -96,8 +96,8 @@ def _standing(cut: Bools, turns: Bools) -> Bools:
 
 def check_index(motion: Motion, job: Job, home: Floats, owner: Ints, faults: Faults) -> list[Diagnostic]:
     """Linking moves that turn rotary axes before a move with another tool axis, where the retract axis is to be at home
-    (J,) meanwhile: an error where the set-up says so, a warning where the controller file does. In the mode by the tip, entered
-    with the tables at zero, it stands lower by what straight paths of the tip need.
+    (J,) meanwhile: an error where the set-up says so, a warning where the controller file does.
+    In the mode by the tip, entered with the tables at zero, it stands lower by what straight paths of the tip need.
 
     Where errors are corrected, what the correction moves and turns is neither away from home nor a turn."""
     if not job.index_at_home or job.control.tip_law:

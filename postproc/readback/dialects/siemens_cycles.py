@@ -71,7 +71,7 @@ def _deep(s: DialectStatement, plain: Drill, surface: float, speed: float) -> tu
 
 
 def _strokes(surface: float, bottom: float, first: float, share: float, least: float) -> tuple[float, ...]:
-    """Depths of strokes: each `share` of the last one, `least` at the least; all alike where `share` is 0."""
+    """Depths of strokes: each `share` of the last one, `least` or more; all alike where `share` is 0."""
     if share == 0.0:
         return pecks(surface, bottom, first)
     depths, stroke = [surface - first], first

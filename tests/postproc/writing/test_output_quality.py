@@ -161,8 +161,8 @@ def test_the_tool_is_home_there_in_corrected_programs_too(controller: str, outpu
 
 
 @pytest.mark.parametrize("index", ["home", "plane"])
-def test_a_plane_is_stated_at_home_on_the_way_from_home(index: str) -> None:
-    """Behind a tool change, or `index = "home"`: no length comes into force above the part and is cancelled for G68.2, G43.4."""
+def test_a_plane_is_stated_at_home_on_travel_from_home(index: str) -> None:
+    """Behind a tool change, or `index = "home"`: no length is in force above the part and cancelled for G68.2, G43.4."""
     result = indexing("fanuc-30i", index, "auto")
     assert result.ok, [str(d) for d in result.diagnostics]
     blocks, above, cancelled = result.text.split("\n"), False, 0
@@ -170,7 +170,7 @@ def test_a_plane_is_stated_at_home_on_the_way_from_home(index: str) -> None:
         if block.startswith(("G68.2", "G43.4")):
             cancelled += above
             assert "G43" in blocks[k + 2 * block.startswith("G68.2")]
-        above = "G43" in block or above and "G53 G0 Z250." not in block
+        above = "G43" in block or (above and "G53 G0 Z250." not in block)
     planes = sum(block.startswith("G68.2") for block in blocks)
     assert planes > 3 and cancelled == (0 if index == "home" else 2)
 
