@@ -234,7 +234,10 @@ def run(tasks: list[Task], workers: int) -> Counter[tuple[str, str, str]]:
                 return found
             task = running.pop(done)
             try:
-                found += done.result()
+                made = done.result()
+                found += made
+                if failures(made):
+                    print(table(made), file=sys.stderr, flush=True)
             except BrokenProcessPool:
                 found[INTERNAL, "a process ended without a word (memory?)", f"near {task.file.name} on {task.machine}"] += 1
                 return found
