@@ -19,6 +19,8 @@ from toolpaths.toolpath import Cycle, Kind, Toolpath
 
 ROUNDED = 1.5
 """last decimals by which words along a hole may differ in a plane whose printed angles are rounded"""
+LEAST_SHARE = 0.001
+"""of the first peck: what cycles can state (CYCLE83, DAM)"""
 STATES_RETRACT = ("{retract}", "{second}")
 """one of them stands in cycles that state the level they retract to"""
 
@@ -197,8 +199,8 @@ def cycle_spec(controller: ControllerFile, cycle: Cycle, key: CycleKey) -> Canne
 
 
 def falls(cycle: Cycle) -> bool:
-    """True where all pecks behind the first are one smaller one."""
-    return len(cycle.steps) == 2 and 0.0 < cycle.steps[1] < cycle.steps[0]
+    """True where all pecks behind the first are one smaller one, of a thousandth of it at least."""
+    return len(cycle.steps) == 2 and LEAST_SHARE * cycle.steps[0] <= cycle.steps[1] < cycle.steps[0]
 
 
 def cycle_key(kind: CycleKind, turning: int) -> CycleKey:

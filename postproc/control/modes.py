@@ -105,6 +105,13 @@ class OutputModes:
         return WordFrame(_with_arcs(control, mode))
 
     @property
+    def plane_from_home(self) -> bool:
+        """True where a tilted plane is stated at the height of home on travel from there, since no length may be in force
+        where it is stated."""
+        mode = self.controller.modes.tilted
+        return mode is not None and mode.length == "off"
+
+    @property
     def tcp_code(self) -> str:
         """What switches the mode by the tip on."""
         mode = self.controller.modes.tcp

@@ -13,10 +13,11 @@ WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59
 CYCLE_LENGTHS = ("retract", "surface", "clearance", "bottom", "depth", "level", "step", "less", "least", "relief", "pitch",
                  "second")
 """those of `CYCLE_VALUES` that are lengths, in the units of the program"""
-CYCLE_VALUES = (*CYCLE_LENGTHS, "breaks", "dwell", "feed", "speed")
+CYCLE_VALUES = (*CYCLE_LENGTHS, "breaks", "factor", "dwell", "feed", "speed")
 """what a cycle's text may name: retract level, surface and bottom (on the tool's axis), clearance above
 the surface, depth below it, level of the bottom seen from it (negative), peck, by what each next one is less,
-the least of them, relief (`cycles.peck_relief`), number of pecks, dwell in s, feed as F states it, pitch
+the least of them, relief (`cycles.peck_relief`), number of pecks, share of the last peck that the next one
+is, rounded down to a thousandth, with a minus, dwell in s, feed as F states it, pitch
 (negative: left-hand), speed in 1/min, second: the retract level above the surface"""
 
 

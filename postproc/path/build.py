@@ -18,7 +18,7 @@ from postproc.joints.run_plan import RunPlan, plan_moves
 from postproc.path.blocks import LEG, PathBuilder, add_run, rapid_codes
 from postproc.path.home_links import add_home_links
 from postproc.path.linearise import approached
-from postproc.path.links import Link, Pose, SafeSpace, plan_link
+from postproc.path.links import Link, Pose, SafeSpace, has_retract_axis, plan_link
 from postproc.path.model import FEED, TRAVERSE, JointPath
 from postproc.path.rewinds import RetractPlan
 from postproc.path.solved_runs import SolvedRun, SolvedRuns, solved_runs
@@ -169,9 +169,10 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
             entry = zero_entry(modes.control, modes.tcp.control, run.kin, space, link)
             longer.append(entry.seconds)
             link = replace(link, clear=link.clear and entry.clear)
+        down = by_home and run.frame.control.law == "tilted" and modes.plane_from_home and has_retract_axis(travel.control)
         leaving = road.modes.at(before.frame.control.place).base
         _add_link(out, moves, first, link, _Legs(before.frame, leaving if by_home else travel, travel, run.frame, before.kin,
-                                                 run.kin, before.pose, entry))
+                                                 run.kin, before.pose, entry, down))
         if not link.clear:
             found.append(faults.no_path(moves, first, road.file))
         if progress:
@@ -203,6 +204,8 @@ class _Legs:
     start: Pose | None
     entry: ZeroEntry | None = None
     """where the mode that it goes to is entered with the tables at zero"""
+    down: bool = False
+    """the travel down from home, the last of `Link.index`, is in the plane that it goes to"""
 
 
 def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs) -> None:
@@ -216,13 +219,16 @@ def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs)
     out.link(legs.home, link.home, row, not legs.home.control.tip_law, link.home_state)
     out.begin[row] = out.count
     if legs.entry is not None:
-        out.link(legs.travel, legs.entry.before, row, False, legs.entry.state)
+        out.link(legs.travel, legs.entry.before[:-1], row, False, legs.entry.state[:-1])
+        out.link(legs.travel, legs.entry.before[-1:], row, True, legs.entry.state[-1:])
         out.link(legs.after, legs.entry.inside, row)
     state = link.index_state.copy()
     if len(state) and legs.after is not legs.travel and not state[:, legs.travel.control.rotary].any(axis=0).all():
         state[-1] = True
     if legs.entry is None:
-        out.link(legs.travel, link.index, row, False, state)
+        last = len(state) - int(legs.down)
+        out.link(legs.travel, link.index[:last], row, False, state[:last])
+        out.link(legs.after, link.index[last:], row)
     if not len(link.approach):
         return
     begin = link.index[-1]

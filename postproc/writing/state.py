@@ -222,7 +222,7 @@ class WriterState:
         pitch = cycle.pitch or (feed * self.controller.feed_unit / abs(self.speed) if self.speed else 0.0)
         return {"retract": hole.retract, "surface": surface, "clearance": cycle.clearance, "bottom": hole.bottom,
                 "depth": depth, "level": -depth, "step": step, "less": max(step - least, 0.0), "least": least,
-                "breaks": float(math.ceil(depth / step)),
+                "breaks": float(math.ceil(depth / step)), "factor": -math.floor(1000.0 * least / step + 1e-6) / 1000.0,
                 "relief": self.controller.cycles.peck_relief, "dwell": cycle.dwell, "feed": feed,
                 "pitch": -pitch if hole.key == "TAP_LEFT" else pitch, "speed": abs(self.speed),
                 "second": hole.retract - surface}

@@ -1,14 +1,15 @@
 """Every sample, and every file of a folder, on every machine and control: what comes out, by kind (`make hard`).
 
-    python tests/hard/run.py [FOLDER] [--machine NAME ...] [--controller NAME ...] [--workers 2]
+    python tests/hard/run.py [FOLDER] [--machine NAME ...] [--controller NAME ...] [--workers 2] [--law]
                              [--edits N | --edits all | --edits deleted [--alike N] [--first]]
 
 Each conversion is written and proved, or refused with a code; the estimate of its time and all texts are made
 too. With --edits each program is changed in N blocks (`edits.py`) and goes through `time` and `verify` again;
 `--edits deleted` takes each block out in turn (with --alike N at most N of blocks that are alike in
 themselves and their neighbours), with --first on the first machine of the list that the file can be written
-for. Internal errors, and conversions without an end, are
-failures: exit code 1.
+for. With --law nothing is changed, and what is refused is converted in each output mode: that `auto` refuses
+what another mode converts is a failure, as is an error of the read-back that does not say what to do.
+Internal errors, and conversions without an end, are failures: exit code 1.
 """
 
 from __future__ import annotations
@@ -38,10 +39,13 @@ SAMPLES = ROOT / "samples"
 ENDINGS = frozenset({".cls", ".cl", ".apt", ".aptsource", ".clt", ".ncl", ".as", ".ncd", ".tap", ".txt", ".cldata"})
 SETUPS = (("h4a", "h4a.setup.toml"), ("delta", "delta.setup.toml"), ("uranesx", "delta.setup.toml"),
           ("", "tools.setup.toml"))
-"""set-up by how the machine's name begins, unless FILE.setup.toml stands with the file"""
+"""set-up by how the machine's name begins, unless FILE.setup.toml or FOLDER.setup.toml stands with the file"""
 LONGEST = 900
 """s that one conversion may take, edits included"""
 PROVED, REFUSED, INTERNAL, ENDLESS, NUMBERS = "written and proved", "refused", "INTERNAL ERROR", "NO END", "number warning"
+REFUSES_MORE, NO_HINT = "AUTO REFUSES MORE", "READ-BACK WITHOUT A HINT"
+OUTPUT_MODES = ("axes", "tcp", "tilted")
+FAILURES = (INTERNAL, ENDLESS, REFUSES_MORE, NO_HINT)
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,8 @@ class Task:
     deleted: bool = False
     """blocks are taken out, each by itself, and nothing else is changed"""
     alike: int | None = None
+    law: bool = False
+    """what is refused is converted in each output mode, nothing is edited"""
 
 
 def files_of(folder: Path | None) -> list[Path]:
@@ -98,7 +104,9 @@ def _outcomes(task: Task, controller: str) -> Iterator[tuple[str, str, str]]:
     try:
         result = _converted(task, controller)
         yield (PROVED, "", "") if result.ok else (REFUSED, _reason(result.diagnostics), "")
-        if not result.ok or task.edits == 0:
+        if task.law and not result.ok:
+            yield from _against_the_law(task, controller, result)
+        if not result.ok or task.edits == 0 or task.law:
             return
         from tests.hard.edits import deletions, edits, timed, verified
 
@@ -117,9 +125,29 @@ def _outcomes(task: Task, controller: str) -> Iterator[tuple[str, str, str]]:
         yield INTERNAL, f"[{fingerprint(fault)}] {type(fault).__name__}: {str(fault)[:80]} ({place})", step
 
 
+def _against_the_law(task: Task, controller: str, refused: Any) -> Iterator[tuple[str, str, str]]:
+    """Each output mode that converts what `auto` has refused; a read-back that refuses and does not say what to do."""
+    from postproc.base.options import Options
+
+    if refused.reached == "verify" and not all(d.hint for d in refused.diagnostics if d.severity == 2):
+        yield NO_HINT, _reason(refused.diagnostics), ""
+    for mode in OUTPUT_MODES:
+        if _asked(task, controller, Options(output=mode)).ok:
+            yield REFUSES_MORE, f"{_reason(refused.diagnostics)}, {mode} converts", f", {mode}"
+
+
+def _asked(task: Task, controller: str, options: Any) -> Any:
+    """The conversion."""
+    import postproc
+
+    path, found = _read(task.file)
+    machine, setup = _machine(task.machine, str(_setup_of(task)))
+    return postproc.convert(path, machine, controller, setup, options, list(found))
+
+
 def _converted(task: Task, controller: str) -> Any:
     """The conversion, with all that is said of it."""
-    import postproc
+    from postproc.base.options import Options
     from postproc.cli.console import rounded
     from postproc.cycle_time import report
     from postproc.cycle_time.conversion import estimate_of
@@ -128,16 +156,16 @@ def _converted(task: Task, controller: str) -> Any:
     from postproc.cycle_time.source import from_conversion
     from postproc.report import summary
 
-    path, found = _read(task.file)
-    machine, setup = _machine(task.machine, str(_setup_of(task)))
-    result = postproc.convert(path, machine, controller=controller, setup=setup, diagnostics=list(found))
+    result = _asked(task, controller, Options())
+    if task.law:
+        return result
     time = estimate_of(result)
     summary.as_text(result, "out.nc", time)
     json.dumps(rounded(summary.as_dict(result, "out.nc", time)), allow_nan=False, default=str)
     if result.ok:
         planner, _ = load_model(model_name(controller, result.controller.writer))
         assert planner is not None
-        figures = estimate(from_conversion(result), machine, planner)
+        figures = estimate(from_conversion(result), result.machine, planner)
         json.dumps(rounded(report.as_dict(figures)), allow_nan=False, default=str)
         report.as_text(figures, "out.nc")
     return result
@@ -159,8 +187,10 @@ def _machine(name: str, setup: str) -> Any:
 
 
 def _setup_of(task: Task) -> Path:
-    own = task.file.with_name(f"{task.file.stem}.setup.toml")
-    return own if own.is_file() else SAMPLES / next(name for begin, name in SETUPS if task.machine.startswith(begin))
+    for stem in (task.file.stem, task.file.parent.name):
+        if (own := task.file.with_name(f"{stem}.setup.toml")).is_file():
+            return own
+    return SAMPLES / next(name for begin, name in SETUPS if task.machine.startswith(begin))
 
 
 def _reason(diagnostics: Any) -> str:
@@ -185,8 +215,8 @@ def table(found: Counter[tuple[str, str, str]]) -> str:
 
 
 def failures(found: Counter[tuple[str, str, str]]) -> int:
-    """Internal errors, conversions without an end, and refusals that name no reason."""
-    return sum(count for (kind, detail, _), count in found.items() if kind in (INTERNAL, ENDLESS) or detail == "NO REASON")
+    """Internal errors, conversions without an end, refusals that name no reason, breaches of the law of `auto`."""
+    return sum(count for (kind, detail, _), count in found.items() if kind in FAILURES or detail == "NO REASON")
 
 
 def run(tasks: list[Task], workers: int) -> Counter[tuple[str, str, str]]:
@@ -204,7 +234,10 @@ def run(tasks: list[Task], workers: int) -> Counter[tuple[str, str, str]]:
                 return found
             task = running.pop(done)
             try:
-                found += done.result()
+                made = done.result()
+                found += made
+                if failures(made):
+                    print(table(made), file=sys.stderr, flush=True)
             except BrokenProcessPool:
                 found[INTERNAL, "a process ended without a word (memory?)", f"near {task.file.name} on {task.machine}"] += 1
                 return found
@@ -231,6 +264,7 @@ def main() -> int:
     wanted.add_argument("--edits", default="1")
     wanted.add_argument("--alike", type=int)
     wanted.add_argument("--first", action="store_true")
+    wanted.add_argument("--law", action="store_true")
     wanted.add_argument("--workers", type=int, default=2)
     wanted.add_argument("--match", default="", help="part of the files' names")
     a = wanted.parse_args()
@@ -239,7 +273,7 @@ def main() -> int:
     deleted = a.edits == "deleted"
     edits = None if deleted or a.edits == "all" else int(a.edits)
     files = sorted((file for file in files_of(a.folder) if a.match in file.name), key=lambda file: file.stat().st_size)
-    tasks = [Task(file, machine, tuple(a.controller), edits, deleted, a.alike) for file in files
+    tasks = [Task(file, machine, tuple(a.controller), edits, deleted, a.alike, a.law) for file in files
              for machine in (_first(file, a.machine, a.controller) if a.first else a.machine)]
     found = run(tasks, a.workers)
     print(table(found))

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from tests.hard.run import INTERNAL, PROVED, REFUSED, Task, failures, files_of, table, worked
+from postproc.base.options import Options
+from postproc.pipeline.result import PostResult
+from tests.hard import run
+from tests.hard.run import INTERNAL, NO_HINT, PROVED, REFUSED, REFUSES_MORE, Task, failures, files_of, table, worked
 from tests.postproc.kit import SAMPLES
+from toolpaths.diagnostics import error
 
 NX = SAMPLES / "dialects" / "inch_nx.cls"
 
@@ -34,6 +39,21 @@ def test_faults_are_failures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("postproc.pipeline.stages.prepare", fail)
     found = worked(Task(NX, "mill-3axis", ("generic-iso",), 0))
     assert kinds(found) == {INTERNAL: 1} and failures(found) == 1 and "ZeroDivisionError" in table(found)
+
+
+def test_auto_that_refuses_what_another_mode_converts_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    task = Task(NX, "mill-3axis", ("generic-iso",), 0, law=True)
+    assert kinds(worked(task)) == {PROVED: 1}
+    asked = run._asked
+
+    def refusing(task: Task, controller: str, options: Options) -> PostResult:
+        result: PostResult = asked(task, controller, options)
+        bad = error("verify.path", "planted", file="x")
+        return result if options.output == "axes" else replace(result, reached="verify", diagnostics=[bad])
+    monkeypatch.setattr(run, "_asked", refusing)
+    found = worked(task)
+    assert kinds(found) == {REFUSED: 1, REFUSES_MORE: 1, NO_HINT: 1} and failures(found) == 2
+    assert "verify.path, axes converts" in table(found)
 
 
 def test_all_samples_and_the_files_of_a_folder_are_taken(tmp_path: Path) -> None:

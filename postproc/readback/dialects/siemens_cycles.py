@@ -1,8 +1,8 @@
 """CYCLE81 to CYCLE86 of SINUMERIK (Programming Manual Cycles): parameters by their place.
 
 All begin with RTP (retraction), RFP (reference), SDIS (safety), DP (depth) or DPR (depth below RFP). The tool
-goes rapidly to RFP + SDIS, feeds to the depth and leaves for RTP. CYCLE83: FDEP or FDPR first peck, DAM less
-for each next, DTB, DTS,
+goes rapidly to RFP + SDIS, feeds to the depth and leaves for RTP. CYCLE83: FDEP or FDPR first peck, DAM
+below 0 the share of the last stroke that the next one is, _MDEP the least stroke, DTB, DTS,
 FRF, VARI (0 breaks chips: up by VRT, 1 mm by default; 1 leaves the hole, then stops DIS1 before the last depth: 0.6 mm down
 to 30 mm depth, a fiftieth of the depth, 7 mm at the most, beyond).
 """
@@ -13,13 +13,13 @@ import math
 from dataclasses import replace
 
 from postproc.readback.text.canonical import DialectStatement, Drill
-from postproc.readback.text.cycles import pecks
+from postproc.readback.text.cycles import EPSILON, MOST, pecks
 
 CYCLES = ("CYCLE81", "CYCLE82", "CYCLE83", "CYCLE84", "CYCLE840", "CYCLE85", "CYCLE86")
 _SHALLOW, _LEAD, _MOST = 30.0, 0.6, 7.0
 
 
-_LENGTHS = {"CYCLE83": (5, 6, 7, 14, 16), "CYCLE84": (8,), "CYCLE840": (10,)}
+_LENGTHS = {"CYCLE83": (5, 6, 13, 14, 16), "CYCLE84": (8,), "CYCLE840": (10,)}
 """places of further lengths, next to the first five"""
 
 
@@ -55,16 +55,30 @@ def _drill_of(s: DialectStatement, speed: float) -> tuple[Drill | None, str]:
 
 def _deep(s: DialectStatement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:
     first = surface - s.number(5) if not math.isnan(s.number(5)) else s.number(6)
-    less, breaks = s.number(7, 0.0), s.number(11, 0.0) == 0.0
+    share, breaks = -s.number(7, 0.0), s.number(11, 0.0) == 0.0
     if not first > 0.0:
         return None, "lacks FDEP or FDPR"
-    if less != 0.0 or s.number(9, 0.0) != 0.0 or s.number(10, 1.0) not in (0.0, 1.0):
-        return None, "with DAM, DTS or FRF is not executed by this reader"
+    if share < 0.0 or s.number(9, 0.0) != 0.0 or s.number(10, 1.0) not in (0.0, 1.0):
+        return None, "with DAM above 0, DTS or FRF is not executed by this reader"
+    if share > 0.0 and not (0.001 <= share <= 1.0 and s.number(13) > 0.0):
+        return None, "with DAM below 0 needs a factor from -0.001 to -1 and _MDEP"
     depth = surface - plain.bottom
     lead = _LEAD if depth <= _SHALLOW else min(depth / 50.0, _MOST)
     relief = s.number(14, 1.0) if breaks else s.number(16, lead)
-    return Drill(plain.plane, plain.bottom, plain.out, pecks(surface, plain.bottom, first), "break" if breaks else "peck",
+    strokes = _strokes(surface, plain.bottom, first, share, s.number(13, 0.0))
+    return Drill(plain.plane, plain.bottom, plain.out, strokes, "break" if breaks else "peck",
                  relief, plain.dwell), ""
+
+
+def _strokes(surface: float, bottom: float, first: float, share: float, least: float) -> tuple[float, ...]:
+    """Depths of strokes: each `share` of the last one, `least` or more; all alike where `share` is 0."""
+    if share == 0.0:
+        return pecks(surface, bottom, first)
+    depths, stroke = [surface - first], first
+    while depths[-1] > bottom + EPSILON and len(depths) <= MOST:
+        stroke = max(stroke * share, least)
+        depths.append(depths[-1] - stroke)
+    return (*depths[:-1], bottom)
 
 
 def _tap(s: DialectStatement, plain: Drill, surface: float, speed: float) -> tuple[Drill | None, str]:

@@ -21,6 +21,7 @@ from postproc.pipeline.result import PostResult
 from postproc.readback.execution.frames import tool_frame
 from postproc.report.summary import output_modes
 from postproc.verification.read_back import read_back
+from tests.hard.run import Task, failures, files_of, table, worked
 from tests.postproc.correction.test_compensation_holes import HEIGHTS, PLACES
 from tests.postproc.correction.test_compensation_points import both_directions_of_all
 from toolpaths.diagnostics import Severity, error, has_errors
@@ -170,21 +171,12 @@ def test_auto_converts_what_another_mode_converts(sample: str, machine: str, con
 
 @pytest.mark.slow
 @pytest.mark.parametrize("controller", WITH_PLANES)
-@pytest.mark.parametrize("machine", ["mikron-ucp710", "trunnion-bc", "head-table", "fork-head-ab", "nutating-head",
-                                     "linuxcnc-xyzac-trt", "linuxcnc-xyzbc-trt", "mill-4axis", "casting/trunnion_over.toml"])
+@pytest.mark.parametrize("machine", [*machines.names(), *machines.catalogued(), "casting/trunnion_over.toml"])
 def test_auto_converts_all_samples_that_another_mode_converts(machine: str, controller: str) -> None:
-    loaded = machines.load(SAMPLES / machine if machine.endswith("toml") else machine)
-    for file in sorted(p for p in SAMPLES.rglob("*") if p.suffix in (".cls", ".apt", ".ncl", ".clt", ".as", ".aptsource")):
-        own = [file.with_suffix(".setup.toml"), file.parent / f"{file.parent.name}.setup.toml", SAMPLES / "tools.setup.toml"]
-        setup = next(p for p in own if p.exists())
-        path, found = toolpaths.read(file)
-        auto = postproc.convert(path, loaded, controller, setup, diagnostics=found)
-        if auto.ok:
-            continue
-        assert all(d.hint for d in auto.diagnostics if d.severity is Severity.ERROR and auto.reached == "verify"), file
-        for mode in MODES:
-            asked = postproc.convert(path, loaded, controller, setup, Options(output=mode), found)
-            assert not asked.ok, (file, mode, errors_of(auto))
+    name = str(SAMPLES / machine) if machine.endswith("toml") else machine
+    for file in files_of(None):
+        found = worked(Task(file, name, (controller,), None, law=True))
+        assert not failures(found), table(found)
 
 
 @pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc"])

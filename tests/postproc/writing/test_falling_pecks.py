@@ -17,7 +17,7 @@ from tests.postproc.kit import convert, good, setup_of, toolpath
 from toolpaths.diagnostics import Severity
 
 NAMES = ["linuxcnc", "fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640", "generic-iso"]
-FALLING = ["haas-ngc", "heidenhain-tnc640"]
+FALLING = ["haas-ngc", "heidenhain-tnc640", "siemens-840d"]
 HOLES = ["GOTO/0,0,0", "GOTO/10,0,0", "GOTO/20,0,0"]
 
 
@@ -47,10 +47,11 @@ def pecks(result: PostResult) -> list[float]:
 @pytest.mark.parametrize(("first", "then"), [(5.0, 3.0), (5.0, 1.5), (6.0, 5.0)])
 def test_the_pecks_are_those_of_the_file(controller: str, first: float, then: float, units: str) -> None:
     """From the start plane, or from the surface: the first deeper than the others, which are all alike."""
+    surface = controller in ("heidenhain-tnc640", "siemens-840d")
     result = good(drilled(controller, first, then, 0.0, units))
     found = pecks(result)
     steps = [b - a for a, b in pairwise(found)]
-    assert found[0] == pytest.approx(first if controller == "heidenhain-tnc640" else first - 3.0, abs=4e-3)
+    assert found[0] == pytest.approx(first if surface else first - 3.0, abs=4e-3)
     assert steps[:-1] == pytest.approx([then] * (len(steps) - 1), abs=4e-3) and steps[-1] <= then + 4e-3
 
 
@@ -60,7 +61,10 @@ def test_they_are_native_where_the_control_has_them() -> None:
     for word in ("CYCL DEF 203", "Q202=+5 ", "Q212=+2 ", "Q205=+3 ", "Q213=+0 "):
         assert word in tnc
     assert tnc.count(" M99") == 3
+    siemens = good(drilled("siemens-840d", 5.0, 3.0)).text
+    assert "MCALL CYCLE83(3,0,3,-20.88,,,5,-0.6,0,0,1,1,,3)" in siemens and siemens.count("MCALL CYCLE83") == 1
     assert "P500" in good(drilled("haas-ngc", 5.0, 3.0, 0.5)).text
+    assert ",5,-0.6,0.5,0,1,1,,3)" in good(drilled("siemens-840d", 5.0, 3.0, 0.5)).text
     assert "Q211=+0.5 " in good(drilled("heidenhain-tnc640", 5.0, 3.0, 0.5)).text
 
 
@@ -80,13 +84,24 @@ def test_what_is_not_equal_is_written_as_moves_and_said_once(controller: str) ->
 @pytest.mark.parametrize(("controller", "old", "new"), [
     ("haas-ngc", " J2. K3.", " J0. K3."), ("haas-ngc", " K3.", " K4."), ("haas-ngc", " I5.", " I6."),
     ("heidenhain-tnc640", "Q212=+2 ", "Q212=+0 "), ("heidenhain-tnc640", "Q205=+3 ", "Q205=+4 "),
-    ("heidenhain-tnc640", "Q202=+5 ", "Q202=+6 ")])
+    ("heidenhain-tnc640", "Q202=+5 ", "Q202=+6 "),
+    ("siemens-840d", ",-0.6,", ",-0.7,"), ("siemens-840d", ",5,-0.6,", ",6,-0.5,"), ("siemens-840d", ",,3)", ",,4)"),
+    ("siemens-840d", ",-0.6,", ",0,")])
 def test_deeper_pecks_behind_the_first_are_found(controller: str, old: str, new: str) -> None:
     """Each peck against its own step, not against the largest."""
     result = good(drilled(controller, 5.0, 3.0))
     assert result.job is not None and old in result.text
     found = read_back(result.text.replace(old, new).encode(), result.job, "test.apt")[1]
     assert "deeper pecks" in " ".join(d.message for d in found if d.code == "verify.hole")
+
+
+@pytest.mark.parametrize(("old", "new", "why"), [
+    (",-0.6,", ",2,", "with DAM above 0"), (",1,,3)", ",1)", "_MDEP"), (",-0.6,", ",-2,", "factor from -0.001 to -1")])
+def test_strokes_that_no_page_settles_are_not_read(old: str, new: str, why: str) -> None:
+    result = good(drilled("siemens-840d", 5.0, 3.0))
+    assert result.job is not None and old in result.text
+    found = read_back(result.text.replace(old, new).encode(), result.job, "test.apt")[1]
+    assert [d.code for d in found] == ["gcode.cycle"] and why in found[0].message
 
 
 def test_the_second_witness_counts_each_peck(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -160,6 +160,21 @@ def test_the_tool_is_home_there_in_corrected_programs_too(controller: str, outpu
         assert ("verify.index" in verdict(result, text)) == said
 
 
+@pytest.mark.parametrize("index", ["home", "plane"])
+def test_a_plane_is_stated_at_home_on_travel_from_home(index: str) -> None:
+    """Behind a tool change, or `index = "home"`: no length is in force above the part and cancelled for G68.2, G43.4."""
+    result = indexing("fanuc-30i", index, "auto")
+    assert result.ok, [str(d) for d in result.diagnostics]
+    blocks, above, cancelled = result.text.split("\n"), False, 0
+    for k, block in enumerate(blocks):
+        if block.startswith(("G68.2", "G43.4")):
+            cancelled += above
+            assert "G43" in blocks[k + 2 * block.startswith("G68.2")]
+        above = "G43" in block or (above and "G53 G0 Z250." not in block)
+    planes = sum(block.startswith("G68.2") for block in blocks)
+    assert planes > 3 and cancelled == (0 if index == "home" else 2)
+
+
 def test_haas_indexes_at_home_unless_the_set_up_says_otherwise() -> None:
     """Mill Operator's Manual, G254: before rotary motion, a G53 move retracts the tool."""
     haas = postproc.convert(indexed(), machines.load("mikron-ucp710"), "haas-ngc", SETUP, Options())
