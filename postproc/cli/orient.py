@@ -125,7 +125,8 @@ def _errors(options: Options, machine: Machine) -> list[Diagnostic]:
 
     model, found = load_checked(options.error_model, machine)
     noted = info("orient.error_model", "times and travel are those of the machine without its geometric errors: corrections "
-                 "of some micrometres change no choice", file=options.error_model, hint="convert corrects and proves them")
+                 "of some micrometres change no choice", file=options.error_model,
+                 hint="nothing is to be done: convert corrects and proves them")
     return [*found, noted] if model is not None else list(found)
 
 

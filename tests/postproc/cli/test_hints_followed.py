@@ -104,6 +104,20 @@ def test_one_wrong_number_is_one_error(what: str, tmp_path: Path) -> None:
     assert code != "path.odd_record" or f"p.apt:{line}:" in got.stderr
 
 
+@pytest.mark.parametrize(("far", "code"), [
+    ("FINI", "travel.exceeded"), ("GOTO/0,0,5\nFEDRAT/MMPM,600\nGOTO/0,0,0\nRAPID\nGOTO/0,0,9\nFINI", "path.odd_record")])
+def test_a_park_point_is_no_odd_record(far: str, code: str, tmp_path: Path) -> None:
+    """Rapids alone behind it: its line is named by travel; with a cut behind it, it is a damaged number."""
+    text = "\n".join([*START, *SQUARE, "RAPID", "GOTO/0,0,5000", far])
+    (tmp_path / "p.apt").write_text(text)
+    (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 120.0\n")
+    got = run("convert", tmp_path / "p.apt", "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.ngc", "--setup",
+              tmp_path / "s.toml")
+    line = text.splitlines().index("GOTO/0,0,5000") + 1
+    assert got.exit_code == 1 and re.findall(r"error \[(\S+)\]", got.stderr)[0] == code, got.stderr
+    assert f"p.apt:{line}:" in got.stderr, got.stderr
+
+
 def test_a_file_that_is_far_larger_than_the_machine_has_no_odd_record(tmp_path: Path) -> None:
     (tmp_path / "p.apt").write_text("\n".join([*START, *SQUARE, "FINI"]).replace("UNITS/MM", "UNITS/INCHES"))
     got = run("convert", tmp_path / "p.apt", "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.ngc")
