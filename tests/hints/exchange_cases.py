@@ -81,7 +81,7 @@ def _sample(code: str, says: str, name: str, harm: Edit, *does: Edit) -> HintCas
     names = (f"{name}.toml", f"{name}.csv", "start.toml", "screw-start.toml", "screw-start-X.csv")
     files = {n: (SAMPLES / "calibration" / n).read_text("utf-8") for n in names}
     assert harm.old in files[harm.file]
-    text = files[harm.file].replace(harm.old, harm.new, 1) if harm.old else files[harm.file] + harm.new
+    text = files[harm.file].replace(harm.old, harm.new) if harm.old else files[harm.file] + harm.new
     return HintCase(code, f"calibrate {name}.toml -o out.toml", {**files, harm.file: text}, says, does)
 
 
@@ -102,4 +102,18 @@ _CALIBRATION = [
     _sample("calibrate.unused", r"columns are .*", "laser", Edit("laser.csv", "X way,", "X wae,"),
             Edit("laser.csv", "X wae,", "X way,")),
 ]
-EXCHANGE = [*_CALIBRATION, *_IMPORTS, *_MODELS]
+_MORE = [
+    _sample("calibrate.setup", "number the set-ups 0, 1, ... without a gap", "reversal", Edit("reversal.csv", "\n3,", "\n5,"),
+            Edit("reversal.csv", "\n5,", "\n3,")),
+    _sample("calibrate.ways", "add a column (X way)", "laser", Edit("laser.csv", "X way", "spare"),
+            Edit("laser.csv", "spare", r"\1")),
+    HintCase("error-export.input", "errors import model-X.csv -m mill-3axis -o model.toml", {"model-X.csv": AXIS},
+             "write into another folder, or under another name", (Edit(COMMAND, "model.toml", "other.toml"),)),
+    _check("error-model.no-effect", r"belongs into (\[components\.\w+\]): (polynomial = \[6\]) and its (range)",
+           "[location]\nEX0Y = 6.0\n", "",
+           Edit("e.toml", "[location]\nEX0Y = 6.0\n", r"\1\n\2\n\3 = [-500, 500]\n")),
+    HintCase("error-model.range", "errors check e.toml -m mikron-ucp710", {
+        "e.toml": '[components.EXC]\ntable = "x.csv"\n', "x.csv": "C [deg],EXC [um]\n0,0\n180,1\n360,0\n"},
+        "write (repeats = 360) where it closes after a turn", (Edit("e.toml", "", r"\1\n"),)),
+]
+EXCHANGE = [*_MORE, *_CALIBRATION, *_IMPORTS, *_MODELS]

@@ -77,6 +77,12 @@ _AXES = [
            sheet('[hooks]\nbefore_tool = ["(OURS)"]\n', ""), setup=LENGTH + '[hooks]\nbefore_tool = ["(OURS)"]\n'),
 ]
 _MACHINES = [
+    convert("cutcom.register", START + LEFT + ARC + "CUTCOM/OFF\nGOTO/-20,20,2\nRAPID\nGOTO/-20,20,20\n",
+            r'\[tools\.N\] (compensation = "wear")', sheet("", r"\1\n"), control="fanuc-30i"),
+    HintCase("tool-table.bodies", f"verify p.nc part.apt {ON} --tool-table t.csv", {
+        "part.apt": SHAPE + "FINI\n", "part.off": GOOD_BOX, "s.toml": LENGTH + BODY, "t.csv": "register,length\n1,109\n"},
+        r"write the lengths into the set-up", (sheet("110.0", "109.0"),), first=(f"convert part.apt {ON} -o p.nc",)),
+
     edited("verify.cutcom_arc", LEFT + ARC + "CUTCOM/OFF\nGOTO/-20,20,2\nRAPID\nGOTO/-20,20,20\n",
            "G41 D1\nY0.\nG3", "Y0.\nG41 D1\nG3", "a straight move must lead to the contour and away from it",
            Edit("p.nc", "Y0.\nG41 D1\nG3", "G41 D1\nY0.\nG3")),
