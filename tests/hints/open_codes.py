@@ -4,18 +4,17 @@ from __future__ import annotations
 
 _WHY = {
     "nothing is to be done: it says what was taken, or what a look at the machine decides": (
-        "calibrate.ways collision.bound compensation.range cutcom.own_register cutcom.register error-model.no-effect "
-        "error-model.range error-table.kind orient.unproved tool-table.bodies tool.length_twice"),
+        "collision.bound compensation.range cutcom.own_register error-table.kind orient.unproved tool.length_twice"),
     "only by a fault of the program itself, or of a library call: no file leads there": (
         "arc.no_start axis.spin calibrate.converged cl.dropped cycle.pitch file.not_recovered geometric_errors.bound "
         "orient.pass output.smoothing_mode plan.failed plan.limits plan.reach rollover.standing rollover.turn "
         "time.plan time.unsolved verify.option verify.planned"),
     "the remedy is at the machine or in the CAM system: measured anew, exported anew": (
-        "calibrate.few calibrate.place calibrate.rank calibrate.setup calibrate.silent calibrate.unchecked "
-        "cl.index-axis cl.index-cut log.fit tool-table.apart"),
+        "calibrate.few calibrate.place calibrate.rank calibrate.silent calibrate.unchecked cl.index-axis cl.index-cut "
+        "log.fit tool-table.apart"),
     "followed by a test of its own room, which has the files that it takes": (
-        "cl.cycle-height collision.point compensation.reach error-export.input file.input file.twice file.unfinished "
-        "place.found proof.comment proof.input_changed verify.clamp verify.no_bound"),
+        "cl.cycle-height collision.point compensation.reach file.input file.twice file.unfinished place.found "
+        "proof.comment proof.input_changed verify.clamp verify.no_bound"),
     "no small file has been found that leads there: random programs of the tests alone do": (
         "link.blocked path.jump"),
 }

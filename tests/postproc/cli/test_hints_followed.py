@@ -78,6 +78,30 @@ def test_g_code_in_the_place_of_a_cl_file_is_named(tmp_path: Path) -> None:
     assert toolpaths.read_bytes(b"UNITS/MM\nGOTO/1,2,3\n", file="x")[0].file == "x"
 
 
+def test_a_program_and_a_cl_file_in_each_others_place_are_named_by_every_command(tmp_path: Path) -> None:
+    cl, nc = tmp_path / "p.apt", tmp_path / "a.ngc"
+    cl.write_text("\n".join([*START, "GOTO/0,0,0", "FINI"]))
+    nc.write_text("G21 G90\nG0 X1 Y2\nM2\n")
+    (tmp_path / "r.csv").write_text("x [mm]\n1\n")
+    (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 120.0\n")
+    on, out = ["-m", "mikron-ucp710"], ["-o", tmp_path / "o.toml"]
+    for words in (["place", nc, *on, "--setup", tmp_path / "s.toml", *out], ["orient", nc, *on],
+                  ["setup", "new", nc, *on, *out, "--yes"],
+                  ["setup", "align", tmp_path / "r.csv", nc, *on, "-c", "linuxcnc", "--setup", tmp_path / "s.toml", *out],
+                  ["verify", cl, cl, *on, "-c", "linuxcnc"]):
+        got = run(*words)
+        said = "this is a CL file" if words[0] == "verify" else "this is G-code"
+        assert got.exit_code == 1 and got.stderr.count("error [") == 1 and said in got.stderr, (words, got.stderr)
+
+
+def test_a_misspelt_value_of_a_hook_names_its_line_and_the_nearest(tmp_path: Path) -> None:
+    (tmp_path / "p.apt").write_text("\n".join([*START, "GOTO/0,0,0", "FINI"]))
+    (tmp_path / "s.toml").write_text('[tools.1]\ngauge_length = 120.0\n[hooks]\nbefore_tool = ["(T{tool_nmber})"]\n')
+    got = run("convert", tmp_path / "p.apt", "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.ngc", "--setup",
+              tmp_path / "s.toml")
+    assert got.exit_code == 1 and "s.toml:4:" in got.stderr and "did you mean {tool_number}?" in got.stderr, got.stderr
+
+
 SQUARE = ["RAPID", "GOTO/0,0,5", "GOTO/0,0,0", "GOTO/40,0,0", "GOTO/40,30,0", "GOTO/0,30,0", "GOTO/0,0,0", "RAPID",
           "GOTO/0,0,5"]
 CAUSES = {"4000 for 40": ("GOTO/40,30", "GOTO/4000,30", "path.odd_record"),
