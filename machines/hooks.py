@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Mapping
 from string import Formatter
@@ -25,6 +26,11 @@ _FRAME = re.compile(r"\s*(%|/|N?\s*\d)|.*~\s*$", re.IGNORECASE)
 """what belongs to the file and not to a block: the tape mark, block numbers, the block switch, blocks that go on"""
 
 
+def _near(name: str) -> str:
+    close = difflib.get_close_matches(name, HOOK_VALUES, n=1)
+    return f"did you mean {{{close[0]}}}? " if close else ""
+
+
 def _one_block(text: str) -> str:
     try:
         parts = list(Formatter().parse(text))
@@ -33,7 +39,7 @@ def _one_block(text: str) -> str:
     for _, name, form, conversion in parts:
         if name is not None and name not in HOOK_VALUES:
             raise AdvisedError(f"unknown placeholder {{{name}}}",
-                               "allowed is " + ", ".join("{" + a + "}" for a in HOOK_VALUES))
+                               _near(name) + "allowed is " + ", ".join("{" + a + "}" for a in HOOK_VALUES))
         if conversion or (form and not (name in _NUMBERED and _DIGITS.fullmatch(form))):
             raise AdvisedError(f"{text!r}: {{{name}}} cannot be written in that form",
                                "write the name alone, or a number with zeros: {tool_number:03d}, {work_offset:02d}")

@@ -273,7 +273,8 @@ def _cannot(path: Path, fault: OSError) -> Diagnostic:
 
 def _mixed(path: Path, fault: OSError) -> Diagnostic:
     return error("file.mixed", "some files of this command are new, some old: what stood there cannot be put back: "
-                 f"{fault.strerror}", file=str(path), hint="the next run that writes here puts the old ones back")
+                 f"{fault.strerror}", file=str(path),
+                 hint="nothing is to be done: the next run that writes here puts the old ones back")
 
 
 def _umask() -> int:

@@ -127,7 +127,7 @@ def _loud(run: CalibrationRun, figures: CalibrationFigures, noise: Noise, messag
         f", and {without:.3g} times without the errors found: they explain little")
     if accepted:
         run.warn("calibrate.residual", f"{message}{explains}: the covariance is scaled by {figures['covariance_scale']:.4g}",
-                 "accept_residual is set")
+                 "nothing is to be done: accept_residual is set")
         return
     run.problem("calibrate.unexplained" if explains and noise.left > UNFIT else "calibrate.residual", message + explains,
                 f"look for wrong signs, units, outliers (robust = true); {stated}; {ACCEPT}")

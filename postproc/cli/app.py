@@ -14,9 +14,11 @@ from postproc.cli.console import (
     Json,
     controller_of,
     machine_of,
+    no_cl_file,
     no_program,
     own_files,
     progress_bar,
+    read_cl,
     refuse_inputs,
     refuse_overwriting,
     report,
@@ -56,10 +58,8 @@ from toolpaths.choices import FieldEnding, GivenDialect, GivenUnit
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
-    from postproc.base.progress import Progress
     from postproc.pipeline.result import PostResult
     from toolpaths.diagnostics import Diagnostic
-    from toolpaths.toolpath import Toolpath
 
 app = typer.Typer(name="postproc", cls=Group, no_args_is_help=True, add_completion=False, rich_markup_mode=None,
                   context_settings={"help_option_names": ["-h", "--help"]},
@@ -149,7 +149,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     with shown_errors(json), progress_bar() as progress:
         known = command.hashed(machine, controller, options) if proof else None
         m, spec = machine_of(machine), controller_of(controller)
-        path, found = _read(file, options, progress)
+        path, found = read_cl(file, options, progress, options.tolerance)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
         noted, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
@@ -194,7 +194,8 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
         stated = read_header(first_bytes(gcode, HEADER)).tolerance
-        path, found = _read(file, replace(options, tolerance=stated or tolerance), progress)
+        no_cl_file(gcode)
+        path, found = read_cl(file, options, progress, stated or tolerance)
         result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress,
                      tool_table=tool_table)
         kept, more = command.compared_with(result, machine, controller, proof)
@@ -223,7 +224,7 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
 
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
-        path, found = _read(file, options, progress)
+        path, found = read_cl(file, options, progress, options.tolerance)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
         stages, more = trace_line(result, line)
     report((*result.diagnostics, *more), json, stages, as_text(stages))
@@ -305,14 +306,6 @@ def _options(tolerance: float, axis_tolerance: float, feed_mode: FeedModeChoice,
     return Options(tolerance, axis_tolerance, feed_mode, setup, units, dialect,
                    tuple(w.upper() for w in allow_unknown or ()))
 
-
-def _read(file: Path, options: Options, progress: Progress) -> tuple[Toolpath, list[Diagnostic]]:
-    import toolpaths
-
-    no_program(file, options.dialect)
-    return toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
-                          allow_unknown=options.allow_unknown, tolerance=options.tolerance,
-                          progress=lambda at, total: progress("reading", at, total))
 
 
 if __name__ == "__main__":

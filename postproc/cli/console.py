@@ -14,9 +14,11 @@ from postproc.cli.says import SAYS
 
 if TYPE_CHECKING:
     from machines.machine import Machine
+    from postproc.base.options import Options
     from postproc.base.progress import Progress
     from postproc.controllers.model import ControllerFile
     from toolpaths.diagnostics import Diagnostic, Severity
+    from toolpaths.toolpath import Toolpath
 
 Json = Annotated[str, typer.Option("--json", metavar="FILE", help="write the figures as JSON; - for standard output")]
 
@@ -80,6 +82,41 @@ def no_program(file: Path, dialect: str = "") -> None:
         raise DiagnosticError([error("file.program", "this is G-code, a program of a control, not a CL file", file=str(file),
                                      hint="name the CL file that it was made from; postproc verify GCODE FILE compares the "
                                      "two, postproc time GCODE estimates its time; --dialect freecad reads FreeCAD's own")])
+
+
+def no_cl_file(file: Path) -> None:
+    """An error where a CL file stands in the place of a program; standard input is not looked at.
+
+    Raises:
+        DiagnosticError: says what it is.
+    """
+    from postproc.cycle_time.source import looks_like_apt
+    from toolpaths.diagnostics import DiagnosticError, error
+    from toolpaths.input_files import first_bytes
+
+    if looks_like_apt(first_bytes(file, 20_000)):
+        raise DiagnosticError([error("file.program", "this is a CL file, not a program of a control", file=str(file),
+                                     hint="name the program first, then the CL file: postproc verify GCODE FILE")])
+
+
+def read_cl(file: Path, options: Options, progress: Progress | None = None,
+            tolerance: float | None = None) -> tuple[Toolpath, list[Diagnostic]]:
+    """The CL file of a command; `tolerance` mm of its splines, that of `toolpaths.read` where it is None.
+
+    Raises:
+        DiagnosticError: where it is a program of a control.
+    """
+    import toolpaths
+
+    no_program(file, options.dialect)
+    given = {} if tolerance is None else {"tolerance": tolerance}
+
+    def shown(at: int, total: int) -> None:
+        if progress is not None:
+            progress("reading", at, total)
+
+    return toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
+                          allow_unknown=options.allow_unknown, progress=shown, **given)
 
 
 @contextmanager

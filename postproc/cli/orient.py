@@ -14,6 +14,7 @@ from postproc.cli.console import (
     machine_of,
     own_files,
     progress_bar,
+    read_cl,
     refuse_overwriting,
     report,
     shown_errors,
@@ -106,12 +107,9 @@ def _check(passes: list[int]) -> None:
 def _chosen(file: Path, machine: Machine, controller: str, options: Options,
             progress: Progress) -> tuple[OrientationChoice | None, list[Diagnostic]]:
     """The choice for a file; None where a diagnostic is an ERROR."""
-    import toolpaths
     from postproc.pipeline.convert import choose_axes
 
-    path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
-                                 allow_unknown=options.allow_unknown,
-                                 progress=lambda at, total: progress("reading", at, total))
+    path, found = read_cl(file, options, progress)
     result = choose_axes(path, machine, controller, options, [*found, *_errors(options, machine)], progress)
     return result.choice, list(result.diagnostics)
 
@@ -125,7 +123,8 @@ def _errors(options: Options, machine: Machine) -> list[Diagnostic]:
 
     model, found = load_checked(options.error_model, machine)
     noted = info("orient.error_model", "times and travel are those of the machine without its geometric errors: corrections "
-                 "of some micrometres change no choice", file=options.error_model, hint="convert corrects and proves them")
+                 "of some micrometres change no choice", file=options.error_model,
+                 hint="nothing is to be done: convert corrects and proves them")
     return [*found, noted] if model is not None else list(found)
 
 

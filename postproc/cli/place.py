@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.cli.console import Json, machine_of, own_files, progress_bar, read_cl, refuse_overwriting, report, shown_errors
 from postproc.cli.options import (
     Allow,
     AxisToleranceOption,
@@ -106,15 +106,12 @@ def _check(setup: Path) -> None:
 def _chosen(file: Path, machine: Machine, controller: str, options: Options,
             progress: Progress) -> tuple[PlacementChoice | None, list[Diagnostic]]:
     """The choice for a file; None where a diagnostic is an ERROR."""
-    import toolpaths
     from postproc.placement.place import place as run
     from postproc.setup.model import load_setup
     from toolpaths.diagnostics import has_errors, read_value
 
     settings = read_value(load_setup(options.setup))
-    path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
-                                 allow_unknown=options.allow_unknown,
-                                 progress=lambda at, total: progress("reading", at, total))
+    path, found = read_cl(file, options, progress)
     found = [*found, *(d for d in path.faults if d not in found)]
     if has_errors(found):
         return None, found

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from postproc.cli.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.cli.console import Json, machine_of, own_files, progress_bar, read_cl, refuse_overwriting, report, shown_errors
 from postproc.cli.options import (
     Allow,
     AxisToleranceOption,
@@ -46,7 +46,6 @@ def setup_align(readings: Annotated[Path, typer.Argument(metavar="READINGS", hel
     refuse_overwriting({"-o": str(output), "--json": json},
                        {"the readings": str(readings), "the CL file": str(file), "the set-up": str(setup),
                         **own_files(machine, controller)})
-    import toolpaths
     from postproc.alignment import report as figures
     from postproc.alignment.align import ProbeReading, align
     from postproc.base.options import Options
@@ -58,9 +57,7 @@ def setup_align(readings: Annotated[Path, typer.Argument(metavar="READINGS", hel
     text, outputs = "", dict[Path, str | bytes]()
     with shown_errors(json), progress_bar() as progress:
         m = machine_of(machine)
-        path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
-                                     allow_unknown=options.allow_unknown,
-                                     progress=lambda at, total: progress("reading", at, total))
+        path, found = read_cl(file, options, progress)
         probe = ProbeReading(probe_length, machine_coordinates, None if sigma_um is None else 1e-3 * sigma_um)
         made = align(path, m, controller, options, readings, probe, large, found, progress)
         values = figures.as_dict(made) | {"output": str(output) if made.part else None}

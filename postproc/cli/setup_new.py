@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli.console import Json, machine_of, own_files, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.cli.console import Json, machine_of, own_files, progress_bar, read_cl, refuse_overwriting, report, shown_errors
 from postproc.cli.options import (
     Allow,
     AxisToleranceOption,
@@ -77,12 +77,10 @@ def setup_new(file: ClFile, machine: MachineName,
 
 def _made(file: Path, machine: str, controller: str, options: Options, given: GivenAnswers, yes: bool, code: str,
           progress: Any) -> SetupSheet:
-    import toolpaths
     from postproc.setup_sheet.make import new_setup
 
     asked, m = _Asking(), machine_of(machine)
-    path, found = toolpaths.read(file, units=options.units or None, dialect=options.dialect or None,
-                                 allow_unknown=options.allow_unknown)
+    path, found = read_cl(file, options)
     try:
         return new_setup(path, m, controller, options, given, None if yes else asked, yes, found, code, progress)
     except EOFError:

@@ -89,7 +89,8 @@ def _differing(number: int, tool: Tool | None, given: ToolSetup) -> list[Diagnos
         return []
     said = [(name, getattr(given, name), getattr(tool, name)) for name in ("diameter", "corner_radius", "flute_length")]
     return [warning("collision.cutter", f"T{number}: {name} is {own:g} mm in the set-up, {other:g} mm in the CL file; the "
-                    "set-up counts", hint=f"tools.{number}.{name}")
+                    "set-up counts",
+                    hint=f"write {name} = {other:g} to [tools.{number}] where the CL file is right, else leave it")
             for name, own, other in said if own is not None and other is not None and abs(own - other) > _DIFFERS]
 
 

@@ -54,7 +54,7 @@ def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[RunLog | None,
     if not {"nc_line", "time_s"} <= set(names) <= set(allowed) or len(set(names)) < len(names):
         return None, [error("log.columns", f"columns {', '.join(names) or 'none'}, allowed: nc_line, time_s and any of "
                             f"{', '.join(letters)}, each once", file=str(file), lines=[1],
-                            hint="the first line names the columns")]
+                            hint="the first line names the columns, a comma between them, a point in decimals")]
     values, found = _numbers(rows[1:], len(names), str(file))
     if found:
         return None, found

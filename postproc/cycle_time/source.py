@@ -143,6 +143,13 @@ def looks_like_gcode(data: bytes) -> bool:
     return False
 
 
+def looks_like_apt(data: bytes) -> bool:
+    """True for a CL file of APT text: a record with a slash before anything that only programs have."""
+    lines = (line for raw in data[:20_000].splitlines() if (line := raw.strip().upper()))
+    first = next((line for line in lines if _RECORD.match(line) or _BLOCK.match(line) or line.startswith((b"(", b";"))), b"")
+    return _RECORD.match(first) is not None
+
+
 def read_file(file: str | Path, hint: str = "a CL file, or a program of the controller") -> bytes:
     """The bytes of a file.
 

@@ -139,7 +139,8 @@ def _said(first: PostResult, made: PostResult, job: Job, modes: OutputModes,
         found.append(warning("output.next_mode", f"{names}{more}: written in {MODE_NAMES[new]}, since in {MODE_NAMES[old]} "
                              f"[{reason.code}] {reason.message}", file=path.file, count=len(rows),
                              lines=[path.operations[k].line for k in rows[:_SHOWN]],
-                             hint=f'[output.operations] of the set-up with "{new}" for it asks for that mode'))
+                             hint="nothing is to be done: "
+                             f'[output.operations] of the set-up with "{new}" for it asks for that mode'))
     return made.with_found(found)
 
 

@@ -130,7 +130,7 @@ def _lifted(space: Space, best: TimedPlace, file: str) -> list[Diagnostic]:
     what = "higher than [part] has it: it needs a support of that height" if lift > 0.0 else (
         "lower than [part] has it: what it stands on must be as much lower")
     return [info("place.lifted", f"the part stands {abs(lift):.3f} mm {what}", file=file,
-                 hint="fix z in [placement] (leave it out) where the part stays on its support")]
+                 hint="nothing is to be done: fix z in [placement] (leave it out) where the part stays on its support")]
 
 
 def _begun(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options,

@@ -76,12 +76,14 @@ def with_compensation(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, l
         tool = setup.tools.get(str(one.number), ToolSetup())
         if refused := _refusal(tool, one.radius, _diameter(one.number, toolpath)):
             found.append(error(f"cutcom.{refused[0]}", f"T{one.number}: {refused[1]}", file=toolpath.file,
-                               lines=one.lines[:6], count=len(one.lines), hint=refused[2].format(number=one.number)))
+                               lines=one.lines[:6], count=len(one.lines),
+                              hint=refused[2].format(number=one.number)))
         elif one.kind == "none":
             bare.add(one.number)
             found.append(info("cutcom.none", f'T{one.number}: compensation = "none" of the set-up, CUTCOM is not written: '
                               "the words are the path of the tool's centre", file=toolpath.file, lines=one.lines[:6],
-                              count=len(one.lines), hint="a tool of another radius needs the CL file again"))
+                              count=len(one.lines),
+                              hint="nothing is to be done: a tool of another radius needs the CL file again"))
     if not bare:
         return toolpath, found
     events = tuple(e for number, e in _with_tools(toolpath) if e.word != "CUTCOM" or number not in bare)

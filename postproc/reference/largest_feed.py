@@ -41,7 +41,8 @@ def limited_feeds(moves: Moves, toolpath: Toolpath, largest: float) -> tuple[Mov
         found.append(warning("feed.largest", f"feeds up to {asked[rows].max() / PER_MINUTE:g} mm/min are limited "
                              f"to {largest / PER_MINUTE:g} mm/min, the largest cutting feed ([control] "
                              "largest_feed)", file=toolpath.file, lines=np.unique(moves.line[rows])[:6].tolist(),
-                             count=len(rows), hint="the program is written and proved with the limited feed"))
+                             count=len(rows),
+                             hint="nothing is to be done: the program is written and proved with the limited feed"))
     feed, seconds = moves.feed.copy(), moves.seconds.copy()
     feed[rows] = np.where(np.isfinite(feed[rows]), np.minimum(feed[rows], largest), feed[rows])
     seconds[rows] = np.where(seconds[rows] > 0.0, moves.lengths()[rows] / largest, seconds[rows])

@@ -7,7 +7,7 @@ import numpy as np
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
-from toolpaths.toolpath import Role, Toolpath
+from toolpaths.toolpath import Kind, Role, Toolpath
 from toolpaths.units import DEG
 
 _FAR = 5.0
@@ -42,10 +42,17 @@ def _far_point(toolpath: Toolpath, rows: Ints, longest: float) -> Diagnostic | N
             continue
         low, high = float(rest.min()), float(rest.max())
         far = max(low - float(values[at]), float(values[at]) - high)
-        if far > _FAR * max(high - low, 1.0) and far > longest:
+        if far > _FAR * max(high - low, 1.0) and far > longest and not _parked(toolpath, int(rows[at])):
             return _odd(toolpath, rows[at], f"{name} goes to {values[at]:g} mm, {far:g} mm beyond all other points of the "
                         f"file, which lie between {low:g} and {high:g} mm")
     return None
+
+
+def _parked(toolpath: Toolpath, row: int) -> bool:
+    """True where rapids alone lead from there to the end of the file, or from its start there: a park point. It is
+    stated on purpose, and where it is out of reach the error of travel names it."""
+    cuts = (toolpath.role != Role.START) & ((toolpath.kind != Kind.RAPID) | (toolpath.role == Role.HOLE))
+    return not cuts[row:].any() or not cuts[: row + 1].any()
 
 
 def _turned_axis(toolpath: Toolpath, rows: Ints) -> Diagnostic | None:

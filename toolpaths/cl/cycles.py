@@ -95,6 +95,7 @@ def _arm(b: ToolpathBuilder, v: CycleValues) -> None:
         b.log.warning("cl.cycle-place", f"CYCLE/{v.kind}: numbers without words, read as depth {v.depth:g}"
                       + ("" if v.feed is None else f", feed {v.feed[0]:g} {v.feed[1] or 'per minute'}")
                       + ("" if math.isnan(v.clearance) else f", start plane {v.clearance:g}"), b.line,
+                      "nothing is to be done where the numbers are right: "
                       f"their order is that of the user's table in {b.dialect.title}")
     b.cycle.set(b.row, len(b.cycles))
     b.cycles.append(_made(b, v))

@@ -78,7 +78,8 @@ def _own_tilt(work: PassContext, free: list[Pass], tilt: float) -> list[Diagnost
     return [warning("orient.own_tilt", f"the CL file's own axis of pass {worst.number} stands {lean:.3f} degrees from the "
                     f"surface normal, more than --max-tilt {tilt / DEG:g}", file=work.toolpath.file,
                     lines=[one.line for one in bad][:6], count=len(bad),
-                    hint=f"it is kept where nothing better is found; --max-tilt {_above(lean)} allows axes round it")]
+                    hint="nothing is to be done: it is kept where nothing better is found; "
+                    f"--max-tilt {_above(lean)} allows axes round it")]
 
 
 def _lean(one: Pass) -> float:
@@ -110,7 +111,8 @@ def _own(work: PassContext, limits: OrientationLimits, free: list[Pass]) -> list
     one, why = found[0]
     return [warning("orient.own_limits", f"the CL file's own axis of pass {one.number} is outside [orientation] of the "
                     f"set-up: {why}", file=work.toolpath.file, lines=[each.line for each, _ in found][:6], count=len(found),
-                    hint="it is kept where nothing better is found; chosen axes are inside the limits")]
+                    hint="nothing is to be done: it is kept where nothing better is found; "
+                    "chosen axes are inside the limits")]
 
 
 def _line(file: str, key: str) -> list[int]:

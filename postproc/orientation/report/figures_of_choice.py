@@ -53,7 +53,7 @@ def slower(choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
         return []
     return [warning("orient.slower", f"{plan} takes {made:.3f} s, the axes of the CL file {before:.3f} s: turning between "
                     "passes costs more than it gives", file=choice.work.toolpath.file,
-                    hint="--orient auto is never slower than any other")]
+                    hint="nothing is to be done: --orient auto is never slower than any other")]
 
 
 def gain(made: float, before: float) -> float | None:

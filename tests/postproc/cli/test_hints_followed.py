@@ -78,6 +78,30 @@ def test_g_code_in_the_place_of_a_cl_file_is_named(tmp_path: Path) -> None:
     assert toolpaths.read_bytes(b"UNITS/MM\nGOTO/1,2,3\n", file="x")[0].file == "x"
 
 
+def test_a_program_and_a_cl_file_in_each_others_place_are_named_by_every_command(tmp_path: Path) -> None:
+    cl, nc = tmp_path / "p.apt", tmp_path / "a.ngc"
+    cl.write_text("\n".join([*START, "GOTO/0,0,0", "FINI"]))
+    nc.write_text("G21 G90\nG0 X1 Y2\nM2\n")
+    (tmp_path / "r.csv").write_text("x [mm]\n1\n")
+    (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 120.0\n")
+    on, out = ["-m", "mikron-ucp710"], ["-o", tmp_path / "o.toml"]
+    for words in (["place", nc, *on, "--setup", tmp_path / "s.toml", *out], ["orient", nc, *on],
+                  ["setup", "new", nc, *on, *out, "--yes"],
+                  ["setup", "align", tmp_path / "r.csv", nc, *on, "-c", "linuxcnc", "--setup", tmp_path / "s.toml", *out],
+                  ["verify", cl, cl, *on, "-c", "linuxcnc"]):
+        got = run(*words)
+        said = "this is a CL file" if words[0] == "verify" else "this is G-code"
+        assert got.exit_code == 1 and got.stderr.count("error [") == 1 and said in got.stderr, (words, got.stderr)
+
+
+def test_a_misspelt_value_of_a_hook_names_its_line_and_the_nearest(tmp_path: Path) -> None:
+    (tmp_path / "p.apt").write_text("\n".join([*START, "GOTO/0,0,0", "FINI"]))
+    (tmp_path / "s.toml").write_text('[tools.1]\ngauge_length = 120.0\n[hooks]\nbefore_tool = ["(T{tool_nmber})"]\n')
+    got = run("convert", tmp_path / "p.apt", "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.ngc", "--setup",
+              tmp_path / "s.toml")
+    assert got.exit_code == 1 and "s.toml:4:" in got.stderr and "did you mean {tool_number}?" in got.stderr, got.stderr
+
+
 SQUARE = ["RAPID", "GOTO/0,0,5", "GOTO/0,0,0", "GOTO/40,0,0", "GOTO/40,30,0", "GOTO/0,30,0", "GOTO/0,0,0", "RAPID",
           "GOTO/0,0,5"]
 CAUSES = {"4000 for 40": ("GOTO/40,30", "GOTO/4000,30", "path.odd_record"),
@@ -102,6 +126,20 @@ def test_one_wrong_number_is_one_error(what: str, tmp_path: Path) -> None:
     assert got.exit_code == 1 and codes[0] == code and set(codes) <= {code, "setup.offered"}, got.stderr
     line = next(k for k, text in enumerate(good.replace(old, new).splitlines(), 1) if new and new in text) if new else 0
     assert code != "path.odd_record" or f"p.apt:{line}:" in got.stderr
+
+
+@pytest.mark.parametrize(("far", "code"), [
+    ("FINI", "travel.exceeded"), ("GOTO/0,0,5\nFEDRAT/MMPM,600\nGOTO/0,0,0\nRAPID\nGOTO/0,0,9\nFINI", "path.odd_record")])
+def test_a_park_point_is_no_odd_record(far: str, code: str, tmp_path: Path) -> None:
+    """Rapids alone behind it: its line is named by travel; with a cut behind it, it is a damaged number."""
+    text = "\n".join([*START, *SQUARE, "RAPID", "GOTO/0,0,5000", far])
+    (tmp_path / "p.apt").write_text(text)
+    (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 120.0\n")
+    got = run("convert", tmp_path / "p.apt", "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.ngc", "--setup",
+              tmp_path / "s.toml")
+    line = text.splitlines().index("GOTO/0,0,5000") + 1
+    assert got.exit_code == 1 and re.findall(r"error \[(\S+)\]", got.stderr)[0] == code, got.stderr
+    assert f"p.apt:{line}:" in got.stderr, got.stderr
 
 
 def test_a_file_that_is_far_larger_than_the_machine_has_no_odd_record(tmp_path: Path) -> None:
