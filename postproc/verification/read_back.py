@@ -92,6 +92,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls,
                         machine.clamp_codes)
+    held = dict(_others(job, reader))
+    reader.given(lambda register: held.get(register, control).work_offset, job.register_lengths())
     code, diagnostics = reader.read(data, gcode, others)
     header = read_header(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]

@@ -50,6 +50,7 @@ class FanucReader(IsoReader):
         "once": (4, 28, 53, 53.1), "arc_distance": ()}
     m_codes = (*M_CODES, 29.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLO"
+    language = "fanuc"
     rises_first = False
     stating = Reader.stating
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tilted": ("G69",)}

@@ -31,6 +31,7 @@ class HaasReader(FanucReader):
         "once": (4, 28, 53), "arc_distance": ()}
     m_codes = (*M_CODES, 97.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLOE"
+    language = "haas"
     laws = (43.0, 49.0, 234.0, 254.0, 255.0)
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tilted": ("G255",)}
     tcp_code = 234.0

@@ -31,6 +31,7 @@ New = list[tuple[int, str, float]]
 class IsoReader(Reader):
     """Letters and numbers; rests in seconds (P), registers by H."""
 
+    language = "linuxcnc"
     rises_first = True
     stating = Reader.stating | {"arc_distance": "G91.1 or G90.1"}
     units_from = "the program before left them, or as its start-up code and the INI file have them"
