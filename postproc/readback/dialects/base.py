@@ -170,7 +170,8 @@ class Reader(ABC):
     def executed(self, data: bytes, file: str, others: Mapping[str, bytes]) -> tuple[Canonical | None, list[Diagnostic]]:
         """A program in macro language, as the plain blocks that it comes to."""
         assert self.language
-        held = Held(self.axes, self.home, self.work, self.lengths, self.passive, most_now())
+        held = Held(self.axes, self.home, self.work, self.lengths,
+                    self.controller.tools.names if self.controller is not None else {}, self.passive, most_now())
         program, found = executed(data, file, others, self.language, held, self.numbered)
         if program is None:
             return None, found

@@ -13,21 +13,29 @@ import numpy as np
 from postproc.readback.macros.expressions import MacroFault
 from postproc.readback.macros.fanuc import FanucRun
 from postproc.readback.macros.held import Held
+from postproc.readback.macros.klartext import KlartextRun, klartext_rows
 from postproc.readback.macros.linuxcnc import LinuxCncRun, linuxcnc_rows
+from postproc.readback.macros.siemens import SiemensRun
+from postproc.readback.macros.siemens_rows import siemens_rows
 from postproc.readback.macros.sources import Cleaned, Sources
 from postproc.readback.text.canonical import Files, placed
-from postproc.readback.text.words import block_delete, plain
+from postproc.readback.text.words import block_delete, lines_of, plain
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shapes import arrays
 
 Numbered = Callable[[bytes, str], tuple[bytes, list[Diagnostic]]]
 MacroLanguage = Literal["fanuc", "haas", "linuxcnc", "siemens", "klartext"]
-_COMMENT = re.compile(rb"\([^()\n]*\)|;[^\n]*")
 _NEEDED = {
     "fanuc": re.compile(rb"[#\[]|GOTO|M0*99[ \t]*P|G0*(?:10|30|52|92|6[567])(?![\d.])"),
     "linuxcnc": re.compile(rb"[#\[]|G0*(?:10|28|30|52|92)(?![\d])|\bO\s*(?:<|\d+\s*[A-Z])"),
-}
+    "siemens": re.compile(
+        rb"\b(?:DEF|IF|GOTO[FBC]?|FOR|WHILE|REPEATB?|LOOP|CASE|EXTERN|A?TRANS|A?ROTS?|A?SCALE|A?MIRROR|EXTCALL|SETAL|G53|G153|G20|G21)\b"
+        rb"|\bR\d+[ \t]*=|=[ \t]*[-+]*[ \t]*(?!(?:IC|AC|DC|ACP|ACN)[ \t]*\([ \t]*[-+.\d]+[ \t]*\))[A-Z_$(\[]"
+        rb"|=[ \t]*[-+]?[\d.]+[ \t]*[-+*/]|\bT[ \t]*=[ \t]*\"|\bPROC\b[^\n]*\("),
+    "klartext": re.compile(rb"FN[ \t]*\d+[ \t]*:|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}
+_CONTINUED = re.compile(rb"~[ \t]*\n")
+_STRINGS = re.compile(rb'(?<!T=)"[^"\n]*"|;[^\n]*')
 
 
 @dataclass(frozen=True)
@@ -46,10 +54,15 @@ class PlainProgram:
 
 def needed(data: bytes, language: MacroLanguage, passive: tuple[str, ...] = ()) -> bool:
     """True where a program, comments aside, has what only its execution explains."""
-    form = _NEEDED.get("fanuc" if language == "haas" else language)
-    if form is None or not form.search(data.upper()):
+    form = _NEEDED["fanuc" if language == "haas" else language]
+    text = data.upper()
+    if not form.search(text):
         return False
-    found = {m[0] for m in form.finditer(plain(data).upper())}
+    if language == "siemens":
+        return form.search(_STRINGS.sub(b"", text)) is not None
+    if language == "klartext":
+        return form.search(_CONTINUED.sub(b" ", re.sub(rb";[^~\n]*", b"", lines_of(text)))) is not None
+    found = {m[0] for m in form.finditer(plain(text))}
     codes = {f"G{int(f[1:])}" for f in found if f[:1] == b"G" and f[1:].isdigit()}
     return bool({f for f in found if not f[1:].isdigit()} or codes - set(passive))
 
@@ -66,14 +79,14 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
 
     Work is bounded: `held.most` blocks. `numbered` puts numbers in the place of the names of tools.
     """
-    rows: Cleaned = linuxcnc_rows if language == "linuxcnc" else fanuc_rows
+    rows: dict[MacroLanguage, Cleaned] = {"linuxcnc": linuxcnc_rows, "siemens": siemens_rows, "klartext": klartext_rows}
 
     def cleaned(text: bytes, name: str) -> tuple[list[str], list[Diagnostic]]:
-        text, found = numbered(text, name)
-        made, more = rows(text, name)
+        text, found = (text, []) if language == "siemens" else numbered(text, name)
+        made, more = rows.get(language, fanuc_rows)(text, name)
         return made, [*found, *more]
     sources = Sources(data, file, others, cleaned)
-    run = LinuxCncRun(sources, held) if language == "linuxcnc" else FanucRun(sources, held, language == "haas")
+    run = _run(language, sources, held)
     try:
         run.run()
     except MacroFault as fault:
@@ -87,6 +100,14 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
     text = "".join(f"{row}\n" for row in run.blocks.rows).encode("ascii", "replace")
     line = np.array([0, *run.blocks.lines], dtype=np.int64)
     return PlainProgram(text, line, sources.files), found
+
+
+def _run(language: MacroLanguage, sources: Sources, held: Held) -> FanucRun | LinuxCncRun | SiemensRun | KlartextRun:
+    if language == "linuxcnc":
+        return LinuxCncRun(sources, held)
+    if language == "siemens":
+        return SiemensRun(sources, held)
+    return KlartextRun(sources, held) if language == "klartext" else FanucRun(sources, held, language == "haas")
 
 
 def in_source(found: list[Diagnostic], program: PlainProgram) -> list[Diagnostic]:

@@ -39,6 +39,7 @@ class Held:
         home (J,): machine coordinates, mm and degrees; None where it is not known
         work: (J,) of the work offset of a register; None where the set-up is not known
         lengths: mm by register
+        tools: names of the tools by number, as the control calls them
         passive: codes of the shop that change nothing
         most: blocks that are executed before a program counts as endless
     """
@@ -47,5 +48,6 @@ class Held:
     home: Floats | None = None
     work: Callable[[float], Floats] | None = None
     lengths: dict[int, float] = field(default_factory=dict)
+    tools: dict[int, str] = field(default_factory=dict)
     passive: tuple[str, ...] = ()
     most: int = MOST_BLOCKS
