@@ -70,14 +70,15 @@ class SiemensRun:
             codes_here = [g for at, g in path if at == b]
             for g in codes_here or [held]:
                 if g == 9.0:
-                    self.new += [(b, SMOOTH, 0.0)] + ([(b + 1, SMOOTH, self._allowed(held, distance))] if held == held and
-                                                      b < self.words.lines else [])
-                elif g == g:
+                    self.new.append((b, SMOOTH, 0.0))
+                    self.new += [(b + 1, SMOOTH, self._allowed(b, held, distance))] if b < self.words.lines else []
+                elif not np.isnan(g):
                     held = g
-                    self.new.append((b, SMOOTH, self._allowed(g, distance) * (self.unit(b) if g in _BY_DISTANCE else 1.0)))
+                    self.new.append((b, SMOOTH, self._allowed(b, g, distance)))
 
-    def _allowed(self, code: float, distance: float) -> float:
-        return 0.0 if code == 60.0 else distance if code in _BY_DISTANCE else float("inf")
+    def _allowed(self, b: int, code: float, distance: float) -> float:
+        """mm that a code of the path mode may take; NaN for none."""
+        return 0.0 if code == 60.0 else distance * self.unit(b) if code in _BY_DISTANCE else code if np.isnan(code) else np.inf
 
     def statements(self) -> tuple[tuple[WordMeaning, ...], tuple[Drill, ...]]:
         """Laws and cycles, with the words that put them in force."""
