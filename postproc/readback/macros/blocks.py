@@ -54,6 +54,7 @@ class Blocks:
         self.state: dict[int | str, float] = {}
         self.tilted = False
         self.second: list[int] = []
+        self.tool = 0.0
         self.drill_plane: float | None = None
         self.first: float | None = None
 
@@ -66,6 +67,8 @@ class Blocks:
         """One block obeyed; True where it moves an axis."""
         codes = [w.value for w in words if w.letter == "G"]
         self._modes(words, codes)
+        if self.linuxcnc and 43 in codes and not any(w.letter == "H" for w in words):
+            words = [*words, Word("H", self.tool)]
         for code in codes:
             if code == 10:
                 return self._data(words, line)
@@ -100,13 +103,14 @@ class Blocks:
             elif code in (54.1, 154):
                 track.take_offset(EXTENDED_OFFSETS + stated.get("P", 0.0))
             elif code in _LENGTHS:
-                track.take_length(int(stated.get("H", self.state.get("H", self.state.get("T", 0.0)))))
+                other = self.tool if self.linuxcnc else self.state.get("H", 0.0)
+                track.take_length(int(stated.get("H", other)))
             elif code == 49:
                 track.take_length(NO_LENGTH)
         self.tilted = (self.tilted or any(c in _TILTS for c in codes)) and not any(c in (69, 255) for c in codes)
         self.state.update({a: v for a, v in stated.items() if a in "DFHSTB"})
-        if any(w.letter == "M" and w.value == 6 for w in words) and self.linuxcnc:
-            track.at["Z"] = None if track.length not in (NO_LENGTH, None) else track.at.get("Z")
+        if any(w.letter == "M" and w.value == 6 for w in words):
+            self.tool = self.state.get("T", 0.0)
 
     def _moved(self, words: Sequence[Word], codes: list[float]) -> list[Word]:
         """The axis words of a block obeyed."""
@@ -217,7 +221,7 @@ class Blocks:
             self.second.append(line)
         letters = [w.letter for w in given] or list(self.held.axes)
         self._rest(words, frozenset({"P", *self.held.axes}), (code, 0, 1, 2, 3), line)
-        if any(w.value for w in given) or (given and track.absolute):
+        if any(w.value for w in given) or (given and (track.absolute or self.linuxcnc)):
             made = "".join(Word(w.letter, track.go(w.letter, w.value)).written() for w in given)
             self.write(f"G0{made}", line)
         targets = {a: float(home[self.held.axes.index(a)]) for a in letters}
