@@ -64,8 +64,8 @@ def small(rng: Random) -> str:
     return f"[{value(rng)} MOD 50]"
 
 
-def rows(rng: Random, depth: int, label: list[int], counter: list[int]) -> list[str]:
-    """Random blocks, loops and branches."""
+def rows(rng: Random, depth: int, label: list[int], counter: list[int], leaves: bool) -> list[str]:
+    """Random blocks, loops and branches, with break and continue or with do: behind a break LinuxCNC 2.9 runs a do loop once."""
     made = list[str]()
     for _ in range(rng.randint(2, 4)):
         kind = rng.randint(0, 12 if depth else 7)
@@ -88,17 +88,19 @@ def rows(rng: Random, depth: int, label: list[int], counter: list[int]) -> list[
         elif kind == 7:
             made.append(f"g2 x[#5420+2] y#5421 i1 j0\ng1 x[#5420 + #5211] y[#5421-#5212] z#5422")
         elif kind == 8:
-            made += [f"{o} if [{value(rng)}]", *rows(rng, depth - 1, label, counter), f"{o} elseif [{value(rng)}]",
-                     *rows(rng, depth - 1, label, counter), f"{o} else", *rows(rng, depth - 1, label, counter), f"{o} endif"]
+            made += [f"{o} if [{value(rng)}]", *rows(rng, depth - 1, label, counter, leaves), f"{o} elseif [{value(rng)}]",
+                     *rows(rng, depth - 1, label, counter, leaves), f"{o} else", *rows(rng, depth - 1, label, counter, leaves), f"{o} endif"]
         elif kind == 9:
-            made += [f"{o} repeat [{rng.randint(0, 3)}.4]", *rows(rng, depth - 1, label, counter), f"{o} endrepeat"]
+            made += [f"{o} repeat [{rng.randint(0, 3)}.4]", *rows(rng, depth - 1, label, counter, leaves), f"{o} endrepeat"]
         else:
             counter[0] += 1
             name = f"#<loop{counter[0]}>"
-            leave = f"o{label[0]}9 if [{value(rng)} gt 3]\n{o} {rng.choice(('break', 'continue'))}\no{label[0]}9 endif"
-            body = [f"{name} = [{name} + 1]", *rows(rng, depth - 1, label, counter), leave, "g1 x[#<here> MOD 7]"]
+            out = label[0]
+            leave = f"o{out}9 if [{value(rng)} gt 3]\n{o} {rng.choice(('break', 'continue'))}\no{out}9 endif"
+            inner = rows(rng, depth - 1, label, counter, leaves)
+            body = [f"{name} = [{name} + 1]", *inner, *([leave] if leaves else []), "g1 x[#<here> MOD 7]"]
             ends = f"[{name} lt {rng.randint(1, 3)}]"
-            made += [f"{name} = 0", *([f"{o} while {ends}", *body, f"{o} endwhile"] if kind < 12 else
+            made += [f"{name} = 0", *([f"{o} while {ends}", *body, f"{o} endwhile"] if kind < 12 or leaves else
                                       [f"{o} do", *body, f"{o} while {ends}"])]
     return made
 
@@ -107,7 +109,7 @@ def rows(rng: Random, depth: int, label: list[int], counter: list[int]) -> list[
 def test_moves_as_the_program_itself(seed: int, tmp_path: Path) -> None:
     rng = Random(seed)
     label, counter = [100], [0]
-    text = HEAD + "\n".join(row for _ in range(8) for row in rows(rng, 2, label, counter)) + "\nm2\n"
+    text = HEAD + "\n".join(row for _ in range(8) for row in rows(rng, 2, label, counter, seed % 2 == 0)) + "\nm2\n"
     held = Held(("X", "Y", "Z"), np.zeros(3), lambda register: np.zeros(3), {1: 75.5, 2: 80.0, 3: 60.0})
     made, found = executed(text.encode(), "", {}, "linuxcnc", held, lambda data, name: (data, []))
     (tmp_path / "program.ngc").write_text(text)

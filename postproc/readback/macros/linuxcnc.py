@@ -235,7 +235,10 @@ class LinuxCncRun:
         """The row that ends the loop of a label around here."""
         start = self._begins(level.source, label, ("WHILE", "REPEAT", "DO"), level.at - 1)
         word = _word(level.source.rows[start])[0] if start >= 0 else ""
-        return self.found(level.source, label, {"DO": ("WHILE",), "REPEAT": ("ENDREPEAT",)}.get(word, ("ENDWHILE",)), level.at)
+        if word not in ("DO", "WHILE"):
+            raise MacroFault("gcode.jump", f"o{label} break or continue outside of a while or do",
+                             "LinuxCNC takes them in these loops only")
+        return self.found(level.source, label, ("WHILE",) if word == "DO" else ("ENDWHILE",), level.at)
 
     def _break(self, level: OLevel, label: str, c: Cursor) -> None:
         level.at = self._end_of(level, label) + 1
