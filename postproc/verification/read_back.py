@@ -27,7 +27,7 @@ from postproc.readback.comparison.stock import check_stock
 from postproc.readback.comparison.stops_and_dwells import check_stops
 from postproc.readback.comparison.tool_changes import check_changes
 from postproc.readback.comparison.unstated_codes import check_stated
-from postproc.readback.dialects.base import UNITS_UNSTATED, Reader, as_bytes
+from postproc.readback.dialects.base import ASSUMED, UNITS_UNSTATED, Reader, as_bytes
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
@@ -228,8 +228,9 @@ def _bodies(motion: Motion, executed: BlockPoses, job: Job, comparison: Comparis
 
 
 def _judged(d: Diagnostic, stays: bool) -> Diagnostic:
-    """Units that nothing states: nothing is proved where another program may have left them in inches."""
-    return d if d.code != UNITS_UNSTATED or stays else replace(d, severity=Severity.ERROR)
+    """Units that nothing states, and what is only taken to be so: nothing is proved where the control may have it otherwise."""
+    assumed = d.code in ASSUMED or (d.code == UNITS_UNSTATED and not stays)
+    return replace(d, severity=Severity.ERROR) if assumed else d
 
 
 def _located(d: Diagnostic, file: str, of_cl: Callable[[int], tuple[int, ...]] | None) -> Diagnostic:

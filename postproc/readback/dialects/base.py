@@ -41,6 +41,8 @@ from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
 ParsedProgram = tuple[ProgramText, Structure]
 UNITS_UNSTATED = "gcode.units_unstated"
+ASSUMED = frozenset({"gcode.second_reference", "gcode.tool_unnamed"})
+"""what is taken to be so where a program is timed, and refused where it is verified"""
 STOPS = (0.0, 1.0)
 """M codes of stops"""
 M_CODES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 30.0)

@@ -78,7 +78,9 @@ class SiemensRun:
 
     def _allowed(self, b: int, code: float, distance: float) -> float:
         """mm that a code of the path mode may take; NaN for none."""
-        return 0.0 if code == 60.0 else distance * self.unit(b) if code in _BY_DISTANCE else code if np.isnan(code) else np.inf
+        if code in _BY_DISTANCE:
+            return distance * self.unit(b)
+        return 0.0 if code == 60.0 else code if np.isnan(code) else np.inf
 
     def statements(self) -> tuple[tuple[WordMeaning, ...], tuple[Drill, ...]]:
         """Laws and cycles, with the words that put them in force."""

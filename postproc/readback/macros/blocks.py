@@ -1,4 +1,4 @@
-"""Blocks of words as a program that is executed comes to them: written on plain, with G10, G28, G30, G52 and G92 carried out."""
+"""Blocks of words as a program that is executed comes to them: written on plain, G10, G28, G30, G52 and G92 carried out."""
 
 from __future__ import annotations
 
@@ -197,7 +197,8 @@ class Blocks:
         if code in (92.1, 92.2):
             track.zero.clear()
         elif code == 92.3:
-            raise MacroFault("gcode.data_setting", "G92.3 takes an offset that the control has kept", "state G92 with its words")
+            raise MacroFault("gcode.data_setting", "G92.3 takes an offset that the control has kept",
+                             "state G92 with its words")
         for axis, value in given.items():
             track.shifted = True
             if code == 92:
@@ -215,7 +216,8 @@ class Blocks:
         track, home = self.track, self.held.home
         given = [w for w in words if w.letter in self.held.axes]
         if home is None or (not given and not self.linuxcnc):
-            raise MacroFault("gcode.reference", f"G{code:g} without axis words" if home is not None else f"G{code:g} without a home",
+            raise MacroFault("gcode.reference", f"G{code:g} without axis words" if home is not None
+                             else f"G{code:g} without a home",
                              "write G91 G28 Z0.")
         if code == 30:
             self.second.append(line)
@@ -237,7 +239,8 @@ class Blocks:
         """What is taken to be so, though the control may have it otherwise."""
         if not self.second:
             return []
-        return [warning("gcode.second_reference", "G30: the second reference position is a parameter of the control, the home of "
+        return [warning("gcode.second_reference", "G30: the second reference position is a parameter of the control, the "
+                                                  "home of "
                         "the machine file is taken for it", file=self.file, lines=self.second[:6], count=len(self.second),
                         hint="write G28 where that is meant, or G53 with the position")]
 

@@ -94,7 +94,8 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
     except RecursionError:
         deep = MacroFault("gcode.expression", "brackets too deep", "write the expression in steps")
         return None, [*sources.found, *placed([deep.at(file, run.line)], sources.files)]
-    found = [*sources.found, *placed(run.blocks.judged(), sources.files)]
+    judged = run.judged() if isinstance(run, SiemensRun) else run.blocks.judged()
+    found = [*sources.found, *placed(judged, sources.files)]
     if has_errors(found):
         return None, found
     text = "".join(f"{row}\n" for row in run.blocks.rows).encode("ascii", "replace")

@@ -1,7 +1,9 @@
 """Expressions of Fanuc's custom macro B and of LinuxCNC: values of words, conditions, assignments.
 
-Fanuc B-64484EN, custom macro (arithmetic and logic operation): functions, then * / AND MOD, then + - OR XOR, then comparisons;
-a variable that was never set is vacant: it counts as 0, and EQ and NE tell it from 0. LinuxCNC (G-code overview): ** before * / MOD,
+Fanuc B-64484EN, custom macro (arithmetic and logic operation): functions, then * / AND MOD, then + - OR XOR, then
+comparisons;
+a variable that was never set is vacant: it counts as 0, and EQ and NE tell it from 0. LinuxCNC (G-code overview): **
+before * / MOD,
 + -, comparisons, AND OR XOR, which are 1 or 0; numbers nearer than 0.0001 are equal.
 """
 
@@ -106,7 +108,7 @@ def _power(a: float, b: float) -> float:
         result = math.nan
     if isinstance(result, complex) or not math.isfinite(result):
         raise MacroFault("gcode.expression", f"{a:g} to the power of {b:g} is no number")
-    return result
+    return float(result)
 
 
 def _fanuc_modulo(a: float, b: float) -> float:

@@ -24,7 +24,7 @@ _LETTER = re.compile(r"[A-Z]")
 _DIGITS = re.compile(r"\d+")
 FIRST = {"A": 1, "B": 2, "C": 3, "I": 4, "J": 5, "K": 6, "D": 7, "E": 8, "F": 9, "H": 11, "M": 13, "Q": 17, "R": 18, "S": 19,
          "T": 20, "U": 21, "V": 22, "W": 23, "X": 24, "Y": 25, "Z": 26}
-"""local variables of the arguments (argument specification I); I, J, K once more are #7 to #9 and so on (specification II)"""
+"""local variables of the arguments (specification I); I, J, K once more are #7 to #9 and so on (specification II)"""
 _SCALED = frozenset("ABCEIJKQRUVWXYZ")
 """arguments whose unit, without a point, is a parameter of the control"""
 
@@ -286,7 +286,7 @@ class FanucRun:
         if span is None:
             stems = (f"O{number}", f"O{number:04d}", f"O{number:05d}", f"{number}", f"{number:04d}")
             source = self.sources.open(stems)
-            span = source and (program(source, number) or (source, 0, len(source.rows) - 1))
+            span = None if source is None else program(source, number) or (source, 0, len(source.rows) - 1)
         if span is None:
             raise MacroFault("gcode.subprogram", f"there is no subprogram O{number}",
                              f"put it beside the program, as O{number:04d}.nc")
@@ -350,7 +350,8 @@ def arguments(words: Sequence[Word]) -> dict[int, Value]:
     sets, before = 0, ""
     for w in words:
         if w.letter in _SCALED and w.text and "." not in w.text and w.value:
-            raise MacroFault("gcode.decimal_point", f"argument {w.text} has no decimal point: its unit is a parameter of the "
+            raise MacroFault("gcode.decimal_point", f"argument {w.text} has no decimal point: its unit is a parameter of "
+                                                    f"the "
                              "control", "write the decimal point")
         if w.letter not in FIRST:
             raise MacroFault("gcode.subprogram", f"{w.letter} is no argument of a macro", "G, L, N, O and P are none")

@@ -1,7 +1,9 @@
 """Variables of custom macro B: local, common, and the system variables that follow from the program or the set-up.
 
-B-64484EN, custom macro (system variables): #3006 stop with a message; #4001 on modal codes, of the block before; #5001 on the end
-of the block before, #5041 on where the axes stand, in workpiece coordinates; #5021 on in machine coordinates; #5201 on work offsets.
+B-64484EN, custom macro (system variables): #3006 stop with a message; #4001 on modal codes, of the block before; #5001 on
+the end
+of the block before, #5041 on where the axes stand, in workpiece coordinates; #5021 on in machine coordinates; #5201 on
+work offsets.
 """
 
 from __future__ import annotations
@@ -79,7 +81,8 @@ class Variables:
 
     def _axis(self, number: int) -> str:
         if number > len(self.held.axes):
-            raise MacroFault("gcode.variable", f"the machine has no axis {number}", f"its axes are {', '.join(self.held.axes)}")
+            raise MacroFault("gcode.variable", f"the machine has no axis {number}",
+                             f"its axes are {', '.join(self.held.axes)}")
         ordered = sorted(self.held.axes, key=lambda a: _AXES.find(a) if a in _AXES else len(_AXES))
         return ordered[number - 1]
 
@@ -105,5 +108,6 @@ class Variables:
 
 
 def _refused(index: int) -> MacroFault:
-    return MacroFault("gcode.variable", f"system variable #{index} is not read: what it holds is not in the program, nor in the "
+    return MacroFault("gcode.variable", f"system variable #{index} is not read: what it holds is not in the program, nor "
+                                        f"in the "
                       "set-up", "put the figure that the control would find there in its place, in a copy of the program")

@@ -1,6 +1,7 @@
 """Klartext executed: Q, QL and QR parameters, FN functions, formulas, labels, programs that are called.
 
-HEIDENHAIN TNC 640, Klartext Programming (34059x), subprograms and program section repeats, Q parameters: FN 0 to FN 5 arithmetic, FN 6 to
+HEIDENHAIN TNC 640, Klartext Programming (34059x), subprograms and program section repeats, Q parameters: FN 0 to FN 5
+arithmetic, FN 6 to
 FN 8 and FN 13 angles, FN 9 to FN 12 jumps; formulas reckon ^ before * / % before + -, functions take the value behind them.
 """
 
@@ -30,7 +31,8 @@ _FUNCTION = re.compile(r"SQRT|SQ|SIN|COS|TAN|ASIN|ACOS|ATAN|LN|LOG|EXP|NEG|INT|A
 _GIVEN = re.compile(r"(Q[LRS]?\d+)[ \t]*=[ \t]*")
 _USED = re.compile(r"([-+]?)[ \t]*Q([LRS]?)(\d+)(?![\d]|[ \t]*=)")
 _FN = re.compile(r"FN[ \t]*(\d+)[ \t]*:[ \t]*")
-_JUMP = re.compile(r"IF[ \t]*(.+?)[ \t]*(EQU|NE|GT|LT|IS UNDEFINED|IS DEFINED)[ \t]*(.*?)[ \t]*GOTO LBL[ \t]*\"?([^\"\s]+)\"?")
+_JUMP = re.compile(r"IF[ \t]*(.+?)[ \t]*(EQU|NE|GT|LT|IS UNDEFINED|IS DEFINED)[ \t]*(.*?)[ \t]*GOTO LBL[ "
+                    "\t]*\"?([^\"\\s]+)\"?")
 _LABEL = re.compile(r"LBL[ \t]+\"?([^\"]+?)\"?")
 _CALL = re.compile(r"CALL LBL[ \t]+\"?([^\"\s]+)\"?(?:[ \t]+REP[ \t]?(\d+))?")
 _PROGRAM = re.compile(r"CALL PGM[ \t]+(\S+)")
@@ -196,7 +198,8 @@ class KlartextRun:
         if kind == "S":
             raise MacroFault("gcode.variable", f"QS{index} holds characters: it is not executed", "write the name itself")
         if held is None:
-            raise MacroFault("gcode.variable", f"Q{kind}{index} is read before the program sets it: the control, another program or "
+            raise MacroFault("gcode.variable", f"Q{kind}{index} is read before the program sets it: the control, another "
+                                               f"program or "
                              "the operator has set it", f"set it first, in a copy of the program: Q{kind}{index} = ...")
         return held
 
@@ -294,7 +297,8 @@ class KlartextRun:
             raise Cursor(rest).fault("a jump that is not read")
         if m[2].startswith("IS"):
             q = _Q.fullmatch(m[1].strip())
-            held = q is not None and (int(q[2]) in self.levels[-1].local if q[1] == "L" else (q[1], int(q[2])) in self.parameters)
+            held = q is not None and (int(q[2]) in self.levels[-1].local if q[1] == "L" else (q[1],
+                                                                                              int(q[2])) in self.parameters)
             holds = held == (m[2] == "IS DEFINED")
         else:
             a, b = self._whole_term(m[1]), self._whole_term(m[3])

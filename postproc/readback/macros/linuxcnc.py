@@ -13,7 +13,8 @@ from postproc.readback.macros.held import Held
 from postproc.readback.macros.linuxcnc_parameters import Parameters
 from postproc.readback.macros.sources import SourceFile, Sources
 from postproc.readback.text.flow import DEEPEST
-from postproc.readback.text.words import block_delete, plain as uncommented
+from postproc.readback.text.words import block_delete
+from postproc.readback.text.words import plain as uncommented
 from toolpaths.diagnostics import Diagnostic
 
 _SEQUENCE = re.compile(r"N\d+(?:\.\d*)?")
@@ -59,7 +60,8 @@ class LinuxCncRun:
         self.words_of: dict[str, list[Word]] = {}
         self.line, self.ended = 0, False
         self.keywords: dict[str, Callable[[OLevel, str, Cursor], None]] = {
-            "SUB": self._over, "ENDSUB": self._back, "RETURN": self._back, "CALL": self._call, "IF": self._if, "ELSEIF": self._past,
+            "SUB": self._over, "ENDSUB": self._back, "RETURN": self._back, "CALL": self._call, "IF": self._if,
+            "ELSEIF": self._past,
             "ELSE": self._past, "ENDIF": self._nothing, "WHILE": self._while, "ENDWHILE": self._again, "DO": self._nothing,
             "REPEAT": self._repeat, "ENDREPEAT": self._once_more, "BREAK": self._break, "CONTINUE": self._continue}
 

@@ -93,7 +93,8 @@ class Parameters:
         if place == 5400 and "T" in self.blocks.state:
             return self.blocks.state["T"]
         if place == 5403 and track.length is not None:
-            drawn = 0.0 if track.length == NO_LENGTH else self.held.lengths.get(track.length, 0.0) + track.lengthened[track.length]
+            drawn = 0.0 if track.length == NO_LENGTH else self.held.lengths.get(track.length,
+                                                                                0.0) + track.lengthened[track.length]
             return drawn / track.unit
         raise MacroFault("gcode.variable", f"#{place} is not read: what it holds is not in the program, nor in the set-up",
                          "put the figure that the control would find there in its place, in a copy of the program")

@@ -1,4 +1,4 @@
-"""Programs of SINUMERIK 840D executed: variables, jumps, loops, subprograms with parameters (Programming Manual Job Planning)."""
+"""Programs of SINUMERIK 840D executed: variables, jumps, loops, subprograms (Programming Manual Job Planning)."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from postproc.readback.macros.siemens_rows import Listing, Row, listing
 from postproc.readback.macros.siemens_variables import Declared, SiemensNames
 from postproc.readback.macros.siemens_words import SiemensWords
 from postproc.readback.macros.sources import SourceFile, Sources
+from toolpaths.diagnostics import Diagnostic, warning
 
 DEEPEST = 16
 """levels of programs (840D sl)"""
@@ -57,6 +58,12 @@ class SiemensRun:
         self.levels: list[SiemensLevel] = []
         self.line, self.ended, self.executed = 0, False, 0
         self.modal: tuple[str, str] | None = None
+
+    def judged(self) -> list[Diagnostic]:
+        """What is taken to be so, though the control may have it otherwise."""
+        return [warning("gcode.tool_unnamed", f'no tool of the set-up is called "{name}": its length counts as 0',
+                        file=self.blocks.file, lines=[line], hint='[tools.N] called = "..." of the set-up: the number of the tool '
+                        'that the control calls so') for name, line in self.words.unknown_tools.items()]
 
     def listed(self, source: SourceFile) -> Listing:
         """The rows of a file."""
@@ -228,7 +235,8 @@ class SiemensRun:
             raise c.fault("REPEAT of a label that is not in the program")
         last = where[0] if one_row else where[1] if len(where) > 1 else level.at - 2
         if times > 0:
-            self._push(SiemensLevel(level.source, where[0], last, where[0], level.local, times, part=True, modal=level.modal))
+            self._push(SiemensLevel(level.source, where[0], last, where[0], level.local, times, part=True,
+                                    modal=level.modal))
 
     def _case(self, c: Cursor) -> None:
         """CASE value OF 1 GOTOF A 2 GOTOF B DEFAULT GOTOF C."""
@@ -264,7 +272,8 @@ class SiemensRun:
         """A subprogram with the text of its values."""
         span = self._found(PurePath(name).stem.removeprefix("_N_").removesuffix("_SPF"))
         if span is None:
-            raise MacroFault("gcode.subprogram", f"there is no subprogram {name}", f"put it beside the program, as {name}.SPF")
+            raise MacroFault("gcode.subprogram", f"there is no subprogram {name}",
+                             f"put it beside the program, as {name}.SPF")
         local, back = self._parameters(span, given)
         if times > 0:
             self._push(SiemensLevel(*span, span[1], local, times, back=back, modal=modal or self.levels[-1].modal))

@@ -1,6 +1,7 @@
 """Expressions of SINUMERIK 840D (Programming Manual Job Planning, arithmetic functions; priority of the operations).
 
-From the first that binds: NOT B_NOT; * / DIV MOD; + -; B_AND; B_XOR; B_OR; AND; XOR; OR; <<; comparisons, equal within a part in 1e12.
+From the first that binds: NOT B_NOT; * / DIV MOD; + -; B_AND; B_XOR; B_OR; AND; XOR; OR; <<; comparisons, equal within a
+part in 1e12.
 """
 
 from __future__ import annotations
@@ -68,7 +69,9 @@ OPERATORS: dict[str, tuple[int, Callable[[Value, Value], Value]]] = {
     "XOR": (3, _on_numbers(lambda a, b: bool(a) != bool(b))), "OR": (2, _on_numbers(lambda a, b: bool(a) or bool(b))),
     "<<": (1, lambda a, b: text(a) + text(b)),
     "==": (0, lambda a, b: float(equal(a, b))), "<>": (0, lambda a, b: float(not equal(a, b))),
-    ">": (0, _on_numbers(lambda a, b: a > b and not equal(a, b))), "<": (0, _on_numbers(lambda a, b: a < b and not equal(a, b))),
+    ">": (0, _on_numbers(lambda a, b: a > b and not equal(a, b))), "<": (0,
+                                                                         _on_numbers(lambda a, b: a < b and not equal(a,
+                                                                                                                      b))),
     ">=": (0, _on_numbers(lambda a, b: a > b or equal(a, b))), "<=": (0, _on_numbers(lambda a, b: a < b or equal(a, b)))}
 _ONE: dict[str, Callable[[float], float]] = {
     **COMMON, "POT": lambda a: a * a, "TRUNC": lambda a: float(math.trunc(a)), "ROUNDUP": lambda a: float(math.ceil(a))}

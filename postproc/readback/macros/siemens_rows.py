@@ -15,8 +15,8 @@ _COMMENT = re.compile(rb'("[^"\n]*")|;[^\n]*')
 _SMALL = re.compile(rb'"[^"\n]*"|[^"\n]+')
 _BEGINS = re.compile(r"%_N_([A-Z0-9_]+)_([MS]PF)")
 _FRONT = re.compile(r"[ \t]*(?:(?:N|:)(\d+)(?![A-Z_]))?[ \t]*(?:([A-Z_][A-Z0-9_]*):(?!=))?[ \t]*")
-_HEAD = re.compile(r"IF|ELSE|ENDIF|FOR|ENDFOR|WHILE|ENDWHILE|REPEATB?|UNTIL|LOOP|ENDLOOP|CASE|GOTO[FBCS]?|DEF|EXTERN|PROC|RET|"
-                   r"MSG|SETAL|A?TRANS|A?ROTS?|A?SCALE|A?MIRROR")
+_HEAD = re.compile(r"IF|ELSE|ENDIF|FOR|ENDFOR|WHILE|ENDWHILE|REPEATB?|UNTIL|LOOP|ENDLOOP|CASE|GOTO[FBCS]?|DEF|EXTERN|PROC|"
+                   r"RET|MSG|SETAL|A?TRANS|A?ROTS?|A?SCALE|A?MIRROR")
 _JUMPS = re.compile(r"(?<![A-Z0-9_])GOTO[FBC]?(?![A-Z0-9_])")
 _CLOSES = {"ENDIF": ("IF", "ELSE"), "ELSE": ("IF",), "ENDFOR": ("FOR",), "ENDWHILE": ("WHILE",), "UNTIL": ("REPEAT",),
            "ENDLOOP": ("LOOP",)}

@@ -1,4 +1,4 @@
-"""Variables of SINUMERIK programs: R parameters, those that DEF declares, system variables that the program itself determines."""
+"""Variables of SINUMERIK programs: R parameters, those that DEF declares, system variables that the program determines."""
 
 from __future__ import annotations
 
@@ -52,7 +52,8 @@ class SiemensNames(Names):
         if name == "R" or (name[0] == "R" and name[1:].isdigit()):
             place = int(number(index[0])) if name == "R" else int(name[1:])
             if place not in self.parameters:
-                raise MacroFault("gcode.variable", f"R{place} is read before the program sets it: what it holds was left there "
+                raise MacroFault("gcode.variable", f"R{place} is read before the program sets it: what it holds was left "
+                                                   f"there "
                                  "by another program, or by hand", f"set it first, in a copy of the program: R{place}=...")
             return self.parameters[place]
         held = self._declared(name)

@@ -1,4 +1,4 @@
-"""Words, assignments, frames and calls of a row of a SINUMERIK program: written on with figures in the place of expressions."""
+"""Words, assignments, frames and calls of a row of a SINUMERIK program: figures in the place of expressions."""
 
 from __future__ import annotations
 
@@ -45,10 +45,11 @@ class SiemensWords:
         self.names = SiemensNames(self.track, self.state)
         self.tools: dict[str, int] = {}
         self.unknown_tools: dict[str, int] = {}
+        self.line = 0
 
     def row(self, head: str, c: Cursor, line: int) -> RowDone:
         """One row obeyed, and written on."""
-        done = RowDone()
+        done, self.line = RowDone(), line
         if _FRAMES.fullmatch(head):
             self._frame(head, c)
             return done
@@ -122,7 +123,8 @@ class SiemensWords:
             out.append(key[1])
             done.back |= key[1] == "RET"
 
-    def _word(self, letter: str, value: float, word: re.Match[str], out: list[str], calls: list[tuple[str, str]], machine: bool,
+    def _word(self, letter: str, value: float, word: re.Match[str], out: list[str], calls: list[tuple[str, str]],
+              machine: bool,
               done: RowDone) -> None:
         if letter == "L":
             calls.append((f"L{word[2]}", ""))
@@ -160,7 +162,8 @@ class SiemensWords:
             self.names.put(key, index, expression(c, self.names))
             return
         if index:
-            raise MacroFault("gcode.variable", f"{key}[...] is set, and no DEF declares it", f"declare it: DEF REAL {key}[...]")
+            raise MacroFault("gcode.variable", f"{key}[...] is set, and no DEF declares it",
+                             f"declare it: DEF REAL {key}[...]")
         skip(c)
         how = _HOW.match(c.text, c.at)
         if how:
@@ -204,7 +207,7 @@ class SiemensWords:
             return int(name)
         if name.upper() in named:
             return named[name.upper()]
-        self.unknown_tools.setdefault(name, 0)
+        self.unknown_tools.setdefault(name, self.line)
         return 30_000 + list(self.unknown_tools).index(name)
 
     def split(self, given: str) -> list[str]:

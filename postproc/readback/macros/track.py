@@ -9,7 +9,6 @@ from collections import defaultdict
 
 from postproc.readback.macros.expressions import MacroFault
 from postproc.readback.macros.held import Held
-from toolpaths.units import MM_PER_INCH
 
 ROTARY = "ABC"
 NO_LENGTH = -1
@@ -52,7 +51,8 @@ class Track:
         """Of an axis in the coordinates that the program sees."""
         here = self.at.get(axis)
         if here is None:
-            raise MacroFault("gcode.position_unknown", f"where {axis} stands here is not known: no block since its last move in "
+            raise MacroFault("gcode.position_unknown", f"where {axis} stands here is not known: no block since its last "
+                                                       f"move in "
                              "machine coordinates, or change of offset or length, states it absolutely",
                              f"state {axis} with G90 before this block")
         return here - self.shift(axis)
