@@ -220,7 +220,7 @@ def _parse(row: str, line: int, new: New, statements: list[DialectStatement], fi
         match = _TOKEN.match(row, at)
         if match is None or not _token(match, line, new, statements):
             return [error("gcode.syntax", f"not a block of words: {row.strip()[:60]!r}", file=file, lines=[line],
-                          hint="variables, jumps and expressions are not read")]
+                          hint="a block is words, names of the control and calls")]
         at = match.end()
     return []
 

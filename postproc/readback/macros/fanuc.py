@@ -9,11 +9,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from postproc.readback.macros.blocks import Blocks, Word
 from postproc.readback.macros.expressions import FANUC, Cursor, Expressions, MacroFault, Value, plain, rounded
 from postproc.readback.macros.fanuc_variables import Variables
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.sources import SourceFile, Sources
+from postproc.readback.macros.word_blocks import Blocks, Word
 from postproc.readback.text.flow import DEEPEST
 
 _SEQUENCE = re.compile(r"N\d+")

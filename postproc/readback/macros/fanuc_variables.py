@@ -8,9 +8,9 @@ work offsets.
 
 from __future__ import annotations
 
-from postproc.readback.macros.blocks import Blocks
 from postproc.readback.macros.expressions import MacroFault, Value, plain
 from postproc.readback.macros.held import Held
+from postproc.readback.macros.word_blocks import Blocks
 
 _PASSIVE = frozenset({3003, 3004, 3005, 3001, 3002})
 _LETTERS = {4102: "B", 4107: "D", 4109: "F", 4111: "H", 4113: "M", 4119: "S", 4120: "T"}

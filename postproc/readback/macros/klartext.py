@@ -13,11 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import PurePath
 
-from postproc.readback.macros.blocks import Blocks
 from postproc.readback.macros.expressions import Cursor, MacroFault, applied, written
 from postproc.readback.macros.fanuc import too_many
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.sources import SourceFile, Sources
+from postproc.readback.macros.word_blocks import Blocks
 from postproc.readback.text.flow import DEEPEST
 from postproc.readback.text.words import lines_of
 from toolpaths.diagnostics import Diagnostic

@@ -6,12 +6,12 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from postproc.readback.macros.blocks import Blocks, Word
 from postproc.readback.macros.expressions import LINUXCNC, Cursor, Expressions, MacroFault, Value, plain
 from postproc.readback.macros.fanuc import coded, too_many
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.linuxcnc_parameters import Parameters
 from postproc.readback.macros.sources import SourceFile, Sources
+from postproc.readback.macros.word_blocks import Blocks, Word
 from postproc.readback.text.flow import DEEPEST
 from postproc.readback.text.words import block_delete
 from postproc.readback.text.words import plain as uncommented

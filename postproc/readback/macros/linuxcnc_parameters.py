@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from postproc.readback.macros.blocks import Blocks
 from postproc.readback.macros.expressions import MacroFault
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.track import NO_LENGTH
+from postproc.readback.macros.word_blocks import Blocks
 
 if TYPE_CHECKING:
     from postproc.readback.macros.linuxcnc import OLevel

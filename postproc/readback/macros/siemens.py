@@ -6,7 +6,6 @@ import re
 from dataclasses import dataclass, field
 from pathlib import PurePath
 
-from postproc.readback.macros.blocks import Blocks
 from postproc.readback.macros.expressions import Cursor, MacroFault
 from postproc.readback.macros.fanuc import too_many
 from postproc.readback.macros.held import Held
@@ -15,6 +14,7 @@ from postproc.readback.macros.siemens_rows import Listing, Row, listing
 from postproc.readback.macros.siemens_variables import Declared, SiemensNames
 from postproc.readback.macros.siemens_words import SiemensWords
 from postproc.readback.macros.sources import SourceFile, Sources
+from postproc.readback.macros.word_blocks import Blocks
 from toolpaths.diagnostics import Diagnostic, warning
 
 DEEPEST = 16
