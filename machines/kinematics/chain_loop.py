@@ -1,0 +1,95 @@
+"""A serial chain's poses in one loop over points: the compiled twin of `Serial`'s columns, with the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics.chain import Joint
+from toolpaths.arrays import Floats, Ints
+from toolpaths.compiled import compiled, loop
+from toolpaths.shapes import arrays
+
+_NUMBERS, _ROWS = ("float64", 1), ("float64", 2)
+COMPILE_FROM = 20_000
+"""points that are worth compiling for; fewer take the loop where any is compiled anyway"""
+
+
+@dataclass(frozen=True)
+@arrays(turn="C", column="C", along="C 3", place="C 3", turning="R")
+class ChainLoop:
+    """C joints as the loop takes them, see there; `turning` (R,): columns of q of the rotary ones."""
+
+    turn: Ints
+    column: Ints
+    along: Floats
+    place: Floats
+    turning: Ints
+
+    @classmethod
+    def of(cls, chain: Sequence[Joint], axis_names: Sequence[str]) -> ChainLoop:
+        """Of a chain whose joints stand in q in the order of `axis_names`."""
+        column = [axis_names.index(joint.name) for joint in chain]
+        turning = [at for at, joint in zip(column, chain, strict=True) if joint.rotary]
+        turn = [turning.index(at) if joint.rotary else -1 for at, joint in zip(column, chain, strict=True)]
+        return cls(np.array(turn), np.array(column), np.array([joint.along for joint in chain]),
+                   np.array([joint.place for joint in chain]), np.array(turning, dtype=np.int64))
+
+    def poses(self, q: Floats, carried: Floats) -> Floats:
+        """(1 + C, N, 3), see `chain_poses`; sines as numpy has them, whose bits the columns have too."""
+        cos, sin = np.empty((2, len(self.turning), len(q)))
+        for k, j in enumerate(self.turning.tolist()):
+            np.cos(q[:, j], out=cos[k])
+            np.sin(q[:, j], out=sin[k])
+        return compiled(chain_poses)(q, cos, sin, self.turn, self.column, self.along, self.place, carried)
+
+
+@loop(takes=(_ROWS, _ROWS, _ROWS, ("int64", 1), ("int64", 1), _ROWS, _ROWS, _ROWS))
+def chain_poses(q: Floats, cos: Floats, sin: Floats, turn: Ints, column: Ints, along: Floats, place: Floats,
+                carried: Floats) -> Floats:
+    """(1 + C, N, 3): a point and directions at the tool's end, `carried` (1 + C, 3), moved by C joints in turn.
+
+    Args:
+        q: (N, J) joints; `column` (C,): where each joint of the chain stands in it, from the part to the tool
+        cos, sin: (R, N) of the rotary joints; `turn` (C,): which of them a joint is, -1 for slides
+        along, place: (C, 3) directions of the joints, points of rotary ones
+    """
+    result = np.empty((len(carried), len(q), 3))
+    v = np.empty(3)
+    for n in range(len(q)):
+        for m in range(len(carried)):
+            for i in range(3):
+                v[i] = carried[m, i]
+            for c in range(len(turn) - 1, -1, -1):
+                if turn[c] >= 0:
+                    for i in range(3 if m == 0 else 0):
+                        v[i] = v[i] - place[c, i]
+                    turn_vector(v, along[c], cos[turn[c], n], sin[turn[c], n])
+                    for i in range(3 if m == 0 else 0):
+                        v[i] = v[i] + place[c, i]
+                elif m == 0:
+                    for i in range(3):
+                        if along[c, i] != 0.0:
+                            v[i] = v[i] + q[n, column[c]] * along[c, i]
+            for i in range(3):
+                result[m, n, i] = v[i]
+    return result
+
+
+@loop
+def turn_vector(v: Floats, d: Floats, cos: float, sin: float) -> None:
+    """Turn v (3,) about the unit d (3,) (Rodrigues); about an axis of coordinates two numbers change."""
+    for i in range(3):
+        if abs(d[i]) == 1.0:
+            j, k = (i + 1) % 3, (i + 2) % 3
+            signed = sin if d[i] > 0.0 else -sin
+            x, y = v[j], v[k]
+            v[j], v[k] = cos * x - signed * y, signed * x + cos * y
+            return
+    a, b, c = v[0], v[1], v[2]
+    near = d[0] * a + d[1] * b + d[2] * c
+    v[0] = near * d[0] + cos * (a - near * d[0]) + sin * (d[1] * c - d[2] * b)
+    v[1] = near * d[1] + cos * (b - near * d[1]) + sin * (d[2] * a - d[0] * c)
+    v[2] = near * d[2] + cos * (c - near * d[2]) + sin * (d[0] * b - d[1] * a)

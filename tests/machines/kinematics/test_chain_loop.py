@@ -1,0 +1,24 @@
+"""The compiled loop of serial chains against numpy's columns: the same bits."""
+
+import numpy as np
+import pytest
+
+import machines
+from machines.kinematics import serial
+from machines.kinematics.serial import Serial
+
+pytestmark = pytest.mark.numeric
+CHAINS = sorted(name for name in machines.names() if isinstance(machines.load(name).kinematics, Serial))
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_poses_have_the_bits_of_the_columns(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    kin = machines.load(name).kinematics.with_tool(123.4)
+    q = np.random.default_rng(5).normal(size=(300, kin.joints)) * 3.0
+    found = []
+    for chosen in (False, True):
+        monkeypatch.setattr(serial, "wanted", lambda *_, chosen=chosen: chosen)
+        found.append([*kin.pose(q), *kin.forward(q)])
+    for plain, fast in zip(*found, strict=True):
+        np.testing.assert_array_equal(plain, fast)
+        assert fast.flags.writeable
