@@ -44,8 +44,8 @@ def _hold_blocks(context: typer.Context, value: int | None) -> None:
 
 MaxBlocks = Annotated[int | None, typer.Option("--max-blocks", metavar="N", min=1, max=1_000_000_000,
                                                callback=lambda context, value: _hold_blocks(context, value),
-                                               help="most blocks of a program with macros that are executed before it counts "
-                                               "as endless (default 1000000)")]
+                                               help="blocks of a program with macros that are executed before it "
+                                               "counts as endless (default 1000000)")]
 MachineName = Annotated[str, typer.Option("-m", "--machine", metavar="MACHINE",
                                          help="name from `postproc machine list`, or a TOML file")]
 ToleranceOption = Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0,

@@ -228,7 +228,7 @@ def _bodies(motion: Motion, executed: BlockPoses, job: Job, comparison: Comparis
 
 
 def _judged(d: Diagnostic, stays: bool) -> Diagnostic:
-    """Units that nothing states, and what is only taken to be so: nothing is proved where the control may have it otherwise."""
+    """Units that nothing states, what is only taken to be so: nothing is proved where the control may have it otherwise."""
     assumed = d.code in ASSUMED or (d.code == UNITS_UNSTATED and not stays)
     return replace(d, severity=Severity.ERROR) if assumed else d
 

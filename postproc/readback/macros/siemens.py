@@ -60,10 +60,10 @@ class SiemensRun:
         self.modal: tuple[str, str] | None = None
 
     def judged(self) -> list[Diagnostic]:
-        """What is taken to be so, though the control may have it otherwise."""
+        """Tools whose names the set-up has not."""
         return [warning("gcode.tool_unnamed", f'no tool of the set-up is called "{name}": its length counts as 0',
-                        file=self.blocks.file, lines=[line], hint='[tools.N] called = "..." of the set-up: the number of the tool '
-                        'that the control calls so') for name, line in self.words.unknown_tools.items()]
+                        file=self.blocks.file, lines=[line], hint='[tools.N] called = "..." of the set-up: the number of '
+                        'the tool that the control calls so') for name, line in self.words.unknown_tools.items()]
 
     def listed(self, source: SourceFile) -> Listing:
         """The rows of a file."""

@@ -1,4 +1,4 @@
-"""Macro language of each control: where short programs go, worked out by hand from the maker's rules, and what is refused."""
+"""Macro language of each control: where short programs go, by hand from the maker's rules, and what is refused."""
 
 from __future__ import annotations
 
@@ -63,7 +63,8 @@ def test_sinumerik_calls_with_values() -> None:
 
 @pytest.mark.parametrize(("body", "ends"), [
     ("Q1 = 2 * (3 + 4) - SQRT 16\nL X+Q1 Y-Q1 FMAX\n", [[10, -10, 0]]),
-    ("FN 0: Q1 = +3\nLBL 1\nL IX+1 FMAX\nFN 2: Q1 = +Q1 - +1\nFN 11: IF +Q1 GT +0 GOTO LBL 1\n", [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
+    ("FN 0: Q1 = +3\nLBL 1\nL IX+1 FMAX\nFN 2: Q1 = +Q1 - +1\nFN 11: IF +Q1 GT +0 GOTO LBL 1\n",
+     [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
     ("Q5 = 1\nLBL 1\nL IX+Q5 FMAX\nCALL LBL 1 REP 2\n", [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
     ("FN 8: Q1 = +3 LEN +4\nFN 13: Q2 = +1 ANG +1\nFN 4: Q3 = +9 DIV +2\nL X+Q1 Y+Q2 Z+Q3 FMAX\n", [[5, 45, 4.5]])])
 def test_klartext(body: str, ends: list[list[float]]) -> None:
@@ -79,13 +80,15 @@ def test_o_words_and_a_file_beside() -> None:
 def test_faults_stand_at_the_line_that_was_written() -> None:
     text = HEAD + "#1=1.\nWHILE[#1LT3]DO1\nG2 X#1 R.1 F9\n#1=#1+1\nEND1\nM30\n%\n"
     assert faults(FANUC, text).get("gcode.arc") == [8]
+    assert faults(FANUC, text.replace("G2", "G51"))["gcode.unknown_code"] == [8, 8]
     _, found = executed(FANUC, HEAD + "G65 P9000\nM30\n%\n", others={"O9000.nc": b"O9000\n\nG0 X#500\nM99\n"})
     assert [(d.code, d.file, d.lines) for d in found] == [("gcode.variable", "O9000.nc", (3,))]
 
 
 @pytest.mark.parametrize(("control", "text"), [
     (FANUC, HEAD + "N1 #1=0\nGOTO1\nM30\n"), (LINUXCNC, HEAD + "O1 WHILE [1]\nO1 ENDWHILE\nM2\n"),
-    (SIEMENS, SINUMERIK + "AA: R1=1\nGOTOB AA\nM30\n"), (TNC, "BEGIN PGM A MM\nLBL 1\nFN 9: IF +1 EQU +1 GOTO LBL 1\nEND PGM A MM\n")])
+    (SIEMENS, SINUMERIK + "AA: R1=1\nGOTOB AA\nM30\n"), (TNC, "BEGIN PGM A MM\nLBL 1\n"
+     "FN 9: IF +1 EQU +1 GOTO LBL 1\nEND PGM A MM\n")])
 def test_a_program_without_an_end_is_refused(control: str, text: str) -> None:
     with most_blocks(500):
         assert set(faults(control, text)) == {"gcode.endless"}
