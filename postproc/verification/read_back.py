@@ -92,8 +92,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls,
                         machine.clamp_codes)
-    held = dict(_others(job, reader))
-    reader.given(lambda register: held.get(register, control).work_offset, job.register_lengths())
+    _give(reader, job)
     code, diagnostics = reader.read(data, gcode, others)
     header = read_header(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]
@@ -145,6 +144,12 @@ def _offsets(job: Job, reader: Reader, home: Floats) -> Offsets:
     return Offsets(job.control.work_offset, job.control.xyz, job.register_lengths(), home, job.control.length_on_z,
                    job.controller.cycles.peck_relief, job.control, reader.rises_first, reader.arc_slack,
                    _others(job, reader), radii, job.controller.cutter_compensation.corners)
+
+
+def _give(reader: Reader, job: Job) -> None:
+    """What the control holds by the set-up, for programs that ask for it."""
+    held = dict(_others(job, reader))
+    reader.given(lambda register: held.get(register, job.control).work_offset, job.register_lengths())
 
 
 def _others(job: Job, reader: Reader) -> tuple[tuple[float, Control], ...]:

@@ -11,20 +11,20 @@ from typing import Literal
 import numpy as np
 
 from postproc.readback.macros.expressions import MacroFault
-from postproc.readback.macros.fanuc import FanucRun
+from postproc.readback.macros.fanuc import FanucMacros
 from postproc.readback.macros.held import Held
-from postproc.readback.macros.klartext import KlartextRun, klartext_rows
-from postproc.readback.macros.linuxcnc import LinuxCncRun, linuxcnc_rows
-from postproc.readback.macros.siemens import SiemensRun
+from postproc.readback.macros.klartext import KlartextMacros, klartext_rows
+from postproc.readback.macros.linuxcnc import LinuxCncMacros, linuxcnc_rows
+from postproc.readback.macros.siemens import SiemensMacros
 from postproc.readback.macros.siemens_rows import siemens_rows
-from postproc.readback.macros.sources import Cleaned, Sources
+from postproc.readback.macros.sources import Cleaned, ProgramFiles
 from postproc.readback.text.canonical import Files, placed
 from postproc.readback.text.words import block_delete, lines_of, plain
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shapes import arrays
 
-Numbered = Callable[[bytes, str], tuple[bytes, list[Diagnostic]]]
+ToolsNumbered = Callable[[bytes, str], tuple[bytes, list[Diagnostic]]]
 MacroLanguage = Literal["fanuc", "haas", "linuxcnc", "siemens", "klartext"]
 _NEEDED = {
     "fanuc": re.compile(rb"[#\[]|GOTO|M0*99[ \t]*P|G0*(?:10|30|52|92|6[567])(?![\d.])"),
@@ -74,7 +74,7 @@ def fanuc_rows(data: bytes, file: str) -> tuple[list[str], list[Diagnostic]]:
 
 
 def executed(data: bytes, file: str, others: Mapping[str, bytes], language: MacroLanguage, held: Held,
-             numbered: Numbered) -> tuple[PlainProgram | None, list[Diagnostic]]:
+             numbered: ToolsNumbered) -> tuple[PlainProgram | None, list[Diagnostic]]:
     """The plain program; None, and why, where a block cannot be executed.
 
     Work is bounded: `held.most` blocks. `numbered` puts numbers in the place of the names of tools.
@@ -85,7 +85,7 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
         text, found = (text, []) if language == "siemens" else numbered(text, name)
         made, more = rows.get(language, fanuc_rows)(text, name)
         return made, [*found, *more]
-    sources = Sources(data, file, others, cleaned)
+    sources = ProgramFiles(data, file, others, cleaned)
     run = _run(language, sources, held)
     try:
         run.run()
@@ -94,7 +94,7 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
     except RecursionError:
         deep = MacroFault("gcode.expression", "brackets too deep", "write the expression in steps")
         return None, [*sources.found, *placed([deep.at(file, run.line)], sources.files)]
-    judged = run.judged() if isinstance(run, SiemensRun) else run.blocks.judged()
+    judged = run.judged() if isinstance(run, SiemensMacros) else run.blocks.judged()
     found = [*sources.found, *placed(judged, sources.files)]
     if has_errors(found):
         return None, found
@@ -103,12 +103,13 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
     return PlainProgram(text, line, sources.files), found
 
 
-def _run(language: MacroLanguage, sources: Sources, held: Held) -> FanucRun | LinuxCncRun | SiemensRun | KlartextRun:
+def _run(language: MacroLanguage, sources: ProgramFiles,
+         held: Held) -> FanucMacros | LinuxCncMacros | SiemensMacros | KlartextMacros:
     if language == "linuxcnc":
-        return LinuxCncRun(sources, held)
+        return LinuxCncMacros(sources, held)
     if language == "siemens":
-        return SiemensRun(sources, held)
-    return KlartextRun(sources, held) if language == "klartext" else FanucRun(sources, held, language == "haas")
+        return SiemensMacros(sources, held)
+    return KlartextMacros(sources, held) if language == "klartext" else FanucMacros(sources, held, language == "haas")
 
 
 def in_source(found: list[Diagnostic], program: PlainProgram) -> list[Diagnostic]:

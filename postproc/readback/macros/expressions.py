@@ -2,7 +2,7 @@
 
 Fanuc B-64484EN, custom macro (arithmetic and logic operation): functions, then * / AND MOD, then + - OR XOR, then
 comparisons;
-a variable that was never set is vacant: it counts as 0, and EQ and NE tell it from 0. LinuxCNC (G-code overview): **
+a variable that was never set is vacant: it counts as 0, and EQ and NE know it from 0. LinuxCNC (G-code overview): **
 before * / MOD,
 + -, comparisons, AND OR XOR, which are 1 or 0; numbers nearer than 0.0001 are equal.
 """
@@ -17,7 +17,7 @@ from decimal import Decimal
 
 from toolpaths.diagnostics import Diagnostic, error
 
-Value = float | None
+MacroValue = float | None
 _NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
 _NAME = re.compile(r"[A-Z]+")
 LINUXCNC_EQUAL = 1e-4
@@ -77,21 +77,21 @@ class Grammar:
     `full_turn`: ATAN lies between 0 and 360 degrees.
     """
 
-    operators: dict[str, tuple[int, Callable[[Value, Value], float]]]
+    operators: dict[str, tuple[int, Callable[[MacroValue, MacroValue], float]]]
     functions: dict[str, Callable[[float], float]]
     full_turn: bool
 
 
-def plain(a: Value) -> float:
+def plain(a: MacroValue) -> float:
     """A value in arithmetic: vacant is 0."""
     return 0.0 if a is None else a
 
 
-def _arithmetic(f: Callable[[float, float], float]) -> Callable[[Value, Value], float]:
+def _arithmetic(f: Callable[[float, float], float]) -> Callable[[MacroValue, MacroValue], float]:
     return lambda a, b: f(plain(a), plain(b))
 
 
-def _bits(f: Callable[[int, int], int]) -> Callable[[Value, Value], float]:
+def _bits(f: Callable[[int, int], int]) -> Callable[[MacroValue, MacroValue], float]:
     return lambda a, b: float(f(round(plain(a)), round(plain(b))))
 
 
@@ -148,7 +148,7 @@ _COMPARED: dict[str, Callable[[float, float], bool]] = {
     "GT": lambda a, b: a > b, "GE": lambda a, b: a >= b, "LT": lambda a, b: a < b, "LE": lambda a, b: a <= b}
 
 
-def _orders(rank: int) -> dict[str, tuple[int, Callable[[Value, Value], float]]]:
+def _orders(rank: int) -> dict[str, tuple[int, Callable[[MacroValue, MacroValue], float]]]:
     return {name: (rank, _arithmetic(lambda a, b, f=f: float(f(a, b)))) for name, f in _COMPARED.items()}  # type: ignore[misc]
 
 
@@ -175,12 +175,12 @@ LINUXCNC = Grammar({
 class Expressions:
     """Values from text without blanks, in capitals; `variable` reads what stands behind a #."""
 
-    def __init__(self, grammar: Grammar, variable: Callable[[Cursor], Value],
-                 special: Callable[[str, Cursor], Value]) -> None:
+    def __init__(self, grammar: Grammar, variable: Callable[[Cursor], MacroValue],
+                 special: Callable[[str, Cursor], MacroValue]) -> None:
         self.grammar, self.variable, self.special = grammar, variable, special
         self.signs = sorted(grammar.operators, key=len, reverse=True)
 
-    def value(self, c: Cursor) -> Value:
+    def value(self, c: Cursor) -> MacroValue:
         """A number, a variable, a function or brackets, each with signs before it."""
         if c.take("["):
             result = self.expression(c)
@@ -220,7 +220,7 @@ class Expressions:
         angle = math.degrees(math.atan2(rise, run))
         return angle + 360.0 if angle < 0.0 and two and self.grammar.full_turn else angle
 
-    def expression(self, c: Cursor, rank: int = 0) -> Value:
+    def expression(self, c: Cursor, rank: int = 0) -> MacroValue:
         """Values joined by operators that bind at least as `rank` does, from the left."""
         left = self.value(c)
         while True:

@@ -9,10 +9,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from postproc.readback.macros.expressions import FANUC, Cursor, Expressions, MacroFault, Value, plain, rounded
+from postproc.readback.macros.expressions import FANUC, Cursor, Expressions, MacroFault, MacroValue, plain, rounded
 from postproc.readback.macros.fanuc_variables import Variables
 from postproc.readback.macros.held import Held
-from postproc.readback.macros.sources import SourceFile, Sources
+from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks, Word
 from postproc.readback.text.flow import DEEPEST
 
@@ -37,7 +37,7 @@ class Level:
     first: int
     last: int
     at: int
-    local: dict[int, Value]
+    local: dict[int, MacroValue]
     times: int = 1
     modal: bool = False
 
@@ -48,13 +48,13 @@ class ModalCall:
 
     program: int
     times: int
-    local: dict[int, Value] = field(default_factory=dict)
+    local: dict[int, MacroValue] = field(default_factory=dict)
 
 
-class FanucRun:
+class FanucMacros:
     """Executes a program; `haas` where the control is one."""
 
-    def __init__(self, sources: Sources, held: Held, haas: bool, linuxcnc: bool = False) -> None:
+    def __init__(self, sources: ProgramFiles, held: Held, haas: bool, linuxcnc: bool = False) -> None:
         self.sources, self.held, self.haas = sources, held, haas
         self.blocks = Blocks(held, linuxcnc, sources.read[0].name)
         self.levels: list[Level] = []
@@ -106,10 +106,10 @@ class FanucRun:
         elif row:
             self.block(self.words(row))
 
-    def _unknown(self, name: str, c: Cursor) -> Value:
+    def _unknown(self, name: str, c: Cursor) -> MacroValue:
         raise c.fault(f"{name or 'nothing'} stands where a value is asked for")
 
-    def variable(self, c: Cursor) -> Value:
+    def variable(self, c: Cursor) -> MacroValue:
         """#n, #[...] or ##n."""
         return self.variables.get(self.index(c), self.levels[-1].local)
 
@@ -279,8 +279,8 @@ class FanucRun:
         else:
             self.modal = ModalCall(int(stated["P"]), int(stated.get("L", 1.0)), local)
 
-    def call(self, number: int, times: int, local: dict[int, Value], modal: bool = False) -> None:
-        """A program by its number: of the file that calls, of the others that were read, of a file beside them."""
+    def call(self, number: int, times: int, local: dict[int, MacroValue], modal: bool = False) -> None:
+        """A program by its number: of the file that calls, of the others that were read, of a file next to them."""
         here = self.levels[-1].source
         span = next((s for source in (here, *self.sources.read) if (s := program(source, number))), None)
         if span is None:
@@ -289,7 +289,7 @@ class FanucRun:
             span = None if source is None else program(source, number) or (source, 0, len(source.rows) - 1)
         if span is None:
             raise MacroFault("gcode.subprogram", f"there is no subprogram O{number}",
-                             f"put it beside the program, as O{number:04d}.nc")
+                             f"put it next to the program, as O{number:04d}.nc")
         self.push(Level(*span, span[1], local, times, modal or self.levels[-1].modal))
 
     def push(self, level: Level) -> None:
@@ -344,9 +344,9 @@ def coded(letter: str, value: float) -> float:
     return value
 
 
-def arguments(words: Sequence[Word]) -> dict[int, Value]:
+def arguments(words: Sequence[Word]) -> dict[int, MacroValue]:
     """Local variables of a macro call: sets of I, J, K one behind the other."""
-    local: dict[int, Value] = {}
+    local: dict[int, MacroValue] = {}
     sets, before = 0, ""
     for w in words:
         if w.letter in _SCALED and w.text and "." not in w.text and w.value:

@@ -8,7 +8,7 @@ work offsets.
 
 from __future__ import annotations
 
-from postproc.readback.macros.expressions import MacroFault, Value, plain
+from postproc.readback.macros.expressions import MacroFault, MacroValue, plain
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.word_blocks import Blocks
 
@@ -23,9 +23,9 @@ class Variables:
 
     def __init__(self, blocks: Blocks, held: Held) -> None:
         self.blocks, self.held = blocks, held
-        self.common: dict[int, Value] = {}
+        self.common: dict[int, MacroValue] = {}
 
-    def get(self, index: int, local: dict[int, Value]) -> Value:
+    def get(self, index: int, local: dict[int, MacroValue]) -> MacroValue:
         """The value of a variable; None where it is vacant."""
         if index == 0:
             return None
@@ -44,7 +44,7 @@ class Variables:
             return self._offset(index)
         raise _refused(index)
 
-    def put(self, index: int, value: Value, local: dict[int, Value], line: int) -> None:
+    def put(self, index: int, value: MacroValue, local: dict[int, MacroValue], line: int) -> None:
         """A variable set; line: of the block."""
         if 1 <= index <= 33:
             local[index] = value
@@ -61,7 +61,7 @@ class Variables:
         else:
             raise _refused(index)
 
-    def _common(self, index: int) -> Value:
+    def _common(self, index: int) -> MacroValue:
         if index in self.common:
             return self.common[index]
         if index < 100:
@@ -69,14 +69,14 @@ class Variables:
         raise MacroFault("gcode.variable", f"#{index} is read before the program sets it: what it holds was left there by "
                          "another program, or by hand", f"set it first, in a copy of the program: #{index}=...")
 
-    def _modal(self, index: int) -> Value:
+    def _modal(self, index: int) -> MacroValue:
         group = index - 4000
         held = self.blocks.state.get(_LETTERS.get(index, group))
         if index == 4014 and self.blocks.track.register is not None:
             held = self.blocks.track.register
         if held is None:
-            raise MacroFault("gcode.variable", f"#{index} is read, and the program has not stated what it tells",
-                             "state the code that it tells before this block")
+            raise MacroFault("gcode.variable", f"#{index} is read, and the program has not stated what it says",
+                             "state the code that it says before this block")
         return held
 
     def _axis(self, number: int) -> str:

@@ -16,7 +16,7 @@ from pathlib import PurePath
 from postproc.readback.macros.expressions import Cursor, MacroFault, applied, written
 from postproc.readback.macros.fanuc import too_many
 from postproc.readback.macros.held import Held
-from postproc.readback.macros.sources import SourceFile, Sources
+from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks
 from postproc.readback.text.flow import DEEPEST
 from postproc.readback.text.words import lines_of
@@ -102,10 +102,10 @@ def klartext_rows(data: bytes, file: str) -> tuple[list[str], list[Diagnostic]]:
     return made, []
 
 
-class KlartextRun:
+class KlartextMacros:
     """Executes a program and what it calls."""
 
-    def __init__(self, sources: Sources, held: Held) -> None:
+    def __init__(self, sources: ProgramFiles, held: Held) -> None:
         self.sources, self.held = sources, held
         self.blocks = Blocks(held, False, sources.read[0].name)
         self.levels = [KlartextLevel(sources.read[0], 0, False)]
@@ -336,11 +336,11 @@ class KlartextRun:
         self.levels.append(level)
 
     def _program(self, name: str) -> None:
-        """CALL PGM: a file beside the program."""
+        """CALL PGM: a file next to the program."""
         stem = PurePath(name.strip('"').replace("\\", "/")).stem
         source = self.sources.open((stem,))
         if source is None:
-            raise MacroFault("gcode.subprogram", f"there is no program {stem}", f"put it beside the program, as {stem}.H")
+            raise MacroFault("gcode.subprogram", f"there is no program {stem}", f"put it next to the program, as {stem}.H")
         self._push(KlartextLevel(source, 0, False))
 
 

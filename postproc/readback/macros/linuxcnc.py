@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
-from postproc.readback.macros.expressions import LINUXCNC, Cursor, Expressions, MacroFault, Value, plain
+from postproc.readback.macros.expressions import LINUXCNC, Cursor, Expressions, MacroFault, MacroValue, plain
 from postproc.readback.macros.fanuc import coded, too_many
 from postproc.readback.macros.held import Held
-from postproc.readback.macros.linuxcnc_parameters import Parameters
-from postproc.readback.macros.sources import SourceFile, Sources
+from postproc.readback.macros.linuxcnc_parameters import OLevel, Parameters
+from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks, Word
 from postproc.readback.text.flow import DEEPEST
 from postproc.readback.text.words import block_delete
@@ -31,27 +30,16 @@ _ENDS = {"IF": ("ELSEIF", "ELSE", "ENDIF"), "ELSEIF": ("ENDIF",), "ELSE": ("ENDI
 ARGUMENTS = 30
 
 
-@dataclass
-class OLevel:
-    """A program or subprogram that runs: its file, the next row, its own parameters, repeats that are left by label."""
-
-    source: SourceFile
-    at: int
-    local: dict[int, float] = field(default_factory=dict)
-    named: dict[str, float] = field(default_factory=dict)
-    left: dict[str, int] = field(default_factory=dict)
-
-
 def linuxcnc_rows(data: bytes, file: str) -> tuple[list[str], list[Diagnostic]]:
     """Rows without comments, blanks and tape marks, in capitals."""
     text, found = block_delete(re.sub(rb"(?m)^[ \t]*%[^\n]*", b"", uncommented(data).upper()), file)
     return re.sub(r"[ \t]", "", text.decode("ascii", "replace")).split("\n")[:-1], found
 
 
-class LinuxCncRun:
+class LinuxCncMacros:
     """Executes a program with its O words."""
 
-    def __init__(self, sources: Sources, held: Held) -> None:
+    def __init__(self, sources: ProgramFiles, held: Held) -> None:
         self.sources, self.held = sources, held
         self.blocks = Blocks(held, True, sources.read[0].name)
         self.parameters = Parameters(self.blocks, held)
@@ -146,11 +134,11 @@ class LinuxCncRun:
             raise c.fault("the number of a parameter is not whole")
         return round(number)
 
-    def variable(self, c: Cursor) -> Value:
+    def variable(self, c: Cursor) -> MacroValue:
         """The value of a parameter."""
         return self.parameters.get(self._place(c), self.levels[-1])
 
-    def _special(self, name: str, c: Cursor) -> Value:
+    def _special(self, name: str, c: Cursor) -> MacroValue:
         """EXISTS[#<name>]."""
         if name != "EXISTS":
             raise c.fault(f"{name or 'nothing'} stands where a value is asked for")
@@ -262,7 +250,7 @@ class LinuxCncRun:
                 self.levels.append(OLevel(source, at + 1, local))
                 return
         raise MacroFault("gcode.subprogram", f"there is no subprogram o<{label.lower()}>",
-                         f"put it beside the program, as {label.lower()}.ngc")
+                         f"put it next to the program, as {label.lower()}.ngc")
 
     def _back(self, level: OLevel, label: str, c: Cursor) -> None:
         """endsub and return, with a value or without."""

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
 from postproc.readback.macros.expressions import MacroFault
 from postproc.readback.macros.held import Held
+from postproc.readback.macros.sources import SourceFile
 from postproc.readback.macros.track import NO_LENGTH
 from postproc.readback.macros.word_blocks import Blocks
-
-if TYPE_CHECKING:
-    from postproc.readback.macros.linuxcnc import OLevel
 
 _AXES = "XYZABCUVW"
 _OFFSETS = (54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 59.1, 59.2, 59.3)
@@ -18,6 +16,17 @@ _LAST_OF_USER = 5000
 _LOCAL = 30
 _MODES = {"_METRIC": (6, 21), "_IMPERIAL": (6, 20), "_ABSOLUTE": (3, 90), "_INCREMENTAL": (3, 91), "_INVERSE_TIME": (5, 93),
           "_UNITS_PER_MINUTE": (5, 94), "_UNITS_PER_REV": (5, 95)}
+
+
+@dataclass
+class OLevel:
+    """A program or subprogram that runs: its file, the next row, its own parameters, repeats that are left by label."""
+
+    source: SourceFile
+    at: int
+    local: dict[int, float] = field(default_factory=dict)
+    named: dict[str, float] = field(default_factory=dict)
+    left: dict[str, int] = field(default_factory=dict)
 
 
 class Parameters:

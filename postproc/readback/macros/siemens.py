@@ -9,11 +9,11 @@ from pathlib import PurePath
 from postproc.readback.macros.expressions import Cursor, MacroFault
 from postproc.readback.macros.fanuc import too_many
 from postproc.readback.macros.held import Held
-from postproc.readback.macros.siemens_expressions import Value, equal, expression, number, skip, take
-from postproc.readback.macros.siemens_rows import Listing, Row, listing
-from postproc.readback.macros.siemens_variables import Declared, SiemensNames
+from postproc.readback.macros.siemens_expressions import SiemensValue, equal, expression, number, skip, take
+from postproc.readback.macros.siemens_rows import Listing, SiemensRow, listing
+from postproc.readback.macros.siemens_variables import KINDS, DeclaredVariable, SiemensNames
 from postproc.readback.macros.siemens_words import SiemensWords
-from postproc.readback.macros.sources import SourceFile, Sources
+from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks
 from toolpaths.diagnostics import Diagnostic, warning
 
@@ -38,18 +38,18 @@ class SiemensLevel:
     first: int
     last: int
     at: int
-    local: dict[str, Declared]
+    local: dict[str, DeclaredVariable]
     times: int = 1
     part: bool = False
-    back: dict[str, tuple[str, tuple[Value, ...]]] = field(default_factory=dict)
+    back: dict[str, tuple[str, tuple[SiemensValue, ...]]] = field(default_factory=dict)
     ends: dict[int, float] = field(default_factory=dict)
     modal: bool = False
 
 
-class SiemensRun:
+class SiemensMacros:
     """Executes a program and what it calls."""
 
-    def __init__(self, sources: Sources, held: Held) -> None:
+    def __init__(self, sources: ProgramFiles, held: Held) -> None:
         self.sources, self.held = sources, held
         self.blocks = Blocks(held, False, sources.read[0].name)
         self.words = SiemensWords(self.blocks, held, self.runnable)
@@ -99,7 +99,7 @@ class SiemensRun:
         self.levels.append(level)
         self.names.local = level.local
 
-    def statement(self, level: SiemensLevel, row: Row) -> None:
+    def statement(self, level: SiemensLevel, row: SiemensRow) -> None:
         """One row: a jump, a loop, a declaration, or words."""
         c = Cursor(row.body, len(row.head.split(" ", 1)[0]))
         head = row.head
@@ -175,7 +175,7 @@ class SiemensRun:
             self.levels.pop()
         if how != "GOTOC":
             raise MacroFault("gcode.jump", f"there is no label {target} to jump to with {how}",
-                             "GOTOF looks ahead, GOTOB back, GOTO both ways, in the same program")
+                             "GOTOF looks ahead, GOTOB back, GOTO in both directions, in the same program")
 
     def _block(self, level: SiemensLevel, head: str, c: Cursor, k: int) -> None:
         """IF ... ELSE ... ENDIF and the loops."""
@@ -255,7 +255,7 @@ class SiemensRun:
             skip(c)
 
     def runnable(self, name: str) -> bool:
-        """True for the name of a subprogram that is known, or that stands beside the program."""
+        """True for the name of a subprogram that is known, or that stands next to the program."""
         return self._found(name) is not None
 
     def _found(self, name: str) -> tuple[SourceFile, int, int] | None:
@@ -273,25 +273,25 @@ class SiemensRun:
         span = self._found(PurePath(name).stem.removeprefix("_N_").removesuffix("_SPF"))
         if span is None:
             raise MacroFault("gcode.subprogram", f"there is no subprogram {name}",
-                             f"put it beside the program, as {name}.SPF")
+                             f"put it next to the program, as {name}.SPF")
         local, back = self._parameters(span, given)
         if times > 0:
             self._push(SiemensLevel(*span, span[1], local, times, back=back, modal=modal or self.levels[-1].modal))
 
     def _parameters(self, span: tuple[SourceFile, int, int], given: str,
-                    ) -> tuple[dict[str, Declared], dict[str, tuple[str, tuple[Value, ...]]]]:
+                    ) -> tuple[dict[str, DeclaredVariable], dict[str, tuple[str, tuple[SiemensValue, ...]]]]:
         """Variables of a PROC with the values of a call."""
         rows = self.listed(span[0]).rows
         head = next((m for k in range(span[1], span[2] + 1) if (m := _PROC.match(rows[k].body))), None)
         stated = _PARAMETER.finditer(head[1]) if head and head[1] else iter(())
         values = self.words.split(given)
-        local: dict[str, Declared] = {}
-        back: dict[str, tuple[str, tuple[Value, ...]]] = {}
+        local: dict[str, DeclaredVariable] = {}
+        back: dict[str, tuple[str, tuple[SiemensValue, ...]]] = {}
         count = 0
         for k, m in enumerate(stated):
             count += 1
             here = values[k].strip() if k < len(values) else ""
-            made = local[m[3]] = Declared(m[2])
+            made = local[m[3]] = DeclaredVariable(next(kind for kind in KINDS if kind == m[2]))
             if here or m[4]:
                 made.put((), here if m[2] == "AXIS" else expression(Cursor(here or m[4]), self.names))
             if m[1] and here:

@@ -13,7 +13,7 @@ from typing import Protocol
 
 from postproc.readback.macros.expressions import COMMON, Cursor, MacroFault, applied
 
-Value = float | str
+SiemensValue = float | str
 BLANKS = re.compile(r"[ \t]*")
 NAME = re.compile(r"[A-Z_$][A-Z_$][A-Z0-9_$]*|R\d+")
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?")
@@ -26,30 +26,30 @@ _EQUAL = 1e-12
 class Names(Protocol):
     """Where values of names come from."""
 
-    def get(self, name: str, index: tuple[Value, ...]) -> Value:
+    def get(self, name: str, index: tuple[SiemensValue, ...]) -> SiemensValue:
         """A variable, an element of one, or a system variable."""
 
 
-def number(value: Value) -> float:
+def number(value: SiemensValue) -> float:
     """A value in arithmetic."""
     if isinstance(value, str):
         raise MacroFault("gcode.expression", f'"{value[:30]}" stands where a number is asked for')
     return value
 
 
-def text(value: Value) -> str:
+def text(value: SiemensValue) -> str:
     """A value in a chain of characters."""
     return value if isinstance(value, str) else f"{value:g}"
 
 
-def equal(a: Value, b: Value) -> bool:
+def equal(a: SiemensValue, b: SiemensValue) -> bool:
     """Two values alike, numbers within a part in 1e12."""
     if isinstance(a, str) or isinstance(b, str):
         return text(a) == text(b)
     return abs(a - b) <= _EQUAL * max(abs(a), abs(b))
 
 
-def _on_numbers(f: Callable[[float, float], float]) -> Callable[[Value, Value], Value]:
+def _on_numbers(f: Callable[[float, float], float]) -> Callable[[SiemensValue, SiemensValue], SiemensValue]:
     return lambda a, b: float(f(number(a), number(b)))
 
 
@@ -59,7 +59,7 @@ def _divided(a: float, b: float) -> float:
     return a / b
 
 
-OPERATORS: dict[str, tuple[int, Callable[[Value, Value], Value]]] = {
+OPERATORS: dict[str, tuple[int, Callable[[SiemensValue, SiemensValue], SiemensValue]]] = {
     "*": (9, _on_numbers(lambda a, b: a * b)), "/": (9, _on_numbers(_divided)),
     "DIV": (9, _on_numbers(lambda a, b: float(math.trunc(_divided(a, b))))),
     "MOD": (9, _on_numbers(lambda a, b: math.fmod(a, b) if b else _divided(a, b))),
@@ -75,7 +75,7 @@ OPERATORS: dict[str, tuple[int, Callable[[Value, Value], Value]]] = {
     ">=": (0, _on_numbers(lambda a, b: a > b or equal(a, b))), "<=": (0, _on_numbers(lambda a, b: a < b or equal(a, b)))}
 _ONE: dict[str, Callable[[float], float]] = {
     **COMMON, "POT": lambda a: a * a, "TRUNC": lambda a: float(math.trunc(a)), "ROUNDUP": lambda a: float(math.ceil(a))}
-_MORE: dict[str, Callable[..., Value]] = {
+_MORE: dict[str, Callable[..., SiemensValue]] = {
     "ATAN2": lambda y, x: math.degrees(math.atan2(number(y), number(x))), "MINVAL": lambda a, b: min(number(a), number(b)),
     "MAXVAL": lambda a, b: max(number(a), number(b)), "BOUND": lambda a, b, x: min(max(number(a), number(x)), number(b)),
     "STRLEN": lambda s: float(len(text(s))), "NUMBER": lambda s: float(text(s)), "TOUPPER": lambda s: text(s).upper()}
@@ -99,9 +99,9 @@ def need(c: Cursor, sign: str) -> None:
     c.need(sign)
 
 
-def listed(c: Cursor, names: Names, end: str) -> list[Value]:
+def listed(c: Cursor, names: Names, end: str) -> list[SiemensValue]:
     """Values between commas up to `end`."""
-    result = list[Value]()
+    result = list[SiemensValue]()
     if take(c, end):
         return result
     while True:
@@ -111,7 +111,7 @@ def listed(c: Cursor, names: Names, end: str) -> list[Value]:
         need(c, ",")
 
 
-def value_of(c: Cursor, names: Names) -> Value:
+def value_of(c: Cursor, names: Names) -> SiemensValue:
     """A number, characters, a name, a function or brackets, with a sign before it."""
     skip(c)
     if c.take("("):
@@ -134,7 +134,7 @@ def value_of(c: Cursor, names: Names) -> Value:
     return _named(name, c, names)
 
 
-def _named(name: str, c: Cursor, names: Names) -> Value:
+def _named(name: str, c: Cursor, names: Names) -> SiemensValue:
     if name in ("NOT", "B_NOT"):
         inner = number(value_of(c, names))
         return float(not inner) if name == "NOT" else float(~int(inner))
@@ -155,7 +155,7 @@ def _named(name: str, c: Cursor, names: Names) -> Value:
     return names.get(name, index)
 
 
-def indices(c: Cursor, names: Names) -> list[Value]:
+def indices(c: Cursor, names: Names) -> list[SiemensValue]:
     """What stands between [ and ]: numbers, or names of axes, which stand for themselves."""
     axis = re.compile(r"[ \t]*([A-Z]\d*)[ \t]*\]").match(c.text, c.at)
     if axis and not re.fullmatch(r"R\d+", axis[1]):
@@ -164,7 +164,7 @@ def indices(c: Cursor, names: Names) -> list[Value]:
     return listed(c, names, "]")
 
 
-def expression(c: Cursor, names: Names, rank: int = 0) -> Value:
+def expression(c: Cursor, names: Names, rank: int = 0) -> SiemensValue:
     """Values joined by operators that bind at least as `rank` does, from the left."""
     left = value_of(c, names)
     while True:

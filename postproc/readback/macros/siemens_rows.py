@@ -23,7 +23,7 @@ _CLOSES = {"ENDIF": ("IF", "ELSE"), "ELSE": ("IF",), "ENDFOR": ("FOR",), "ENDWHI
 
 
 @dataclass(frozen=True)
-class Row:
+class SiemensRow:
     """One row: its block number, -1 for none, its label, the word that it begins with, and all behind number and label."""
 
     number: int
@@ -36,7 +36,7 @@ class Row:
 class Listing:
     """A file: its rows; programs by name with their first and last row; the partner of each row of a loop or IF."""
 
-    rows: list[Row]
+    rows: list[SiemensRow]
     programs: dict[str, tuple[int, int]] = field(default_factory=dict)
     partner: dict[int, int] = field(default_factory=dict)
 
@@ -49,7 +49,7 @@ def siemens_rows(data: bytes, file: str) -> tuple[list[str], list[Diagnostic]]:
     return data.decode("ascii", "replace").split("\n")[:-1], found
 
 
-def row_of(text: str) -> Row:
+def row_of(text: str) -> SiemensRow:
     """A row taken apart."""
     front = _FRONT.match(text)
     assert front is not None
@@ -60,7 +60,7 @@ def row_of(text: str) -> Row:
         head = "IF GOTO"
     if head == "REPEAT" and body != "REPEAT":
         head = "REPEAT LABEL"
-    return Row(int(front[1]) if front[1] else -1, front[2] or "", head, body)
+    return SiemensRow(int(front[1]) if front[1] else -1, front[2] or "", head, body)
 
 
 def listing(source: SourceFile) -> Listing:

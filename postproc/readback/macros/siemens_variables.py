@@ -5,9 +5,20 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 from postproc.readback.macros.expressions import Cursor, MacroFault, rounded
-from postproc.readback.macros.siemens_expressions import NAME, Names, Value, expression, listed, number, skip, take, text
+from postproc.readback.macros.siemens_expressions import (
+    NAME,
+    Names,
+    SiemensValue,
+    expression,
+    listed,
+    number,
+    skip,
+    take,
+    text,
+)
 from postproc.readback.macros.track import Track
 
 _TYPE = re.compile(r"REAL|INT|BOOL|STRING|CHAR|AXIS|FRAME")
@@ -18,15 +29,19 @@ _FALSE = frozenset({"$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN
 _POSITIONS = frozenset({"$AA_IW", "$P_EP", "$P_EPM"})
 
 
+VariableKind = Literal["REAL", "INT", "BOOL", "STRING", "CHAR", "AXIS"]
+KINDS: tuple[VariableKind, ...] = get_args(VariableKind)
+
+
 @dataclass
-class Declared:
+class DeclaredVariable:
     """A variable by DEF: kind, lengths of its dimensions, values by index."""
 
-    kind: str
+    kind: VariableKind
     sizes: tuple[int, ...] = ()
-    values: dict[tuple[int, ...], Value] = field(default_factory=dict)
+    values: dict[tuple[int, ...], SiemensValue] = field(default_factory=dict)
 
-    def put(self, index: tuple[int, ...], value: Value) -> None:
+    def put(self, index: tuple[int, ...], value: SiemensValue) -> None:
         """A value as its kind holds it: INT rounds, BOOL is 0 or 1."""
         if self.kind in ("STRING", "CHAR", "AXIS"):
             self.values[index] = text(value)
@@ -41,13 +56,13 @@ class SiemensNames(Names):
     def __init__(self, track: Track, state: dict[str, float]) -> None:
         self.track, self.state = track, state
         self.parameters: dict[int, float] = {}
-        self.local: dict[str, Declared] = {}
-        self.common: dict[str, Declared] = {}
+        self.local: dict[str, DeclaredVariable] = {}
+        self.common: dict[str, DeclaredVariable] = {}
 
-    def _declared(self, name: str) -> Declared | None:
+    def _declared(self, name: str) -> DeclaredVariable | None:
         return self.local.get(name, self.common.get(name))
 
-    def get(self, name: str, index: tuple[Value, ...]) -> Value:
+    def get(self, name: str, index: tuple[SiemensValue, ...]) -> SiemensValue:
         """A value by name."""
         if name == "R" or (name[0] == "R" and name[1:].isdigit()):
             place = int(number(index[0])) if name == "R" else int(name[1:])
@@ -74,7 +89,7 @@ class SiemensNames(Names):
         """True for what may stand before =."""
         return name == "R" or bool(re.fullmatch(r"R\d+", name)) or self._declared(name) is not None
 
-    def put(self, name: str, index: tuple[Value, ...], value: Value) -> None:
+    def put(self, name: str, index: tuple[SiemensValue, ...], value: SiemensValue) -> None:
         """A variable set."""
         if name == "R" or (name[0] == "R" and name[1:].isdigit()):
             self.parameters[int(number(index[0])) if name == "R" else int(name[1:])] = number(value)
@@ -84,20 +99,21 @@ class SiemensNames(Names):
             raise MacroFault("gcode.variable", f"{name} is set, and no DEF declares it", f"declare it: DEF REAL {name}")
         held.put(self._within(held, name, index), value)
 
-    def _within(self, held: Declared, name: str, index: tuple[Value, ...]) -> tuple[int, ...]:
+    def _within(self, held: DeclaredVariable, name: str, index: tuple[SiemensValue, ...]) -> tuple[int, ...]:
         where = tuple(int(number(i)) for i in index)
         if len(where) != len(held.sizes) or any(not 0 <= i < n for i, n in zip(where, held.sizes, strict=False)):
             raise MacroFault("gcode.variable", f"{name}{list(where)} is outside of its array",
                              f"{name} has {' by '.join(map(str, held.sizes)) or 'no'} elements, counted from 0")
         return where
 
-    def declare(self, c: Cursor, into: dict[str, Declared] | None = None) -> None:
+    def declare(self, c: Cursor, into: dict[str, DeclaredVariable] | None = None) -> None:
         """DEF REAL A, B=1.5, C[3,2] with values, behind the DEF."""
         skip(c)
         while c.match(_SCOPE):
             skip(c)
-        kind = c.match(_TYPE)
-        if kind in ("", "FRAME"):
+        word = c.match(_TYPE)
+        kind = next((k for k in KINDS if k == word), None)
+        if kind is None:
             raise c.fault("DEF of a kind that is not executed")
         if kind == "STRING" and take(c, "["):
             listed(c, self, "]")
@@ -109,14 +125,14 @@ class SiemensNames(Names):
             sizes = tuple(int(number(v)) for v in listed(c, self, "]")) if take(c, "[") else ()
             if math.prod(sizes) > 1_000_000:
                 raise c.fault("DEF of an array that is too large")
-            made = Declared(kind, sizes)
+            made = DeclaredVariable(kind, sizes)
             if take(c, "="):
                 self._first_values(c, made)
             (self.local if into is None else into)[name] = made
             if not take(c, ","):
                 return
 
-    def _first_values(self, c: Cursor, made: Declared) -> None:
+    def _first_values(self, c: Cursor, made: DeclaredVariable) -> None:
         skip(c)
         if made.kind == "AXIS" and (axis := _AXIS.match(c.text, c.at)):
             c.at = axis.end()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from postproc.readback.macros.expressions import Cursor, MacroFault, written
 from postproc.readback.macros.fanuc import coded
 from postproc.readback.macros.held import Held
-from postproc.readback.macros.siemens_expressions import NAME, Value, expression, indices, number, skip, take
+from postproc.readback.macros.siemens_expressions import NAME, SiemensValue, expression, indices, number, skip, take
 from postproc.readback.macros.siemens_variables import SiemensNames
 from postproc.readback.macros.word_blocks import Blocks
 
@@ -110,7 +110,7 @@ class SiemensWords:
         if key is None:
             raise c.fault("not a block of words")
         c.at = key.end()
-        index: tuple[Value, ...] = tuple(indices(c, self.names)) if take(c, "[") else ()
+        index: tuple[SiemensValue, ...] = tuple(indices(c, self.names)) if take(c, "[") else ()
         if not c.text.startswith("==", c.at) and take(c, "="):
             self._assigned(key[1], index, c, out, machine, done)
         elif take(c, "("):
@@ -156,7 +156,8 @@ class SiemensWords:
             return value
         return self.track.go(axis, value)
 
-    def _assigned(self, key: str, index: tuple[Value, ...], c: Cursor, out: list[str], machine: bool, done: RowDone) -> None:
+    def _assigned(self, key: str, index: tuple[SiemensValue, ...], c: Cursor, out: list[str], machine: bool,
+                  done: RowDone) -> None:
         """NAME=..., R1=..., X=..., X=IC(...), T="..."."""
         if self.names.known(key):
             self.names.put(key, index, expression(c, self.names))

@@ -25,7 +25,7 @@ class SourceFile:
     """rows by their block number"""
 
 
-class Sources:
+class ProgramFiles:
     """The files by the order in which they were read; others are opened where they are called.
 
     `cleaned` makes rows of the bytes of a file: in capitals where the control knows no small letters.

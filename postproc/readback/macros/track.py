@@ -99,11 +99,6 @@ class Track:
         drawn = self.held.lengths.get(self.length, 0.0) if axis == "Z" and self.length is not None else 0.0
         self.at[axis] = value - self.work(self.register, axis) - drawn
 
-    def set_zero(self, axis: str, value: float) -> None:
-        """G92: where the axis stands is `value` mm from here on."""
-        self.zero[axis] += self.position(axis) - value
-        self.shifted = True
-
     def set_work(self, register: float, axis: str, value: float, added: bool = False) -> None:
         """G10 L2: a work offset is `value` mm in machine coordinates, or that more than it was."""
         held = self.moved[register][axis]

@@ -22,7 +22,6 @@ _GROUPS = {1: (0, 1, 2, 3, 33), 2: (17, 18, 19), 3: (90, 91), 5: (93, 94, 95), 6
            8: (43, 43.4, 43.5, 44, 49, 234), 9: (80, *_CYCLES), 10: (98, 99), 14: (*_OFFSETS, 54.1, 154),
            15: (61, 61.1, 62, 63, 64)}
 """modal groups as the system variables #4001 on number them (B-64484EN)"""
-ARGUMENTS = frozenset("PQRLEIJK")
 
 
 class Word(NamedTuple):
