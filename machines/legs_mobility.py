@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from machines.key_problem import KeyProblem
+from machines.kinematics.legs.attitudes import direction_of
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.mobility import LEAST, place_words, sign_fault
 from toolpaths.arrays import Floats
@@ -29,12 +30,11 @@ STOPPED = 1e-6
 def examined(kinematics: OnLegs) -> tuple[Floats, Floats, Floats]:
     """(C (N, 3), R (N, 3, 3), tilts (N,)) all over the workspace, its edges included, carriers at 0."""
     place, tilt = kinematics.workspace.grid((*GRID, TILTS + 5))
+    heading = np.zeros(len(tilt))
     if kinematics.loops.turns == "abc":
         heading = np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False)
         place, tilt, heading = (np.repeat(place, HEADINGS, axis=0), np.repeat(tilt, HEADINGS), np.tile(heading, len(place)))
-    else:
-        heading = np.full(len(tilt), -0.5 * np.pi if kinematics.loops.turns == "a" else 0.0)
-    axis = np.stack([np.sin(tilt) * np.cos(heading), np.sin(tilt) * np.sin(heading), np.cos(tilt)], axis=1)
+    axis = direction_of(kinematics.loops.turns, tilt, heading)
     turn, held = kinematics.turn_of(axis, np.zeros(len(axis))), kinematics.loops.basis[:3].any(axis=1)
     return np.where(held, place, 0.0), turn, tilt
 
@@ -69,7 +69,7 @@ def travel_faults(kinematics: OnLegs, travel: Floats, home: Floats) -> Iterator[
     """
     hint = "flip `root` (a star of arms has the elbows outside with -1, inside with 1), or correct travel and home"
     names, legs_at = kinematics.leg_names, kinematics.legs_at
-    if not np.isfinite(kinematics.forward(home[None])[0]).all():
+    if not kinematics.stands_at(home):
         yield KeyProblem("machine.home", ("axes", names[0], "home"), "the legs meet at no platform with all axes at "
                          "home", hint)
     place, turn, _ = examined(kinematics)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ from machines.kinematics.chain import LINEAR, ROTARY
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import FREEDOMS, Loops
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.workspace import Workspace
 from machines.leg_layouts import BoundedVector, DriveModel, StarLayout, stray_keys
 from machines.legs_mobility import leg_faults, travel_faults
 from machines.models import KinematicsModel, Vector
@@ -80,12 +82,19 @@ class LegsModel(KinematicsModel):
             np.array([leg.drive == "slide" for leg in legs]), np.array([leg.drive == "arm" for leg in legs]))
         return OnLegs(
             Loops(drives, np.array([leg.joint for leg in legs]), tuple(sorted(self.freedoms, key=FREEDOMS.index))),
-            self.workspace.build(), np.array(self.gauge), names,
+            self._space(), np.array(self.gauge), names,
             tuple(name in self.drives and self.drives[name].drive == "arm" for name in names),
             np.array([names.index(name) for name in self.drives]),
             np.array([names.index(name) for name in self.carriers], dtype=np.int64),
             np.array([c.direction for c in self.carriers.values()], dtype=np.float64).reshape(-1, 3),
             clearance_sizes(legs, self.clearance))
+
+    def _space(self) -> Workspace:
+        """The workspace, without height where neither platform nor carriers move along z: there the platform stands at 0."""
+        space = self.workspace.build()
+        moves = "z" in self.freedoms or any(carrier.direction[2] for carrier in self.carriers.values())
+        flat = np.array([1.0, 1.0, 0.0])
+        return space if moves else replace(space, lower=space.lower * flat, upper=space.upper * flat)
 
     def problems(self) -> Iterator[KeyProblem]:
         """Vectors that are no directions, letters, freedoms that do not go with the legs; faults over the workspace."""

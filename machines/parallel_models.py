@@ -12,7 +12,9 @@ from machines.key_problem import KeyProblem
 from machines.kinematics.h4_axes import H4SpindleAxis, H4TableAxis
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.h4_platform import H4Platform
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.legs.drives import on_slides
+from machines.kinematics.legs.loops import Loops
+from machines.kinematics.legs.on_legs import OnLegs
 from machines.machine import ControlKinematics
 from machines.mobility import delta_faults, h4_faults, reach_faults
 from machines.models import NotNegative, Vector, blanks
@@ -40,10 +42,11 @@ class LinearDeltaModel(SliderModel):
         """The kind."""
         return "linear Delta"
 
-    def build(self) -> LinearDelta:
-        """The kinematics at the gauge point."""
-        return LinearDelta(self.build_legs(), self.platform_joints(), self.workspace.build(), self.axis_names,
-                           clearance=self.build_clearance())
+    def build(self) -> OnLegs:
+        """The kinematics at the gauge point: a machine on legs whose platform is free in x, y and z."""
+        loops = Loops(on_slides(self.build_legs()), self.platform_joints(), ("x", "y", "z"))
+        return OnLegs(loops, self.workspace.build(), np.zeros(3), self.axis_names, (False,) * 3, np.arange(3),
+                      np.zeros(0, dtype=np.int64), np.zeros((0, 3)), self.build_clearance())
 
     def mobility_problems(self) -> Iterator[KeyProblem]:
         """Workspace out of reach or singular; pairs of rods that leave the platform a turn."""

@@ -10,7 +10,7 @@ from machines.choices import MotionOrder
 from machines.key_problem import KeyProblem
 from machines.kinematics.chain import Joint
 from machines.machine import Machine
-from toolpaths.units import DEG
+from toolpaths.units import DEG, MM_PER_INCH
 
 Ranges = dict[MotionOrder, tuple[float, float]]
 LINEAR: Ranges = {"velocity": (2.0, 5000.0), "acceleration": (10.0, 1e5), "jerk": (50.0, 1e7)}
@@ -19,12 +19,20 @@ ROTARY: Ranges = {"velocity": (1.0, 7200.0), "acceleration": (10.0, 1e5), "jerk"
 """deg/s, deg/s2, deg/s3"""
 LONGEST_RAMP = 4.0
 """s from rest to full speed"""
-TRAVEL = (20.0, 60000.0)
+TRAVEL = (50.0, 60000.0)
 """mm"""
 BEYOND = 0.25
 """share of its travel by which a pivot may lie beyond the end of it"""
 HEAD = 1000.0
 """mm between the gauge point and the pivots of a head"""
+SLOWEST = 8.0
+"""the fastest of X, Y, Z over the slowest"""
+SHORTEST = 12.0
+"""the longest travel of X, Y, Z over the shortest: an inch taken for a mm makes 25.4"""
+TILT = 900.0
+"""deg/s of a rotary axis with ends"""
+END, MIDDLE = 0.12, 0.15
+"""shares of a travel: next to its end, and around its middle"""
 _HINTS: dict[MotionOrder, str] = {
     "velocity": "write it per second: mm/min and deg/min are divided by 60, m/min by 0.06, turns per minute times 6",
     "acceleration": "write it in mm/s2 or deg/s2: m/s2 are times 1000, g times 9807, turns/s2 times 360",
@@ -36,12 +44,15 @@ def implausible(machine: Machine) -> Iterator[KeyProblem]:
     """Every figure that no machine has; paths as in the machine file."""
     for j, name in enumerate(machine.axis_names):
         yield from _limits(machine, j, name)
+    yield from _unlike(machine)
     points = {joint.name: joint for joint in machine.kinematics.chain}
     slides = [joint for joint in points.values() if not joint.rotary]
     for joint in points.values():
         if joint.rotary:
             carries = f"{joint.name}'" in machine.structure.split()
             yield from _table_pivot(machine, joint, slides) if carries else _head_pivot(joint)
+            if carries:
+                yield from _pivot_in_inches(machine, joint, slides)
 
 
 def _limits(machine: Machine, j: int, name: str) -> Iterator[KeyProblem]:
@@ -62,6 +73,46 @@ def _limits(machine: Machine, j: int, name: str) -> Iterator[KeyProblem]:
     if not rotary and not TRAVEL[0] <= length <= TRAVEL[1]:
         says = f"travel of {name} is {length:g} mm long: machines have {TRAVEL[0]:g} to {TRAVEL[1]:g}"
         yield KeyProblem("machine.plausible", (*path, "travel"), says, "write it in mm: inches are times 25.4")
+
+
+def _unlike(machine: Machine) -> Iterator[KeyProblem]:
+    """Slides of one machine are of one kind: a unit mistaken in one of them stands out; a tilting axis does not spin."""
+    limits, chain = machine.limits, {joint.name for joint in machine.kinematics.chain}
+    slides = [j for j, name in enumerate(machine.axis_names) if name in "XYZ" and name in chain and not machine.rotary[j]]
+    for values, most, key, unit, hint in (
+            (limits.velocity, SLOWEST, "velocity", "mm/s", "see to its unit: mm/min, m/min or mm/s"),
+            (limits.upper - limits.lower, SHORTEST, "travel", "mm long", "see to their units: mm or inches")):
+        if not slides or np.ptp(values[slides]) == 0.0:
+            continue
+        least, largest = min(slides, key=lambda j: float(values[j])), max(slides, key=lambda j: float(values[j]))
+        times = float(values[largest] / values[least])
+        if times > most:
+            short, long = machine.axis_names[least], machine.axis_names[largest]
+            says = (f"{key} of {short} is {values[least]:g} {unit}, of {long} {values[largest]:g}: {times:.3g} times as "
+                    f"much, of most machines less than {most:g} times")
+            yield KeyProblem("machine.plausible", ("axes", short, key), says, hint)
+    for j, name in enumerate(machine.axis_names):
+        speed = float(limits.velocity[j]) / DEG
+        if machine.rotary[j] and not machine.endless[j] and TILT < speed <= ROTARY["velocity"][1]:
+            says = f"{name} tilts at {speed:g} deg/s, {speed / 6.0:g} turns per minute: most less than {TILT / 6.0:g}"
+            yield KeyProblem("machine.plausible", ("axes", name, "velocity"), says, "see to its unit: deg/s or turns/min")
+
+
+def _pivot_in_inches(machine: Machine, joint: Joint, slides: list[Joint]) -> Iterator[KeyProblem]:
+    """Tables stand about the middle of the slides across them: a pivot at the ends that 25.4 brings there is in inches."""
+    across = [slide for slide in slides if abs(float(slide.direction @ joint.direction)) < 0.5]
+    across = [slide for slide in across if machine.axis_names.index(slide.name) != machine.retract_axis]
+    shares = []
+    for slide in across:
+        j = machine.axis_names.index(slide.name)
+        low, long = float(machine.limits.lower[j]), float(machine.limits.upper[j] - machine.limits.lower[j])
+        at = float(joint.point @ slide.direction)
+        shares.append(((at - low) / long, (at * MM_PER_INCH - low) / long))
+    if shares and all(min(abs(now), abs(1.0 - now)) < END and abs(then - 0.5) < MIDDLE for now, then in shares):
+        where = " and ".join(slide.name for slide in across)
+        says = f"{joint.name} turns about a line at the end of {where}; its numbers times 25.4 are in the middle"
+        yield KeyProblem("machine.plausible", ("kinematics", "axes", joint.name, "point"), says,
+                         "see to their unit: pivots are in mm, a control in inches shows inches")
 
 
 def _table_pivot(machine: Machine, joint: Joint, slides: list[Joint]) -> Iterator[KeyProblem]:

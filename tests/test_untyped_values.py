@@ -54,6 +54,7 @@ BORDERS = {
     "toolpaths/interrupted_runs.py": "the journal, JSON",
     "toolpaths/cl/build.py": "what handlers of records keep, each its own class, checked where it is taken out",
     "toolpaths/compiled.py": "keywords of numba", "toolpaths/drawing.py": "keywords of matplotlib",
+    "machines/analysis/machine_figure.py": "keywords of matplotlib",
     "toolpaths/shapes.py": "names of a function that is made",
     "postproc/cli/group.py": "keywords of typer", "postproc/placement/figure.py": "keywords of matplotlib",
     "postproc/pipeline/stage_values.py": "what one stage adds to the value before: its fields, by their names",

@@ -15,16 +15,18 @@ from machines.analysis.transmission import (
     WorstValue,
     condition_number,
     force_transmission,
-    lever,
     speed_acceleration,
     speed_transmission,
     worst,
 )
-from machines.kinematics.rod_platform import RodPlatform
+from machines.kinematics.rod_platform import RodPlatform, Transmission
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.units import DEG
+
+GRID, COARSE = (11, 11, 11, 7), (5, 5, 5, 3)
+"""places and tilts at which a worst value is first looked for; coarse where a tilt has several directions"""
 
 
 def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, Any]:
@@ -42,8 +44,10 @@ def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, 
     if (space := kinematics.workspace) is not None:
         found["workspace_mm"] = _span(space.lower, space.upper)
         found["tilt_range_deg"] = [t / DEG for t in space.tilt]
-    if kinematics.on_rods is not None:
-        found |= _transmission(kinematics.on_rods)
+    if kinematics.transmits is not None:
+        found |= _transmission(kinematics.transmits) | _roots(machine)
+    if kinematics.on_rods is not None and not kinematics.on_rods.platform_turns:
+        found["acceleration_per_speed_squared_per_mm"] = _largest(speed_acceleration, kinematics.on_rods)
     every, largest = tilts(machine)
     found["tilt_in_every_direction_deg"] = every if np.isfinite(every) else None
     found["largest_tilt_deg"] = largest
@@ -64,19 +68,27 @@ def _proof_step(machine: Machine, floor: float) -> float | None:
     return grid_step_that_proves(rods, floor)
 
 
-def _transmission(kinematics: RodPlatform) -> dict[str, Any]:
-    def largest(measure: Any) -> dict[str, Any]:
-        bound: Measure = partial(measure, kinematics)
-        return _point(worst(bound, kinematics.workspace))
-
+def _transmission(kinematics: Transmission) -> dict[str, Any]:
+    several = len(kinematics.headings) > 1
     found: dict[str, Any] = {
-        "condition_number": largest(condition_number), "speed_transmission": largest(speed_transmission),
-        "force_transmission": largest(force_transmission)}
-    if kinematics.platform_turns:
-        found["turn_lever_mm"] = lever(kinematics)
-    else:
-        found["acceleration_per_speed_squared_per_mm"] = largest(speed_acceleration)
-    return found
+        "condition_number": _largest(condition_number, kinematics, several),
+        "speed_transmission": _largest(speed_transmission, kinematics, several),
+        "force_transmission": _largest(force_transmission, kinematics, several)}
+    return found | ({"turn_lever_mm": kinematics.lever} if kinematics.lever else {})
+
+
+def _roots(machine: Machine) -> dict[str, Any]:
+    """How many poses the joints of home have, and how many joints the pose there: roots of the loops."""
+    tip, axis = machine.kinematics.forward(machine.home[None])
+    every = machine.kinematics.assembly_modes(machine.home[None])[0][:, 0]
+    joints = machine.kinematics.with_all_roots().inverse(tip, axis)[:, 0]
+    return {"assembly_modes_at_home": int(np.isfinite(every).all(axis=1).sum()),
+            "inverse_branches_at_home": int(np.isfinite(joints).all(axis=1).sum())}
+
+
+def _largest(measure: Any, parts: Transmission | RodPlatform, several: bool = False) -> dict[str, Any]:
+    bound: Measure = partial(measure, parts)
+    return _point(worst(bound, parts.workspace, COARSE if several else GRID))
 
 
 def _point(value: WorstValue) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from machines.exchange.draft import Draft
 from machines.exchange.ini_file import HalFiles, IniEntry, IniFile, read_ini
-from machines.exchange.linuxcnc_kins import COORDINATES, NOT_OURS, UNREAD_PINS, PinReader, put_geometry
+from machines.exchange.linuxcnc_kins import COORDINATES, NOT_OURS, ON_LEGS, UNREAD_PINS, PinReader, put_geometry
 from machines.kinematics.chain import ROTARY
 from toolpaths.units import MM_PER_INCH
 
@@ -78,7 +78,9 @@ class _IniMachine:
                            f"it is not among those known here: {', '.join(COORDINATES)}")
         if why:
             self.draft.error("import.kinematics", f"{entry.said}: {why}", entry.line, file=entry.file,
-                             hint="postproc machine new asks for the geometry itself")
+                             hint='write a machine file of kind = "legs" with its struts or arms, as hexapod is, and run '
+                             "trivkins: programs hold the positions of the drives then" if self.module in ON_LEGS else
+                             "postproc machine new asks for the geometry itself")
             return False
         if any(word.lower().startswith("sparm=identityfirst") for word in entry.value.split()):
             self.draft.warning("import.kinematics", f"{entry.said}: the control begins without {self.module}", entry.line,

@@ -8,6 +8,7 @@ from pathlib import Path
 from machines.exchange.choices import GivenForm, MachineForm
 from machines.exchange.draft import Draft, finish
 from machines.exchange.freecad import read_freecad
+from machines.exchange.fusion import read_fusion
 from machines.exchange.linuxcnc_ini import read_linuxcnc
 from machines.exchange.siemens import read_siemens
 from machines.machine import Machine
@@ -15,10 +16,9 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import advice, read_input, reason
 
 _READERS: dict[MachineForm, Callable[[Path, str, Sequence[str]], tuple[Draft, dict[str, bool]]]] = {
-    "linuxcnc-ini": read_linuxcnc, "siemens": read_siemens, "freecad": read_freecad}
+    "linuxcnc-ini": read_linuxcnc, "siemens": read_siemens, "freecad": read_freecad, "fusion": read_fusion}
 UNDOCUMENTED: dict[MachineForm, str] = {
-    "heidenhain": "the form of Heidenhain's kinematics (KinematicsDesign, CfgKin..., backups of cycle 450) is not published",
-    "fusion": "the form of Fusion's machine files (.mch, .machine) is not published"}
+    "heidenhain": "the form of Heidenhain's kinematics (KinematicsDesign, CfgKin..., backups of cycle 450) is not published"}
 """form: why it is not read"""
 
 
@@ -45,7 +45,7 @@ def import_machine(path: Path, form: GivenForm, stated: Sequence[str]) -> tuple[
 
 
 def _form_of(path: Path, text: str) -> MachineForm | None:
-    if path.suffix.lower() in (".mch", ".machine"):
+    if path.suffix.lower() in (".mch", ".machine") or (text.lstrip().startswith("{") and '"kinematics"' in text):
         return "fusion"
     if text.lstrip().startswith("{") and '"axes"' in text:
         return "freecad"

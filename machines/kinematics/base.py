@@ -21,7 +21,7 @@ import numpy as np
 from machines.kinematics import by_samples
 from machines.kinematics.chain import Joint
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceParts
-from machines.kinematics.rod_platform import RodPlatform
+from machines.kinematics.rod_platform import RodPlatform, Transmission
 from machines.kinematics.taylor import TaylorVector, straight
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, Ints, read_only
@@ -68,6 +68,8 @@ class Kinematics(ABC):
     (product of exponentials, see `Serial`); () of any other"""
     on_rods: RodPlatform | None = None
     """the platform and its rods, where rods carry the tool"""
+    transmits: Transmission | None = None
+    """how legs pass motion and force on to a platform; None where none carry the tool"""
     clearance_parts: ClearanceParts | None = None
     """rods, spindle and slides that may touch each other (`machines.reach`)"""
     workspace: Workspace | None = None
@@ -120,6 +122,17 @@ class Kinematics(ABC):
         """True (N,) where joints may turn while the tool stands, so that the inverse is a family: mostly
         where the tool lies along a rotary axis."""
         return by_samples.free(self.jacobian(q), self.rotary)
+
+    def assembly_modes(self, q: Floats) -> tuple[Floats, Floats]:
+        """Every pose (tip, axis), each (M, N, 3), that the machine has at joints q (N, J), its own first; NaN where a point
+        has fewer. Without a platform one."""
+        tip, axis = self.forward(q)
+        return tip[None], axis[None]
+
+    def with_all_roots(self) -> Self:
+        """The same machine with every choice of roots of its legs among the branches of `inverse`, its own first: also those
+        to which it is not assembled. Without legs as it is."""
+        return self
 
     def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:
         """The pose (N, 6) at joints q0 (N, J) as the rotary joints outside the closed loops turn it on the

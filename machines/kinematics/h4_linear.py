@@ -177,6 +177,10 @@ class H4Linear(OnSlides):
         placed = [self.place(p, q[:, 4]) for p in self.platform.modes(q[:, :4])]
         return np.stack([tip for tip, _, _ in placed]), np.stack([axis for _, axis, _ in placed])
 
+    def with_all_roots(self) -> Self:
+        """See the base class."""
+        return replace(self, all_roots=True)
+
     def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """Where the parts are at joints q (N, 5), for the clearances."""
         p = self.solve_platform(q, near)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
+import numpy as np
+
 from machines.kinematics.base import Kinematics
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.rod_loops import by_parts
@@ -24,6 +26,28 @@ class OnSlides(Kinematics):
     clearance: ClearanceSizes | None
     platform_turns: bool
     gauge_below: float
+
+    @property
+    def transmits(self) -> OnSlides:  # type: ignore[override]  # nothing assigns it
+        """Itself."""
+        return self
+
+    @property
+    def lever(self) -> float:
+        """See `Transmission`."""
+        joints = self.platform_joints
+        return 0.5 * float(np.linalg.norm(joints[:, None] - joints[None], axis=2).max())
+
+    @property
+    def headings(self) -> Floats:
+        """See `Transmission`: it tilts about x."""
+        return np.zeros(1)
+
+    def loops_at(self, place: Floats, tilt: Floats, heading: float) -> tuple[Floats, Floats]:
+        """See `Transmission`."""
+        jx = self.loop_matrices(place, tilt)
+        jx[:, :, 3] /= self.lever
+        return jx, self.legs.along(jx[:, :, :3])
 
     @property
     def on_rods(self) -> OnSlides:  # type: ignore[override]  # nothing assigns it

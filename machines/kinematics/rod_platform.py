@@ -10,6 +10,26 @@ from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
 
 
+class Transmission(Protocol):
+    """Legs between K drives and a platform of K freedoms, all as lengths."""
+
+    @property
+    def workspace(self) -> Workspace:
+        """Of the reference point and the tilt."""
+
+    @property
+    def lever(self) -> float:
+        """mm by which the platform's turns count: half the largest distance of two platform joints (d in Company 2000); 0
+        of a platform that only translates."""
+
+    @property
+    def headings(self) -> Floats:
+        """(H,) rad into which a tilt may point."""
+
+    def loops_at(self, place: Floats, tilt: Floats, heading: float) -> tuple[Floats, Floats]:
+        """(Jx (N, K, K) with turns by the lever, diagonal of Jq (N, K)), mm, at places (N, 3) and tilts (N,)."""
+
+
 class RodPlatform(Protocol):
     """A platform on K legs whose carriages run on straight slides; its place is its reference point, mm, and a tilt."""
 

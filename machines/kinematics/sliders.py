@@ -146,7 +146,8 @@ def smallest_singular_value(jx: Floats) -> Floats:
 
 
 def three_spheres(centres: Floats, radii: Floats) -> tuple[Floats, Floats]:
-    """(foot, out), each (N, 3): the spheres around `centres` (N, 3, 3) meet at foot + out and foot - out.
+    """(foot, out), each (N, 3): the spheres around `centres` (N, 3, 3) with `radii` (3,) or (N, 3) meet at foot + out and
+    foot - out.
 
     `out` is along (c2 - c1) x (c3 - c1), so that det of the rods is positive at foot + out. NaN where they do not meet.
     """
@@ -154,10 +155,29 @@ def three_spheres(centres: Floats, radii: Floats) -> tuple[Floats, Floats]:
     e1, e2 = centres[:, 1] - first, centres[:, 2] - first
     normal = cross(e1, e2)
     square = np.einsum("ni,ni->n", normal, normal)
-    k1 = 0.5 * (np.einsum("ni,ni->n", e1, e1) + radii[0] ** 2 - radii[1] ** 2)
-    k2 = 0.5 * (np.einsum("ni,ni->n", e2, e2) + radii[0] ** 2 - radii[2] ** 2)
+    k1 = 0.5 * (np.einsum("ni,ni->n", e1, e1) + radii[..., 0] ** 2 - radii[..., 1] ** 2)
+    k2 = 0.5 * (np.einsum("ni,ni->n", e2, e2) + radii[..., 0] ** 2 - radii[..., 2] ** 2)
     square = np.where(square > 0.0, square, np.nan)
     foot = (k1[:, None] * cross(e2, normal) + k2[:, None] * cross(normal, e1)) / square[:, None]
-    rest = radii[0] ** 2 - np.einsum("ni,ni->n", foot, foot)
+    rest = radii[..., 0] ** 2 - np.einsum("ni,ni->n", foot, foot)
     height = np.sqrt(np.where(rest >= 0.0, rest, np.nan) / square)
     return first + foot, height[:, None] * normal
+
+
+def two_circles(centres: Floats, radii: Floats) -> tuple[Floats, Floats]:
+    """(foot, out), each (N, 3): in the plane z = 0 the spheres around `centres` (N, 2, 3) with `radii` (N, 2) meet at
+    foot + out and foot - out.
+
+    `out` is a quarter turn ahead of c2 - c1, so that det of the rods is positive at foot + out. NaN where they do not meet.
+    """
+    first, along = centres[:, 0, :2], centres[:, 1, :2] - centres[:, 0, :2]
+    r1, r2 = (radii**2 - centres[:, :, 2] ** 2).T
+    square = np.einsum("ni,ni->n", along, along)
+    square = np.where(square > 0.0, square, np.nan)
+    share = 0.5 * (1.0 + (r1 - r2) / square)
+    rest = r1 / square - share**2
+    height = np.sqrt(np.where(rest >= 0.0, rest, np.nan))
+    zero = np.zeros(len(centres))
+    foot = first + share[:, None] * along
+    return (np.column_stack([foot, zero + 0.0 * height]),
+            np.column_stack([-height * along[:, 1], height * along[:, 0], zero]))

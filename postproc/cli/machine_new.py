@@ -10,6 +10,7 @@ import typer
 from postproc.cli.console import Json, refuse_overwriting, report, shown_errors
 
 if TYPE_CHECKING:
+    from machines.machine import Machine
     from machines.sheet.make import NewMachine
     from machines.sheet.questions import SheetQuestion
 
@@ -86,8 +87,24 @@ def _text(made: NewMachine, output: Path, drawing: str) -> str:
         return ""
     unproved = [name.split(".")[0] for name in made.assumed if name.endswith(".direction")]
     lines = [f"written: {output}{f', {drawing}' if drawing else ''}",
-             f"{made.machine.structure}, {len(made.assumed)} figures assumed"]
+             f"{made.machine.structure}, {len(made.assumed)} figures assumed", *_understood(made.machine)]
     if unproved:
         lines.append(f"senses of {', '.join(unproved)} are not proved: jog each by +10, write what was seen into the sheet")
     lines.append(f"next: postproc convert part.cls -m {output} -c CONTROLLER --check-program check.nc proves the pivots")
     return "\n".join(lines)
+
+
+def _understood(machine: Machine) -> list[str]:
+    """Travel and speed of each axis in both units that brochures print: a unit that was mistaken shows."""
+    from toolpaths.units import DEG, MM_PER_INCH
+
+    lines, limits = [], machine.limits
+    for j, name in enumerate(machine.axis_names):
+        low, high, speed = (float(values[j]) for values in (limits.lower, limits.upper, limits.velocity))
+        if not machine.rotary[j]:
+            ends = f"{low:g} to {high:g} mm ({(high - low) / MM_PER_INCH:.4g} in long)"
+            lines.append(f"  {name}: {ends}, {speed * 0.06:.4g} m/min ({speed * 60.0 / MM_PER_INCH:.4g} in/min)")
+        else:
+            ends = "endless" if machine.endless[j] else f"{low / DEG:g} to {high / DEG:g} degrees"
+            lines.append(f"  {name}: {ends}, {speed / DEG / 6.0:.4g} turns/min ({speed / DEG:.4g} degrees/s)")
+    return lines

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,10 +21,15 @@ from postproc.cli.group import Group
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.machine_new import EXAMPLES as NEW
 from postproc.cli.machine_new import machine_new
+from postproc.cli.options import figure_ending
 from postproc.cli.setup_align import EXAMPLES as ALIGNED
 from postproc.cli.setup_align import setup_align
 from postproc.cli.setup_new import EXAMPLES, setup_new
 from toolpaths.table_text import table_text
+
+if TYPE_CHECKING:
+    from machines.machine import Machine
+    from toolpaths.choices import FigureEnding
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                           help="Machines: new, list, show, check, analyse, import, export, schema.")
@@ -55,13 +61,30 @@ def machine_list(json: Json = "") -> None:
 
 
 @machine_app.command("show")
-def machine_show(name: Annotated[str, typer.Argument(help="name or TOML file")], json: Json = "") -> None:
+def machine_show(name: Annotated[str, typer.Argument(help="name or TOML file")],
+                 figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="a machine on legs at home, "
+                                                             ".png or .svg")] = None, json: Json = "") -> None:
     """Show a machine: axes, travel, limits, which values are assumed."""
     from postproc.cli.catalogue import machine_dict, machine_text
 
+    ending = figure_ending(figure)
+    refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the machine": name})
+    outputs: dict[Path, str | bytes] = {}
     with shown_errors(json):
         m = machine_of(name)
-    report((), json, machine_dict(m), machine_text(m))
+        if figure is not None and ending is not None:
+            outputs[figure] = _figure(m, ending)
+    report((), json, machine_dict(m), machine_text(m), outputs)
+
+
+def _figure(machine: Machine, ending: FigureEnding) -> bytes:
+    """Of a machine at home; wrong use where it has no legs."""
+    from machines.analysis.machine_figure import machine_figure
+
+    try:
+        return machine_figure(machine, ending)
+    except ValueError as fault:
+        raise typer.BadParameter(f"{fault}: only machines on legs are drawn", param_hint="--figure") from fault
 
 
 @machine_app.command("check", epilog="Example: postproc machine check my-machine.toml")

@@ -81,6 +81,8 @@ class SheetFacts:
     refused: tuple[Diagnostic, ...]
     largest_speed: float = math.inf
     """rev/min, of the machine's spindle"""
+    reach: bool = False
+    """no place was found without gauge lengths: the spindle would have to come down to the part itself"""
 
     @property
     def numbers(self) -> dict[str, int]:

@@ -11,10 +11,10 @@ from pathlib import Path
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.base.progress import Progress
-from postproc.controllers.model import load_controller
+from postproc.controllers.model import ControllerFile, load_controller
 from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import NumberedTool, SheetFacts, facts_of, named_tools, taken_numbers
-from postproc.setup_sheet.place import Fit, below_origin, fitted
+from postproc.setup_sheet.place import Fit, below_origin, beyond, fitted
 from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, number_questions, questions_of
 from postproc.setup_sheet.text import ORIGIN, TOOL_NUMBERS, SheetHeader, sheet_text, sheet_values
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, read_value, warning
@@ -59,8 +59,39 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     known = [*found, *(d for d in toolpath.faults if d not in found)]
     if has_errors(known):
         return SetupSheet("", tuple(known))
+    said: dict[str, float | str] = {}
+
+    def once(question: Question) -> float | str:
+        assert ask is not None
+        if question.key not in said:
+            said[question.key] = ask(question)
+        return said[question.key]
+
+    def made(reach: bool) -> SetupSheet:
+        return _made(toolpath, machine, controller, options, given, once if ask is not None else None, assume,
+                     (list(found), known), code, progress, spec, reach)
+
+    first = made(False)
+    if first.text or not (ask is not None or assume) or not _lengths_may_help(first):
+        return first
+    again = made(True)
+    return again if again.text else first
+
+
+def _lengths_may_help(made: SetupSheet) -> bool:
+    """True where no place fits and a tool has no gauge length: its spindle was held against travel as if it cut itself."""
+    if made.fit is None or made.facts is None or not beyond(made.fit.result):
+        return False
+    return not {f"tools.{tool.number}.gauge_length" for tool in made.facts.tools} <= {key for key, _ in made.answers}
+
+
+def _made(toolpath: Toolpath, machine: Machine, controller: str | Path, options: Options, given: GivenAnswers,
+          ask: Callable[[Question], float | str] | None, assume: bool, read: tuple[list[Diagnostic], list[Diagnostic]],
+          code: str, progress: Progress | None, spec: ControllerFile, reach: bool) -> SetupSheet:
+    """See `new_setup`; `reach`: gauge lengths are asked for although no word depends on them."""
+    found, known = read[0], list(read[1])
     named, asked, unnumbered = _numbers(toolpath, given, ask, assume)
-    facts = facts_of(toolpath, machine, spec, options, named)
+    facts = replace(facts_of(toolpath, machine, spec, options, named), reach=reach)
     known += _of_two(named, toolpath) + _no_such_name(given, [one.name for one in asked], toolpath)
     if facts.refused or has_errors(known):
         return SetupSheet("", (*known, *facts.refused), facts)
@@ -68,7 +99,7 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     answers, left = answered(questions[len(asked):], given, ask, assume)
     left = [*unnumbered, *left]
     known += _unused(given, facts, toolpath)
-    for tool in () if facts.lengths else facts.tools:  # not needed, but given: travel is checked with it
+    for tool in () if facts.lengths or reach else facts.tools:  # not needed, but given: travel is checked with it
         length = given.gauge_length.get(tool.number, given.gauge_length.get(0))
         if length is not None:
             answers[f"tools.{tool.number}.gauge_length"] = Answer(length, "answered")

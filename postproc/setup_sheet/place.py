@@ -81,7 +81,7 @@ def fitted(toolpath: Toolpath, machine: Machine, controller: str | Path, setup: 
     attitudes = attitudes_of(toolpath, machine, options.axis_tolerance * DEG)
     begin = FoundPlace(_part(attitudes[0], np.zeros(3)), attitudes[0], np.nan)
     first = converted(placed_at(setup, begin))
-    if first.ok or not _beyond(first):
+    if first.ok or not beyond(first):
         return Fit(placed_at(setup, begin), first, begin, 1, ())
     tried, lacks = 1, list[str]()
     for place in _places(toolpath, machine, setup, options, attitudes, lacks):
@@ -109,7 +109,7 @@ def placed_at(setup: SetupFile, place: FoundPlace) -> SetupFile:
     return setup.model_copy(update={"part": place.part})
 
 
-def _beyond(result: PostResult) -> bool:
+def beyond(result: PostResult) -> bool:
     """True where every error may be one of the place."""
     return all(d.code in PLACES for d in result.diagnostics if d.severity is Severity.ERROR)
 
@@ -117,7 +117,7 @@ def _beyond(result: PostResult) -> bool:
 def found_place(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
     """What `place` would find for a conversion that is refused by travel or reach: a note with [part], or why no place fits,
     or the one record that no place puts right; nothing for other refusals. `toolpath` is as it was read."""
-    if result.ok or not _beyond(result):
+    if result.ok or not beyond(result):
         return []
     odd = odd_record(toolpath, _largest(result.machine))
     if odd is not None:
@@ -179,8 +179,9 @@ def _space(work: PassContext, setup: SetupFile, machine: Machine) -> Space:
     limits = np.concatenate([machine.limits.lower, machine.limits.upper])[np.tile(~np.array(machine.rotary), 2)]
     far = float(np.abs(limits[np.isfinite(limits)]).max(initial=1000.0)) + size
     box = machine.kinematics.workspace
-    low, high = (np.full(3, -far), np.full(3, far)) if machine.kinematics.straight_slides or box is None else (
-        box.lower - size, box.upper + size)
+    if not machine.kinematics.straight_slides and box is not None:
+        far = float(np.abs([box.lower, box.upper]).max()) + size + 2.0 * float(np.linalg.norm(_platform_to_tip(work)))
+    low, high = np.full(3, -far), np.full(3, far)
     x, y, z = ((float(a), float(b)) for a, b in zip(low, high, strict=True))
     return space_of(PlacementLimits(x=x, y=y, z=z), Placement(np.eye(3), np.zeros(3)),
                     (safe.corners.min(axis=0), safe.corners.max(axis=0)))
@@ -193,7 +194,7 @@ def _deepest(work: PassContext, space: Space, one: Attitude, least: float) -> tu
     if region is None:
         return None, str(refused)
     try:
-        place, margin, lack = region.deepest(*space.room(angles))
+        place, margin, lack = region.deepest(*_room(work, space, one))
     except ArithmeticError as fault:
         return None, str(fault)
     if not margin >= 0.0:
@@ -203,6 +204,29 @@ def _deepest(work: PassContext, space: Space, one: Attitude, least: float) -> tu
         at = float(region.margins(near[None, :])[0])
         place, margin = (near, at) if at >= 0.0 else (place, margin)
     return FoundPlace(_part(one, place[:ANGLES]), one, margin), ""
+
+
+def _platform_to_tip(work: PassContext) -> Floats:
+    """(3,) mm from the point of which a workspace is stated to the tip of the longest tool, at home."""
+    home, kin = work.machine.home[None], work.machine.kinematics
+    longest = max((one.kin.tool_length for one in work.passes), default=0.0)
+    rig = kin.rig(home)
+    return np.asarray(rig.gauge[0] - rig.place[0] - longest * rig.axis[0])
+
+
+def _room(work: PassContext, space: Space, one: Attitude) -> tuple[Floats, Floats]:
+    """Ends (3,) of where the part may stand in an attitude; with a workspace, where all of its tips come into that, its
+    middle first: rods on their other sides reach places far from there too, in which the machine never is."""
+    low, high = space.room(angles_of(one.turn))
+    kin = work.machine.kinematics
+    if kin.straight_slides or kin.workspace is None:
+        return low, high
+    away = _platform_to_tip(work)
+    tips = work.space.corners @ one.turn.T
+    axes = np.concatenate([each.axes for each in work.passes]) @ one.turn.T
+    slack = float(np.linalg.norm(away)) * float(np.linalg.norm(axes - work.machine.home_axis, axis=1).max())
+    least, most = kin.workspace.lower + away - tips.min(axis=0), kin.workspace.upper + away - tips.max(axis=0)
+    return np.clip(np.minimum(least, most) - slack, low, high), np.clip(np.maximum(least, most) + slack, low, high)
 
 
 def _part(one: Attitude, origin: Floats) -> PartPlacement:

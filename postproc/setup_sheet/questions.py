@@ -116,7 +116,7 @@ def questions_of(facts: SheetFacts) -> list[Question]:
     """All that the files leave open, in the order of the set-up file."""
     result = []
     for tool in facts.tools:
-        if facts.lengths:
+        if facts.lengths or facts.reach:
             result.append(Question("gauge_length", tool.number, f"{tool.called}: gauge length, from the gauge point of the "
                                    "spindle to the tip", None, _length(tool)))
         if not tool.speed:

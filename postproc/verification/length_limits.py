@@ -8,8 +8,8 @@ lengths found, and the bound of its deviation (`deviation_bound`) must keep the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,23 +28,19 @@ from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
 from postproc.setup.model import ToolSetup
 from postproc.verification.executed import executed_poses
+from postproc.verification.length_ends import LEAST, SIGNS, Ends
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import lengths
 from toolpaths.shapes import arrays
 
 STEP = 0.1
 """mm that all tools are made longer by, to see what goes with the length"""
-LEAST = 1e-6
-"""mm or rad per mm: less is arithmetic"""
 SHARE = 0.997
 """of a length that was found, which is then proved; of the proved one, which is stated: not on the edge"""
 NEAR = 1.02
 """of a length that is proved to one that is not, which is near enough"""
 TRIED = (1.0, 0.98, 0.9653, 0.9506, 0.9359, 0.9212, *(0.9212 * 0.82 * 0.5**k for k in range(8)))
 """of a length that was found, tried in this order until one is proved: from the third to the sixth it is near enough then"""
-_ROUNDS, _CLOSE = 60, 1e-5
-_FEW, _FARTHER = 16, 4.0
-_SIGNS = -1.0, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,95 +61,6 @@ class LengthTrial:
         held = job.register_lengths()
         motion, _ = run(self.code, job.machine.axis_names, replace(self.offsets, lengths=held))
         return motion, executed_poses(job, motion, held)
-
-
-_Room = Callable[[Ints, Floats], Floats]
-"""What is left of a tolerance or a clearance at places (K,) with tools longer by mm (K,), no faster than they move."""
-
-
-def _nearest(tool: Ints, sure: Floats) -> Ints:
-    """The few places of every tool that are nearest to their tolerance."""
-    order = np.lexsort((sure, tool))
-    rank = np.arange(len(order)) - np.searchsorted(tool[order], tool[order])
-    return np.asarray(order[rank < _FEW])
-
-
-def _first_zero(room: _Room, places: Ints, direction: float, ends: tuple[Floats, Floats], left: tuple[Floats, Floats],
-                tool: Ints) -> Floats:
-    """(K,) mm, between `ends` (K,) and close to where the room of places (K,) ends, that leave some; `left` (K,) at `ends`.
-
-    False position (Illinois); places that are not the first of their tool are not followed to the end.
-    """
-    (low, high), (f_low, f_high) = (np.array(ends[0]), np.array(ends[1])), (np.array(left[0]), np.array(left[1]))
-    side, first = np.zeros(len(low)), np.full(tool.max() + 1, np.inf)
-    for _ in range(_ROUNDS):
-        np.minimum.at(first, tool, high)
-        k = np.flatnonzero((high - low > _CLOSE * high) & (low < first[tool]))
-        if not len(k):
-            break
-        share = np.clip(f_low[k] / (f_low[k] - f_high[k]), 0.5 * _CLOSE, 0.9)
-        x = np.minimum(low[k] + share * (high[k] - low[k]), _FARTHER * low[k] + _FARTHER * LEAST)
-        x = np.where(x < high[k], x, 0.5 * (low[k] + high[k]))
-        at = room(places[k], direction * x)
-        inside = at > 0.0
-        f_high[k[inside & (side[k] > 0.0)]] *= 0.5
-        f_low[k[~inside & (side[k] < 0.0)]] *= 0.5
-        low[k[inside]], f_low[k[inside]] = x[inside], at[inside]
-        high[k[~inside]], f_high[k[~inside]] = x[~inside], at[~inside]
-        side[k] = np.where(inside, 1.0, -1.0)
-    return low
-
-
-@dataclass
-class _Ends:
-    """The least length found so far: mm (T, 2) by tool and sign, and what fails there."""
-
-    numbers: Ints
-    mm: Floats = field(init=False)
-    what: list[list[str]] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.mm = np.full((len(self.numbers), 2), MUCH)
-        self.what = [["", ""] for _ in self.numbers]
-
-    def add(self, tool: Ints, sign: int, mm: Floats, what: str) -> None:
-        """Lengths (N,) of tools (N,), as indices; the shorter ones stay."""
-        for t in np.unique(tool).tolist():
-            least = float(mm[tool == t].min())
-            if least < self.mm[t, sign]:
-                self.mm[t, sign], self.what[t][sign] = max(least, 0.0), what
-
-    def follow(self, tool: Ints, speed: Floats, room: _Room, what: str) -> None:
-        """Places (N,) with a speed (N,) mm or rad per mm, of a clearance: as far as is left, again and again."""
-        goes = np.flatnonzero(speed > LEAST)
-        for sign, direction in enumerate(_SIGNS if len(goes) else ()):
-            x, k = np.zeros(len(goes)), np.arange(len(goes))
-            most = self.mm[tool[goes], sign]
-            for _ in range(_ROUNDS):
-                step = np.maximum(room(goes[k], direction * x[k]), 0.0) / speed[goes[k]]
-                x[k] += step
-                k = k[(step > _CLOSE * (x[k] + LEAST)) & (x[k] < most[k])]
-                if not len(k):
-                    break
-            self.add(tool[goes], sign, x, what)
-
-    def leave(self, tool: Ints, speed: Floats, room: _Room, what: str) -> None:
-        """Places (N,) of a tolerance, as above: a tip on a line is never farther from its path than at the ends
-        of the line, so a place that keeps the tolerance at a length keeps it at all lengths between."""
-        goes = np.flatnonzero(speed > LEAST)
-        if not len(goes):
-            return
-        speed, tool, left = speed[goes], tool[goes], np.maximum(room(goes, np.zeros(len(goes))), 0.0)
-        sure = left / speed
-        for sign, direction in enumerate(_SIGNS):
-            for k in (_nearest(tool, sure), np.arange(len(goes))):
-                most = self.mm[tool[k], sign]
-                k, most = k[sure[k] < most], most[sure[k] < most]
-                beyond = room(goes[k], direction * most) if len(k) else most
-                k, most, beyond = k[beyond < 0.0], most[beyond < 0.0], beyond[beyond < 0.0]
-                if len(k):
-                    mm = _first_zero(room, goes[k], direction, (sure[k], most), (left[k], beyond), tool[k])
-                    self.add(tool[k], sign, mm, what)
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +92,7 @@ def length_margins(trial: LengthTrial, motion: Motion, executed: BlockPoses, c: 
     again, longer = trial.executed(dict.fromkeys(numbers.tolist(), STEP))
     if len(again) != len(motion):
         return tuple(LengthMargin(number, 0.0, 0.0, "other blocks", "other blocks") for number in numbers.tolist())
-    ends, matters = _Ends(numbers), length_matters(job)
+    ends, matters = Ends(numbers), length_matters(job)
     look = _Look(job, motion, executed, again, longer, c, ends, matters)
     look.cuts_and_links()
     look.points()
@@ -196,7 +103,7 @@ def length_margins(trial: LengthTrial, motion: Motion, executed: BlockPoses, c: 
     return tuple(_margin(job, ends, t) for t in range(len(numbers)))
 
 
-def _margin(job: Job, ends: _Ends, t: int) -> LengthMargin:
+def _margin(job: Job, ends: Ends, t: int) -> LengthMargin:
     (shorter, longer), (why, so), number = ends.mm[t].tolist(), ends.what[t], int(ends.numbers[t])
     whole = job.length_of(number)
     if shorter >= whole > 0.0:
@@ -215,7 +122,7 @@ class _Look:
     again: Motion
     longer: BlockPoses
     c: Comparison
-    ends: _Ends
+    ends: Ends
     matters: bool
 
     @cached_property
@@ -244,21 +151,35 @@ class _Look:
                 yield rows
 
     def _poses(self, rows: Ints, t: float | Floats) -> _Places:
-        return _Places.of(self.executed.poses(self.motion, rows, t), self.longer.poses(self.again, rows, t))
+        here = self.executed.poses(self.motion, rows, t)
+        if self._keeps_joints(rows).all():
+            return _Places(*here, -here[1], np.zeros_like(here[1]))
+        return _Places.of(here, self.longer.poses(self.again, rows, t))
+
+    def _keeps_joints(self, rows: Ints) -> Bools:
+        """(K,) blocks of machine coordinates whose joints are those with longer tools too: the tip alone goes, along the
+        tool."""
+        if self.job.control.base == "tcp":
+            return np.zeros(len(rows), dtype=bool)
+        words = np.array([frame.law == "axes" for frame in self.motion.frames])[self.motion.frame[rows]]
+        same = (self.motion.end[rows] == self.again.end[rows]).all(axis=1)
+        return np.asarray(words & same & (begins(self.motion, rows) == begins(self.again, rows)).all(axis=1))
 
     def cuts_and_links(self) -> None:
         """Tolerances in cuts, clearance of links, at the places of `check_links` and `compare`."""
         for rows in self._rows():
-            run_by = self.moves.run_by(self.c.owner[rows])
-            cuts, links = rows[run_by], rows[~run_by]
-            for which, look in ((cuts, self._cuts), (links[links > 0], self._links)):
-                if len(which):
-                    look(which)
+            run_by, keeps = self.moves.run_by(self.c.owner[rows]), self._keeps_joints(rows)
+            for alike in (keeps, ~keeps):
+                cuts, links = rows[run_by & alike], rows[~run_by & alike & (rows > 0)]
+                for which, look in ((cuts, self._cuts), (links, self._links)):
+                    if len(which):
+                        look(which)
 
     def _times(self, rows: Ints) -> list[float | Floats]:
         """Fractions at which blocks are looked at; poses with longer tools are made at once too."""
         times = self.executed.times(self.motion, rows)
-        self.longer.look_ahead(self.again, rows, times)
+        if not self._keeps_joints(rows).all():
+            self.longer.look_ahead(self.again, rows, times)
         return times
 
     def _cuts(self, rows: Ints) -> None:
@@ -320,7 +241,7 @@ class _Look:
                 q, other = self.executed.joints(self.motion, rows, t), self.longer.joints(self.again, rows, t)
                 slope = (other - q) / STEP
                 for j in np.flatnonzero((np.abs(slope) > LEAST).any(axis=0)).tolist():
-                    for sign, direction in enumerate(_SIGNS):
+                    for sign, direction in enumerate(SIGNS):
                         goes = direction * slope[:, j]
                         k = np.flatnonzero(np.abs(goes) > LEAST)
                         room = np.where(goes[k] > 0.0, limits.upper[j] - q[k, j], q[k, j] - limits.lower[j])
@@ -337,19 +258,19 @@ class _Look:
                 continue
             here = reach.reach(kin, q[k])
             slope = (reach.reach(kin, other[k]).values - here.values) / STEP
-            for sign, direction in enumerate(_SIGNS):
+            for sign, direction in enumerate(SIGNS):
                 with np.errstate(divide="ignore", invalid="ignore"):
                     mm = np.where(direction * slope < -LEAST, here.values / (-direction * slope), np.inf)
                 for name, column in zip(here.names, np.nan_to_num(mm, nan=np.inf).T, strict=True):
                     self.ends.add(self._tool(rows[k]), sign, column, name)
 
 
-def _prove(trial: LengthTrial, c: Comparison, ends: _Ends) -> None:
+def _prove(trial: LengthTrial, c: Comparison, ends: Ends) -> None:
     """Lengths at which the bound of every cut keeps the tolerances: those that were found, else less.
 
     `low` is proved, `high` is not: less and less first, as places lie near to each other, then half between.
     """
-    for sign, direction in enumerate(_SIGNS):
+    for sign, direction in enumerate(SIGNS):
         by_place = np.array([what[sign].endswith("tolerance") for what in ends.what])
         found = np.where(by_place, SHARE, 1.0) * ends.mm[:, sign]
         low, high, next_ = np.zeros(len(found)), np.array(found), np.array(found)

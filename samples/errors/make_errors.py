@@ -58,7 +58,7 @@ def serial(name: str, seed: int) -> ErrorModel:
 def parallel(name: str, seed: int) -> ErrorModel:
     """A machine on rods: every dimension off by some 10 um, guides by some 5 arcsec."""
     kinematics, rng = machines.load(name).kinematics, np.random.default_rng(seed)
-    frame = rod_frame(kinematics)
+    frame = rod_frame(kinematics.on_rods)
     slides = kinematics.axis_names[: len(frame.rail)]
     zero = RodErrors.none(slides, rod_names(frame, slides))
     size = [5 * ARCSEC if angular(n) else 0.008 for n in zero.names]

@@ -81,7 +81,7 @@ def main() -> None:
 
     compared("sweep.py, 300 places", sweep, lambda: swept(sweep.sweep), lambda: swept(sweep.compiled_sweep))
     kin = kinematics("uranesx")
-    frame, errors, (slides, where, turned) = rod_frame(kin), rod_errors(kin), platform(kin, 300)
+    frame, errors, (slides, where, turned) = rod_frame(kin.on_rods), rod_errors(kin), platform(kin, 300)
     compared("rods.py, 300 poses", rods, lambda: frame.solve(slides, where, turned, errors),
              lambda: frame.solve(slides, where, turned, errors))
     moving, pieces = random_case(rng)

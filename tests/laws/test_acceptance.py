@@ -16,7 +16,7 @@ import pytest
 import machines
 from machines.analysis.singularity import growth, safe_radius
 from machines.analysis.transmission import condition_number, speed_acceleration, speed_transmission, worst
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.legs.on_legs import OnLegs
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -32,9 +32,9 @@ class Row(NamedTuple):
     compute: Callable[[], float]
 
 
-def delta(name: str) -> LinearDelta:
+def delta(name: str) -> OnLegs:
     kinematics = machines.load(name).kinematics
-    assert isinstance(kinematics, LinearDelta)
+    assert isinstance(kinematics, OnLegs)
     return kinematics
 
 
@@ -42,19 +42,19 @@ def conditioning(name: str) -> float:
     """Worst condition number over x, y within 250 mm and z within 200 mm."""
     kinematics = delta(name)
     np.testing.assert_array_equal(kinematics.workspace.upper, [250.0, 250.0, 200.0])
-    return worst(partial(condition_number, kinematics), kinematics.workspace).value
+    return worst(partial(condition_number, kinematics.transmits), kinematics.workspace).value
 
 
 def motor_speed() -> float:
     """m/s at 2 m/s of the spindle."""
     kinematics = delta("uranesx")
-    return 2.0 * worst(partial(speed_transmission, kinematics), kinematics.workspace).value
+    return 2.0 * worst(partial(speed_transmission, kinematics.transmits), kinematics.workspace).value
 
 
 def motor_acceleration() -> float:
     """m/s2 at 35 m/s2 and 2 m/s: the separate maxima of both terms added."""
     kinematics = delta("uranesx")
-    bent = worst(partial(speed_acceleration, kinematics), kinematics.workspace).value
+    bent = worst(partial(speed_acceleration, kinematics.on_rods), kinematics.workspace).value
     return 35.0 * motor_speed() / 2.0 + 1000.0 * bent * 2.0**2
 
 

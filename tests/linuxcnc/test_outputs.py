@@ -31,12 +31,14 @@ MADE = {"bicubic.cls": ("mill-3axis", "planar-delta-z"), "blade.cls": ("linuxcnc
         "five_faces.cls": ("trunnion-bc",), "five_tilted.cls": ("nutating-head",),
         "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
         "inch_plate.apt": ("mill-4axis",), "indexed_4axis.cls": ("mill-4axis",),
-        "pocket.cls": ("uranesx", "delta-cone", "delta-coplanar", "delta-hybrid", "linuxcnc-lineardelta"),
+        "pocket.cls": ("uranesx", "rotary-delta", "triaglide", "delta-cone", "delta-coplanar", "delta-hybrid",
+                       "linuxcnc-lineardelta"),
         "test_part.cls": ("delta-parallel-x", "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact",
                           "delta-star"),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
 """machines on which each sample is made: every sample, and every machine whose letters LinuxCNC's interpreter has"""
-ORIGINS = {"planar-delta-z": (-41.0, -30.0, -125.0)}
+ORIGINS = {"planar-delta-z": (-41.0, -30.0, -125.0), "rotary-delta": (-40.0, -30.0, -200.0),
+           "triaglide": (-40.0, -30.0, -200.0)}
 """mm, of the part on machines in whose middle it has no room"""
 MORE = {"bicubic.cls": ("uranesx",), "blade.cls": ("head-table",),
         "five_faces.cls": ("mikron-ucp710", "linuxcnc-xyzac-trt"),

@@ -53,7 +53,7 @@ def rod_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01,
                angle: float = 3.0 * ARCSEC) -> RodErrors:
     """All dimensions of a machine on rods."""
     rng = np.random.default_rng(seed)
-    frame = rod_frame(kinematics)
+    frame = rod_frame(kinematics.on_rods)
     slides = kinematics.axis_names[: len(frame.rail)]
     zero = RodErrors.none(slides, rod_names(frame, slides))
     return zero.with_values(rng.normal(size=len(zero.names)) * [angle if ".guide." in n else length for n in zero.names])

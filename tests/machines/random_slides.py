@@ -6,17 +6,14 @@ import numpy as np
 
 from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.legs.on_legs import OnLegs
-from machines.kinematics.linear_delta import LinearDelta
 from toolpaths.arrays import Floats
 
 
-def random_slides(kinematics: H4Linear | LinearDelta | OnLegs, rng: np.random.Generator, n: int) -> Floats:
+def random_slides(kinematics: H4Linear | OnLegs, rng: np.random.Generator, n: int) -> Floats:
     """Slides (n, 3 or 4) of random places and tilts of the workspace; of a machine on legs all joints."""
     if isinstance(kinematics, OnLegs):
         return kinematics.inverse(*poses_over_workspace(kinematics, rng, n))[0]
     place, tilt = kinematics.workspace.random(rng, n)
-    if isinstance(kinematics, LinearDelta):
-        return kinematics.legs.inverse(place[:, None, :] + kinematics.platform)
     return kinematics.platform.inverse(np.column_stack([place, tilt]))
 
 

@@ -8,22 +8,22 @@ import pytest
 import machines
 from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.legs.on_legs import OnLegs
 from machines.reach import Margins, is_checked, reach, reach_between, segment_distance
 from tests.machines.random_slides import random_slides
 
 NAMES = ("uranesx", "h4a-c-table", "h4a-spindle-axis")
 
 
-def parallel(name: str) -> LinearDelta | H4Linear:
+def parallel(name: str) -> OnLegs | H4Linear:
     kinematics = machines.load(name).kinematics
-    assert isinstance(kinematics, LinearDelta | H4Linear)
+    assert isinstance(kinematics, OnLegs | H4Linear)
     return kinematics
 
 
-def joints(kinematics: LinearDelta | H4Linear, n: int, seed: int = 0) -> np.ndarray:
+def joints(kinematics: OnLegs | H4Linear, n: int, seed: int = 0) -> np.ndarray:
     slides = random_slides(kinematics, np.random.default_rng(seed), n)
-    return slides if isinstance(kinematics, LinearDelta) else np.column_stack([slides, np.zeros(n)])
+    return slides if isinstance(kinematics, OnLegs) else np.column_stack([slides, np.zeros(n)])
 
 
 def test_segment_distance_is_the_least_over_both_segments() -> None:

@@ -20,7 +20,7 @@ WITNESS = "postproc.witness."
 """shares no code with the rest"""
 IN_WORK = {"toolpaths.cl.assemble.PointRows", "toolpaths.cl.text.scan._Chunk", "toolpaths.cl.text.scan._Lines",
            "postproc.joints.plan._Stage", "postproc.readback.execution.rows.SectionState",
-           "postproc.readback.text.cycles.Sticky", "postproc.verification.length_limits._Ends"}
+           "postproc.readback.text.cycles.Sticky", "postproc.verification.length_ends.Ends"}
 """dataclasses that are not frozen: what one function works on; no stage gets them from another"""
 ARRAY = re.compile(r"\b(Floats|Ints|Bools|Array|NDArray)\b")
 NO_ARRAY = re.compile(r"\b(Callable|list|dict|Mapping|Sequence|tuple\[tuple)\[")

@@ -184,6 +184,8 @@ def _unsupported(b: ToolpathBuilder, s: Statement, word: str) -> None:
     if s.words[-1:] == ("NOMORE",) and len(s.words) == 1 + len(s.numbers):
         b.taken.add(b.index)
         return
+    if word == "THREAD":
+        b.turns()
     b.log.error("cl.unsupported-motion", f"{word} moves the tool or changes how it moves, and is not supported",
                 b.line, f"have the CAM system write out the points it makes; --allow-unknown {word} leaves the record out",
                 key=word)

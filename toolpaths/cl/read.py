@@ -24,7 +24,7 @@ from toolpaths.cl.text.other_formats import other_format
 from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, ReadProgress, scan
 from toolpaths.cl.text.source import normalise
 from toolpaths.cl.text.statements import Lexer, StatementList
-from toolpaths.diagnostics import Diagnostic, Severity
+from toolpaths.diagnostics import Diagnostic, Severity, has_errors
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import ClSource, Toolpath
 
@@ -115,6 +115,10 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     if not form:
         check_forms(program, log, b.allow_unknown, found)
     records = counted(b, frozenset(HANDLERS))
+    turning = [op.turning for op in toolpath.operations]
+    if any(turning) and has_errors(log.diagnostics()):
+        whole = "this is a turning file" if all(turning) else "turning stands between milling"
+        log.info("cl.turning", f"{whole}: milling alone is converted")
     diagnostics = log.diagnostics()
     read = replace(_with_faults(toolpath, diagnostics), records=records)
     object.__setattr__(read, "source", ClSource(raw, units or "", dialect or ""))

@@ -86,6 +86,12 @@ def apply(b: ToolpathBuilder, s: Statement) -> None:
         b.turns()
 
 
+def machin(b: ToolpathBuilder, s: Statement) -> None:
+    """MACHIN names the post-processor; that of a lathe says that the file is turning."""
+    if any(isinstance(word, str) and word.startswith(("LATHE", "TURN")) for word in s.words):
+        b.turns()
+
+
 def partno(b: ToolpathBuilder, s: Statement) -> None:
     """The name of the part; the first one counts."""
     b.name = b.name or s.body.strip("'")
@@ -165,6 +171,8 @@ def mode(b: ToolpathBuilder, s: Statement) -> None:
         b.log.error("cl.motion-word", f"{s.major}/{s.body}: incremental coordinates are not supported", b.line,
                     "have the CAM system write absolute coordinates")
     elif s.major == "MODE":
+        if s.has("TURN"):
+            b.turns()
         plain_event(b, s)
 
 
@@ -270,5 +278,5 @@ HANDLERS: dict[str, Callable[[ToolpathBuilder, Statement], None]] = {
     "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl, "DWELL": dwell,
     "STOP": stop, "OPSTOP": stop, "DELETE": opskip, "SELECTL": selctl, "OP_NAME": named_operation,
     "MODE": mode, "CSI_TOOL_PATH": named_operation, "OPNAME": named_operation, "APPLY": apply,
-    "OPFEATSTART": solidworks_feature, "TRNTYP": turn_type,
+    "OPFEATSTART": solidworks_feature, "TRNTYP": turn_type, "MACHIN": machin,
 }

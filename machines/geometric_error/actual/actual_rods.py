@@ -30,11 +30,18 @@ from machines.kinematics import columns
 from machines.kinematics.chain import Joint
 from machines.kinematics.columns import Columns
 from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.rod_platform import RodPlatform
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import rotation
 
 UP = np.array([0.0, 0.0, 1.0])
+
+
+def rods_of(kinematics: OnLegs) -> RodPlatform:
+    """The rods of a machine that has them."""
+    assert kinematics.on_rods is not None
+    return kinematics.on_rods
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +64,7 @@ class ActualRods(Actual):
 
     @property
     @abstractmethod
-    def _slides_of(self) -> LinearDelta | H4Linear:
+    def _slides_of(self) -> RodPlatform:
         """The kinematics."""
 
     @abstractmethod
@@ -99,12 +106,12 @@ class ActualRods(Actual):
 class ActualDelta(ActualRods):
     """w = nominal tip."""
 
-    kinematics: LinearDelta = field(kw_only=True)
+    kinematics: OnLegs = field(kw_only=True)
     turns = 0
 
     @property
-    def _slides_of(self) -> LinearDelta:
-        return self.kinematics
+    def _slides_of(self) -> RodPlatform:
+        return rods_of(self.kinematics)
 
     def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
         """See the base class."""

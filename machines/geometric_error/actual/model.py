@@ -9,7 +9,7 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.actual_map import ActualByMap
-from machines.geometric_error.actual.actual_rods import ActualDelta, ActualH4
+from machines.geometric_error.actual.actual_rods import ActualDelta, ActualH4, rods_of
 from machines.geometric_error.actual.actual_serial import ActualSerial
 from machines.geometric_error.actual.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.actual.serial_errors import SerialErrors
@@ -17,7 +17,7 @@ from machines.geometric_error.tables.curves import least_apart
 from machines.geometric_error.tables.lattice import ErrorMap
 from machines.kinematics.base import Kinematics
 from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.rod_platform import RodPlatform
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats
@@ -122,9 +122,9 @@ class Forms:
             raise ValueError("the model has dimensions of legs, this machine has none")
         return ActualSerial(kinematics, self.axes)
 
-    def translating_rods(self, kinematics: LinearDelta) -> Actual:
+    def translating_rods(self, kinematics: OnLegs) -> Actual:
         """See `ErrorForms`."""
-        return ActualDelta(self._rods_of(kinematics), self.axes, kinematics=kinematics)
+        return ActualDelta(self._rods_of(rods_of(kinematics)), self.axes, kinematics=kinematics)
 
     def tilting_rods(self, kinematics: H4Linear) -> Actual:
         """See `ErrorForms`."""

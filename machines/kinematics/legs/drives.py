@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.kinematics.sliders import whole_rows
+from machines.kinematics.sliders import Legs, whole_rows
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import dot, wrap
 from toolpaths.shapes import arrays
@@ -64,8 +64,15 @@ class Drives:
         """(K, 3) u x a"""
         return np.asarray(np.cross(self.directions, self.arms), dtype=np.float64)
 
+    @cached_property
+    def on_slides(self) -> Legs | None:
+        """The same legs where all are rods on slides, which have the law of `sliders` in one go; else None."""
+        return Legs(self.points, self.directions, self.lengths, self.roots) if self.slide.all() else None
+
     def feet(self, q: Floats) -> Floats:
         """A (N, K, 3) mm of joints q (N, K)."""
+        if self.on_slides is not None:
+            return self.on_slides.carriages(q)
         along = np.where(self.slide, q, 0.0)[:, :, None] * self.directions
         return np.asarray(self.points + along + self._arm(q), dtype=np.float64)
 
@@ -91,6 +98,9 @@ class Drives:
     def solve(self, joints: Floats, roots: Floats) -> Floats:
         """q (N, K) of platform joints (N, K, 3) with the given roots (K,); a row with a leg out of reach is NaN
         throughout."""
+        if self.on_slides is not None:
+            middle, half = self.on_slides.solve(joints)
+            return whole_rows(middle + roots * half)
         q = np.empty(joints.shape[:2])
         for k in range(len(self.lengths)):
             w = joints[:, k] - self.points[k]
@@ -129,6 +139,13 @@ class Drives:
     def transmission(self, rods: Floats, q: Floats) -> Floats:
         """Cosine (N, K) of the angle between rod and motion of its drive; 1 of legs of changing length."""
         return np.asarray(self.gains(rods, q) / (self.spans(q) * self.size), dtype=np.float64)
+
+
+def on_slides(legs: Legs) -> Drives:
+    """Rods of fixed length on slides."""
+    k = len(legs.lengths)
+    return Drives(legs.points, legs.directions, legs.lengths, legs.roots, np.zeros((k, 3)), np.ones(k, dtype=np.bool_),
+                  np.zeros(k, dtype=np.bool_))
 
 
 def _root(square: Floats) -> Floats:

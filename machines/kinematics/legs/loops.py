@@ -9,17 +9,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal, cast
 
 import numpy as np
 
 from machines.kinematics.legs.drives import Drives
-from machines.kinematics.sliders import determinant, solved, unsolvable
+from machines.kinematics.sliders import determinant, solved, three_spheres, two_circles, unsolvable
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import cross, dot, lengths
 from toolpaths.shapes import arrays
 
 STEPS, CLOSED = 30, 1e-13
 """of Newton; closure relative to the square of a rod's length, before its last step"""
+PlatformTurns = Literal["", "a", "b", "c", "abc"]
 FREEDOMS = ("x", "y", "z", "a", "b", "c")
 """translations along x, y, z and turns about them"""
 
@@ -44,9 +46,9 @@ class Loops:
         return np.eye(6)[:, [FREEDOMS.index(name) for name in self.freedoms]]
 
     @property
-    def turns(self) -> str:
-        """"", "a", "b", "c" or "abc": the turns among the freedoms."""
-        return "".join(name for name in self.freedoms if name in "abc")
+    def turns(self) -> PlatformTurns:
+        """The turns among the freedoms."""
+        return cast(PlatformTurns, "".join(name for name in self.freedoms if name in "abc"))
 
     @cached_property
     def lever(self) -> float:
@@ -111,6 +113,18 @@ class Loops:
             closed[live[done]] = True
             live = live[~done & np.isfinite(step).all(axis=1)]
         return place, turn, closed & np.isfinite(place).all(axis=1)
+
+    @property
+    def closed_form(self) -> bool:
+        """True of a platform that does not turn: its joints lie on spheres about the feet, moved by -b."""
+        return not self.turns
+
+    def places(self, q: Floats) -> tuple[Floats, Floats]:
+        """(foot, out), each (N, 3) mm, of joints q (N, K) of a platform that does not turn: it stands at foot + out, where
+        det Jx > 0, or at foot - out; of three slides along z III-11 of Company 2000 as corrected. NaN where the legs do not
+        meet."""
+        centres, radii = self.drives.feet(q) - self.joints, self.drives.spans(q)
+        return three_spheres(centres, radii) if len(self.freedoms) == 3 else two_circles(centres, radii)
 
     def side(self, place: Floats, turn: Floats, q: Floats) -> Floats:
         """(N,) det Jx, whose sign cannot change inside an assembly mode."""

@@ -14,14 +14,18 @@ from typing import Self
 
 import numpy as np
 
-from machines.kinematics.base import Kinematics, as_points
+from machines.kinematics.base import ErrorForm, ErrorForms, Kinematics, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about, tool_x
+from machines.kinematics.legs.attitudes import ROUND_OFF, nearest_directions, tilt_of
 from machines.kinematics.legs.bounds import MovingLoops
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import Loops
-from machines.kinematics.rod_loops import by_parts
+from machines.kinematics.legs.modes import found_modes, in_order
+from machines.kinematics.legs.over_workspace import OverWorkspace
+from machines.kinematics.legs.rods_on_slides import RodsOnSlides
+from machines.kinematics.rod_loops import RodLoop, by_parts
 from machines.kinematics.singular_distance import NAMES, distance, distance_between
 from machines.kinematics.taylor import TaylorVector
 from machines.kinematics.workspace import Workspace
@@ -30,8 +34,6 @@ from toolpaths.rotations import angle_between, cross, unit
 from toolpaths.shapes import arrays
 
 UP = np.array([0.0, 0.0, 1.0])
-ROUND_OFF = 1e-12
-"""rad: directions nearer than this are the same"""
 ASIDE = 1e-9
 """mm that a point may lie off what the slides and the platform can reach"""
 PARTS = 16
@@ -46,7 +48,8 @@ class OnLegs(Kinematics):
     """A platform on legs.
 
     Home mode: the legs' own roots and the sign of det Jx as in the middle of the workspace, and of such poses the one that
-    Newton finds from there. `all_roots` gives every choice of roots, the own ones first, as `Drives.root_choices` has them.
+    Newton finds from there; of a platform that does not turn, which stands in one of two places, the sign alone. `all_roots`
+    gives every choice of roots, the own ones first, as `Drives.root_choices` has them.
 
     Attributes:
         legs_at, carriers_at: joints of the legs and of the slides that carry legs and platform, or the part
@@ -72,6 +75,21 @@ class OnLegs(Kinematics):
     def legs(self) -> Drives:
         """See `ClearanceParts`."""
         return self.loops.drives
+
+    @property
+    def transmits(self) -> OverWorkspace:  # type: ignore[override]  # nothing assigns it
+        """See the base class."""
+        return OverWorkspace(self.loops, self.workspace)
+
+    @cached_property
+    def on_rods(self) -> RodsOnSlides | None:  # type: ignore[override]  # nothing assigns it
+        """Its rods, of a platform that only translates on three slides and whose gauge point is its reference point."""
+        whole = self.legs.on_slides is not None and self.loops.freedoms == ("x", "y", "z") and not self.gauge.any()
+        return RodsOnSlides(self) if whole and not len(self.carriers) else None
+
+    def with_errors(self, forms: ErrorForms[ErrorForm]) -> ErrorForm:
+        """See the base class: of those that are `on_rods`."""
+        return super().with_errors(forms) if self.on_rods is None else forms.translating_rods(self)
 
     @property
     def leg_names(self) -> tuple[str, ...]:
@@ -108,18 +126,28 @@ class OnLegs(Kinematics):
     def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0,
                 near: Floats | None = None) -> Floats:
         """Joints (B, N, J); NaN where a leg does not reach or the platform cannot take the direction."""
-        tip, axis = as_points(tip, 3, "tip"), unit(as_points(axis, 3, "axis"))
+        tip, axis = as_points(tip, 3, "tip"), as_points(axis, 3, "axis")
         spin = np.broadcast_to(np.asarray(spin, dtype=np.float64), len(tip))
         roots = self.legs.root_choices() if self.all_roots else self.legs.roots[None]
         q = np.empty((len(roots), len(tip), self.joints))
         for part in blocks(len(tip)):
-            turn = self.turn_of(axis[part], spin[part])
-            place, carried = self._split(tip[part] + self.tool_length * axis[part] - turn @ self.gauge)
-            ends = self.loops.ends(place, turn)
+            ends, carried = self._ends(tip[part], axis[part], spin[part])
             for k, choice in enumerate(roots):
                 q[k, part][:, self.legs_at] = self.legs.solve(ends, choice)
             q[:, part][:, :, self.carriers_at] = np.where(np.isnan(q[:, part][:, :, self.legs_at[:1]]), np.nan, carried)
         return q
+
+    def _ends(self, tip: Floats, axis: Floats, spin: Floats) -> tuple[Floats, Floats]:
+        """(platform joints (N, K, 3), travel of the carriers (N, M)) of a tip, axis and spin; NaN where there are none."""
+        if self.loops.closed_form:
+            up = (np.hypot(axis[:, 0], axis[:, 1]) <= ROUND_OFF * axis[:, 2]) & (axis[:, 2] > 0.0) & (spin == 0.0)
+            tip = np.where(up[:, None], tip, np.nan)
+            place, carried = self._split(tip + (self.tool_length * UP - self.gauge))
+            return place[:, None, :] + self.loops.joints, carried
+        axis = unit(axis)
+        turn = self.turn_of(axis, spin)
+        place, carried = self._split(tip + self.tool_length * axis - turn @ self.gauge)
+        return self.loops.ends(place, turn), carried
 
     def turn_of(self, axis: Floats, spin: Floats) -> Floats:
         """R (N, 3, 3) that gives the tool the axis (N, 3) and spin (N,); NaN where the platform has none."""
@@ -131,25 +159,7 @@ class OnLegs(Kinematics):
 
     def _within(self, axis: Floats) -> Floats:
         """The nearest directions (N, 3) that the platform can take; those that it can take to the last bit."""
-        if not self.tilts:
-            return np.broadcast_to(UP, axis.shape)
-        if len(self.loops.turns) == 1:
-            return self._about_one(axis, 0 if self.loops.turns == "a" else 1)
-        most, angle = self.workspace.tilt[1], angle_between(axis, np.broadcast_to(UP, axis.shape))
-        flat = np.hypot(axis[:, 0], axis[:, 1])
-        heading = np.where((flat > 0.0)[:, None], axis[:, :2] / np.where(flat > 0.0, flat, 1.0)[:, None], [1.0, 0.0])
-        edge = np.column_stack([np.sin(most) * heading, np.full(len(axis), np.cos(most))])
-        return np.where((angle > most + ROUND_OFF)[:, None], edge, axis)
-
-    def _about_one(self, axis: Floats, about: int) -> Floats:
-        side, sign = (1, -1.0) if about == 0 else (0, 1.0)
-        tilt = np.arctan2(sign * axis[:, side], axis[:, 2])
-        low, high = self.workspace.tilt
-        held = np.clip(tilt, low, high)
-        nearest = np.zeros(axis.shape)
-        nearest[:, side], nearest[:, 2] = sign * np.sin(held), np.cos(held)
-        keep = (np.abs(axis[:, about]) <= ROUND_OFF) & (tilt >= low - ROUND_OFF) & (tilt <= high + ROUND_OFF)
-        return np.where(keep[:, None], axis, nearest)
+        return nearest_directions(self.loops.turns, self.workspace.tilt, axis)
 
     def _split(self, point: Floats) -> tuple[Floats, Floats]:
         """(C (N, 3), travel of the carriers (N, M)) that add up to a point (N, 3); NaN where none do."""
@@ -195,6 +205,9 @@ class OnLegs(Kinematics):
         """(C, R) of joints q (N, J) in the mode nearest the pose `near` (6,) or (N, 6), else the home mode; NaN without
         one."""
         q = as_points(q, self.joints, "q")
+        if self.loops.closed_form:
+            place = self._modes(q, near)[0]
+            return place, np.where(np.isnan(place[:, :1, None]), np.nan, np.eye(3))
         place, turn = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
         for part in blocks(len(q)):
             hint = near[part] if near is not None and near.ndim == 2 else near
@@ -216,6 +229,36 @@ class OnLegs(Kinematics):
         good &= np.isfinite(q).all(axis=1)
         return np.where(good[:, None], place, np.nan), np.where(good[:, None, None], turn, np.nan)
 
+    def _modes(self, q: Floats, near: Floats | None = None) -> Floats:
+        """Both places (2, N, 3) of a platform that does not turn, the home mode first or the one nearest the pose `near`."""
+        places = np.empty((2, len(q), 3))
+        for part in blocks(len(q)):
+            foot, out = self.loops.places(q[part][:, self.legs_at])
+            places[:, part] = foot + self._side * out, foot - self._side * out
+        places[:, ~np.isfinite(q).all(axis=1)] = np.nan
+        if near is not None:
+            wanted = np.broadcast_to(near, (len(q), 6))[:, :3] + self.tool_length * UP - self.gauge
+            wanted = (wanted - q[:, self.carriers_at] @ self.carriers) * self.loops.basis[:3].any(axis=1)
+            far = np.linalg.norm(places - wanted, axis=2)
+            swap = far[1] < far[0]
+            places[:, swap] = places[::-1, swap]
+        return places
+
+    def assembly_modes(self, q: Floats) -> tuple[Floats, Floats]:
+        """See the base class: both of a platform that does not turn; of others those that are found (`modes.py`)."""
+        q = as_points(q, self.joints, "q")
+        if not self.loops.closed_form:
+            return self._found_modes(q)
+        tip = np.stack([self._tip(place, None, q) for place in self._modes(q)])
+        return tip, np.where(np.isnan(tip), np.nan, UP)
+
+    def _found_modes(self, q: Floats) -> tuple[Floats, Floats]:
+        found = []
+        for row in q:
+            place, turn = found_modes(self.loops, row[self.legs_at], self.home[0])
+            found.append(np.hstack([self._tip(place, turn, np.tile(row, (len(place), 1))), turn[:, :, 2]]))
+        return in_order(np.hstack(self.forward(q)), found)
+
     def _near(self, pose: Floats, q: Floats) -> PlatformPose:
         axis = self._within(unit(pose[:, 3:]))
         turn = self.turn_of(axis, np.zeros(len(axis)))
@@ -231,6 +274,12 @@ class OnLegs(Kinematics):
             good &= closed
         return place, turn, good & self._at_home(place, turn, own)
 
+    def stands_at(self, q: Floats) -> bool:
+        """Whether the legs meet at joints q (J,) as the machine is assembled: home mode and own roots."""
+        place, turn = self._platform(q[None])
+        own = q[None, self.legs_at]
+        return bool(self.legs.own(self.loops.ends(place, turn) - self.legs.feet(own), own)[0])
+
     def _at_home(self, place: Floats, turn: Floats, own: Floats) -> Bools:
         """True (N,) where a pose is of the home mode: roots, sign of det Jx, tool above the platform."""
         jx, rods = self.loops.matrix_at(place, turn, own)
@@ -239,12 +288,18 @@ class OnLegs(Kinematics):
 
     def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
         """(tip, axis) (N, 3) of joints q (N, J), see the base class."""
+        if self.loops.closed_form:
+            q = as_points(q, self.joints, "q")
+            place = self._modes(q, near)[0]
+            return self._tip(place, None, q), np.where(np.isnan(place[:, :1]), np.nan, UP)
         place, turn = self._platform(q, near)
         return self._tip(place, turn, q), turn[:, :, 2]
 
-    def _tip(self, place: Floats, turn: Floats, q: Floats) -> Floats:
+    def _tip(self, place: Floats, turn: Floats | None, q: Floats) -> Floats:
+        """`turn` None: a platform that does not turn."""
         shift = np.asarray(q)[:, self.carriers_at] @ self.carriers
-        return np.asarray(place + shift + turn @ (self.gauge - self.tool_length * UP), dtype=np.float64)
+        arm = self.gauge - self.tool_length * UP
+        return np.asarray(place + shift + (arm if turn is None else turn @ arm), dtype=np.float64)
 
     def pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """(tip, axis, spin) of joints q (N, J), see the base class."""
@@ -256,6 +311,10 @@ class OnLegs(Kinematics):
         if self.tilts:
             return super().at_tip(tip, q, solved)
         return np.asarray(self.inverse(tip, np.broadcast_to(UP, tip.shape))[0])
+
+    def with_all_roots(self) -> Self:
+        """See the base class."""
+        return replace(self, all_roots=True)
 
     def with_tool(self, length: float) -> Self:
         """The same machine at the tip of a tool of that length (mm)."""
@@ -281,14 +340,17 @@ class OnLegs(Kinematics):
         place, turn = self._platform(q, near)
         result = np.zeros((len(q), 6, self.joints))
         result[:, :, self.legs_at] = self.loops.rates(place, turn, q[:, self.legs_at])
-        arm = turn @ (self.gauge - self.tool_length * UP)
-        result[:, :3] += np.cross(result[:, 3:], arm[:, :, None], axis=1)
+        if not self.loops.closed_form:
+            arm = turn @ (self.gauge - self.tool_length * UP)
+            result[:, :3] += np.cross(result[:, 3:], arm[:, :, None], axis=1)
         result[:, :3, self.carriers_at] = self.carriers.T
         return result, turn
 
     def jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
         """d(tip, axis)/dq (N, 6, J): the axis turns with omega."""
         twist, turn = self._twist(q, near)
+        if self.loops.closed_form:
+            return twist
         return np.concatenate([twist[:, :3], np.cross(twist[:, 3:], turn[:, :, 2:], axis=1)], axis=1)
 
     def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
@@ -298,6 +360,11 @@ class OnLegs(Kinematics):
     def _jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         middle, step = 0.5 * (q0 + q1), q1 - q0
         place, turn = self._platform(middle)
+        if self.on_rods is not None:  # the same bounds without turns
+            ends = place[:, None, :] + self.loops.joints
+            rods = ends - self.legs.feet(middle)
+            jet, _ = RodLoop(rods, np.zeros_like(rods), self.on_rods.legs, step, False).jets(place, np.zeros(len(place)))
+            return jet + TaylorVector((-self.tool_length * UP).tolist()), TaylorVector(UP.tolist())
         jets = MovingLoops(self.loops, place, turn, middle[:, self.legs_at], step[:, self.legs_at]).jets()
         shift, moved = (list((v[:, self.carriers_at] @ self.carriers).T) for v in (middle, step))
         return (jets.point(self.gauge - self.tool_length * UP) + TaylorVector(shift, moved),
@@ -322,12 +389,9 @@ class OnLegs(Kinematics):
         """Where the parts are at joints q (N, J): seen from the carriers, but for the place that the workspace is about."""
         place, turn = self._platform(q, near)
         shift = np.asarray(q)[:, self.carriers_at] @ self.carriers
-        axis = turn[:, :, 2]
-        tilt = np.arctan2(-axis[:, 1], axis[:, 2]) if self.loops.turns == "a" else (
-            np.arctan2(axis[:, 0], axis[:, 2]) if self.loops.turns == "b" else angle_between(
-                axis, np.broadcast_to(UP, axis.shape)))
-        return ClearanceGeometry(place + shift, tilt, self.legs.feet(q[:, self.legs_at]), self.loops.ends(place, turn),
-                                 place + turn @ self.gauge, axis, turn)
+        axis, turned = turn[:, :, 2], None if self.loops.closed_form else turn
+        return ClearanceGeometry(place + shift, tilt_of(self.loops.turns, axis), self.legs.feet(q[:, self.legs_at]),
+                                 self.loops.ends(place, turn), place + turn @ self.gauge, axis, turned)
 
     def middle_rig(self) -> ClearanceGeometry:
         """The same in the middle of the workspace, carriers at 0."""

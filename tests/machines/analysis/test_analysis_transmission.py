@@ -15,26 +15,26 @@ from machines.analysis.singularity import grid_step_that_proves
 from machines.analysis.transmission import (
     condition_number,
     force_transmission,
-    lever,
     rates,
     speed_acceleration,
     worst,
 )
 from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.legs.on_legs import OnLegs
 from postproc.cli.app import app
 
 
-def delta(name: str) -> LinearDelta:
+def delta(name: str) -> OnLegs:
     kinematics = machines.load(name).kinematics
-    assert isinstance(kinematics, LinearDelta)
+    assert isinstance(kinematics, OnLegs)
     return kinematics
 
 
 def test_worst_condition_number_of_a_compact_layout() -> None:
     """Table III-5 has 2.67, annex C 2.37; the other layouts are in tests/laws/test_acceptance.py."""
     kinematics = delta("delta-parallel-x-compact")
-    assert worst(partial(condition_number, kinematics), kinematics.workspace).value == pytest.approx(2.67, rel=0.004)
+    found = worst(partial(condition_number, kinematics.transmits), kinematics.workspace)
+    assert found.value == pytest.approx(2.67, rel=0.004)
 
 
 def test_condition_number_is_that_of_the_jacobian() -> None:
@@ -42,8 +42,26 @@ def test_condition_number_is_that_of_the_jacobian() -> None:
     place, tilt = kinematics.workspace.random(np.random.default_rng(0), 200)
     q = kinematics.inverse(place, np.tile([0.0, 0.0, 1.0], (200, 1)))[0]
     jacobian = kinematics.jacobian(q)[:, :3]
-    np.testing.assert_allclose(condition_number(kinematics, place, tilt), np.linalg.cond(jacobian), rtol=1e-9)
-    np.testing.assert_allclose(rates(kinematics, place, tilt), jacobian, atol=1e-9)
+    np.testing.assert_allclose(condition_number(kinematics.transmits, place, tilt), np.linalg.cond(jacobian), rtol=1e-9)
+    np.testing.assert_allclose(rates(kinematics.transmits, place, tilt), jacobian, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["hexapod", "hexaslide-cone", "rotary-delta", "planar-delta-z"])
+def test_legs_of_any_drive_transmit_as_their_jacobian_says(name: str) -> None:
+    """Turns by the lever about the platform's reference point, arms by the path of their ends."""
+    kin = delta(name)
+    place, tilt = kin.workspace.random(np.random.default_rng(4), 20)
+    place = place * kin.loops.basis[:3].any(axis=1)
+    axis = np.stack([np.sin(tilt), 0.0 * tilt, np.cos(tilt)], axis=1)
+    arm = kin.turn_of(axis, 0.0 * tilt) @ kin.gauge
+    twist = kin.twist_jacobian(kin.inverse(place + arm, axis)[0])[:, :, kin.legs_at]
+    twist[:, :3] -= np.cross(twist[:, 3:], arm[:, :, None], axis=1)
+    twist[:, 3:] *= kin.transmits.lever
+    own = twist[:, kin.loops.basis.any(axis=1)] / kin.legs.size
+    widest = max(float(np.linalg.norm(a - b)) for a in kin.loops.joints for b in kin.loops.joints)
+    assert kin.transmits.lever == (pytest.approx(0.5 * widest) if kin.loops.turns else 0.0)
+    np.testing.assert_allclose(rates(kin.transmits, place, tilt), own, atol=1e-9)
+    assert (condition_number(kin.transmits, place, tilt) >= 0.999999 * np.linalg.cond(own)).all()
 
 
 def test_speed_acceleration_is_the_second_derivative_of_the_inverse() -> None:
@@ -52,7 +70,7 @@ def test_speed_acceleration_is_the_second_derivative_of_the_inverse() -> None:
     place, tilt = kinematics.workspace.random(rng, 20)
     direction = rng.normal(size=(4000, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    bound = speed_acceleration(kinematics, place, tilt)
+    bound = speed_acceleration(kinematics.on_rods, place, tilt)
     h, up = 0.1, np.tile([0.0, 0.0, 1.0], (4000, 1))
     for i in range(20):
         ahead, here, behind = (kinematics.inverse(place[i] + s * direction, up)[0] for s in (h, 0.0, -h))
@@ -63,18 +81,18 @@ def test_speed_acceleration_is_the_second_derivative_of_the_inverse() -> None:
 def test_force_is_dual_to_speed() -> None:
     kinematics = delta("uranesx")
     place, tilt = kinematics.workspace.random(np.random.default_rng(2), 50)
-    jacobian = rates(kinematics, place, tilt)
+    jacobian = rates(kinematics.transmits, place, tilt)
     force = np.random.default_rng(3).normal(size=(5000, 3))
     force /= np.linalg.norm(force, axis=1, keepdims=True)
     slides = np.abs(np.einsum("nij,mi->nmj", jacobian, force)).max(axis=(1, 2))
-    np.testing.assert_allclose(force_transmission(kinematics, place, tilt), slides, rtol=5e-3)
+    np.testing.assert_allclose(force_transmission(kinematics.transmits, place, tilt), slides, rtol=5e-3)
 
 
 def test_h4a_condition_number_stays_below_six() -> None:
     """V.7: 400 x 400 mm, 45 degrees in either direction, the turn divided by d = 100 mm."""
     kinematics = machines.load("h4a-c-table").kinematics
-    assert isinstance(kinematics, H4Linear) and lever(kinematics) == 100.0
-    found = worst(partial(condition_number, kinematics), kinematics.workspace, (9, 2, 9, 9))
+    assert isinstance(kinematics, H4Linear) and kinematics.lever == 100.0
+    found = worst(partial(condition_number, kinematics.transmits), kinematics.workspace, (9, 2, 9, 9))
     assert 5.7 < found.value < 6.0 and found.least > 3.0
 
 
@@ -87,9 +105,9 @@ def test_worst_finds_a_maximum_inside_the_box() -> None:
 
 def test_the_workspace_of_uranesx_is_proved_free_of_singular_points() -> None:
     kinematics = delta("uranesx")
-    step = grid_step_that_proves(kinematics, floor=100.0)
+    step = grid_step_that_proves(kinematics.on_rods, floor=100.0)
     assert step is not None and 1.0 < step <= 100.0
-    assert grid_step_that_proves(kinematics, floor=1000.0) is None
+    assert grid_step_that_proves(kinematics.on_rods, floor=1000.0) is None
 
 
 def test_the_command_proves_it_and_says_for_which_machines() -> None:

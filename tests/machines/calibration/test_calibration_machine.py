@@ -109,7 +109,7 @@ def test_laser_along_x_gives_the_positioning_table() -> None:
 
 def delta_truth(seed: int) -> tuple[ErrorModel, ErrorModel]:
     kin = machines.load("uranesx").kinematics
-    frame = rod_frame(kin)
+    frame = rod_frame(kin.on_rods)
     zero = RodErrors.none(kin.axis_names, rod_names(frame, kin.axis_names))
     rng = np.random.default_rng(seed)
     values = np.where([".rail." in n or n.endswith(".length") for n in zero.names],

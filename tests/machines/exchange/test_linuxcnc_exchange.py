@@ -170,6 +170,7 @@ def test_wrapped_rotary_is_modulo(tmp_path: Path) -> None:
     ("ANGULAR_UNITS = degree", "ANGULAR_UNITS = grad", "ERROR import.unit 12"),
     ("xyzac-trt-kins", "maxkins", "ERROR import.kinematics 5"),
     ("xyzac-trt-kins", "genserkins", "ERROR import.kinematics 5"),
+    ("xyzac-trt-kins", "genhexkins", "ERROR import.kinematics 5"),
     ("xyzac-trt-kins", "xyzac-trt-kins sparm=identityfirst", "WARNING import.kinematics 5"),
     ("KINEMATICS = xyzac-trt-kins", "", "ERROR import.kinematics 0"),
     ("MAX_LIMIT = 12", "MAX_LIMIT = twelve", "ERROR import.number 16"),

@@ -20,7 +20,7 @@ from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load, load_checked
 from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.legs.on_legs import OnLegs
 from tests.machines.error_models import joints, model, rod_errors
 from tests.machines.random_slides import random_slides
 from toolpaths.arrays import Floats
@@ -29,18 +29,18 @@ NAMES = ("uranesx", "h4a-c-table", "h4a-spindle-axis")
 TOOL = 70.0
 
 
-def kinematics(name: str) -> LinearDelta | H4Linear:
+def kinematics(name: str) -> OnLegs | H4Linear:
     found = machines.load(name).kinematics.with_tool(TOOL)
-    assert isinstance(found, LinearDelta | H4Linear)
+    assert isinstance(found, OnLegs | H4Linear)
     return found
 
 
-def platform(kin: LinearDelta | H4Linear, n: int) -> tuple[Floats, Floats, Floats]:
+def platform(kin: OnLegs | H4Linear, n: int) -> tuple[Floats, Floats, Floats]:
     """(slides, place, turn) of random nominal platforms."""
     rng = np.random.default_rng(1)
     place, tilt = kin.workspace.random(rng, n)
-    if isinstance(kin, LinearDelta):
-        return kin.legs.inverse(place[:, None, :] + kin.platform), place, platform_turn(np.zeros(n))
+    if isinstance(kin, OnLegs):
+        return kin.legs.solve(place[:, None, :] + kin.loops.joints, kin.legs.roots), place, platform_turn(np.zeros(n))
     return kin.platform.inverse(np.column_stack([place, tilt])), place, platform_turn(tilt)
 
 
@@ -60,9 +60,9 @@ def closure(frame: RodFrame, slides: Floats, place: Floats, turned: Floats, erro
 def test_sensitivity_matrix_is_the_derivative_of_the_closure(name: str) -> None:
     """Acceptance 12: S of E-15 (60 parameters of a Delta, 66 of an H4) against finite differences."""
     kin = kinematics(name)
-    frame, zero, (slides, place, turned) = rod_frame(kin), rod_errors(kin).with_values, platform(kin, 20)
+    frame, zero, (slides, place, turned) = rod_frame(kin.on_rods), rod_errors(kin).with_values, platform(kin, 20)
     count = len(rod_errors(kin).names)
-    assert count == (60 if isinstance(kin, LinearDelta) else 66)
+    assert count == (60 if isinstance(kin, OnLegs) else 66)
     s, step = frame.sensitivity(slides, place, turned), 1e-3
     for k in range(count):
         unit = np.eye(count)[k] * step
@@ -75,7 +75,7 @@ def test_sensitivity_matrix_is_the_derivative_of_the_closure(name: str) -> None:
 def test_platform_moves_as_the_sensitivity_says(name: str) -> None:
     """T^-1 S against finite differences of the solved loop, every parameter, 1e-7 of the largest effect."""
     kin = kinematics(name)
-    frame, (slides, place, turned) = rod_frame(kin), platform(kin, 10)
+    frame, (slides, place, turned) = rod_frame(kin.on_rods), platform(kin, 10)
     errors = rod_errors(kin)
     rates = frame.platform_sensitivity(slides, place, turned)
     for k, label in enumerate(errors.names):
@@ -91,7 +91,7 @@ def test_platform_moves_as_the_sensitivity_says(name: str) -> None:
 def test_first_columns_are_those_of_annex_e() -> None:
     """E-18: a displaced rail acts as AB on both rods of its leg and on no other; E-31: +L."""
     kin = kinematics("uranesx")
-    frame, (slides, place, turned) = rod_frame(kin), platform(kin, 3)
+    frame, (slides, place, turned) = rod_frame(kin.on_rods), platform(kin, 3)
     s, rods = frame.sensitivity(slides, place, turned), place[:, None] + frame.joint - frame.carriage_joints(slides)
     assert s[:, :2, :3] == pytest.approx(rods[:, :2], abs=1e-12)
     assert np.abs(s[:, 2:, :3]).max() == 0.0
@@ -105,7 +105,7 @@ def test_first_columns_are_those_of_annex_e() -> None:
 def test_a_second_solution_of_the_loop_agrees(name: str) -> None:
     """scipy's root on place and rotation vector, from the nominal platform."""
     kin = kinematics(name)
-    frame, errors, (slides, place, turned) = rod_frame(kin), rod_errors(kin, 2, 0.05), platform(kin, 6)
+    frame, errors, (slides, place, turned) = rod_frame(kin.on_rods), rod_errors(kin, 2, 0.05), platform(kin, 6)
     found, spun = frame.solve(slides, place, turned, errors)
     for k in range(6):
         one = slice(k, k + 1)
@@ -127,7 +127,7 @@ def test_zero_is_exact_and_first_order_is_to_second_order(name: str) -> None:
     assert isinstance(nominal, ActualDelta | ActualH4)
     w = nominal.coordinates(joints(kin, 100))
     tip, axis, _ = nominal.place(w)
-    expected = (w, np.tile([0.0, 0.0, 1.0], (100, 1))) if isinstance(kin, LinearDelta) else kin.place(w[:, :4], w[:, 4])[:2]
+    expected = (w, np.tile([0.0, 0.0, 1.0], (100, 1))) if isinstance(kin, OnLegs) else kin.place(w[:, :4], w[:, 4])[:2]
     assert np.array_equal(tip, expected[0]) and np.array_equal(axis, expected[1])
     left = []
     for size in (8.0, 4.0):
@@ -184,7 +184,7 @@ def test_rates_are_derivatives_of_the_nominal_place(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_the_compiled_closure_is_the_one_of_numpy(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     kin = kinematics(name)
-    frame, errors, (slides, place, turned) = rod_frame(kin), rod_errors(kin, length=0.5), platform(kin, 50)
+    frame, errors, (slides, place, turned) = rod_frame(kin.on_rods), rod_errors(kin, length=0.5), platform(kin, 50)
     place[3], slides[7] = np.nan, np.nan
     slides[9] += 5000.0
     found = []
@@ -202,15 +202,15 @@ def test_the_compiled_closure_is_the_one_of_numpy(name: str, monkeypatch: pytest
 
 def test_the_loop_as_it_stands_closes_the_rods() -> None:
     kin = kinematics("uranesx")
-    frame, errors, (slides, place, turned) = rod_frame(kin), rod_errors(kin), platform(kin, 3)
+    frame, errors, (slides, place, turned) = rod_frame(kin.on_rods), rod_errors(kin), platform(kin, 3)
     base, along = (frame.carriage_joints(q, errors)[0] for q in (np.zeros((1, 3)), np.ones((1, 3))))
     off = rods_loop.close_all(slides, frame.leg, base, along - base, frame.joint + errors.platform,
                               (frame.length + errors.length) ** 2, place, turned, 12, 1e-13, 0.5)
     assert off.max() < 1e-12 and np.abs(closure(frame, slides, place, turned, errors)).max() < 1e-6
 
 
-DELTAS = [name for name in machines.names() if isinstance(machines.load(name).kinematics, LinearDelta)
-          and not rods.gives_rods(machines.load(name).kinematics)]
+DELTAS = [name for name in machines.names() if (on := machines.load(name).kinematics.on_rods) and not on.platform_turns
+          and not rods.gives_rods(on)]
 
 
 def test_there_are_deltas_without_rods() -> None:
@@ -225,7 +225,7 @@ def test_deltas_without_rods_take_the_distance_of_their_pairs(name: str, tmp_pat
     (tmp_path / "e.toml").write_text(f"{legs}[location]\nEA0S = 3.0\n")
     found = load(tmp_path / "e.toml", machine)
     kin = machine.kinematics.with_tool(TOOL)
-    assert isinstance(kin, LinearDelta) and found.rods is not None and found.rods.pairs == (40.0, 40.0, 40.0)
+    assert isinstance(kin, OnLegs) and found.rods is not None and found.rods.pairs == (40.0, 40.0, 40.0)
     q = random_slides(kin, np.random.default_rng(5), 40)
     tip, axis = kin.forward(q)
     actual = found.on(kin)

@@ -1,20 +1,21 @@
 """Linear Delta: identity over the workspace, both assembly modes, Jacobian, LinuxCNC's lineardeltakins."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import machines
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.legs.on_legs import OnLegs
 from toolpaths.arrays import Floats
 
 NAMES = [name for name in machines.names() if name.startswith("delta-")] + ["uranesx", "linuxcnc-lineardelta"]
 
 
-def delta(name: str) -> LinearDelta:
+def delta(name: str) -> OnLegs:
     kinematics = machines.load(name).kinematics
-    assert isinstance(kinematics, LinearDelta)
+    assert isinstance(kinematics, OnLegs)
     return kinematics
 
 
@@ -22,7 +23,7 @@ def up(n: int) -> Floats:
     return np.tile([0.0, 0.0, 1.0], (n, 1))
 
 
-def poses(kinematics: LinearDelta, n: int, seed: int = 0) -> Floats:
+def poses(kinematics: OnLegs, n: int, seed: int = 0) -> Floats:
     return kinematics.workspace.random(np.random.default_rng(seed), n)[0]
 
 
@@ -40,8 +41,7 @@ def test_forward_of_inverse_is_identity_over_the_workspace(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_every_choice_of_roots_is_a_pose_of_the_machine(name: str) -> None:
     kinematics = delta(name).with_tool(40.0)
-    every = LinearDelta(kinematics.legs, kinematics.platform, kinematics.workspace, tool_length=40.0,
-                        all_roots=True)
+    every = replace(kinematics, all_roots=True)
     tip = poses(kinematics, 2000)
     q = every.inverse(tip, up(len(tip)))
     assert q.shape == (8, len(tip), 3) and every.branches == 8
@@ -60,7 +60,7 @@ def test_assembly_modes_close_the_rods_and_differ(name: str) -> None:
     tips, _ = kinematics.assembly_modes(q)
     assert tips.shape == (2, 2000, 3)
     for tip in tips:
-        length = np.linalg.norm(kinematics.rods(q, tip), axis=2)
+        length = np.linalg.norm(kinematics.loops.ends(tip, up(2000)) - kinematics.legs.feet(q), axis=2)
         np.testing.assert_allclose(length, np.broadcast_to(kinematics.legs.lengths, length.shape), atol=1e-8)
     assert np.linalg.norm(tips[0] - tips[1], axis=1).min() > 1.0
 

@@ -5,21 +5,24 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
 import machines
 from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.legs.drives import Drives
+from machines.kinematics.legs import drives
+from machines.kinematics.legs.bounds import MovingLoops
 from machines.kinematics.legs.loops import Loops
+from machines.kinematics.legs.modes import found_modes
 from machines.kinematics.legs.on_legs import OnLegs
-from machines.kinematics.linear_delta import LinearDelta
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from machines.loader import load_checked
 from postproc.readback.execution.assembly import steps
 from tests.machines.random_slides import poses_over_workspace, random_slides
+from tests.source import ROOT
 from toolpaths.arrays import Floats
 from toolpaths.rotations import rotation
 
@@ -27,7 +30,24 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @cache
+def two_axes() -> OnLegs:
+    """The planar Delta of the note without the slide that carries it."""
+    text = (ROOT / "machines/data/planar-delta-z.toml").read_text()
+    for table in ("kinematics.carriers.Z", "axes.Z"):
+        start = text.index(f"[{table}]")
+        text = text[:start] + text[text.index("\n[", start) + 1:]
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "planar.toml"
+        file.write_text(text.replace('retract_axis = "Z"\n', ""))
+        kinematics = machines.load(file).kinematics
+    assert isinstance(kinematics, OnLegs) and kinematics.axis_names == ("A", "B")
+    return kinematics
+
+
+@cache
 def legs(name: str) -> OnLegs:
+    if name == "planar-delta":
+        return two_axes()
     kinematics = machines.load(name).kinematics
     assert isinstance(kinematics, OnLegs)
     return kinematics
@@ -36,26 +56,66 @@ def legs(name: str) -> OnLegs:
 def on_slides(slides: Legs, joints: Floats, space: Workspace, freedoms: str) -> OnLegs:
     """A platform on the same slides, as data; reference point and gauge point are one."""
     k = len(joints)
-    drives = Drives(slides.points, slides.directions, slides.lengths, slides.roots, np.zeros((k, 3)), np.ones(k, np.bool_),
-                    np.zeros(k, np.bool_))
-    return OnLegs(Loops(drives, joints, tuple(freedoms)), space, np.zeros(3), tuple("XYZU"[:k]), (False,) * k, np.arange(k),
-                  np.zeros(0, np.int64), np.zeros((0, 3)))
+    return OnLegs(Loops(drives.on_slides(slides), joints, tuple(freedoms)), space, np.zeros(3), tuple("XYZU"[:k]),
+                  (False,) * k, np.arange(k), np.zeros(0, np.int64), np.zeros((0, 3)))
 
 
-def test_a_delta_as_data_is_the_delta() -> None:
-    """Joints, poses, bounds of straight moves and distances of the older kind, which has closed forms for them."""
-    delta = machines.load("uranesx").kinematics.with_tool(70.0)
-    assert isinstance(delta, LinearDelta)
-    same = on_slides(delta.legs, delta.platform, delta.workspace, "xyz").with_tool(70.0)
-    q = random_slides(delta, np.random.default_rng(1), 300)
-    tip, axis = delta.forward(q)
-    np.testing.assert_allclose(same.inverse(tip, axis)[0], q, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(same.forward(q)[0], tip, rtol=0, atol=1e-10)
-    np.testing.assert_allclose(same.jacobian(q), delta.jacobian(q), rtol=0, atol=1e-12)
-    np.testing.assert_allclose(same.singular_distance(q), delta.singular_distance(q), rtol=0, atol=1e-12)
-    mine, theirs = (np.asarray(kin.jets(q, q + np.array([3.0, -2.0, 4.0]))[0].third) for kin in (same, delta))
+CLOSED = ("uranesx", "delta-cone", "delta-hybrid", "planar-delta-z", "rotary-delta", "planar-delta", "triaglide")
+
+
+@pytest.mark.parametrize("name", CLOSED)
+def test_closed_forms_are_what_newton_finds(name: str) -> None:
+    """Both modes of a platform that does not turn close every rod, apart by the sign of det Jx; Newton ends in the first."""
+    kin = legs(name).with_tool(70.0)
+    q = random_slides(kin, np.random.default_rng(1), 300)
+    tips, axes = kin.assembly_modes(q)
+    carried = q[:, kin.carriers_at] @ kin.carriers + kin.gauge - 70.0 * UP
+    own, turn = q[:, kin.legs_at], np.tile(np.eye(3), (300, 1, 1))
+    start = tips[0] - carried + np.array([0.4, -0.3, 0.2]) * kin.loops.basis[:3].any(axis=1)
+    place, _, closed = kin.loops.newton(own, start, turn)
+    assert closed.all() and tips.shape == axes.shape == (2, 300, 3)
+    np.testing.assert_allclose(place + carried, tips[0], rtol=0, atol=1e-9)
+    sides = [kin.loops.side(tip - carried, turn, own) for tip in tips]
+    assert (sides[0] * sides[1] < 0.0).all() and (sides[0] * sides[0][0] > 0.0).all()
+    for tip in tips:
+        rods = kin.loops.ends(tip - carried, turn) - kin.legs.feet(own)
+        np.testing.assert_allclose(np.linalg.norm(rods, axis=2), kin.legs.spans(own), rtol=0, atol=1e-8)
+        np.testing.assert_allclose(kin.forward(q, np.hstack([tip, axes[0]]))[0], tip, rtol=0, atol=1e-12)
+
+
+def test_assembly_modes_of_the_planar_delta_are_the_two_of_the_note() -> None:
+    """theta = 0, theta' = 180 degrees: F at (0, +-263.818) mm, from a base 345 mm below the origin; four working modes."""
+    kin = legs("planar-delta")
+    f = kin.assembly_modes(np.zeros((1, 2)))[0][:, 0] - kin.gauge + np.array([35.0, 345.0, 0.0])
+    np.testing.assert_allclose(f, [[0.0, 263.818, 0.0], [0.0, -263.818, 0.0]], atol=1e-3)
+    q = kin.with_all_roots().inverse(kin.gauge[None], UP[None])[:, 0]
+    apart = np.linalg.norm(q[:, None] - q, axis=2)[~np.eye(4, dtype=bool)]
+    assert len(q) == 4 and np.isfinite(q).all() and apart.min() > 0.1
+    for joints in q:
+        assert np.abs(kin.assembly_modes(joints[None])[0] - kin.gauge).max(axis=(1, 2)).min() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["hexapod", "hexaslide-parallel-z"])
+def test_found_modes_of_six_legs_close_every_rod(name: str) -> None:
+    kin = legs(name)
+    q = machines.load(name).home[None]
+    place, turn = found_modes(kin.loops, q[0, kin.legs_at], kin.home[0])
+    own = np.tile(q[:, kin.legs_at], (len(place), 1))
+    rods = kin.loops.ends(place, turn) - kin.legs.feet(own)
+    assert len(place) >= 4
+    np.testing.assert_allclose(np.linalg.norm(rods, axis=2), kin.legs.spans(own), atol=1e-8)
+    tips, _ = kin.assembly_modes(q)
+    np.testing.assert_array_equal(tips[0], kin.forward(q)[0])
+
+
+def test_the_bounds_of_slides_are_those_of_any_drive() -> None:
+    kin = legs("uranesx").with_tool(70.0)
+    q = random_slides(kin, np.random.default_rng(1), 300)
+    step = np.tile([3.0, -2.0, 4.0], (300, 1))
+    place, turn = kin._platform(q + 0.5 * step)
+    mine = MovingLoops(kin.loops, place, turn, q + 0.5 * step, step).jets().third
+    theirs = np.asarray(kin.jets(q, q + step)[0].third)
     assert (mine <= theirs).all() and (mine > 0.9 * theirs).all()
-    assert np.isnan(same.inverse(tip, np.tile([0.0, 1e-6, 1.0], (300, 1)))).all()
 
 
 def test_the_platform_of_an_h4_as_data_is_the_platform_of_the_h4() -> None:

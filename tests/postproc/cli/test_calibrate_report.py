@@ -210,7 +210,7 @@ def test_as_many_readings_as_unknowns_are_reported_to_be_unchecked(folder: Path)
 
 def test_places_the_machine_cannot_stand_at_are_reported_by_line(folder: Path) -> None:
     kin = machines.load("uranesx").kinematics
-    names = rod_names(rod_frame(kin), kin.axis_names)
+    names = rod_names(rod_frame(kin.on_rods), kin.axis_names)
     save(ErrorModel(rods=RodErrors.none(kin.axis_names, names), name="rods"), folder)
     (folder / "d.csv").write_text("X [mm],Y [mm],Z [mm],dx [um],dy [um],dz [um]\n0,0,0,1,2,3\n9000,0,-9000,1,2,3\n")
     (folder / "d.toml").write_text('machine = "uranesx"\nmodel = "rods.toml"\n[poses]\ntable = "d.csv"\nsigma_um = 1\n')

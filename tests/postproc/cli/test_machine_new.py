@@ -62,6 +62,13 @@ def test_faults_write_nothing_and_files_are_not_replaced(folder: Path) -> None:
     assert run("machine", "new", "s.toml", "-o", "m.toml", "--force").exit_code == 0
 
 
+def test_what_was_understood_is_said_in_both_units(folder: Path) -> None:
+    Path("s.toml").write_text(TRUNNION)
+    said = run("machine", "new", "s.toml", "-o", "m.toml").output
+    assert "Y: -508 to 0 mm (20 in long), 22.86 m/min (900 in/min)" in said
+    assert "B: -35 to 120 degrees, 50 turns/min (300 degrees/s)" in said and "C: endless, " in said
+
+
 def test_machine_check_names_what_no_machine_has(folder: Path) -> None:
     Path("m.toml").write_text('base = "mill-3axis"\n[axes.X]\nvelocity = 30000\n')
     got = run("machine", "check", "m.toml", "--json", "-")

@@ -13,7 +13,7 @@ import machines
 import postproc
 import toolpaths
 from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.legs.on_legs import OnLegs
 from machines.machine import Machine
 from postproc.pipeline.result import PostResult
 from postproc.readback.execution import assembly
@@ -129,7 +129,7 @@ ALONG = np.array([np.sqrt(0.75), 0.5, 0.0])
 def post_in_the_path(tmp_path: Path) -> Machine:
     """UraneSX whose slide X stands where rod Y1 passes when the platform is 150 mm along, and well off at 20 and 280."""
     kinematics = machine("uranesx").kinematics
-    assert isinstance(kinematics, LinearDelta)
+    assert isinstance(kinematics, OnLegs)
     rig = kinematics.rig(kinematics.inverse(150.0 * ALONG[None], UP[None])[0])
     shift = np.array([-86.6025403784439, -50.0, 0.0])
     top, foot = rig.carriages[0, 1] + shift, rig.ends[0, 1] + shift
@@ -250,7 +250,7 @@ def test_a_turning_axis_changes_no_mode(name: str, turn: float) -> None:
 class Forgetful:
     """A Delta that takes the other mode for the home mode at some joints, as a machine with two such modes could."""
 
-    def __init__(self, kin: LinearDelta, at: int) -> None:
+    def __init__(self, kin: OnLegs, at: int) -> None:
         self.kin, self.at, self.rotary, self.drives_tip = kin, at, kin.rotary, kin.drives_tip
 
     def forward(self, q: np.ndarray, near: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -266,14 +266,14 @@ class Forgetful:
 
 def test_ends_follow_the_blocks_and_not_the_home_mode() -> None:
     m = machine("uranesx")
-    assert isinstance(m.kinematics, LinearDelta)
+    assert isinstance(m.kinematics, OnLegs)
     q = m.home + np.linspace(0.0, 50.0, 20)[1:, None] * np.array([1.0, -0.5, 0.2])
     right = np.hstack(m.kinematics.forward(q))
     found = assembly.ends(Forgetful(m.kinematics, 5), q, m.home)
     np.testing.assert_allclose(found, right, atol=1e-9)
 
 
-def flipped(result: PostResult, flip: LinearDelta | H4Linear) -> set[str]:
+def flipped(result: PostResult, flip: OnLegs | H4Linear) -> set[str]:
     """Codes of the read-back of a result on a machine with other kinematics."""
     job = replace(result.job, machine=replace(result.machine, kinematics=flip))
     job = replace(job, control=replace(job.control, machine=job.machine))
@@ -287,7 +287,7 @@ def test_a_wrong_assembly_mode_is_caught() -> None:
     kinematics = result.machine.kinematics
     assert flipped(result, kinematics) == set()
     other = replace(kinematics)
-    object.__setattr__(other, "side", -other.side)
+    other.__dict__["_side"] = -other._side
     assert codes_are_errors(flipped(result, other))
 
 

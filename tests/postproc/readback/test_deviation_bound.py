@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from machines.geometric_error.actual.actual_rods import ActualDelta
-from machines.kinematics.linear_delta import LinearDelta
+from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.serial import Serial
 from postproc.readback.comparison import compare as compare_module
 from postproc.readback.comparison import deviation_bound as bound_module
@@ -159,7 +159,7 @@ def test_blocks_that_may_be_off_between_the_places_looked_at_are_an_error(monkey
 
 
 @pytest.mark.parametrize(("file", "name", "kind"), [("short_five_axis.apt", "mikron-ucp710", Serial),
-                                                    ("pocket.cls", "delta-star", LinearDelta)])
+                                                    ("pocket.cls", "delta-star", OnLegs)])
 def test_a_kinematics_without_bounds_is_checked_not_proved(monkeypatch, file, name, kind):
     monkeypatch.setattr(kind, "jets_proved", False)
     result = good(convert(path_of(file), name, "linuxcnc" if kind is Serial else "generic-iso"))
@@ -170,8 +170,8 @@ def test_a_kinematics_without_bounds_is_checked_not_proved(monkeypatch, file, na
 
 def test_another_assembly_mode_than_that_of_the_bound_is_not_called_bounded(monkeypatch):
     """The law's middle and the reader's pose must be one: else the bend is of another motion."""
-    given = LinearDelta.jets
-    monkeypatch.setattr(LinearDelta, "jets", lambda kin, q0, q1: tuple(
+    given = OnLegs.jets
+    monkeypatch.setattr(OnLegs, "jets", lambda kin, q0, q1: tuple(
         replace(jet, value=[x + 1e-4 for x in jet.value]) for jet in given(kin, q0, q1)))
     assert good(convert(path_of("pocket.cls"), "delta-star", "generic-iso")).comparison.unbounded > 10
 

@@ -106,6 +106,18 @@ def test_samples_convert_with_what_is_written(sample: str, name: str, controller
     assert proved(SAMPLES / sample, made, name, controller, tmp_path).text
 
 
+@pytest.mark.parametrize(("case", "name", "controller"), [("far off", "delta-star", "linuxcnc"),
+                                                          ("complete", "hexaslide-cone", "generic-iso")])
+def test_parts_come_into_the_workspace_of_parallel_machines(case: str, name: str, controller: str, tmp_path: Path) -> None:
+    """Not where rods that hang the other way would reach, and by the length of platform and tool below it."""
+    made = sheet(file := bare(tmp_path, case), name, controller)
+    assert made.text and made.fit is not None and made.fit.tried == 2, [str(d) for d in made.diagnostics]
+    path, box = toolpaths.read(file)[0], machine(name).kinematics.workspace
+    assert box is not None
+    middle = made.fit.setup.part.origin + 0.5 * (path.tip.min(axis=0) + path.tip.max(axis=0))
+    assert (np.abs(middle - box.middle)[:2] < 100.0).all() and -400.0 < middle[2] - box.middle[2] < -40.0
+
+
 @pytest.mark.parametrize(("case", "name"), [("from below", "mikron-ucp710"), ("from the side", "mill-3axis"),
                                             ("from below", "mill-3axis")])
 def test_the_tool_comes_from_above(case: str, name: str, tmp_path: Path) -> None:
@@ -197,6 +209,24 @@ def test_gauge_lengths_are_asked_for_where_words_depend_on_them(tmp_path: Path) 
     assert {n: t["gauge_length"] for n, t in tomllib.loads(out.read_text())["tools"].items()} == {"1": 150, "2": 90}
     got = run(*words, "--force", "--yes", "--gauge-length", "7=90", code=1)
     assert "setup.no_such_tool" in got.stderr and "T1, T2" in got.stderr
+
+
+def test_gauge_lengths_are_asked_for_where_no_place_fits_without(tmp_path: Path) -> None:
+    """The table of this machine lies below the travel of its spindle, which would have to cut itself. Each is asked once."""
+    file = tmp_path / "part.cls"
+    lines = (SAMPLES / "five_faces.cls").read_text().splitlines()
+    file.write_text("\n".join(line for line in lines if not line.startswith("SPINDL")) + "\n")
+    path, found = toolpaths.read(file)
+    asked: list[str] = []
+
+    def answer(question: Question) -> float | str:
+        asked.append(question.key)
+        return 180.0 if question.kind == "gauge_length" else 900.0
+
+    typed = new_setup(path, machine("haas-umc-750"), "haas-ngc", Options(), GivenAnswers(), answer, False, found)
+    first = ["tools.1.spindle", "tools.2.spindle"]
+    assert asked == [*first, "tools.1.gauge_length", "tools.2.gauge_length"], asked
+    assert "gauge_length = 180 " in typed.text and "travel is checked with it" in typed.text
 
 
 def test_what_nobody_answers_is_one_list(tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ _REASONS = {
 }
 NEUTRAL: dict[str, str] = {word: reason for reason, words in _REASONS.items() for word in words.split()}
 """Words that neither move the tool nor say anything to the machine, and why."""
-SILENT = frozenset(NEUTRAL) - {"PARTNO", "LPRINT", "PPLABEL", "LETTER", "REMARK"}
+SILENT = frozenset(NEUTRAL) - {"PARTNO", "MACHIN", "LPRINT", "PPLABEL", "LETTER", "REMARK"}
 """Those of them that need no handler."""
 
 UNSUPPORTED_MOTION = frozenset({
