@@ -161,7 +161,7 @@ _KLARTEXT = [
         r"CYCL DEF 9.0 DWELL TIME\n\1\n",
         "(CYCL DEF 9.1 DWELL 0.5)",
     ),
-    _of("gcode.syntax", HEIDENHAIN, "", "FN 0: Q1 = 5\n", "", "allowed are L, C"),
+    _of("gcode.syntax", HEIDENHAIN, "", "RND R5\n", "", "allowed are L, C"),
     _of("gcode.mode", HEIDENHAIN, "", "PLANE RESET MOVE\n", r"\1\n", "(PLANE RESET STAY)", machine="mikron-ucp710"),
 ]
 _ASK = [
