@@ -148,8 +148,12 @@ _COMPARED: dict[str, Callable[[float, float], bool]] = {
     "GT": lambda a, b: a > b, "GE": lambda a, b: a >= b, "LT": lambda a, b: a < b, "LE": lambda a, b: a <= b}
 
 
+def _compared(f: Callable[[float, float], bool]) -> Callable[[MacroValue, MacroValue], float]:
+    return lambda a, b: float(f(plain(a), plain(b)))
+
+
 def _orders(rank: int) -> dict[str, tuple[int, Callable[[MacroValue, MacroValue], float]]]:
-    return {name: (rank, _arithmetic(lambda a, b, f=f: float(f(a, b)))) for name, f in _COMPARED.items()}  # type: ignore[misc]
+    return {name: (rank, _compared(f)) for name, f in _COMPARED.items()}
 
 
 FANUC = Grammar({
