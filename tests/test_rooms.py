@@ -46,6 +46,7 @@ FLOORS = (
     ("postproc.planning", "passes as smooth joint paths, feeds within the limits"),
     ("postproc.writing", "text in each control's dialect"),
     ("postproc.readback.text", "characters to canonical words, modal state"),
+    ("postproc.readback.macros", "macro language executed: variables, jumps, subprograms to plain blocks"),
     ("postproc.readback.dialects", "the reader of each control"),
     ("postproc.readback.execution", "canonical words to motion and poses"),
     ("postproc.readback.alignment", "which blocks run each move of the CL file"),

@@ -14,6 +14,7 @@ READERS = {
     "machines.exchange": "machine files of others",
     "postproc.controllers": "controller files",
     "postproc.readback.text": "programs", "postproc.readback.dialects": "programs",
+    "postproc.readback.macros": "programs",
     "postproc.witness": "CL files and machine files, by itself"}
 """rooms that read text files, and what they read"""
 FILES = {

@@ -38,6 +38,7 @@ from postproc.cli.options import (
     DialectOption,
     HooksFile,
     MachineName,
+    MaxBlocks,
     MaxTilt,
     Orient,
     ProofOf,
@@ -175,6 +176,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            allow_unknown: Allow = None,
            error_model: ErrorsOfProgram = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
            require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTableOption = "",
+           max_blocks: MaxBlocks = None,
            json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),

@@ -34,6 +34,18 @@ def word_option(option: str, words: Any, said: str, *others: str) -> Any:
 
 
 ClFile = Annotated[Path, typer.Argument(metavar="FILE", help="CL file (APT text)")]
+def _hold_blocks(context: typer.Context, value: int | None) -> None:
+    """The number of blocks that was asked for, while the command runs."""
+    if value is not None:
+        from postproc.readback.macros.held import most_blocks
+
+        context.with_resource(most_blocks(value))
+
+
+MaxBlocks = Annotated[int | None, typer.Option("--max-blocks", metavar="N", min=1, max=1_000_000_000,
+                                               callback=lambda context, value: _hold_blocks(context, value),
+                                               help="blocks of a program with macros that are executed before it "
+                                               "counts as endless (default 1000000)")]
 MachineName = Annotated[str, typer.Option("-m", "--machine", metavar="MACHINE",
                                          help="name from `postproc machine list`, or a TOML file")]
 ToleranceOption = Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0,

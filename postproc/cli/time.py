@@ -15,6 +15,7 @@ from postproc.cli.options import (
     DialectOption,
     HooksFile,
     MachineName,
+    MaxBlocks,
     ToleranceOption,
     UnitsOption,
     only_with_errors,
@@ -55,6 +56,7 @@ def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or 
          error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="time a CL file with these "
                                                   "geometric errors of the machine corrected")] = "",
          beyond: Beyond = False,
+         max_blocks: MaxBlocks = None,
          json: Json = "") -> None:
     """Estimate how long a program takes, with a band, and where the time goes."""
     _check(output, calibrate)

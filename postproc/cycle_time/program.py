@@ -170,8 +170,27 @@ def _path_modes(words: Words, blends_unstated: bool) -> tuple[Array, Floats, Flo
     stated = np.where(smooth == 0.0, np.nan, smooth) if not blends_unstated else np.full(words.lines + 1, np.inf)
     stated[at[0] if len(at) else words.lines + 1:] = np.nan
     own = _carried(at, tolerance, words.lines)
-    return (np.nan_to_num(_carried(at, path.astype(np.float64), words.lines), nan=float(CornerMode.BLEND)).astype(np.int8),
-            np.where(np.isnan(own), stated, own), np.nan_to_num(_carried(at, chain, words.lines)))
+    exact, rounded = _exact_stops(words)
+    held = np.nan_to_num(_carried(at, path.astype(np.float64), words.lines), nan=float(CornerMode.BLEND)).astype(np.int8)
+    return (np.where(exact, CornerMode.STOP, held).astype(np.int8),
+            np.where(rounded & (smooth > 0.0), smooth, np.where(np.isnan(own), stated, own)),
+            np.nan_to_num(_carried(at, chain, words.lines)))
+
+
+def _exact_stops(words: Words) -> tuple[Bools, Bools]:
+    """(B + 1,) where the axes rest at the end of the block: G60, G9; and where G641 or G645 round within what ADIS allows
+    (SINUMERIK, exact stop and continuous-path mode)."""
+    held = fill_values(*_picked(words, (60.0, 64.0, 641.0, 642.0, 643.0, 644.0, 645.0)), words.lines)
+    exact = held == 60.0
+    exact[_picked(words, (9.0,))[0]] = True
+    return exact, (held == 641.0) | (held == 645.0)
+
+
+def _picked(words: Words, numbers: tuple[float, ...]) -> tuple[Ints, Floats]:
+    """(blocks, numbers) of those G codes."""
+    at, value = words.pick("G")
+    keep = np.isin(value, numbers)
+    return at[keep], value[keep]
 
 
 def _carried(at: Ints, values: Floats, count: int) -> Floats:

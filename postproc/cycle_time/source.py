@@ -107,6 +107,8 @@ def _executed(data: bytes, controller: ControllerFile, controls: dict[str, Contr
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(controller, machine.axis_names, home, machine.stop, control.rolls,
                         machine.clamp_codes)
+    held = {reader.offset_of(program.offset_text(name)): one.work_offset for name, one in controls.items()}
+    reader.given(lambda register: held.get(register, control.work_offset), lengths)
     code, found = reader.read(data, file, others)
     if code is None or has_errors(found):
         return None, None, found

@@ -27,7 +27,7 @@ from postproc.readback.comparison.stock import check_stock
 from postproc.readback.comparison.stops_and_dwells import check_stops
 from postproc.readback.comparison.tool_changes import check_changes
 from postproc.readback.comparison.unstated_codes import check_stated
-from postproc.readback.dialects.base import UNITS_UNSTATED, Reader, as_bytes
+from postproc.readback.dialects.base import ASSUMED, UNITS_UNSTATED, Reader, as_bytes
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
@@ -92,6 +92,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls,
                         machine.clamp_codes)
+    _give(reader, job)
     code, diagnostics = reader.read(data, gcode, others)
     header = read_header(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]
@@ -143,6 +144,12 @@ def _offsets(job: Job, reader: Reader, home: Floats) -> Offsets:
     return Offsets(job.control.work_offset, job.control.xyz, job.register_lengths(), home, job.control.length_on_z,
                    job.controller.cycles.peck_relief, job.control, reader.rises_first, reader.arc_slack,
                    _others(job, reader), radii, job.controller.cutter_compensation.corners)
+
+
+def _give(reader: Reader, job: Job) -> None:
+    """What the control holds by the set-up, for programs that ask for it."""
+    held = dict(_others(job, reader))
+    reader.given(lambda register: held.get(register, job.control).work_offset, job.register_lengths())
 
 
 def _others(job: Job, reader: Reader) -> tuple[tuple[float, Control], ...]:
@@ -226,8 +233,9 @@ def _bodies(motion: Motion, executed: BlockPoses, job: Job, comparison: Comparis
 
 
 def _judged(d: Diagnostic, stays: bool) -> Diagnostic:
-    """Units that nothing states: nothing is proved where another program may have left them in inches."""
-    return d if d.code != UNITS_UNSTATED or stays else replace(d, severity=Severity.ERROR)
+    """Units that nothing states, what is only taken to be so: nothing is proved where the control may have it otherwise."""
+    assumed = d.code in ASSUMED or (d.code == UNITS_UNSTATED and not stays)
+    return replace(d, severity=Severity.ERROR) if assumed else d
 
 
 def _located(d: Diagnostic, file: str, of_cl: Callable[[int], tuple[int, ...]] | None) -> Diagnostic:

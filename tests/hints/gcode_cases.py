@@ -58,7 +58,7 @@ _ISO = [
     _of("gcode.no_motion", LINUXCNC, "", "G80 X3\n", r"\1 X3\n", "state (G0) or G1"),
     _of("gcode.number", LINUXCNC, "", "G0 X99999999999\n", "G0 X9\n", "correct the number"),
     _of("gcode.repeated", LINUXCNC, "", "G0 X1 X2\n", "G0 X1\n", "one of each in a block"),
-    _of("gcode.syntax", LINUXCNC, "", "G0 X[1+2]\n", "G0 X3\n", "a block is letters with numbers"),
+    _of("gcode.syntax", LINUXCNC, "", "G0 X\n", "G0 X3\n", "a block is letters with numbers"),
     _of("gcode.unknown_code", LINUXCNC, "", "M123\n", "", "take it out"),
     _of("gcode.unknown_word", LINUXCNC, "", "G0 B5\n", r"G0 \1 5\n", "its axes are (X)"),
     _of("gcode.unknown_word", SIEMENS, "", "SHOPCALL(1)\n", "", "take it out|neither a function"),
@@ -102,6 +102,8 @@ _ISO = [
         "write (M29) S in the block before",
     ),
     _of("gcode.machine_position", FANUC, "", "G1 G53 Z0.\n", r"\1 Z0.\n", "write (G53 G0)|write (G0 G53)"),
+    _of("gcode.second_reference", FANUC, "", "G91 G30 Z0.\nG90\n", r"G91 \1 Z0.\nG90\n", "write (G28)", stops=()),
+    _of("gcode.tool_unnamed", SIEMENS, "", 'T="EM10"\n', "T1\n", "the number of the tool", stops=()),
     _of("gcode.subprogram", FANUC, "M30\n", "M99\n", r"\1\n", "write (M30)"),
     _of("gcode.subprogram", FANUC, "", "M98 P77\n", "", "known are"),
     _of("gcode.tool", SIEMENS, "D1\n", "D3\n", r"\1\n", "(D1) or D0"),
@@ -159,7 +161,7 @@ _KLARTEXT = [
         r"CYCL DEF 9.0 DWELL TIME\n\1\n",
         "(CYCL DEF 9.1 DWELL 0.5)",
     ),
-    _of("gcode.syntax", HEIDENHAIN, "", "FN 0: Q1 = 5\n", "", "allowed are L, C"),
+    _of("gcode.syntax", HEIDENHAIN, "", "RND R5\n", "", "allowed are L, C"),
     _of("gcode.mode", HEIDENHAIN, "", "PLANE RESET MOVE\n", r"\1\n", "(PLANE RESET STAY)", machine="mikron-ucp710"),
 ]
 _ASK = [

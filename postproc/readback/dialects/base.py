@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import PurePath
 from typing import ClassVar, Literal
@@ -15,6 +15,8 @@ from machines.machine import ClampCodes
 from postproc.control.control import InterpolationMode
 from postproc.control.rollover import Rollover
 from postproc.controllers.model import ControllerFile, Stops
+from postproc.readback.macros.execution import MacroLanguage, executed, in_source, needed
+from postproc.readback.macros.held import Held, most_now
 from postproc.readback.text.canonical import (
     COOLANT,
     EXTENDED_OFFSETS,
@@ -39,6 +41,8 @@ from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
 ParsedProgram = tuple[ProgramText, Structure]
 UNITS_UNSTATED = "gcode.units_unstated"
+ASSUMED = frozenset({"gcode.second_reference", "gcode.tool_unnamed"})
+"""what is taken to be so where a program is timed, and refused where it is verified"""
 STOPS = (0.0, 1.0)
 """M codes of stops"""
 M_CODES = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 30.0)
@@ -61,12 +65,14 @@ class Reader(ABC):
         stop: what M0 and M1 switch off, by the controller file or by that of the machine (`[control] stop`)
         changes: what a tool change switches off
         clamps: codes of the clamps that programs work, by axis
+        language: of macros, "" for none
         rolls: modulo axes by joint; turn_codes: M126 and M127 say which path they take
     """
 
     groups: Groups = GROUPS
     m_codes: tuple[float, ...] = M_CODES
     letters = "GMFSTHDNIJKRPQLO"
+    language: MacroLanguage | Literal[""] = ""
     rises_first = False
     turn_codes = False
     arc_slack = float("inf")
@@ -93,6 +99,9 @@ class Reader(ABC):
         stops = controller.stops if controller is not None else Stops()
         self.stop, self.changes = stop or stops.switch_off, stops.tool_change
         self.main_file = ""
+        self.passive = controller.program.passive if controller is not None else ()
+        self.work: Callable[[float], Floats] | None = None
+        self.lengths: dict[int, float] = {}
         self.switches = switched_by(controller.codes if controller is not None else None)
         """(bits on, bits off) by M number, see `postproc.reference.coolant`"""
 
@@ -131,6 +140,8 @@ class Reader(ABC):
              ) -> tuple[Canonical | None, list[Diagnostic]]:
         """A program, with the files of its subprograms by name, as canonical words; None where it cannot be read."""
         self.main_file = file
+        if self.language and needed(as_bytes(data), self.language, self.passive):
+            return self.executed(as_bytes(data), file, others or {})
         found: list[Diagnostic] = []
         programs: dict[str, ParsedProgram] = {}
         waiting: dict[str, bytes | str] = {file: data}
@@ -138,6 +149,8 @@ class Reader(ABC):
         stems = {PurePath(name).stem.upper(): name for name in others}
         while waiting:
             name = next(iter(waiting))
+            if programs and self.language and needed(as_bytes(waiting[name]), self.language, self.passive):
+                return self.executed(as_bytes(data), file, others)
             numbered, more = self.numbered(as_bytes(waiting.pop(name)), name)
             found += more
             read, more = self.program(numbered, name) if not has_errors(more) else (None, [])
@@ -153,9 +166,32 @@ class Reader(ABC):
         files = tuple(zip(programs, before, strict=False)) if len(programs) > 1 else ()
         if has_errors(more):
             return None, [*found, *more]
-        code, last = self.translated(text, line, file)
-        last = [*self.units(code, file), *negative_smoothing(code, file), *last]
+        code, last = self.judged(text, line, file)
         return replace(code, files=files), [*found, *more, *placed(last, files)]
+
+    def executed(self, data: bytes, file: str, others: Mapping[str, bytes]) -> tuple[Canonical | None, list[Diagnostic]]:
+        """A program in macro language, as the plain blocks that it comes to."""
+        assert self.language
+        held = Held(self.axes, self.home, self.work, self.lengths,
+                    self.controller.tools.names if self.controller is not None else {}, self.passive, most_now())
+        program, found = executed(data, file, others, self.language, held, self.numbered)
+        if program is None:
+            return None, found
+        read, more = self.program(program.text, file)
+        found += in_source(more, program)
+        if read is None or has_errors(more):
+            return None, found
+        code, last = self.judged(read[0], program.line, file)
+        return replace(code, files=program.files), [*found, *placed(last, program.files)]
+
+    def given(self, work: Callable[[float], Floats], lengths: dict[int, float]) -> None:
+        """What the control holds by the set-up: work offsets (J,) by register, tool lengths by register, mm."""
+        self.work, self.lengths = work, lengths
+
+    def judged(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
+        """Canonical words of blocks in running order, their units and smoothing looked at."""
+        code, last = self.translated(text, line, file)
+        return code, [*self.units(code, file), *negative_smoothing(code, file), *last]
 
     def numbered(self, data: bytes, file: str) -> tuple[bytes, list[Diagnostic]]:
         """The program with numbers in the place of the names of tools, where the control knows names."""

@@ -18,6 +18,7 @@ import numpy as np
 from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import IsoReader, New, motion_of
+from postproc.readback.macros.execution import MacroLanguage
 from postproc.readback.text.canonical import (
     LAW,
     OFFSET,
@@ -50,6 +51,7 @@ class FanucReader(IsoReader):
         "once": (4, 28, 53, 53.1), "arc_distance": ()}
     m_codes = (*M_CODES, 29.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLO"
+    language: MacroLanguage | Literal[""] = "fanuc"
     rises_first = False
     stating = Reader.stating
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tilted": ("G69",)}

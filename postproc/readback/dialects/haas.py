@@ -9,12 +9,13 @@ and metric: setting 9; G20 and G21 only ask for it.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.base import M_CODES
 from postproc.readback.dialects.fanuc import MILLISECONDS, FanucReader, block, take
 from postproc.readback.dialects.iso import New
+from postproc.readback.macros.execution import MacroLanguage
 from postproc.readback.text.canonical import SMOOTH, ProgramText
 from postproc.readback.text.flow import Call, Structure
 from postproc.readback.text.modal import GROUPS, Groups, codes
@@ -31,6 +32,7 @@ class HaasReader(FanucReader):
         "once": (4, 28, 53), "arc_distance": ()}
     m_codes = (*M_CODES, 97.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLOE"
+    language: MacroLanguage | Literal[""] = "haas"
     laws = (43.0, 49.0, 234.0, 254.0, 255.0)
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tilted": ("G255",)}
     tcp_code = 234.0

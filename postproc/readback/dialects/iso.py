@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from postproc.readback.dialects.base import Reader, whole
+from postproc.readback.macros.execution import MacroLanguage
 from postproc.readback.text.canonical import (
     INCREMENTAL,
     LOADED,
@@ -31,6 +34,7 @@ New = list[tuple[int, str, float]]
 class IsoReader(Reader):
     """Letters and numbers; rests in seconds (P), registers by H."""
 
+    language: MacroLanguage | Literal[""] = "linuxcnc"
     rises_first = True
     stating = Reader.stating | {"arc_distance": "G91.1 or G90.1"}
     units_from = "the program before left them, or as its start-up code and the INI file have them"

@@ -56,6 +56,7 @@ class KlartextReader(Reader):
 
     groups: Groups = GROUPS | {"offset": (), "length": (), "level": (), "path": (), "once": (), "arc_distance": (),
                                "distance": (), "units": (), "feed_mode": (), "plane": ()}
+    language = "klartext"
     turn_codes = True
     statements = frozenset({*_CONTOURS, "BLK FORM", "TOOL DEF", "BEGIN PGM", "END PGM", "TOOL CALL", "CYCL DEF", "CYCL CALL",
                             "LBL", "CALL LBL", "CALL PGM", "PLANE SPATIAL", "PLANE RESET", "FUNCTION TCPM",

@@ -19,13 +19,12 @@ from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.base import M_CODES, Reader, as_bytes
 from postproc.readback.dialects.iso import New, relative_words
 from postproc.readback.dialects.siemens_cycles import CYCLES
-from postproc.readback.dialects.siemens_run import LENGTH_AXIS, SiemensRun
+from postproc.readback.dialects.siemens_run import LENGTH_AXIS, ROUNDED, ROUNDED_RAPID, SiemensRun
 from postproc.readback.text.canonical import (
     LOADED,
     OFFSET,
     REGISTER,
     REST,
-    SMOOTH,
     STATEMENT,
     TURNS,
     UNSTATED,
@@ -56,6 +55,7 @@ _PROGRAM = re.compile(rb"(?m)^[ \t]*%_N_([A-Z0-9_]+)_([MS]PF)[^\n]*$")
 PASSIVE = frozenset({"MSG", "SOFT", "BRISK", "FFWON", "FFWOF", "CFTCP", "CFC", "CFIN", "RTLION", "STOPRE", "NORM", "DIAMOF",
                      "WORKPIECE", "ORIMKS", "PROC", "COMPOF"})
 """names that change nothing of what is read back here"""
+_KEYS = {"CR": "R", "TURN": TURNS, "ADIS": ROUNDED, "ADISPOS": ROUNDED_RAPID}
 DIRECTIONS = {"DC": SHORTEST, "ACP": POSITIVE, "ACN": NEGATIVE}
 """of modulo axes"""
 KNOWN = PASSIVE.union(CYCLES, ("SUPA", "TRAORI", "TRAFOOF", "ORIAXES", "CYCLE800", "CYCLE832", "MCALL", "RET", "CALL",
@@ -67,10 +67,11 @@ class SiemensReader(Reader):
 
     groups: Groups = GROUPS | {
         "motion": (0, 1, 2, 3), "units": (70, 71, 700, 710), "offset": (54, 55, 56, 57, 500, *range(505, 600)),
-        "path": (9, 60, 64), "once": (4,), "exact_stop": (601, 602, 603), "corners": (450,),
+        "path": (9, 60, 64, 641, 642, 643, 644, 645), "once": (4,), "exact_stop": (601, 602, 603), "corners": (450,),
         "length": (), "level": (), "arc_distance": ()}
+    language = "siemens"
     m_codes = (*M_CODES, 17.0)
-    letters = "GMFSTDNIJKRLP?~>"
+    letters = f"GMFSTDNIJKRLP?~>{ROUNDED}{ROUNDED_RAPID}"
     stating = {k: v for k, v in Reader.stating.items() if k != "level"} | {"length": "D, or a tool"}
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tcp": ("TRAFOOF",), "tilted": ("CYCLE800",)}
     neutral: ClassVar[frozenset[str]] = PASSIVE
@@ -156,7 +157,7 @@ class SiemensReader(Reader):
         units = (letter == ord("G")) & np.isin(value, (70, 71, 700, 710))
         found += self._feeds_apart(words, line, file)
         value[units] = np.where(np.isin(value[units], (70, 700)), 20.0, 21.0)
-        drop |= (letter == ord(STATEMENT)) | np.isin(letter, [ord(a) for a in "LP"])
+        drop |= (letter == ord(STATEMENT)) | np.isin(letter, [ord(a) for a in (*"LP", ROUNDED, ROUNDED_RAPID)])
         return Canonical(added(Words(letter, value, words.line, words.lines), new, drop), line, laws, drills), found
 
     def _feeds_apart(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
@@ -179,8 +180,7 @@ class SiemensReader(Reader):
             new += [(b, REST, float(words.value[k])) for k in here]
         for b, g in zip(*codes(words, "G", self.groups["offset"]), strict=True):
             new.append((int(b), OFFSET, float(g)))
-        for b, g in zip(*codes(words, "G", (60, 64)), strict=True):
-            new.append((int(b), SMOOTH, 0.0 if g == 60 else float("inf")))
+        run.rounding()
         tool, edge = number_of(words, "T"), words.pick("D")
         change = codes(words, "M", (6,))[0]
         events = sorted([(int(b), 0, 0.0) for b in change] + [(int(b), 1, float(d)) for b, d in zip(*edge, strict=True)])
@@ -220,7 +220,7 @@ def _parse(row: str, line: int, new: New, statements: list[DialectStatement], fi
         match = _TOKEN.match(row, at)
         if match is None or not _token(match, line, new, statements):
             return [error("gcode.syntax", f"not a block of words: {row.strip()[:60]!r}", file=file, lines=[line],
-                          hint="variables, jumps and expressions are not read")]
+                          hint="a block is words, names of the control and calls")]
         at = match.end()
     return []
 
@@ -247,8 +247,8 @@ def _assigned(match: re.Match[str], line: int, new: New) -> bool:
     """X=IC(1), X=AC(1), I=AC(1), X=1, CR=, TURN=."""
     key, how = match["key"], match["how"]
     value = float(match["within"] or match["value"])
-    if key in ("CR", "TURN") and how is None:
-        new.append((line, "R" if key == "CR" else TURNS, value))
+    if key in _KEYS and how is None:
+        new.append((line, _KEYS[key], value))
     elif len(key) == 1 and how in (None, "AC", "IC"):
         code = ord(key) + (0 if how is None else FORCED if how == "AC" else 32)
         new.append((line, chr(code), value))

@@ -28,6 +28,9 @@ from toolpaths.units import MM_PER_INCH
 LENGTH_AXIS = "$SC_TOOL_LENGTH_CONST"
 """SD42940: 17 keeps the tool length along Z in every plane, from the next D on (NC programming, tool length
 and plane change); otherwise it turns with G18 and G19"""
+ROUNDED, ROUNDED_RAPID = "[", "]"
+"""words ADIS and ADISPOS: how far from the corner rounding may begin, at feed and at rapid"""
+_BY_DISTANCE = (641.0, 645.0)
 _SEQUENCE = {1: "X", 2: "Y", 3: "Z"}
 
 
@@ -54,6 +57,30 @@ class SiemensRun:
         """mm of a unit of length at a block: 25.4 behind G70 and G700."""
         at = int(np.searchsorted(self.units[0], b, side="right")) - 1
         return MM_PER_INCH if at >= 0 and self.units[1][at] in (70, 700) else 1.0
+
+    def rounding(self) -> None:
+        """G60 stops at each corner, G9 at the end of its block; G64 and G641 to G645 run through them (NC Programming,
+        continuous-path mode). G641 and G645 leave the path no further than ADIS, 0 where it is not stated; the tolerances of
+        the others are machine data."""
+        stated, distance = dict(zip(*(a.tolist() for a in self.words.pick(ROUNDED)), strict=True)), 0.0
+        path = list(zip(*(a.tolist() for a in codes(self.words, "G", (9, 60, 64, 641, 642, 643, 644, 645))), strict=True))
+        held = float("nan")
+        for b in sorted({*(b for b, _ in path), *stated}):
+            distance = stated.get(b, distance)
+            codes_here = [g for at, g in path if at == b]
+            for g in codes_here or [held]:
+                if g == 9.0:
+                    self.new.append((b, SMOOTH, 0.0))
+                    self.new += [(b + 1, SMOOTH, self._allowed(b, held, distance))] if b < self.words.lines else []
+                elif not np.isnan(g):
+                    held = g
+                    self.new.append((b, SMOOTH, self._allowed(b, g, distance)))
+
+    def _allowed(self, b: int, code: float, distance: float) -> float:
+        """mm that a code of the path mode may take; NaN for none."""
+        if code in _BY_DISTANCE:
+            return distance * self.unit(b)
+        return 0.0 if code == 60.0 else code if np.isnan(code) else np.inf
 
     def statements(self) -> tuple[tuple[WordMeaning, ...], tuple[Drill, ...]]:
         """Laws and cycles, with the words that put them in force."""

@@ -215,7 +215,7 @@ def _slowly(text: bytes, file: str) -> tuple[Words, list[Diagnostic]]:
             if match is None:
                 found = row.strip().decode("ascii", "replace")[:60]
                 diagnostics.append(error("gcode.syntax", f"not a block of words: {found!r}", file=file, lines=[number],
-                                         hint="a block is letters with numbers; expressions and macros are not read"))
+                                         hint="a block is letters with numbers"))
                 break
             letters.append(match[1][0])
             values.append(float(match[2]))

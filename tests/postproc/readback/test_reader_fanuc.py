@@ -143,7 +143,7 @@ def test_subprograms_of_other_files() -> None:
 
 
 def test_a_fault_in_another_file_points_there() -> None:
-    others = {"O77.nc": b"%\nO0077\nG2 X1. R.1 F9\nM99\n%\n", "O78.nc": b"%\nO78\nG52 X1.\nM99\n%\n"}
+    others = {"O77.nc": b"%\nO0077\nG2 X1. R.1 F9\nM99\n%\n", "O78.nc": b"%\nO78\nG51 X1.\nM99\n%\n"}
     _, found = executed(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\n"), others=others)
     assert [(d.code, d.file, list(d.lines)) for d in found] == [("gcode.arc", "O77.nc", [3])], "O78 is not called"
     _, found = executed(FANUC, program("G0 X0. Y0. Z0.\nM98 P78\n"), others=others)
@@ -174,10 +174,11 @@ def test_programs_that_cannot_be_followed(body: str, code: str) -> None:
 
 
 @pytest.mark.parametrize(("block", "code"), [
-    ("G51 X0. P2.", "gcode.unknown_code"), ("G68 X0. Y0. R30.", "gcode.unknown_code"), ("G92 X0.", "gcode.unknown_code"),
-    ("G52 X1.", "gcode.unknown_code"), ("G10 L2 P1 X0.", "gcode.unknown_code"), ("G43.5 H1", "gcode.unknown_code"),
-    ("G76 X0. Z-1. R1. Q.1", "gcode.unknown_code"), ("G87 X0.", "gcode.unknown_code"), ("G30 Z0.", "gcode.unknown_code"),
-    ("G65 P9810", "gcode.unknown_code"), ("#100=1", "gcode.syntax"), ("IF[#1EQ0]GOTO5", "gcode.syntax"),
+    ("G51 X0. P2.", "gcode.unknown_code"), ("G68 X0. Y0. R30.", "gcode.unknown_code"), ("G10 L3 P1 R1.",
+                                                                                        "gcode.data_setting"),
+    ("#1=#500", "gcode.variable"), ("#3000=1", "gcode.alarm"), ("G43.5 H1", "gcode.unknown_code"),
+    ("G76 X0. Z-1. R1. Q.1", "gcode.unknown_code"), ("G87 X0.", "gcode.unknown_code"), ("#1=1/0", "gcode.expression"),
+    ("G65 P9810", "gcode.subprogram"), ("#1=#3012", "gcode.variable"), ("IF[#1EQ#0]GOTO5", "gcode.jump"),
     ("M198 P1", "gcode.unknown_code"), ("G1 G53 X0. F9", "gcode.machine_position"), ("G187 P3", "gcode.unknown_code"),
     ("B5.", "gcode.unknown_word"), ("G0 X1. X2.", "gcode.repeated"), ("G17 G18", "gcode.repeated")])
 def test_what_is_not_modelled_is_an_error_with_its_line(block: str, code: str) -> None:

@@ -121,11 +121,11 @@ def test_subprograms_of_one_archive_and_of_other_files() -> None:
 
 
 @pytest.mark.parametrize(("block", "code"), [
-    ("TRANS X5", "gcode.unknown_word"), ("ROT Z30", "gcode.unknown_word"), ("G0 C=DC(5)", "gcode.rollover"), ("R1=5",
-    "gcode.syntax"),
-    ("IF R1==5 GOTOF A", "gcode.syntax"), ("G0 X=R1", "gcode.syntax"), ("CIP X1 Y1 I1=2", "gcode.syntax"), ("G33 Z1 K1",
+    ("TRANS V5", "gcode.unknown_word"), ("ROT Z30", "gcode.frame_turned"), ("G0 C=DC(5)", "gcode.rollover"), ("R1=R2",
+    "gcode.variable"),
+    ("IF 5==5 GOTOF A", "gcode.jump"), ("G0 X=R1", "gcode.variable"), ("CIP X1 Y1 I1=2", "gcode.syntax"), ("G33 Z1 K1",
     "gcode.unknown_code"),
-    ("G641 ADIS=0.1", "gcode.syntax"), ("G641", "gcode.unknown_code"), ("RTLIOF", "gcode.unknown_word"), ("FGROUP(X)",
+    ("SETAL(61000)", "gcode.alarm"), ("G646", "gcode.unknown_code"), ("RTLIOF", "gcode.unknown_word"), ("FGROUP(X)",
     "gcode.unknown_word"),
     ("G58 X1", "gcode.unknown_code"), ("D2", "gcode.tool"), ("G4 S5", "gcode.dwell"), ("G4 P5", "gcode.dwell"),
     ("CYCLE83(20,0,1,-8,,,3,1,0,0,1,1)", "gcode.cycle"), ("CYCLE86(20,0,1,-8,,0,3,1,0,0,0)", "gcode.cycle"),

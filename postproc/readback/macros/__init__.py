@@ -1,0 +1,1 @@
+"""Macro language executed: variables, jumps, loops and subprograms of a control, as plain blocks."""

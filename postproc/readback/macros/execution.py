@@ -1,0 +1,118 @@
+"""A program in macro language as the plain program that the control makes of it, block by block."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from dataclasses import replace as changed
+from typing import Literal
+
+import numpy as np
+
+from postproc.readback.macros.expressions import MacroFault
+from postproc.readback.macros.fanuc import FanucMacros
+from postproc.readback.macros.held import Held
+from postproc.readback.macros.klartext import KlartextMacros, klartext_rows
+from postproc.readback.macros.linuxcnc import LinuxCncMacros, linuxcnc_rows
+from postproc.readback.macros.siemens import SiemensMacros
+from postproc.readback.macros.siemens_rows import siemens_rows
+from postproc.readback.macros.sources import Cleaned, ProgramFiles
+from postproc.readback.text.canonical import Files, placed
+from postproc.readback.text.words import block_delete, lines_of, plain
+from toolpaths.arrays import Ints
+from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.shapes import arrays
+
+ToolsNumbered = Callable[[bytes, str], tuple[bytes, list[Diagnostic]]]
+MacroLanguage = Literal["fanuc", "haas", "linuxcnc", "siemens", "klartext"]
+_NEEDED = {
+    "fanuc": re.compile(rb"[#\[]|GOTO|M0*99[ \t]*P|G0*(?:10|30|52|92|6[567])(?![\d.])"),
+    "linuxcnc": re.compile(rb"[#\[]|G0*(?:10|28|30|52|92)(?![\d])|\bO\s*(?:<|\d+\s*[A-Z])"),
+    "siemens": re.compile(
+        rb"\b(?:DEF|IF|GOTO[FBC]?|FOR|WHILE|REPEATB?|LOOP|CASE|EXTERN|A?TRANS|A?ROTS?|A?SCALE|A?MIRROR|EXTCALL|SETAL|G53|G153|G20|G21)\b"
+        rb"|\bR\d+[ \t]*=|=[ \t]*[-+]*[ \t]*(?!(?:IC|AC|DC|ACP|ACN)[ \t]*\([ \t]*[-+.\d]+[ \t]*\))[A-Z_$(\[]"
+        rb"|=[ \t]*[-+]?[\d.]+[ \t]*[-+*/]|\bT[ \t]*=[ \t]*\"|\bPROC\b[^\n]*\("),
+    "klartext": re.compile(rb"FN[ \t]*\d+[ \t]*:|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}
+_CONTINUED = re.compile(rb"~[ \t]*\n")
+_STRINGS = re.compile(rb'(?<!T=)"[^"\n]*"|;[^\n]*')
+
+
+@dataclass(frozen=True)
+@arrays(line="B")
+class PlainProgram:
+    """A program without macro language.
+
+    Attributes:
+        text: a block a line; line (B + 1,): of each block, counted through all files; files: as `Canonical.files`
+    """
+
+    text: bytes
+    line: Ints
+    files: Files
+
+
+def needed(data: bytes, language: MacroLanguage, passive: tuple[str, ...] = ()) -> bool:
+    """True where a program, comments aside, has what only its execution explains."""
+    form = _NEEDED["fanuc" if language == "haas" else language]
+    text = data.upper()
+    if not form.search(text):
+        return False
+    if language == "siemens":
+        return form.search(_STRINGS.sub(b"", text)) is not None
+    if language == "klartext":
+        return form.search(_CONTINUED.sub(b" ", re.sub(rb";[^~\n]*", b"", lines_of(text)))) is not None
+    found = {m[0] for m in form.finditer(plain(text))}
+    codes = {f"G{int(f[1:])}" for f in found if f[:1] == b"G" and f[1:].isdigit()}
+    return bool({f for f in found if not f[1:].isdigit()} or codes - set(passive))
+
+
+def fanuc_rows(data: bytes, file: str) -> tuple[list[str], list[Diagnostic]]:
+    """Rows without comments, blanks and tape marks, in capitals."""
+    text, found = block_delete(re.sub(rb"(?m)^[ \t]*%[^\n]*", b"", plain(data).upper()), file)
+    return re.sub(r"[ \t]", "", text.decode("ascii", "replace")).split("\n")[:-1], found
+
+
+def executed(data: bytes, file: str, others: Mapping[str, bytes], language: MacroLanguage, held: Held,
+             numbered: ToolsNumbered) -> tuple[PlainProgram | None, list[Diagnostic]]:
+    """The plain program; None, and why, where a block cannot be executed.
+
+    Work is bounded: `held.most` blocks. `numbered` puts numbers in the place of the names of tools.
+    """
+    rows: dict[MacroLanguage, Cleaned] = {"linuxcnc": linuxcnc_rows, "siemens": siemens_rows, "klartext": klartext_rows}
+
+    def cleaned(text: bytes, name: str) -> tuple[list[str], list[Diagnostic]]:
+        text, found = (text, []) if language == "siemens" else numbered(text, name)
+        made, more = rows.get(language, fanuc_rows)(text, name)
+        return made, [*found, *more]
+    sources = ProgramFiles(data, file, others, cleaned)
+    run = _run(language, sources, held)
+    try:
+        run.run()
+    except MacroFault as fault:
+        return None, [*sources.found, *placed([fault.at(file, run.line)], sources.files)]
+    except RecursionError:
+        deep = MacroFault("gcode.expression", "brackets too deep", "write the expression in steps")
+        return None, [*sources.found, *placed([deep.at(file, run.line)], sources.files)]
+    judged = run.judged() if isinstance(run, SiemensMacros) else run.blocks.judged()
+    found = [*sources.found, *placed(judged, sources.files)]
+    if has_errors(found):
+        return None, found
+    text = "".join(f"{row}\n" for row in run.blocks.rows).encode("ascii", "replace")
+    line = np.array([0, *run.blocks.lines], dtype=np.int64)
+    return PlainProgram(text, line, sources.files), found
+
+
+def _run(language: MacroLanguage, sources: ProgramFiles,
+         held: Held) -> FanucMacros | LinuxCncMacros | SiemensMacros | KlartextMacros:
+    if language == "linuxcnc":
+        return LinuxCncMacros(sources, held)
+    if language == "siemens":
+        return SiemensMacros(sources, held)
+    return KlartextMacros(sources, held) if language == "klartext" else FanucMacros(sources, held, language == "haas")
+
+
+def in_source(found: list[Diagnostic], program: PlainProgram) -> list[Diagnostic]:
+    """Faults of the plain program, at the lines that its blocks come from."""
+    last = len(program.line) - 1
+    return placed([changed(d, lines=tuple(int(program.line[min(n, last)]) for n in d.lines)) for d in found], program.files)

@@ -1,0 +1,256 @@
+"""Expressions of Fanuc's custom macro B and of LinuxCNC: values of words, conditions, assignments.
+
+Fanuc B-64484EN, custom macro (arithmetic and logic operation): functions, then * / AND MOD, then + - OR XOR, then
+comparisons;
+a variable that was never set is vacant: it counts as 0, and EQ and NE know it from 0. LinuxCNC (G-code overview): **
+before * / MOD,
++ -, comparisons, AND OR XOR, which are 1 or 0; numbers nearer than 0.0001 are equal.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import Decimal
+
+from toolpaths.diagnostics import Diagnostic, error
+
+MacroValue = float | None
+_NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
+_NAME = re.compile(r"[A-Z]+")
+LINUXCNC_EQUAL = 1e-4
+HINT = "write it as the control's manual has it, or give the figures themselves"
+
+
+class MacroFault(Exception):
+    """A block that cannot be executed: code, message, remedy."""
+
+    def __init__(self, code: str, message: str, hint: str = HINT) -> None:
+        super().__init__(message)
+        self.code, self.message, self.hint = code, message, hint
+
+    def at(self, file: str, line: int) -> Diagnostic:
+        """The error, with the line of the block."""
+        return error(self.code, self.message, file=file, lines=[line], hint=self.hint)
+
+
+class Cursor:
+    """A place in a row of text."""
+
+    def __init__(self, text: str, at: int = 0) -> None:
+        self.text, self.at = text, at
+
+    def take(self, sign: str) -> bool:
+        """True, and behind it, where `sign` stands here."""
+        if not self.text.startswith(sign, self.at):
+            return False
+        self.at += len(sign)
+        return True
+
+    def need(self, sign: str) -> None:
+        """Behind `sign`, which must stand here."""
+        if not self.take(sign):
+            raise self.fault(f"{sign!r} is missing")
+
+    def match(self, form: re.Pattern[str]) -> str:
+        """What of `form` stands here, "" for nothing."""
+        found = form.match(self.text, self.at)
+        self.at = found.end() if found else self.at
+        return found[0] if found else ""
+
+    def fault(self, what: str) -> MacroFault:
+        """An error of syntax."""
+        return MacroFault("gcode.expression", f"{what}: {self.text[:60]!r}")
+
+    @property
+    def done(self) -> bool:
+        """True at the end."""
+        return self.at >= len(self.text)
+
+
+@dataclass(frozen=True)
+class Grammar:
+    """Operators by their signs, with (rank, function); a higher rank binds first. Functions of one argument.
+
+    `full_turn`: ATAN lies between 0 and 360 degrees.
+    """
+
+    operators: dict[str, tuple[int, Callable[[MacroValue, MacroValue], float]]]
+    functions: dict[str, Callable[[float], float]]
+    full_turn: bool
+
+
+def plain(a: MacroValue) -> float:
+    """A value in arithmetic: vacant is 0."""
+    return 0.0 if a is None else a
+
+
+def _arithmetic(f: Callable[[float, float], float]) -> Callable[[MacroValue, MacroValue], float]:
+    return lambda a, b: f(plain(a), plain(b))
+
+
+def _bits(f: Callable[[int, int], int]) -> Callable[[MacroValue, MacroValue], float]:
+    return lambda a, b: float(f(round(plain(a)), round(plain(b))))
+
+
+def _divided(a: float, b: float) -> float:
+    if b == 0.0:
+        raise MacroFault("gcode.expression", "division by 0", "the control stops there: test the divisor before")
+    return a / b
+
+
+def _power(a: float, b: float) -> float:
+    try:
+        result = a ** b
+    except (ValueError, ZeroDivisionError, OverflowError):
+        result = math.nan
+    if isinstance(result, complex) or not math.isfinite(result):
+        raise MacroFault("gcode.expression", f"{a:g} to the power of {b:g} is no number")
+    return float(result)
+
+
+def _fanuc_modulo(a: float, b: float) -> float:
+    return math.fmod(a, b) if b else _divided(a, b)
+
+
+def _linuxcnc_modulo(a: float, b: float) -> float:
+    rest = math.fmod(a, b) if b else _divided(a, b)
+    return rest + abs(b) if rest < 0.0 else rest
+
+
+def rounded(a: float) -> float:
+    """To the nearest whole number, halves away from 0."""
+    return math.copysign(math.floor(abs(a) + 0.5), a)
+
+
+def _up(a: float) -> float:
+    return math.copysign(math.ceil(abs(a)), a)
+
+
+def _degrees(f: Callable[[float], float]) -> Callable[[float], float]:
+    return lambda a: math.degrees(f(a))
+
+
+def _sine(f: Callable[[float], float]) -> Callable[[float], float]:
+    return lambda a: f(math.radians(a))
+
+
+def _decimal_bits(a: float) -> float:
+    return float(int(f"{round(abs(a))}", 16))
+
+
+COMMON: dict[str, Callable[[float], float]] = {
+    "SIN": _sine(math.sin), "COS": _sine(math.cos), "TAN": _sine(math.tan), "ASIN": _degrees(math.asin),
+    "ACOS": _degrees(math.acos), "SQRT": math.sqrt, "ABS": abs, "ROUND": rounded, "LN": math.log, "EXP": math.exp}
+_COMPARED: dict[str, Callable[[float, float], bool]] = {
+    "GT": lambda a, b: a > b, "GE": lambda a, b: a >= b, "LT": lambda a, b: a < b, "LE": lambda a, b: a <= b}
+
+
+def _compared(f: Callable[[float, float], bool]) -> Callable[[MacroValue, MacroValue], float]:
+    return lambda a, b: float(f(plain(a), plain(b)))
+
+
+def _orders(rank: int) -> dict[str, tuple[int, Callable[[MacroValue, MacroValue], float]]]:
+    return {name: (rank, _compared(f)) for name, f in _COMPARED.items()}
+
+
+FANUC = Grammar({
+    **_orders(1), "EQ": (1, lambda a, b: float(a == b)), "NE": (1, lambda a, b: float(a != b)),
+    "+": (2, _arithmetic(lambda a, b: a + b)), "-": (2, _arithmetic(lambda a, b: a - b)),
+    "OR": (2, _bits(lambda a, b: a | b)), "XOR": (2, _bits(lambda a, b: a ^ b)),
+    "*": (3, _arithmetic(lambda a, b: a * b)), "/": (3, _arithmetic(_divided)),
+    "MOD": (3, _arithmetic(_fanuc_modulo)), "AND": (3, _bits(lambda a, b: a & b))},
+    {**COMMON, "SQR": math.sqrt, "RND": rounded, "FIX": lambda a: float(math.trunc(a)), "FUP": _up,
+     "BIN": lambda a: float(f"{round(abs(a)):x}"), "BCD": _decimal_bits}, True)
+LINUXCNC = Grammar({
+    "AND": (1, _arithmetic(lambda a, b: float(a != 0.0 and b != 0.0))),
+    "OR": (1, _arithmetic(lambda a, b: float(a != 0.0 or b != 0.0))),
+    "XOR": (1, _arithmetic(lambda a, b: float((a != 0.0) != (b != 0.0)))),
+    **_orders(2), "EQ": (2, _arithmetic(lambda a, b: float(abs(a - b) < LINUXCNC_EQUAL))),
+    "NE": (2, _arithmetic(lambda a, b: float(abs(a - b) >= LINUXCNC_EQUAL))),
+    "+": (3, _arithmetic(lambda a, b: a + b)), "-": (3, _arithmetic(lambda a, b: a - b)),
+    "**": (5, _arithmetic(_power)), "*": (4, _arithmetic(lambda a, b: a * b)), "/": (4, _arithmetic(_divided)),
+    "MOD": (4, _arithmetic(_linuxcnc_modulo))},
+    {**COMMON, "FIX": lambda a: float(math.floor(a)), "FUP": lambda a: float(math.ceil(a))}, False)
+
+
+class Expressions:
+    """Values from text without blanks, in capitals; `variable` reads what stands behind a #."""
+
+    def __init__(self, grammar: Grammar, variable: Callable[[Cursor], MacroValue],
+                 special: Callable[[str, Cursor], MacroValue]) -> None:
+        self.grammar, self.variable, self.special = grammar, variable, special
+        self.signs = sorted(grammar.operators, key=len, reverse=True)
+
+    def value(self, c: Cursor) -> MacroValue:
+        """A number, a variable, a function or brackets, each with signs before it."""
+        if c.take("["):
+            result = self.expression(c)
+            c.need("]")
+            return result
+        if c.take("#"):
+            return self.variable(c)
+        if c.take("-"):
+            return -plain(self.value(c))
+        if c.take("+"):
+            return self.value(c)
+        number = c.match(_NUMBER)
+        if number:
+            return float(number)
+        name = c.match(_NAME)
+        if name == "ATAN":
+            return self._arc_tangent(c)
+        if name not in self.grammar.functions:
+            return self.special(name, c)
+        c.need("[")
+        argument = plain(self.expression(c))
+        c.need("]")
+        return applied(name, self.grammar.functions[name], argument)
+
+    def _arc_tangent(self, c: Cursor) -> float:
+        c.need("[")
+        rise, run = plain(self.expression(c)), 1.0
+        two = c.take(",")
+        if two:
+            run = plain(self.expression(c))
+        c.need("]")
+        if not two and c.take("/"):
+            two = True
+            c.need("[")
+            run = plain(self.expression(c))
+            c.need("]")
+        angle = math.degrees(math.atan2(rise, run))
+        return angle + 360.0 if angle < 0.0 and two and self.grammar.full_turn else angle
+
+    def expression(self, c: Cursor, rank: int = 0) -> MacroValue:
+        """Values joined by operators that bind at least as `rank` does, from the left."""
+        left = self.value(c)
+        while True:
+            sign = next((s for s in self.signs if c.text.startswith(s, c.at)), "")
+            if not sign or self.grammar.operators[sign][0] < rank:
+                return left
+            c.take(sign)
+            binds, f = self.grammar.operators[sign]
+            left = f(left, self.expression(c, binds + 1))
+
+
+def applied(name: str, f: Callable[[float], float], argument: float) -> float:
+    """A function of a number; what is no number is an error."""
+    try:
+        result = f(argument)
+    except (ValueError, OverflowError) as fault:
+        raise MacroFault("gcode.expression", f"{name} of {argument:g} is no number",
+                         "the control stops there: test the value before") from fault
+    return float(result)
+
+
+def written(value: float, whole: bool = False) -> str:
+    """A number as a word has it; `whole`: without a point, where it is a whole number."""
+    if not math.isfinite(value):
+        raise MacroFault("gcode.expression", f"a value is {value}", "the control stops there: test it before")
+    if value == round(value) and abs(value) < 1e15:
+        return f"{round(value)}" + ("" if whole else ".")
+    text = format(Decimal(repr(value)), "f")
+    return text if "." in text else text + "."

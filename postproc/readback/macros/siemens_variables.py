@@ -1,0 +1,163 @@
+"""Variables of SINUMERIK programs: R parameters, those that DEF declares, system variables that the program determines."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from postproc.readback.macros.expressions import Cursor, MacroFault, rounded
+from postproc.readback.macros.siemens_expressions import (
+    NAME,
+    Names,
+    SiemensValue,
+    expression,
+    listed,
+    number,
+    skip,
+    take,
+    text,
+)
+from postproc.readback.macros.track import Track
+
+_TYPE = re.compile(r"REAL|INT|BOOL|STRING|CHAR|AXIS|FRAME")
+_SCOPE = re.compile(r"(?:NCK|CHAN|SYNW|SYNR|SYNRW|PHU *\d+|LLI *\S+|ULI *\S+)(?![A-Z0-9_])")
+_AXIS = re.compile(r"[ \t]*([A-Z])[ \t]*(?=[,\n]|$)")
+_FALSE = frozenset({"$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN", "$AN_SETUP_TIME"})
+"""states of the control while a program simply runs"""
+_POSITIONS = frozenset({"$AA_IW", "$P_EP", "$P_EPM"})
+
+
+VariableKind = Literal["REAL", "INT", "BOOL", "STRING", "CHAR", "AXIS"]
+KINDS: tuple[VariableKind, ...] = get_args(VariableKind)
+
+
+@dataclass
+class DeclaredVariable:
+    """A variable by DEF: kind, lengths of its dimensions, values by index."""
+
+    kind: VariableKind
+    sizes: tuple[int, ...] = ()
+    values: dict[tuple[int, ...], SiemensValue] = field(default_factory=dict)
+
+    def put(self, index: tuple[int, ...], value: SiemensValue) -> None:
+        """A value as its kind holds it: INT rounds, BOOL is 0 or 1."""
+        if self.kind in ("STRING", "CHAR", "AXIS"):
+            self.values[index] = text(value)
+            return
+        held = number(value)
+        self.values[index] = rounded(held) if self.kind == "INT" else float(held != 0.0) if self.kind == "BOOL" else held
+
+
+class SiemensNames(Names):
+    """Names of the program that runs, and those of the whole control."""
+
+    def __init__(self, track: Track, state: dict[str, float]) -> None:
+        self.track, self.state = track, state
+        self.parameters: dict[int, float] = {}
+        self.local: dict[str, DeclaredVariable] = {}
+        self.common: dict[str, DeclaredVariable] = {}
+
+    def _declared(self, name: str) -> DeclaredVariable | None:
+        return self.local.get(name, self.common.get(name))
+
+    def get(self, name: str, index: tuple[SiemensValue, ...]) -> SiemensValue:
+        """A value by name."""
+        if name == "R" or (name[0] == "R" and name[1:].isdigit()):
+            place = int(number(index[0])) if name == "R" else int(name[1:])
+            if place not in self.parameters:
+                raise MacroFault("gcode.variable", f"R{place} is read before the program sets it: what it holds was left "
+                                                   f"there "
+                                 "by another program, or by hand", f"set it first, in a copy of the program: R{place}=...")
+            return self.parameters[place]
+        held = self._declared(name)
+        if held is not None:
+            where = self._within(held, name, index)
+            return held.values.get(where, "" if held.kind in ("STRING", "CHAR", "AXIS") else 0.0)
+        if name in _FALSE:
+            return 0.0
+        if name in _POSITIONS and index and text(index[0]) in self.track.at:
+            return self.track.position(text(index[0])) / self.track.scale(text(index[0]))
+        known = {"$P_TOOLNO": "T", "$P_TOOL": "D", "$P_F": "F"}.get(name, "")
+        if known in self.state:
+            return self.state[known]
+        raise MacroFault("gcode.variable", f"{name} is not read: what it holds is neither in the program nor in the set-up",
+                         f"declare it: DEF REAL {name}=..., or put its figure in its place, in a copy of the program")
+
+    def known(self, name: str) -> bool:
+        """True for what may stand before =."""
+        return name == "R" or bool(re.fullmatch(r"R\d+", name)) or self._declared(name) is not None
+
+    def put(self, name: str, index: tuple[SiemensValue, ...], value: SiemensValue) -> None:
+        """A variable set."""
+        if name == "R" or (name[0] == "R" and name[1:].isdigit()):
+            self.parameters[int(number(index[0])) if name == "R" else int(name[1:])] = number(value)
+            return
+        held = self._declared(name)
+        if held is None:
+            raise MacroFault("gcode.variable", f"{name} is set, and no DEF declares it", f"declare it: DEF REAL {name}")
+        held.put(self._within(held, name, index), value)
+
+    def _within(self, held: DeclaredVariable, name: str, index: tuple[SiemensValue, ...]) -> tuple[int, ...]:
+        where = tuple(int(number(i)) for i in index)
+        if len(where) != len(held.sizes) or any(not 0 <= i < n for i, n in zip(where, held.sizes, strict=False)):
+            raise MacroFault("gcode.variable", f"{name}{list(where)} is outside of its array",
+                             f"{name} has {' by '.join(map(str, held.sizes)) or 'no'} elements, counted from 0")
+        return where
+
+    def declare(self, c: Cursor, into: dict[str, DeclaredVariable] | None = None) -> None:
+        """DEF REAL A, B=1.5, C[3,2] with values, behind the DEF."""
+        skip(c)
+        while c.match(_SCOPE):
+            skip(c)
+        word = c.match(_TYPE)
+        kind = next((k for k in KINDS if k == word), None)
+        if kind is None:
+            raise c.fault("DEF of a kind that is not executed")
+        if kind == "STRING" and take(c, "["):
+            listed(c, self, "]")
+        while True:
+            skip(c)
+            name = c.match(NAME)
+            if not name:
+                raise c.fault("DEF without a name")
+            sizes = tuple(int(number(v)) for v in listed(c, self, "]")) if take(c, "[") else ()
+            if math.prod(sizes) > 1_000_000:
+                raise c.fault("DEF of an array that is too large")
+            made = DeclaredVariable(kind, sizes)
+            if take(c, "="):
+                self._first_values(c, made)
+            (self.local if into is None else into)[name] = made
+            if not take(c, ","):
+                return
+
+    def _first_values(self, c: Cursor, made: DeclaredVariable) -> None:
+        skip(c)
+        if made.kind == "AXIS" and (axis := _AXIS.match(c.text, c.at)):
+            c.at = axis.end()
+            made.put((), axis[1])
+            return
+        if made.sizes and (take(c, "SET(") or take(c, "(")):
+            values = listed(c, self, ")")
+        elif made.sizes and take(c, "REP("):
+            values = listed(c, self, ")") * math.prod(made.sizes)
+        else:
+            values = [expression(c, self)] * (math.prod(made.sizes) if made.sizes else 1)
+        for k, value in enumerate(values[:math.prod(made.sizes) if made.sizes else 1]):
+            index, rest = list[int](), k
+            for size in reversed(made.sizes):
+                rest, i = divmod(rest, size)
+                index.insert(0, i)
+            made.put(tuple(index), value)
+
+    def jump_name(self, c: Cursor) -> str:
+        """The label behind GOTO: a name, N and a number, or characters that an expression makes."""
+        skip(c)
+        if m := re.compile(r"[A-Z_][A-Z0-9_]*").match(c.text, c.at):
+            held = self._declared(m[0])
+            if held is None:
+                c.at = m.end()
+                return m[0]
+        return text(expression(c, self)).upper()
+

@@ -1,0 +1,291 @@
+"""Words, assignments, frames and calls of a row of a SINUMERIK program: figures in the place of expressions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from postproc.readback.macros.expressions import Cursor, MacroFault, written
+from postproc.readback.macros.fanuc import coded
+from postproc.readback.macros.held import Held
+from postproc.readback.macros.siemens_expressions import NAME, SiemensValue, expression, indices, number, skip, take
+from postproc.readback.macros.siemens_variables import SiemensNames
+from postproc.readback.macros.word_blocks import Blocks
+
+_WORD = re.compile(r"([A-Z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)(?![\d.]|[ \t]*=)")
+_KEY = re.compile(r"(\$?[A-Z_$][A-Z0-9_$]*)")
+_HOW = re.compile(r"(IC|AC|DC|ACP|ACN|CIC|CAC|CDC)[ \t]*\(")
+_FRAMES = re.compile(r"A?(?:TRANS|ROTS?|SCALE|MIRROR)")
+_LEVELS = {"CYCLE81": (0, 1, 3), "CYCLE82": (0, 1, 3), "CYCLE83": (0, 1, 3, 5), "CYCLE84": (0, 1, 3), "CYCLE840": (0, 1, 3),
+           "CYCLE85": (0, 1, 3), "CYCLE86": (0, 1, 3)}
+"""values of a cycle that are absolute levels"""
+_WHOLE = frozenset("GMTDHLPN")
+_NEVER = frozenset({"MCALL", "CALL", "EXTCALL"})
+
+
+@dataclass
+class RowDone:
+    """What a row has done: moved an axis, ended the program, returned; the call that follows; what MCALL names."""
+
+    moved: bool = False
+    ended: bool = False
+    back: bool = False
+    call: tuple[str, str, int] | None = None
+    modal: tuple[str, str] | None = None
+
+
+class SiemensWords:
+    """Words of rows; `runnable` says which names are those of subprograms."""
+
+    def __init__(self, blocks: Blocks, held: Held, runnable: Callable[[str], bool]) -> None:
+        self.blocks, self.held, self.runnable = blocks, held, runnable
+        self.track = blocks.track
+        self.state: dict[str, float] = {}
+        self.names = SiemensNames(self.track, self.state)
+        self.tools: dict[str, int] = {}
+        self.unknown_tools: dict[str, int] = {}
+        self.line = 0
+
+    def row(self, head: str, c: Cursor, line: int) -> RowDone:
+        """One row obeyed, and written on."""
+        done, self.line = RowDone(), line
+        if _FRAMES.fullmatch(head):
+            self._frame(head, c)
+            return done
+        out: list[str] = []
+        calls: list[tuple[str, str]] = []
+        machine = bool(re.search(r"(?<![A-Z0-9_])(?:SUPA|G53|G153)(?![A-Z0-9_.])", c.text))
+        self._modes(c.text)
+        while True:
+            skip(c)
+            if c.done:
+                break
+            self._piece(c, out, calls, machine, done)
+        times = 1
+        if calls:
+            counted = [w for w in out if w.startswith("P") and w[1:2].isdigit()]
+            times = round(float(counted[-1][1:])) if counted else 1
+            out = [w for w in out if w not in counted]
+            if "MCALL" in out:
+                out.remove("MCALL")
+                done.modal = calls[-1]
+            else:
+                done.call = (*calls[-1], times)
+        elif out == ["MCALL"]:
+            done.modal = ("", "")
+        if machine and out:
+            out = ["SUPA", *(w for w in out if w not in ("SUPA", "G53", "G153"))]
+        if out:
+            self.blocks.write(" ".join(out), line)
+        return done
+
+    def _modes(self, body: str) -> None:
+        """What G codes of a row change before its words are read."""
+        for m in re.finditer(r"(?<![A-Z0-9_])G[ \t]*0*(\d+)(?![A-Z0-9_.])", body):
+            code = int(m[1])
+            if code in (70, 71, 700, 710, 20, 21):
+                self.track.unit = 25.4 if code in (70, 700, 20) else 1.0
+            elif code in (90, 91):
+                self.track.absolute = code == 90
+            elif code in (54, 55, 56, 57, 500, *range(505, 600)):
+                self.track.take_offset(float(code))
+
+    def _piece(self, c: Cursor, out: list[str], calls: list[tuple[str, str]], machine: bool, done: RowDone) -> None:
+        """The next word, assignment, function or call."""
+        if c.text.startswith('"', c.at):
+            end = c.text.find('"', c.at + 1)
+            if end < 0 or not out or out[-1] not in ("CALL", "EXTCALL"):
+                raise c.fault("not a block of words")
+            calls.append((c.text[c.at + 1:end].upper(), ""))
+            out.pop()
+            c.at = end + 1
+            return
+        word = _WORD.match(c.text, c.at)
+        if word:
+            c.at = word.end()
+            self._word(word[1], float(word[2].replace("EX", "e")), word, out, calls, machine, done)
+            return
+        key = _KEY.match(c.text, c.at)
+        if key is None:
+            raise c.fault("not a block of words")
+        c.at = key.end()
+        index: tuple[SiemensValue, ...] = tuple(indices(c, self.names)) if take(c, "[") else ()
+        if not c.text.startswith("==", c.at) and take(c, "="):
+            self._assigned(key[1], index, c, out, machine, done)
+        elif take(c, "("):
+            self._function(key[1], c, out, calls)
+        elif self.runnable(key[1]) and key[1] not in _NEVER:
+            calls.append((key[1], ""))
+        elif index or len(key[1]) == 1:
+            raise c.fault("not a block of words")
+        else:
+            out.append(key[1])
+            done.back |= key[1] == "RET"
+
+    def _word(self, letter: str, value: float, word: re.Match[str], out: list[str], calls: list[tuple[str, str]],
+              machine: bool,
+              done: RowDone) -> None:
+        if letter == "L":
+            calls.append((f"L{word[2]}", ""))
+            return
+        if letter == "M" and value in (2.0, 30.0):
+            done.ended = True
+        if letter == "M" and value == 17.0:
+            done.back = True
+            return
+        self.state[letter] = value
+        if letter in self.held.axes:
+            done.moved = True
+            went = self._go(letter, value, machine)
+            out.append(letter + (written(went) if went != value else word[2]))
+        elif letter == "G" and value in (20.0, 21.0):
+            out.append("G70" if value == 20.0 else "G71")
+        else:
+            self._length(letter)
+            out.append(f"{letter}{word[2]}")
+
+    def _length(self, letter: str) -> None:
+        """Tools and edges change the length: Z is known again behind its next word."""
+        if letter in "TD":
+            self.track.at["Z"] = None
+
+    def _go(self, axis: str, value: float, machine: bool) -> float:
+        if machine:
+            self.track.go_machine(axis, value * self.track.scale(axis))
+            return value
+        return self.track.go(axis, value)
+
+    def _assigned(self, key: str, index: tuple[SiemensValue, ...], c: Cursor, out: list[str], machine: bool,
+                  done: RowDone) -> None:
+        """NAME=..., R1=..., X=..., X=IC(...), T="..."."""
+        if self.names.known(key):
+            self.names.put(key, index, expression(c, self.names))
+            return
+        if index:
+            raise MacroFault("gcode.variable", f"{key}[...] is set, and no DEF declares it",
+                             f"declare it: DEF REAL {key}[...]")
+        skip(c)
+        how = _HOW.match(c.text, c.at)
+        if how:
+            c.at = how.end()
+            value = number(expression(c, self.names))
+            if not take(c, ")"):
+                raise c.fault("')' is missing")
+            out.append(f"{key}={how[1]}({written(self._how(key, how[1], value, machine, done))})")
+            return
+        held = expression(c, self.names)
+        if key == "T" and isinstance(held, str):
+            out.append(f"T{self._tool(held)}")
+            self._length(key)
+        elif len(key) == 1:
+            value = coded(key, number(held))
+            if key in self.held.axes:
+                done.moved = True
+                value = self._go(key, value, machine)
+            self.state[key] = value
+            self._length(key)
+            out.append(key + written(value, key in _WHOLE))
+        elif key.startswith("$"):
+            out.append(f"{key}={written(number(held), True)}")
+        else:
+            out.append(f"{key}={written(number(held))}")
+
+    def _how(self, key: str, how: str, value: float, machine: bool, done: RowDone) -> float:
+        """The number of IC(), AC() and their like."""
+        if key not in self.held.axes:
+            return value
+        done.moved = True
+        before, self.track.absolute = self.track.absolute, how != "IC"
+        value = self._go(key, value, machine)
+        self.track.absolute = before
+        return value
+
+    def _tool(self, name: str) -> int:
+        """The number of a tool that is called by its name."""
+        named = {known.upper(): n for n, known in self.held.tools.items()}
+        if name.strip().isdigit():
+            return int(name)
+        if name.upper() in named:
+            return named[name.upper()]
+        self.unknown_tools.setdefault(name, self.line)
+        return 30_000 + list(self.unknown_tools).index(name)
+
+    def split(self, given: str) -> list[str]:
+        """The values of a call, by the commas between them."""
+        parts, depth, last, inside = list[str](), 0, 0, False
+        for k, sign in enumerate(given):
+            inside ^= sign == '"'
+            depth += 0 if inside else (sign in "([") - (sign in ")]")
+            if sign == "," and not depth and not inside:
+                parts.append(given[last:k])
+                last = k + 1
+        return [*parts, given[last:]] if given.strip() else []
+
+    def _function(self, name: str, c: Cursor, out: list[str], calls: list[tuple[str, str]]) -> None:
+        """NAME(...): a subprogram, or a cycle with its values written out."""
+        start, depth, inside = c.at, 1, False
+        while depth and c.at < len(c.text):
+            sign = c.text[c.at]
+            inside ^= sign == '"'
+            depth += 0 if inside else (sign == "(") - (sign == ")")
+            c.at += 1
+        if depth:
+            raise c.fault("')' is missing")
+        given = c.text[start:c.at - 1]
+        if name not in _LEVELS and self.runnable(name):
+            calls.append((name, given))
+        elif name != "MSG":
+            out.append(f"{name}({','.join(self._values(name, given))})")
+
+    def _values(self, name: str, given: str) -> list[str]:
+        """Values of a cycle, levels in the coordinates of the set-up's work offset."""
+        made = []
+        for k, part in enumerate(self.split(given)):
+            part = part.strip()
+            bare = NAME.fullmatch(part)
+            if not part or (bare and not self.names.known(part)):
+                made.append(part)
+                continue
+            c = Cursor(part)
+            value = expression(c, self.names)
+            skip(c)
+            if not c.done:
+                raise c.fault("a value of a call is not read")
+            if isinstance(value, str):
+                made.append(f'"{value}"')
+                continue
+            shift = self.track.shift("Z") / self.track.scale("Z") if k in _LEVELS.get(name, ()) else 0.0
+            if name == "CYCLE800" and any(self.track.shift(a) for a in self.held.axes):
+                raise MacroFault("gcode.mode", "CYCLE800 in coordinates that TRANS has shifted is not executed",
+                                 "write TRANS alone before it, and state the origin in CYCLE800")
+            made.append(written(value + shift, True))
+        return made
+
+    def _frame(self, head: str, c: Cursor) -> None:
+        """TRANS and ATRANS; others only where they turn and scale nothing, or alone, to cancel."""
+        given = dict[str, float]()
+        while True:
+            skip(c)
+            if c.done:
+                break
+            key = c.match(re.compile(r"[A-Z]+"))
+            if not key:
+                raise c.fault("not a block of words")
+            take(c, "=")
+            given[key] = number(expression(c, self.names))
+        local = self.track.local
+        if not head.startswith("A"):
+            local.clear()
+        neutral = 1.0 if head.endswith("SCALE") else 0.0
+        if not head.endswith("TRANS") and (any(v != neutral for v in given.values()) or (given and head.endswith("MIRROR"))):
+            raise MacroFault("gcode.frame_turned", f"{head} that turns, scales or mirrors the coordinates is not executed",
+                             "write the blocks in the coordinates of the work offset, or CYCLE800")
+        if head.endswith("TRANS"):
+            for axis, value in given.items():
+                if axis not in self.held.axes:
+                    raise MacroFault("gcode.unknown_word", f"{head} {axis}: the machine has no such axis",
+                                     f"its axes are {', '.join(self.held.axes)}")
+                local[axis] += value * self.track.scale(axis)
+                self.track.shifted = True
+

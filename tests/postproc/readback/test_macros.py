@@ -1,0 +1,94 @@
+"""Macro language of each control: where short programs go, by hand from the maker's rules, and what is refused."""
+
+from __future__ import annotations
+
+import pytest
+
+from postproc.readback.macros.held import most_blocks
+from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, executed, faults, good, words
+
+LINUXCNC = "linuxcnc"
+HEAD = "%\nO0001\nG17 G21 G40 G49 G80 G90 G94 G98\nG54\nG0 X0. Y0. Z0.\n"
+SINUMERIK = "G17 G40 G90 G94 G54 G71\nG0 X0 Y0 Z0\n"
+
+
+def track(control: str, body: str, **others: bytes) -> list[list[float]]:
+    """Where the axes go, behind a first block at zero."""
+    head, end = (SINUMERIK, "M30\n") if control == SIEMENS else (HEAD, "M30\n%\n")
+    if control == TNC:
+        head, end = "BEGIN PGM A MM\nL X+0 Y+0 Z+0 R0 FMAX\n", "L M30\nEND PGM A MM\n"
+    subprograms = body.partition("@")[2].lstrip("\n")
+    text = head + body.partition("@")[0] + ((subprograms and end.replace("%\n", "") + subprograms) or end)
+    files = {name.replace("_", "."): data for name, data in others.items()}
+    return words(good(control, text, others=files))[1:]
+
+
+@pytest.mark.parametrize(("body", "ends"), [
+    ("#1=2.\nWHILE[#1GT0]DO1\nG0 X#1 Y[#1*#1]\n#1=#1-1\nEND1\n", [[2, 4, 0], [1, 1, 0]]),
+    ("#1=3\nIF[#1NE#0]GOTO20\nX9.\nN20 G0 Y#1 Z-#1\n", [[0, 3, -3]]),
+    ("#2=7\nIF[#9EQ#0]THEN#2=8\nG0 X#2 Y#9\n", [[8, 0, 0]]),
+    ("#1=ATAN[-1]/[1]\nG0 X#1 Y[1+2*3-6/2] Z[FUP[1.2]+FIX[-1.8]+ROUND[2.5]]\n", [[315, 4, 4]]),
+    ("G65 P9000 A1. B2. I3. J4. I5. L2\n@O9000\nG91 G0 X#1 Y#7 Z[#4+#5]\nG90\nM99\n", [[1, 5, 7], [2, 10, 14]]),
+    ("G66 P9000 A5.\nG0 X1.\nX2.\nG67\nX3.\n@O9000\nG0 Z#1\nG0 Z0.\nM99\n",
+     [[1, 0, 0], [1, 0, 5], [1, 0, 0], [2, 0, 0], [2, 0, 5], [2, 0, 0], [3, 0, 0]]),
+    ("#100=1\nM98 P20077\nG0 X9.\n@O77\nG91 X#100\nG90\n#100=#100+1\nM99\n", [[1, 0, 0], [3, 0, 0], [9, 0, 0]]),
+    ("M98 P77 L1\nG0 X9.\nN50 G0 Y1.\n@O77\nIF[1EQ1]THEN#101=0\nM99 P50\n", [[0, 1, 0]]),
+    ("G52 X10.\nG0 X1.\nG91 X1.\nG90\nG52 X0.\nX1.\nG92 X5. Y2.\nX6. Y2.\n", [[11, 0, 0], [12, 0, 0], [1, 0, 0], [2, 0, 0]]),
+    ("G0 X4. Y3.\n#1=#5001 #2=#4001\nG0 Y[#1*2+#2]\n", [[4, 3, 0], [4, 8, 0]])])
+@pytest.mark.parametrize("control", [FANUC, HAAS])
+def test_custom_macro_b(control: str, body: str, ends: list[list[float]]) -> None:
+    if control == HAAS:
+        body = body.replace("P20077", "P77 L2")
+    assert track(control, body) == ends
+
+
+@pytest.mark.parametrize(("body", "ends"), [
+    ("DEF REAL _HOME=4, LIST[2,2]=SET(1,2,3,4)\nDEF INT II\nR1=3\nX=_HOME+R1*2 Y=LIST[1,0]\n", [[10, 3, 0]]),
+    ("DEF INT II\nFOR II=1 TO 3\nX=II\nENDFOR\n", [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
+    ("R1=0\nTOP: R1=R1+1\nIF R1<3 GOTOB TOP\nX=R1\n", [[3, 0, 0]]),
+    ("R1=1\nIF (R1==1) AND (R1<>2)\nX1\nELSE\nX2\nENDIF\n", [[1, 0, 0]]),
+    ("R1=2\nCASE R1 OF 1 GOTOF AA 2 GOTOF BB DEFAULT GOTOF CC\nAA: X1\nBB: X2\nCC: Y=IC(R1)\n", [[2, 0, 0], [2, 2, 0]]),
+    ("R1=0\nREPEAT\nR1=R1+1\nUNTIL R1>=4\nWHILE R1>3\nX=R1\nR1=R1-1\nENDWHILE\n", [[4, 0, 0]]),
+    ("G91\nPART: X1\nG90\nG91\nREPEAT PART P2\nG90\n", [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
+    ("TRANS X10\nATRANS Y=2*3\nX1 Y1\nTRANS\nX1\n", [[11, 7, 0], [1, 7, 0]])])
+def test_sinumerik(body: str, ends: list[list[float]]) -> None:
+    assert track(SIEMENS, body) == ends
+
+
+def test_sinumerik_calls_with_values() -> None:
+    called = b"PROC HOLE(REAL DEEP, VAR REAL LAST, INT NN=2) SAVE\nG1 Z=-DEEP F100\nLAST=DEEP*NN\nRET\n"
+    body = "DEF REAL BACK\nHOLE(3, BACK)\nX=BACK\nHOLE(1, BACK, 5)\nX=BACK\n"
+    assert track(SIEMENS, body, HOLE_SPF=called) == [[0, 0, -3], [6, 0, -3], [6, 0, -1], [5, 0, -1]]
+
+
+@pytest.mark.parametrize(("body", "ends"), [
+    ("Q1 = 2 * (3 + 4) - SQRT 16\nL X+Q1 Y-Q1 FMAX\n", [[10, -10, 0]]),
+    ("FN 0: Q1 = +3\nLBL 1\nL IX+1 FMAX\nFN 2: Q1 = +Q1 - +1\nFN 11: IF +Q1 GT +0 GOTO LBL 1\n",
+     [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
+    ("Q5 = 1\nLBL 1\nL IX+Q5 FMAX\nCALL LBL 1 REP 2\n", [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
+    ("FN 8: Q1 = +3 LEN +4\nFN 13: Q2 = +1 ANG +1\nFN 4: Q3 = +9 DIV +2\nL X+Q1 Y+Q2 Z+Q3 FMAX\n", [[5, 45, 4.5]])])
+def test_klartext(body: str, ends: list[list[float]]) -> None:
+    assert track(TNC, body)[:len(ends)] == ends
+
+
+def test_o_words_and_a_file_beside() -> None:
+    body = "O<step> CALL [3]\nG0 X#<_value>\nO1 REPEAT [2]\nG91 G0 Y1\nG90\nO1 ENDREPEAT\n"
+    beside = b"o<step> sub\ng0 z[#1 ** 2]\no<step> endsub [#1 + 0.5]\n"
+    assert track(LINUXCNC, body, step_ngc=beside) == [[0, 0, 9], [3.5, 0, 9], [3.5, 1, 9], [3.5, 2, 9]]
+
+
+def test_faults_stand_at_the_line_that_was_written() -> None:
+    text = HEAD + "#1=1.\nWHILE[#1LT3]DO1\nG2 X#1 R.1 F9\n#1=#1+1\nEND1\nM30\n%\n"
+    assert faults(FANUC, text).get("gcode.arc") == [8]
+    assert faults(FANUC, text.replace("G2", "G51"))["gcode.unknown_code"] == [8, 8]
+    _, found = executed(FANUC, HEAD + "G65 P9000\nM30\n%\n", others={"O9000.nc": b"O9000\n\nG0 X#500\nM99\n"})
+    assert [(d.code, d.file, d.lines) for d in found] == [("gcode.variable", "O9000.nc", (3,))]
+
+
+@pytest.mark.parametrize(("control", "text"), [
+    (FANUC, HEAD + "N1 #1=0\nGOTO1\nM30\n"), (LINUXCNC, HEAD + "O1 WHILE [1]\nO1 ENDWHILE\nM2\n"),
+    (SIEMENS, SINUMERIK + "AA: R1=1\nGOTOB AA\nM30\n"), (TNC, "BEGIN PGM A MM\nLBL 1\n"
+     "FN 9: IF +1 EQU +1 GOTO LBL 1\nEND PGM A MM\n")])
+def test_a_program_without_an_end_is_refused(control: str, text: str) -> None:
+    with most_blocks(500):
+        assert set(faults(control, text)) == {"gcode.endless"}
