@@ -38,7 +38,7 @@ class ChainLoop:
                    np.array([joint.place for joint in chain]), np.array(turning, dtype=np.int64))
 
     def pays(self, n: int) -> bool:
-        """Whether the loop is the faster way for n points."""
+        """True where the loop is faster for n points."""
         return wanted(n, COMPILE_FROM)
 
     def poses(self, q: Floats, carried: Floats) -> Floats:
