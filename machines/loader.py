@@ -47,7 +47,20 @@ def load(source: str | Path) -> Machine:
 
 
 def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
-    """The machine of a built-in name or a path, or None and every fault of its file."""
+    """The machine of a built-in name or a path, or None and every fault of its file; built-in ones are loaded once."""
+    if isinstance(source, str) and source in builtin():
+        machine, found = _built_in(source)
+        return machine, list(found)
+    return _from_file(source)
+
+
+@cache
+def _built_in(name: str) -> tuple[Machine | None, tuple[Diagnostic, ...]]:
+    machine, found = _from_file(name)
+    return machine, tuple(found)
+
+
+def _from_file(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
     file, diagnostics = read_toml(source, builtin(), "machine")
     if file is None:
         return None, diagnostics
