@@ -81,6 +81,15 @@ def test_what_is_not_equal_is_written_as_moves_and_said_once(controller: str) ->
     assert not [d for d in equal.diagnostics if d.code == "cycle.as_moves"]
 
 
+@pytest.mark.parametrize("controller", ["heidenhain-tnc640", "siemens-840d"])
+def test_a_last_peck_of_next_to_nothing_becomes_moves(controller: str) -> None:
+    """The depth before it lies within the tolerance of the bottom, of which a cycle would make two bottoms."""
+    result = good(drilled(controller, 7.0, 3.499, depth=14.0))
+    assert [d.message for d in result.diagnostics if d.code == "cycle.as_moves"] == [
+        "3 holes of CYCLE/DEEP written as single moves: its pecks would leave less than 0.02 mm for the last one"]
+    assert good(drilled(controller, 7.0, 3.48, depth=14.0)).text.count("MCALL CYCLE83") == (controller == "siemens-840d")
+
+
 @pytest.mark.parametrize(("controller", "old", "new"), [
     ("haas-ngc", " J2. K3.", " J0. K3."), ("haas-ngc", " K3.", " K4."), ("haas-ngc", " I5.", " I6."),
     ("heidenhain-tnc640", "Q212=+2 ", "Q212=+0 "), ("heidenhain-tnc640", "Q205=+3 ", "Q205=+4 "),
