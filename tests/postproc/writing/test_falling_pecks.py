@@ -63,6 +63,8 @@ def test_they_are_native_where_the_control_has_them() -> None:
     assert tnc.count(" M99") == 3
     siemens = good(drilled("siemens-840d", 5.0, 3.0)).text
     assert "MCALL CYCLE83(3,0,3,-20.88,,,5,-0.6,0,0,1,1,,3)" in siemens and siemens.count("MCALL CYCLE83") == 1
+    assert "DAM below 0 as the factor" in siemens and "(assumed)" in siemens
+    assert "(assumed)" not in good(drilled("siemens-840d", 4.0, 4.0)).text
     assert "P500" in good(drilled("haas-ngc", 5.0, 3.0, 0.5)).text
     assert ",5,-0.6,0.5,0,1,1,,3)" in good(drilled("siemens-840d", 5.0, 3.0, 0.5)).text
     assert "Q211=+0.5 " in good(drilled("heidenhain-tnc640", 5.0, 3.0, 0.5)).text
