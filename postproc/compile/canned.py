@@ -208,7 +208,7 @@ def falls(cycle: Cycle) -> bool:
 
 
 def ends_short(cycle: Cycle) -> bool:
-    """True where pecks of two depths, counted from the surface or from the start plane, leave next to nothing for the last."""
+    """True where pecks of two depths, from the surface or from the start plane, leave next to nothing for the last."""
     rests = [deep - cycle.steps[0] for deep in (cycle.depth, cycle.depth + cycle.clearance)]
     return any(rest > ROUND_OFF and ROUND_OFF < rest % cycle.steps[1] < LAST_PECK for rest in rests)
 
