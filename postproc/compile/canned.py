@@ -23,7 +23,7 @@ LEAST_SHARE = 0.001
 """of the first peck: what cycles can state (CYCLE83, DAM)"""
 ROUND_OFF = 1e-9
 LAST_PECK = 0.02
-"""mm: a last peck of less is none of its own, as no read-back tells its two depths apart"""
+"""mm: a last peck of less is none of its own: to the read-back its two depths are one"""
 STATES_RETRACT = ("{retract}", "{second}")
 """one of them stands in cycles that state the level they retract to"""
 
