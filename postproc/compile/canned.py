@@ -21,6 +21,9 @@ ROUNDED = 1.5
 """last decimals by which words along a hole may differ in a plane whose printed angles are rounded"""
 LEAST_SHARE = 0.001
 """of the first peck: what cycles can state (CYCLE83, DAM)"""
+ROUND_OFF = 1e-9
+LAST_PECK = 0.02
+"""mm: a last peck of less is none of its own: to the read-back its two depths are one"""
 STATES_RETRACT = ("{retract}", "{second}")
 """one of them stands in cycles that state the level they retract to"""
 
@@ -188,12 +191,13 @@ def cycle_spec(controller: ControllerFile, cycle: Cycle, key: CycleKey) -> Canne
     """The controller's cycle that makes a hole as the CL file has it; None where it has none that is equal.
 
     Pecks that are not all alike are equal only to a cycle with a first step, a decrement and a least step: first
-    1STPECK, decrement 1STPECK - SUBPECK, least SUBPECK, where SUBPECK is the smaller one (DEEP2 of SolidWorks).
+    1STPECK, decrement 1STPECK - SUBPECK, least SUBPECK, where SUBPECK is the smaller one (DEEP2 of SolidWorks), and the last
+    one is no crumb.
     """
     cycles = controller.cycles
     if len(set(cycle.steps)) <= 1:
         return (cycles.with_dwell if cycle.dwell > 0.0 else cycles.table).get(key)
-    spec = cycles.falling.get(key) if falls(cycle) else None
+    spec = cycles.falling.get(key) if falls(cycle) and not ends_short(cycle) else None
     says = spec is not None and (spec.dwell or "{dwell}" in spec.code)
     return spec if says or not cycle.dwell > 0.0 else None
 
@@ -201,6 +205,12 @@ def cycle_spec(controller: ControllerFile, cycle: Cycle, key: CycleKey) -> Canne
 def falls(cycle: Cycle) -> bool:
     """True where all pecks behind the first are one smaller one, of a thousandth of it at least."""
     return len(cycle.steps) == 2 and LEAST_SHARE * cycle.steps[0] <= cycle.steps[1] < cycle.steps[0]
+
+
+def ends_short(cycle: Cycle) -> bool:
+    """True where pecks of two depths, from the surface or from the start plane, leave next to nothing for the last."""
+    rests = [deep - cycle.steps[0] for deep in (cycle.depth, cycle.depth + cycle.clearance)]
+    return any(rest > ROUND_OFF and ROUND_OFF < rest % cycle.steps[1] < LAST_PECK for rest in rests)
 
 
 def cycle_key(kind: CycleKind, turning: int) -> CycleKey:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.compile.canned import cycle_key, cycle_spec, falls, may_cycle
+from postproc.compile.canned import LAST_PECK, cycle_key, cycle_spec, ends_short, falls, may_cycle
 from postproc.controllers.model import ControllerFile
 from postproc.path.model import JointPath
 from postproc.reference.events import spindle_states
@@ -65,6 +65,8 @@ def _unequal(cycle: Cycle, controller: ControllerFile) -> str:
     if cycle_spec(controller, cycle, cycle.kind) is not None:
         return ""
     if len(set(cycle.steps)) > 1:
+        if falls(cycle) and ends_short(cycle):
+            return f"its pecks would leave less than {LAST_PECK:g} mm for the last one"
         return "its pecks are not all alike" + (", and the controller's cycles.falling has none" if falls(cycle) else "")
     waits = "with" if cycle.dwell > 0.0 else "without"
     return f"the controller has none {waits} a dwell"

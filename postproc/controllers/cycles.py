@@ -40,6 +40,8 @@ class Cycles(UserModel):
     """used instead where the cycle dwells"""
     falling: dict[str, CannedCycle] = Field(default_factory=dict)
     """used instead where the pecks behind the first are smaller (DEEP2: 1STPECK, SUBPECK); missing: single moves"""
+    falling_relies_on: str = ""
+    """what is assumed of the control's falling pecks: a comment in the header of programs that have them"""
     to_initial: str = "G98"
     """retract to the level that the tool came from"""
     to_plane: str = "G99"

@@ -109,7 +109,7 @@ def written(controller: ControllerFile) -> Iterator[str]:
                                           "levels"},
                                  exclude={"rollover": {"needs", "default", "rules"}, "subprograms": {"place", "file"},
                                           "subprogram_files": {"place", "file"}, "arcs": {"helical_option"},
-                                          "cycles": {"rigid_only", "rigid_option", "floating"}})
+                                          "cycles": {"rigid_only", "rigid_option", "floating", "falling_relies_on"}})
     modes = [mode for mode in (controller.modes.tcp, controller.modes.tilted) if mode is not None]
     texts = [*_texts(program), *_texts(rest), *(t for mode in modes for t in (*mode.start, *mode.enter, *mode.leave))]
     for text in texts:

@@ -88,8 +88,9 @@ class WriterState:
         third = [p.letters.index("ZYX"[plane - 17]) for plane in p.plane[arcs].tolist()]
         rising = p.words[arcs, third] != p.words[arcs - 1, third]
         taps = any(hole.key.startswith("TAP") for hole in p.holes)
+        falling = any(len(set(self.cycles[hole.cycle].steps)) > 1 for hole in p.holes)
         others = ((rules.program.smoothing_option, True), (rules.arcs.helical_option, bool(rising.any())),
-                  (rules.cycles.rigid_option, taps))
+                  (rules.cycles.rigid_option, taps), (rules.cycles.falling_relies_on, falling))
         return needed + [text for text, used in others if text and used]
 
     def restate(self) -> None:

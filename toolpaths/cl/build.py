@@ -239,6 +239,10 @@ class ToolpathBuilder:
         """The operation of the next row is turning, whatever still begins before that row."""
         self.turning.add((self.operation.now, self.row))
 
+    def mills(self) -> None:
+        """The operation of the next row is none of turning, whatever was said before that row."""
+        self.turning.discard((self.operation.now, self.row))
+
     def last_point(self) -> Triple | None:
         """Coordinates of the row before, as written; None where there is none."""
         if self.fast > self._piece:

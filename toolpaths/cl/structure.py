@@ -14,6 +14,7 @@ from toolpaths.cl.tools import describe
 from toolpaths.toolpath import Frame, Operation, Role, Tool
 
 _TOOL_PATH = re.compile(r"(.*?),\s*TOOL\s*(?:,(.*))?$", re.IGNORECASE | re.DOTALL)
+DIGITS = "0123456789"
 _CATIA_OPERATION = re.compile(r"OPERATION NAME\s*:\s*(.*)", re.IGNORECASE)
 
 
@@ -87,8 +88,11 @@ def apply(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def machin(b: ToolpathBuilder, s: Statement) -> None:
-    """MACHIN names the post-processor; that of a lathe says that the file is turning."""
-    if any(isinstance(word, str) and word.startswith(("LATHE", "TURN")) for word in s.words):
+    """MACHIN names the post-processor; LATHE or TURN, with a number or without, says that the file is turning.
+
+    Other names that begin so do not: they may be those of a mill with a turntable or of a mill-turn centre that mills.
+    """
+    if any(isinstance(word, str) and word.rstrip(DIGITS) in ("LATHE", "TURN") for word in s.words):
         b.turns()
 
 
@@ -171,8 +175,10 @@ def mode(b: ToolpathBuilder, s: Statement) -> None:
         b.log.error("cl.motion-word", f"{s.major}/{s.body}: incremental coordinates are not supported", b.line,
                     "have the CAM system write absolute coordinates")
     elif s.major == "MODE":
-        if s.has("TURN"):
+        if s.words[:1] == ("TURN",):
             b.turns()
+        elif s.words[:1] == ("MILL",):
+            b.mills()
         plain_event(b, s)
 
 

@@ -2,7 +2,7 @@
 
 All begin with RTP (retraction), RFP (reference), SDIS (safety), DP (depth) or DPR (depth below RFP). The tool
 goes rapidly to RFP + SDIS, feeds to the depth and leaves for RTP. CYCLE83: FDEP or FDPR first peck, DAM
-below 0 the share of the last stroke that the next one is, _MDEP the least stroke, DTB, DTS,
+below 0 the share of the last stroke that the next one is, _MDEP the least stroke (both assumed), DTB, DTS,
 FRF, VARI (0 breaks chips: up by VRT, 1 mm by default; 1 leaves the hole, then stops DIS1 before the last depth: 0.6 mm down
 to 30 mm depth, a fiftieth of the depth, 7 mm at the most, beyond).
 """

@@ -34,7 +34,7 @@ OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "feed.kept_by_units
           "tools.length_automatic", "tools.cutting_edges", "program.operation",
           "program.carried_out", "program.relies_on_turns", "program.stock",
           "program.exact_path", "program.smoothing_option", "program.without_smoothing", "arcs.helical_option",
-          "cycles.rigid_option", "cycles.floating", "cycles.falling",
+          "cycles.rigid_option", "cycles.floating", "cycles.falling", "cycles.falling_relies_on",
           "codes.tool_by_name", "tools.names",
           "subprograms.call", "subprograms.begin", "subprograms.end",
           "subprograms.place", "subprograms.file", "subprogram_files.call", "subprogram_files.begin", "subprogram_files.end",

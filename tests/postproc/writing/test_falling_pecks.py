@@ -63,6 +63,8 @@ def test_they_are_native_where_the_control_has_them() -> None:
     assert tnc.count(" M99") == 3
     siemens = good(drilled("siemens-840d", 5.0, 3.0)).text
     assert "MCALL CYCLE83(3,0,3,-20.88,,,5,-0.6,0,0,1,1,,3)" in siemens and siemens.count("MCALL CYCLE83") == 1
+    assert "DAM below 0 as the factor" in siemens and "(assumed)" in siemens
+    assert "(assumed)" not in good(drilled("siemens-840d", 4.0, 4.0)).text
     assert "P500" in good(drilled("haas-ngc", 5.0, 3.0, 0.5)).text
     assert ",5,-0.6,0.5,0,1,1,,3)" in good(drilled("siemens-840d", 5.0, 3.0, 0.5)).text
     assert "Q211=+0.5 " in good(drilled("heidenhain-tnc640", 5.0, 3.0, 0.5)).text
@@ -79,6 +81,15 @@ def test_what_is_not_equal_is_written_as_moves_and_said_once(controller: str) ->
         assert bool(re.search(r"G83|CYCL DEF 20|CYCLE83\(", result.text)) == native
     equal = good(drilled(controller, 4.0, 4.0))
     assert not [d for d in equal.diagnostics if d.code == "cycle.as_moves"]
+
+
+@pytest.mark.parametrize("controller", ["heidenhain-tnc640", "siemens-840d"])
+def test_a_last_peck_of_next_to_nothing_becomes_moves(controller: str) -> None:
+    """The depth before it lies within the tolerance of the bottom, of which a cycle would make two bottoms."""
+    result = good(drilled(controller, 7.0, 3.499, depth=14.0))
+    assert [d.message for d in result.diagnostics if d.code == "cycle.as_moves"] == [
+        "3 holes of CYCLE/DEEP written as single moves: its pecks would leave less than 0.02 mm for the last one"]
+    assert good(drilled(controller, 7.0, 3.48, depth=14.0)).text.count("MCALL CYCLE83") == (controller == "siemens-840d")
 
 
 @pytest.mark.parametrize(("controller", "old", "new"), [

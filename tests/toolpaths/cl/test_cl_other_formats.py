@@ -60,6 +60,10 @@ def test_turning_is_turning_whatever_else_is_wrong(text: str) -> None:
         ["this is a turning file: milling alone is converted"] if refused else [])
 
 
-def test_machin_of_a_mill_is_no_turning() -> None:
-    path = toolpaths.read_bytes(b"PARTNO T\nMACHIN/MILL,1\nUNITS/MM\nFEDRAT/200,MMPM\nGOTO/10,5,0\nFINI\n")[0]
-    assert not any(op.turning for op in path.operations)
+@pytest.mark.parametrize(("said", "turning"), [
+    ("MACHIN/MILL,1", False), ("MACHIN/TURNTABLE5X,1", False), ("MACHIN/TURNMILL,3", False), ("MODE/MILL,TURN", False),
+    ("MACHIN/LATHE,1\nMODE/MILL", False), ("MACHIN/LATHE2,1", True), ("MODE/MILL\nMODE/TURN", True)])
+def test_what_says_that_a_file_is_turning(said: str, turning: bool) -> None:
+    """Names that only begin as that of a lathe say nothing, MODE/MILL takes back what was said before it."""
+    path = toolpaths.read_bytes(f"PARTNO T\n{said}\nUNITS/MM\nFEDRAT/200,MMPM\nGOTO/10,5,0\nFINI\n".encode())[0]
+    assert any(op.turning for op in path.operations) is turning
