@@ -9,7 +9,7 @@ import numpy as np
 
 from machines.kinematics.chain import Joint
 from toolpaths.arrays import Floats, Ints
-from toolpaths.compiled import compiled, loop
+from toolpaths.compiled import compiled, loop, wanted
 from toolpaths.shapes import arrays
 
 _NUMBERS, _ROWS = ("float64", 1), ("float64", 2)
@@ -36,6 +36,10 @@ class ChainLoop:
         turn = [turning.index(at) if joint.rotary else -1 for at, joint in zip(column, chain, strict=True)]
         return cls(np.array(turn), np.array(column), np.array([joint.along for joint in chain]),
                    np.array([joint.place for joint in chain]), np.array(turning, dtype=np.int64))
+
+    def pays(self, n: int) -> bool:
+        """True where the loop is faster for n points."""
+        return wanted(n, COMPILE_FROM)
 
     def poses(self, q: Floats, carried: Floats) -> Floats:
         """(1 + C, N, 3), see `chain_poses`; sines as numpy has them, whose bits the columns have too."""

@@ -23,13 +23,12 @@ import numpy as np
 from machines.kinematics import columns
 from machines.kinematics.base import ErrorForm, ErrorForms, Kinematics, as_points
 from machines.kinematics.chain import Joint, unit_vector
-from machines.kinematics.chain_loop import COMPILE_FROM, ChainLoop
+from machines.kinematics.chain_loop import ChainLoop
 from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x, spin_about
 from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.compiled import wanted
 from toolpaths.rotations import angle_between, cross, dot, lengths, unit, wrap
 from toolpaths.shapes import arrays
 
@@ -124,7 +123,7 @@ class Serial(Kinematics):
 
     def _placed(self, q: Floats, carried: Sequence[Floats]) -> list[Floats]:
         """The tip and the vectors `carried` (each (3,)) by the tool, moved by every axis in turn, each (N, 3)."""
-        if wanted(len(q), COMPILE_FROM):
+        if self._loop.pays(len(q)):
             return list(self._loop.poses(q, np.array([-self.tool_length * self.tool_axis, *carried])))
         result = [np.empty((len(q), 3)) for _ in range(1 + len(carried))]
         for part in columns.blocks(len(q)):

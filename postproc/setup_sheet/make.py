@@ -59,16 +59,10 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     known = [*found, *(d for d in toolpath.faults if d not in found)]
     if has_errors(known):
         return SetupSheet("", tuple(known))
-    said: dict[str, float | str] = {}
-
-    def once(question: Question) -> float | str:
-        assert ask is not None
-        if question.key not in said:
-            said[question.key] = ask(question)
-        return said[question.key]
+    once = _asked_once(ask) if ask is not None else None
 
     def made(reach: bool) -> SetupSheet:
-        return _made(toolpath, machine, controller, options, given, once if ask is not None else None, assume,
+        return _made(toolpath, machine, controller, options, given, once, assume,
                      (list(found), known), code, progress, spec, reach)
 
     first = made(False)
@@ -76,6 +70,18 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
         return first
     again = made(True)
     return again if again.text else first
+
+
+def _asked_once(ask: Callable[[Question], float | str]) -> Callable[[Question], float | str]:
+    """The same, with one answer to each question."""
+    said: dict[str, float | str] = {}
+
+    def once(question: Question) -> float | str:
+        if question.key not in said:
+            said[question.key] = ask(question)
+        return said[question.key]
+
+    return once
 
 
 def _lengths_may_help(made: SetupSheet) -> bool:

@@ -19,7 +19,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 import trimesh
 
+import machines
 from machines.geometric_error.actual import rods
+from machines.kinematics import chain_loop
 from postproc.collision import search
 from postproc.collision.solid import solid
 from postproc.feedrate import interior_packed, paths, tightening
@@ -84,6 +86,8 @@ def main() -> None:
     frame, errors, (slides, where, turned) = rod_frame(kin.on_rods), rod_errors(kin), platform(kin, 300)
     compared("rods.py, 300 poses", rods, lambda: frame.solve(slides, where, turned, errors),
              lambda: frame.solve(slides, where, turned, errors))
+    serial, q = machines.load("mikron-ucp710").kinematics, rng.normal(size=(300, 5))
+    compared("chain_loop.py, 300 poses", chain_loop, lambda: serial.forward(q), lambda: serial.forward(q))
     moving, pieces = random_case(rng)
     body = solid(trimesh.creation.icosphere(2, radius=12.0), HERE)
     compared(f"search.py, {len(moving)} moves", search, lambda: search.nearest(body, moving, pieces, 2.0),

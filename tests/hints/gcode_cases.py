@@ -103,7 +103,7 @@ _ISO = [
     ),
     _of("gcode.machine_position", FANUC, "", "G1 G53 Z0.\n", r"\1 Z0.\n", "write (G53 G0)|write (G0 G53)"),
     _of("gcode.second_reference", FANUC, "", "G91 G30 Z0.\nG90\n", r"G91 \1 Z0.\nG90\n", "write (G28)", stops=()),
-    _of("gcode.tool_unnamed", SIEMENS, "", 'T="EM10"\n', "T1\n", "the number of the tool", stops=()),
+    _of("gcode.tool_name", SIEMENS, "", 'T="EM10"\n', "T1\n", "the number of the tool", stops=()),
     _of("gcode.subprogram", FANUC, "M30\n", "M99\n", r"\1\n", "write (M30)"),
     _of("gcode.subprogram", FANUC, "", "M98 P77\n", "", "known are"),
     _of("gcode.tool", SIEMENS, "D1\n", "D3\n", r"\1\n", "(D1) or D0"),

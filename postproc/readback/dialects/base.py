@@ -41,7 +41,7 @@ from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
 ParsedProgram = tuple[ProgramText, Structure]
 UNITS_UNSTATED = "gcode.units_unstated"
-ASSUMED = frozenset({"gcode.second_reference", "gcode.tool_unnamed"})
+ASSUMED = frozenset({"gcode.second_reference", "gcode.tool_name"})
 """what is taken to be so where a program is timed, and refused where it is verified"""
 STOPS = (0.0, 1.0)
 """M codes of stops"""

@@ -61,7 +61,7 @@ class SiemensMacros:
 
     def judged(self) -> list[Diagnostic]:
         """Tools whose names the set-up has not."""
-        return [warning("gcode.tool_unnamed", f'no tool of the set-up is called "{name}": its length counts as 0',
+        return [warning("gcode.tool_name", f'no tool of the set-up is called "{name}": its length counts as 0',
                         file=self.blocks.file, lines=[line], hint='[tools.N] called = "..." of the set-up: the number of '
                         'the tool that the control calls so') for name, line in self.words.unknown_tools.items()]
 
