@@ -47,7 +47,8 @@ def _unsolved(motion: PlannedMotion, moves: Moves, file: str) -> list[Diagnostic
     if not lines:
         return []
     return [warning("time.unsolved", "the least time of these passes was not found; their times are longer than necessary, "
-                    "within all limits", file=file, lines=lines[:6], count=len(lines), hint=f"{REPORT}; --model lookahead needs no plan")]
+                    "within all limits", file=file, lines=lines[:6], count=len(lines),
+                    hint=f"{REPORT}; --model lookahead needs no plan")]
 
 
 def _of_passes(blocks: MotionBlocks, move: Ints, times: BlockTimes, spans: list[tuple[int, int, float]]) -> Floats:

@@ -74,8 +74,8 @@ def without_feed(toolpath: Toolpath) -> Bools:
 
 
 def slow_feeds(toolpath: Toolpath, row: Ints, kind: Array) -> list[Diagnostic]:
-    """A warning of feeds per minute below `SLOWEST`, which another unit would explain; taps are left out, theirs follows from
-    their thread. `row` (M,), `kind` (M,): of the moves."""
+    """A warning of feeds per minute below `SLOWEST`, which another unit would explain; taps are left out, as theirs follows
+    from their thread. `row` (M,), `kind` (M,): of the moves."""
     feed, mode = _stated_feeds(toolpath)
     taps = np.array([c.kind == "TAP" for c in toolpath.cycles] + [False])[
         np.where(toolpath.role == Role.HOLE, toolpath.cycle, -1)]
@@ -84,8 +84,8 @@ def slow_feeds(toolpath: Toolpath, row: Ints, kind: Array) -> list[Diagnostic]:
     if not len(bad):
         return []
     least = float(feed[row[bad]].min()) / PER_MINUTE
-    return [warning("feed.slow", f"cuts at {least:g} mm/min: m/min may be meant, which is {1000.0 * least:g} mm/min, or a feed "
-                    "per revolution", file=toolpath.file, lines=np.unique(toolpath.line[row[bad]])[:6].tolist(),
+    return [warning("feed.slow", f"cuts at {least:g} mm/min: m/min may be meant, which is {1000.0 * least:g} mm/min, or a "
+                    "feed per revolution", file=toolpath.file, lines=np.unique(toolpath.line[row[bad]])[:6].tolist(),
                     count=len(bad),
                     hint=f"write FEDRAT/{1000.0 * least:g},MMPM, or FEDRAT/{least:g},MMPR per revolution; where it is meant "
                     "so, nothing is to be done")]

@@ -41,12 +41,12 @@ def test_what_a_file_is_is_one_line(text: str, said: str) -> None:
 
 
 def test_shapes_of_a_cad_system_are_no_program() -> None:
-    assert not looks_like_gcode(IGES.encode()) and what_is(IGES.encode()) == "an IGES file of a CAD system"
+    assert not looks_like_gcode(IGES.encode()) and what_is(IGES.encode()).startswith("an IGES file")
     assert looks_like_gcode(IGES[:72].encode())
 
 
 @pytest.mark.parametrize(("text", "is_"), [
-    ("GOTO/1,2,3\n", "a CL file"), ("%\nG0 X1\n", "G-code, a program of a control"), (STEP, "a STEP file (Part 21)"),
+    ("GOTO/1,2,3\n", "a CL file"), ("%\nG0 X1\n", "G-code, a program of a control"), (STEP, "a STEP-NC file"),
     ("base = 'mill-3axis'\nG1 X\n", ""), ("x1 = 5\nGOTO/1\n", ""), ("[axes.X]\ntravel = [0, 1\n", ""), ("travel 5\n", "")])
 def test_what_stands_in_the_place_of_a_toml_file(text: str, is_: str) -> None:
     """A file with keys or tables is TOML that is broken, whatever else is in it."""
