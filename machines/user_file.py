@@ -21,6 +21,7 @@ from pydantic_core import ErrorDetails
 
 from machines.toml_lines import KEPT, SHORT, KeyPath, Values, parsed
 from machines.value_words import POINT, advice, allowed, decimal_comma
+from toolpaths.cl.text.kinds_of_file import what_is
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import advice as remedy
 from toolpaths.input_files import place, read_input, reason, shown
@@ -171,11 +172,10 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
     try:
         values, lines = parsed(text)
     except tomllib.TOMLDecodeError as fault:
-        return None, [_syntax(fault, str(path), text)]
+        return None, [_syntax(fault, str(path), text, kind)]
     except (ValueError, RecursionError) as fault:  # of Python's own: digits of a number, depth of lists
         why = "its lists or tables are nested too deeply" if isinstance(fault, RecursionError) else str(fault).split(";")[0]
-        return None, [error("file.syntax", f"not valid TOML: {why}", file=str(path),
-                            hint=_HOW)]
+        return None, [error("file.syntax", f"not valid TOML: {why}", file=str(path), hint=_HOW)]
     origins = {p: ValueSource(str(path), line) for p, line in lines.items()}
     return _with_base(UserFile(name, str(path), deepcopy(values), origins), builtin, kind, (*above, key))
 
@@ -211,9 +211,11 @@ def _text(path: FilePath, source: str, builtin: Mapping[str, FilePath], kind: st
                            hint="save the file as UTF-8 text")
 
 
-def _syntax(fault: tomllib.TOMLDecodeError, file: str, text: str) -> Diagnostic:
-    message = str(fault)
-    what, _, place = message.partition(" (at ")
+def _syntax(fault: tomllib.TOMLDecodeError, file: str, text: str, kind: str) -> Diagnostic:
+    if other := what_is(text.encode()):
+        return error("file.syntax", f"this is {other}, not the TOML file of a {kind}", file=file,
+                     hint=f"name the TOML file of the {kind}")
+    what, _, place = str(fault).partition(" (at ")
     line = int(place.split()[1].rstrip(",")) if place.startswith("line ") else text.count("\n") + 1
     number = decimal_comma(next(iter(text.splitlines()[line - 1:line]), ""))
     if number:

@@ -22,6 +22,7 @@ from postproc.witness.evidence import FindingCode
 from tests.hints.case import example
 from tests.hints.cases import CASES
 from tests.source import tree, walked
+from toolpaths.diagnostics import REPORT
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "postproc" / "explain"
@@ -100,7 +101,7 @@ def _given(node: ast.Call, name: str, at: int, signatures: set[Signature]) -> as
 
 def _said(tree: ast.Module, signatures: dict[str, set[Signature]]) -> Iterator[tuple[str, str, str]]:
     """(code, message, hint) of a file; texts "" where a code stands by itself."""
-    known = _texts_of(tree)
+    known = {"REPORT": REPORT, **_texts_of(tree)}
     for node in walked(tree):
         for k, one in enumerate(node.args[:3]) if isinstance(node, ast.Call) else ():
             if isinstance(one, ast.Constant) and isinstance(one.value, str) and CODE.match(one.value):

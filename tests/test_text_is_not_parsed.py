@@ -29,7 +29,6 @@ FILES = {
     "postproc.pipeline.hooks": "blocks of controller files",
     "postproc.reference.records": "blocks of INSERT records",
     "postproc.base.header_words": "headers of programs: written and read in one place",
-    "postproc.cycle_time.source": "whether a file is a CL file or a program",
     "postproc.readback.comparison.hooks": "blocks of the shop in programs",
     "postproc.readback.comparison.slow_moves": "F words of programs",
     "postproc.readback.comparison.stock": "stock stated in programs",

@@ -90,6 +90,10 @@ def _stated(lines: Sequence[int]) -> tuple[int, ...]:
     return tuple(line for line in lines if line > 0)
 
 
+REPORT = "a fault of postproc: report it with the files and the command line"
+"""how the hint of a code begins that no file is known to lead to: it is there so that such a fault stops in words"""
+
+
 def error(code: str, message: str, *, file: str = "", lines: Sequence[int] = (), count: int = 1,
           hint: str = "") -> Diagnostic:
     """A Diagnostic that stops the work."""

@@ -14,6 +14,9 @@ NO_FILE = "without a file"
 SETUP_MARK = "fingerprint of the set-up"
 """before the eight hex digits of the set-up"""
 
+HOOKS = "blocks of the shop:"
+"""before the name of their file"""
+
 FINGERPRINT = "fingerprint of the geometric errors"
 """before the eight hex digits of the error model that a program was written with"""
 FEEDS = "fingerprint of the planned feeds"
@@ -68,6 +71,11 @@ def setup_line(name: str, mark: str) -> str:
     return f"setup {name or NO_FILE}{f', {SETUP_MARK} {mark}' if mark else ''}"
 
 
+def hooks_line(name: str) -> str:
+    """The file of the shop's own blocks that was given besides the set-up."""
+    return f"{HOOKS} {name}"
+
+
 def feed_line(source: str, merged: float) -> str:
     """Where F words come from, and the part by which they may be lowered to share one."""
     return f"feed {source}, merged within {100.0 * merged:g} %"
@@ -106,6 +114,7 @@ class ProgramHeader:
         tolerance: mm that the program was converted with, 0 where none is stated
         planned: True where its feeds were planned
         feeds: fingerprint of its F words, "" where none is stated
+        hooks: name of the file of the shop's own blocks, "" where none is named
     """
 
     ours: bool
@@ -117,12 +126,33 @@ class ProgramHeader:
     tolerance: float
     planned: bool
     feeds: str
+    hooks: str = ""
 
 
+_GAP = rb"(?:[ \t]+|[ \t]*\)?[ \t]*\n[ \t]*(?:N?\d+[ \t]*)?[(;][ \t]*)"
+"""between two words: the end of a comment too, where a line that is longer than a block goes on in the next"""
+_FOLD = re.compile(_GAP)
+_BEGINS = rb"(?im)^[ \t(;\dN]*"
+
+
+def _spaced(text: str) -> bytes:
+    """A pattern of words, wherever the line is folded."""
+    return _GAP.join(re.escape(word).encode("ascii") for word in text.split())
+
+
+_NAME = rb"([\s\S]{0,500}?)"
+"""a name, in one line or several"""
 _CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors ([^\n]*?):? corrected in this program")
 _MODEL = re.compile(rb"(?im)^[^\n]*" + FINGERPRINT.encode("ascii") + rb" ([0-9a-f]{8})\b")
 _BY_CONTROL = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
 _AXES = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
+_CORRECTED_FOLDED = re.compile(_BEGINS + _spaced("geometric errors") + _GAP + _NAME + rb":?" + _GAP +
+                               _spaced("corrected in this program"))
+_BY_CONTROL_FOLDED = re.compile(_BEGINS + _spaced("geometric errors") + _GAP + _NAME + rb":?" + _GAP +
+                                _spaced("corrected by the control"))
+_SETUP_FOLDED = re.compile(_BEGINS + b"setup" + _GAP + _NAME + b"," + _GAP + _spaced(SETUP_MARK) + _GAP +
+                           rb"([0-9a-f]{8})\b")
+_HOOKS = re.compile(_BEGINS + _spaced(HOOKS) + _GAP + rb"([^\n]*)")
 _SETUP = re.compile(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
 _OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
 _TOLERANCE = re.compile(rb"(?im)^[ \t(;\dN]*tolerance (\d[\d.e-]*) mm,")
@@ -134,20 +164,29 @@ _PLACE = re.compile(f"(?i){FEEDS} {UNKNOWN}")
 def read_header(data: bytes) -> ProgramHeader:
     """The header of a program as values; data may be the whole program."""
     header = header_of(data)
-    named, axes, setup = _CORRECTED.search(header), _AXES.search(header), _SETUP.search(header)
+    axes, setup = _AXES.search(header), _SETUP_FOLDED.search(header) or _SETUP.search(header)
+    by_control = _BY_CONTROL.search(header) or _BY_CONTROL_FOLDED.search(header)
+    named = _CORRECTED.search(header) or (None if by_control else _CORRECTED_FOLDED.search(header))
+    hooks = _HOOKS.search(header)
     tolerance = _TOLERANCE.search(header)
     marks = [found[1].decode("ascii").lower() if (found := mark.search(header)) else "" for mark in (_MODEL, _FEEDS)]
     return ProgramHeader(
-        ours=_OURS.search(header) is not None, by_control=_BY_CONTROL.search(header) is not None,
-        corrected=named[1].decode("utf-8", "replace") if named else None, model=marks[0],
+        ours=_OURS.search(header) is not None, by_control=by_control is not None,
+        corrected=_unfolded(named[1]) if named else None, model=marks[0],
         axes=AxesNamed(*(text.decode("ascii", "replace").lower() for text in axes.groups())) if axes else None,
         setup=_named(setup) if setup else None, tolerance=float(tolerance[1]) if tolerance else 0.0,
-        planned=_PLANNED.search(header) is not None, feeds=marks[1])
+        planned=_PLANNED.search(header) is not None, feeds=marks[1],
+        hooks=hooks[1].decode("utf-8", "replace").strip().removesuffix(")") if hooks else "")
+
+
+def _unfolded(name: bytes) -> str:
+    """A name of one line or several, in one."""
+    return _FOLD.sub(b" ", name).decode("utf-8", "replace")
 
 
 def _named(setup: re.Match[bytes]) -> SetupNamed:
     """The set-up of a line; the bracket that ends a comment is no part of its name."""
-    name, mark = setup[1].decode("utf-8", "replace").strip(), (setup[2] or b"").decode("ascii").lower()
+    name, mark = _unfolded(setup[1]).strip(), (setup[2] or b"").decode("ascii").lower()
     in_brackets = setup[0].lstrip(b" \tN0123456789").startswith(b"(")
     return SetupNamed(name if mark or not in_brackets else name.removesuffix(")"), mark)
 

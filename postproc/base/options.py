@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from postproc.base.header_words import chosen_axes, feed_line, setup_line
+from postproc.base.header_words import chosen_axes, feed_line, hooks_line, setup_line
 from toolpaths.choices import GivenDialect, GivenUnit
 
 FeedModeChoice = Literal["auto", "per-minute", "inverse-time"]
@@ -67,6 +67,8 @@ class Options:
             lines.append(f"error model {Path(self.error_model).name}{beyond}")
         if self.setup or self.setup_mark:
             lines.append(setup_line(Path(self.setup).name, self.setup_mark))
+        if self.hooks:
+            lines.append(hooks_line(Path(self.hooks).name))
         for name in ("units", "dialect"):
             if getattr(self, name):
                 lines.append(f"{name} {getattr(self, name)}")

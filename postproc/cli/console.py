@@ -72,8 +72,8 @@ def no_program(file: Path, dialect: str = "") -> None:
     Raises:
         DiagnosticError: says what it is.
     """
-    from postproc.cycle_time.source import looks_like_gcode
     from toolpaths.cl.systems.recognise import recognised
+    from toolpaths.cl.text.kinds_of_file import looks_like_gcode
     from toolpaths.diagnostics import DiagnosticError, error
     from toolpaths.input_files import first_bytes
 
@@ -90,11 +90,17 @@ def no_cl_file(file: Path) -> None:
     Raises:
         DiagnosticError: says what it is.
     """
-    from postproc.cycle_time.source import looks_like_apt
+    from toolpaths.cl.text.kinds_of_file import looks_like_apt
+    from toolpaths.cl.text.other_formats import shape_file
     from toolpaths.diagnostics import DiagnosticError, error
     from toolpaths.input_files import first_bytes
 
-    if looks_like_apt(first_bytes(file, 20_000)):
+    head = first_bytes(file, 20_000)
+    shapes = shape_file(head)
+    if shapes:
+        raise DiagnosticError([error("file.program", f"this is {shapes}, not a program of a control", file=str(file),
+                                     hint="name the program first, then the CL file: postproc verify GCODE FILE")])
+    if looks_like_apt(head):
         raise DiagnosticError([error("file.program", "this is a CL file, not a program of a control", file=str(file),
                                      hint="name the program first, then the CL file: postproc verify GCODE FILE")])
 

@@ -106,9 +106,10 @@ def _blocks(file: Path, machine: Machine, controller: str, model: str, options: 
     """The blocks of a CL file (converted first) or of a program, the model of the control, and times that are planned."""
     from postproc.controllers.model import load_controller
     from postproc.cycle_time.model import load_model, model_name
-    from postproc.cycle_time.source import from_conversion, from_gcode, looks_like_gcode, read_file
+    from postproc.cycle_time.source import from_conversion, from_gcode, read_file
     from postproc.setup.model import load_setup
     from postproc.verification.neighbour_files import NeighbourFiles
+    from toolpaths.cl.text.kinds_of_file import looks_like_gcode
     from toolpaths.diagnostics import read_value
 
     spec = read_value(load_controller(controller))

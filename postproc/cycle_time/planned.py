@@ -16,7 +16,7 @@ from postproc.planning.planned_errors import planned_correction
 from postproc.planning.planned_source import source_of
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
+from toolpaths.diagnostics import REPORT, Diagnostic, DiagnosticError, warning
 
 
 def planned_times(result: PostResult, blocks: MotionBlocks, model: CycleTimeModel,
@@ -37,7 +37,7 @@ def planned_times(result: PostResult, blocks: MotionBlocks, model: CycleTimeMode
                  for one, made in zip(motion.passes, motion.plans, strict=True)]
     except DiagnosticError as fault:
         return times, [warning("time.plan", f"the motion cannot be planned, times of passes are the model's: {fault}",
-                               file=job.toolpath.file, hint="--model lookahead")]
+                               file=job.toolpath.file, hint=f"{REPORT}; --model lookahead needs no plan")]
     return with_seconds(times, _of_passes(blocks, blocks.move, times, spans)), _unsolved(motion, moves, job.toolpath.file)
 
 
@@ -47,7 +47,8 @@ def _unsolved(motion: PlannedMotion, moves: Moves, file: str) -> list[Diagnostic
     if not lines:
         return []
     return [warning("time.unsolved", "the least time of these passes was not found; their times are longer than necessary, "
-                    "within all limits", file=file, lines=lines[:6], count=len(lines), hint="--model lookahead")]
+                    "within all limits", file=file, lines=lines[:6], count=len(lines),
+                    hint=f"{REPORT}; --model lookahead needs no plan")]
 
 
 def _of_passes(blocks: MotionBlocks, move: Ints, times: BlockTimes, spans: list[tuple[int, int, float]]) -> Floats:

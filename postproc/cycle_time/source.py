@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -124,32 +123,6 @@ def _blocks(code: Canonical, motion: Motion, machine: Machine, control: Control,
             origin: BlockOrigin | None, override: float) -> MotionBlocks:
     return blocks_of(code, motion, machine, control, origin, blends_unstated=controller.kinematics.blends_unstated,
                      by_radius=controller.feed.arc_inverse == "radius", override=override)
-
-
-_RECORD = re.compile(rb"(N?\d+\s*)?[A-Z][A-Z0-9]*\s*/")
-"""An APT record with a major word, with or without a sequence number"""
-_BLOCK = re.compile(rb"%|O\d|/?\s*N\d+\s*\S|/?\s*(\d+\s*)?BEGIN PGM|/?\s*[GMTXYZABCSF]\s*[-+.\d]")
-"""A line that only programs have: a program's name, a block number, or an address with a number"""
-
-
-def looks_like_gcode(data: bytes) -> bool:
-    """True for a program of a control: a name, a numbered block or words, in what comes before any APT record."""
-    for raw in data[:20_000].splitlines():
-        line = raw.strip().upper()
-        if line.startswith((b"(", b";", b"$$")) or not line:
-            continue
-        if _RECORD.match(line):
-            return False
-        if _BLOCK.match(line):
-            return True
-    return False
-
-
-def looks_like_apt(data: bytes) -> bool:
-    """True for a CL file of APT text: a record with a slash before anything that only programs have."""
-    lines = (line for raw in data[:20_000].splitlines() if (line := raw.strip().upper()))
-    first = next((line for line in lines if _RECORD.match(line) or _BLOCK.match(line) or line.startswith((b"(", b";"))), b"")
-    return _RECORD.match(first) is not None
 
 
 def read_file(file: str | Path, hint: str = "a CL file, or a program of the controller") -> bytes:

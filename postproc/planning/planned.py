@@ -26,7 +26,7 @@ from postproc.planning.steady_feed import CORNER, steady_seconds
 from postproc.reference.moves import Moves
 from postproc.setup.model import ToolSetup
 from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, require
+from toolpaths.diagnostics import REPORT, Diagnostic, DiagnosticError, error, require
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.blend import SHARPEST
 from toolpaths.smoothing.smooth import Tolerance
@@ -132,7 +132,7 @@ class PlannedMotion:
         except (ValueError, ArithmeticError) as fault:
             lines = self.source.moves.line[one.move[[0, -1]]].tolist()
             raise DiagnosticError([error("plan.failed", f"no motion could be planned: {fault}", file=self.source.file,
-                                         lines=lines, hint="--feed programmed needs no plan")]) from fault
+                                         lines=lines, hint=f"{REPORT}; --feed programmed needs no plan")]) from fault
 
     @property
     def seconds(self) -> float:
@@ -217,7 +217,7 @@ def _limits_exceeded(passes: list[PassGeometry], needed: Floats, source: Source)
     if not count:
         return []
     return [error("plan.limits", f"a planned feed would take {worst:.3f} times what an axis can do", file=source.file,
-                  lines=[where], count=count, hint="--feed programmed needs no plan")]
+                  lines=[where], count=count, hint=f"{REPORT}; --feed programmed needs no plan")]
 
 
 def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits,

@@ -14,7 +14,7 @@ from postproc.reference.events import tool_changes
 from postproc.reference.holes import HoleLeg, hole_legs
 from postproc.reference.holes import Phase as Phase
 from postproc.reference.repeated import Repeated
-from postproc.reference.stated_feeds import feeds_of, follows_speed
+from postproc.reference.stated_feeds import feeds_of, follows_speed, slow_feeds
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, error
@@ -235,8 +235,8 @@ def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float,
                   shared(phase), taken(toolpath.cycle, row), link[row] & first, taken(toolpath.tool, row),
                   toolpath.line[as_slice(row)],
                   repeated(np.nan, len(row)) if toolpath.spin is None else toolpath.spin[pose], toolpath.arcs)
-    return moves, diagnostics + _missing_feeds(toolpath, moves) + _opposite_axes(toolpath, moves) + _lone_arcs(
-        toolpath, moves) + _arcs_behind_holes(toolpath, moves)
+    return moves, [*diagnostics, *_missing_feeds(toolpath, moves), *slow_feeds(toolpath, moves.row, moves.kind),
+                   *_opposite_axes(toolpath, moves), *_lone_arcs(toolpath, moves), *_arcs_behind_holes(toolpath, moves)]
 
 
 def _left_to(toolpath: Toolpath, holes: Ints, legs: list[list[HoleLeg]]) -> Floats:

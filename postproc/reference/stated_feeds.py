@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.reference.events import spindle_speed
-from toolpaths.arrays import Array, Bools, Floats
-from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.toolpath import FeedMode, Kind, Role, Toolpath
 from toolpaths.units import PER_MINUTE
+
+SLOWEST = 2.0
+"""mm/min: the smallest engraving cutters run above it; feeds in m/min or per revolution are numbers below"""
 
 
 def feeds_of(toolpath: Toolpath, default: float | None) -> tuple[Floats, Floats, list[Diagnostic]]:
@@ -68,3 +71,21 @@ def follows_speed(toolpath: Toolpath) -> Bools:
 def without_feed(toolpath: Toolpath) -> Bools:
     """(N,) rows that cut while the file has stated no feed: they run at the set-up's `[output] feed`."""
     return _unstated(toolpath, *_stated_feeds(toolpath))
+
+
+def slow_feeds(toolpath: Toolpath, row: Ints, kind: Array) -> list[Diagnostic]:
+    """A warning of feeds per minute below `SLOWEST`, which another unit would explain; taps are left out, as theirs follows
+    from their thread. `row` (M,), `kind` (M,): of the moves."""
+    feed, mode = _stated_feeds(toolpath)
+    taps = np.array([c.kind == "TAP" for c in toolpath.cycles] + [False])[
+        np.where(toolpath.role == Role.HOLE, toolpath.cycle, -1)]
+    slow = (mode == FeedMode.PER_TIME) & (feed > 0.0) & (feed < SLOWEST * PER_MINUTE) & ~taps
+    bad = np.flatnonzero(slow[row] & (kind != Kind.RAPID)) if slow.any() else row[:0]
+    if not len(bad):
+        return []
+    least = float(feed[row[bad]].min()) / PER_MINUTE
+    return [warning("feed.slow", f"cuts at {least:g} mm/min: m/min may be meant, which is {1000.0 * least:g} mm/min, or a "
+                    "feed per revolution", file=toolpath.file, lines=np.unique(toolpath.line[row[bad]])[:6].tolist(),
+                    count=len(bad),
+                    hint=f"write FEDRAT/{1000.0 * least:g},MMPM, or FEDRAT/{least:g},MMPR per revolution; where it is meant "
+                    "so, nothing is to be done")]

@@ -15,7 +15,7 @@ from postproc.readback.comparison.slow_moves import Slack, axis_seconds, feed_ro
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic
+from toolpaths.diagnostics import REPORT, Diagnostic
 from toolpaths.shapes import arrays
 
 
@@ -75,7 +75,7 @@ def check_planned(path: JointPath, moves: Moves, needed: Floats, merge: float, c
             k = int(bad[0])
             found.append(faults.error("verify.planned", f"the F words run a block in {run[k]:.5f} s, {word} its plan of "
                                       f"{wanted[k]:.5f} s", int(reference.line[owner[k]]), int(motion.line[first[k]]),
-                                      len(bad), "--feed programmed needs no plan"))
+                                      len(bad), f"{REPORT}; --feed programmed needs no plan"))
     return found
 
 

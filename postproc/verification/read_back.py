@@ -65,6 +65,9 @@ def other_setup(data: bytes, options: Options, off: bool, gcode: str) -> list[Di
     """What the header of a program says of its set-up where that is not the one given; `off`: the program fails."""
     header = read_header(data)
     stated, then = header.setup, header.setup.mark if header.setup else ""
+    if header.hooks and not options.hooks:
+        return [(error if off else warning)("verify.hooks", f"the header of the program names the blocks of the shop "
+                f"{header.hooks}, none are given", file=gcode, hint=f"verify with --hooks {header.hooks}")]
     if then == options.setup_mark or (stated and not then) or not header.ours:
         return []
     given = f"{Path(options.setup).name or NO_FILE} (fingerprint {options.setup_mark})" if options.setup_mark else "none"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from postproc.compile.program import Program
 from postproc.controllers.model import ControllerFile
 from postproc.writing.compensated import compensated_arcs
-from toolpaths.diagnostics import Diagnostic, error, warning
+from toolpaths.diagnostics import REPORT, Diagnostic, error, warning
 from toolpaths.toolpath import Cycle
 
 
@@ -83,7 +83,7 @@ def _pitches(controller: ControllerFile, program: Program, cycles: tuple[Cycle, 
         return []
     return [error("cycle.pitch", "a tap without pitch or spindle speed: this controller's cycle states the pitch", file=file,
                   lines=sorted(set(lines))[:6], count=len(lines),
-                  hint="state the pitch in CYCLE/TAP, or SPINDL/RPM before it")]
+                  hint=f"{REPORT}; state the pitch in CYCLE/TAP, or SPINDL/RPM before it")]
 
 
 def _no_tool(controller: ControllerFile, program: Program, file: str) -> list[Diagnostic]:

@@ -181,6 +181,11 @@ CL_WORDS = [
     ),
     _whole("cl.no-units", "FEDRAT/100\nGOTO/0,0,0\nGOTO/1,0,0\n", "(--units)", Edit(COMMAND, "", r" \1 mm")),
     _whole("cl.number", GENERIC + "GOTO/1,,3\n", "3, 6 or 9 numbers", _in("1,,3", "1,2,3")),
+    _whole("cl.number", GENERIC + "GOTO/9;0;0\n", "put commas between the numbers: (GOTO/9,0,0)", _in("GOTO/9;0;0", r"\1")),
+    _whole("cl.axis", GENERIC + "GOTO/1,25,2,5,3,75\n", "points for decimal commas",
+           _in("1,25,2,5,3,75", "1.25,2.5,3.75")),
+    _whole("cl.goto-feed", GENERIC + "GOTO/1,25,2,3\n", "points for decimal commas: 10.25", _in("1,25,2,3", "1.25,2,3")),
+    _whole("cl.form", GENERIC + "FEDRAT/1500,5,MMPM\nGOTO/1,2,3\n", "a point for a decimal comma", _in("1500,5", "1500.5")),
     _whole("cl.number", GENERIC + "GOTO/P1\n", "3, 6 or 9 numbers", _in("P1", "1,2,3")),
     _whole(
         "cl.rapid-below",

@@ -292,6 +292,17 @@ _SHEETS = [
     ),
 ]
 _NUMBERS = [
+    HintCase("file.syntax", "convert part.apt -m mill-3axis -c linuxcnc --setup part.apt -o p.nc",
+             {"part.apt": START + CUT + "FINI\n", "s.toml": LENGTH}, "name the TOML file of the set-up",
+             (Edit(COMMAND, "--setup part.apt", "--setup s.toml"),)),
+    HintCase("file.syntax", "convert part.apt -m p.ngc -c linuxcnc --setup s.toml -o q.nc",
+             {"part.apt": START + CUT + "FINI\n", "p.ngc": "G21 G90\nG0 X1\nM2\n", "s.toml": LENGTH},
+             "name the TOML file of the machine", (Edit(COMMAND, "-m p.ngc", "-m mill-3axis"),)),
+    HintCase("file.program", "verify part.igs part.apt -m mill-3axis -c linuxcnc --setup s.toml",
+             {"part.apt": START + CUT + "FINI\n", "s.toml": LENGTH,
+              "part.igs": f"{'part':<72}S      1\n{'1H,,1H;':<72}G      1\n"},
+             "name the program first", (Edit(COMMAND, "part.igs", "p.ngc"),),
+             first=("convert part.apt -m mill-3axis -c linuxcnc --setup s.toml -o p.ngc",)),
     HintCase("setup.number_taken", "setup new part.cls -m mill-3axis -o new.toml --force --yes --tool-number EM6=2",
              {"part.cls": "UNITS/MM\n" + nx("EM12", 2, 12) + nx("EM6", 2, 6)}, "(--tool-number EM6=[0-9]+)",
              (Edit(COMMAND, "--tool-number EM6=2", r"\1"),)),

@@ -6,9 +6,8 @@ _WHY = {
     "nothing is to be done: it says what was taken, or what a look at the machine decides": (
         "collision.bound compensation.range cutcom.own_register error-table.kind orient.unproved tool.length_twice"),
     "only by a fault of the program itself, or of a library call: no file leads there": (
-        "arc.no_start axis.spin calibrate.converged cl.dropped cycle.pitch file.not_recovered geometric_errors.bound "
-        "orient.pass output.smoothing_mode plan.failed plan.limits plan.reach rollover.standing rollover.turn "
-        "time.plan time.unsolved verify.option verify.planned"),
+        "arc.no_start axis.spin calibrate.converged file.not_recovered geometric_errors.bound "
+        "output.smoothing_mode plan.reach rollover.standing rollover.turn"),
     "the remedy is at the machine or in the CAM system: measured anew, exported anew": (
         "calibrate.few calibrate.place calibrate.rank calibrate.silent calibrate.unchecked cl.index-axis cl.index-cut "
         "log.fit tool-table.apart"),

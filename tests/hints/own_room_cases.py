@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tests.hints.case import COMMAND, Edit, HintCase
-from tests.hints.convert_cases import ARC, CUT, LEFT, LENGTH, START, convert, nx, option, part, sheet
+from tests.hints.convert_cases import ARC, CUT, LEFT, LENGTH, START, TAP, convert, nx, option, part, sheet
 from tests.hints.file_cases import BODY, GOOD_BOX, SHAPE
 from tests.hints.verify_cases import edited
 
@@ -99,6 +99,21 @@ _MACHINES = [
          harm=(Edit("e.toml", "6.0", "6.5"),), e_toml="[location]\nEC0Y = 6.0\n"),
     _own("gcode.open", f"verify q.nc part.apt {ON}", "name the program that is checked", Edit(COMMAND, "q.nc", "p.nc"),
          first=(f"convert part.apt {ON} -o p.nc",)),
+    _own("verify.hooks", f"verify p.nc part.apt {ON}", r"verify with (--hooks) HOOKS.TOML", option(r" \1 hooks.toml", ""),
+         first=(f"convert part.apt {ON} --hooks hooks.toml -o p.nc",),
+         hooks_toml='[hooks]\nbefore_tool = ["M34"]\npassive = ["M34"]\n'),
+    HintCase("feed.slow", f"convert part.apt {ON} -o p.nc",
+             {"part.apt": START + CUT.replace("GOTO/0,0,0\n", "FEDRAT/0.6,MMPM\nGOTO/0,0,0\n") + "FINI\n", "s.toml": LENGTH},
+             "write (FEDRAT/600,MMPM)", (Edit("part.apt", "FEDRAT/0.6,MMPM", r"\1"),)),
+    HintCase("orient.pass", "orient part.apt -m mikron-ucp710 --setup s.toml --figure p.svg --pass 9",
+             {"part.apt": BALL + "FINI\n", "s.toml": LENGTH}, "passes are numbered (0) to 0",
+             (Edit(COMMAND, "--pass 9", r"--pass \1"),)),
+    HintCase("verify.option", "verify p.nc part.apt -m m.toml -c fanuc-30i --setup s.toml",
+             {"part.apt": START + TAP + "FINI\n", "s.toml": LENGTH,
+              "m.toml": 'base = "mill-3axis"\n[control]\nrigid_tapping = true\n'},
+             r"state the option under \[control\]", (Edit("m.toml", "false", "true"),),
+             first=("convert part.apt -m m.toml -c fanuc-30i --setup s.toml -o p.nc",),
+             harm=(Edit("m.toml", "true", "false"),)),
     _own("tool-table.far", f"verify p.nc part.apt {ON} --tool-table t.csv", "look at the tool and its register",
          Edit("t.csv", "1,180", "1,110"), first=(f"convert part.apt {ON} -o p.nc",), t_csv="register,length\n1,180\n"),
     HintCase("file.own_name", "convert part.cls -m mikron-ucp710 -c fanuc-30i --setup s.toml -o o1001",

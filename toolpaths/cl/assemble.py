@@ -160,8 +160,16 @@ def _checked_axis(b: ToolpathBuilder, rows: PointRows) -> Floats:
     if bad.any():
         b.log.many(Severity.ERROR, "cl.axis", f"the tool axis has length {norm[bad][0]:.6g}, it must be 1 within "
                    f"{UNIT_ROUNDING}", rows.line[bad],
+                   "write x, y, z, then i, j, k of length 1, and points for decimal commas: 10.25 for 10,25"
+                   if _whole(rows, bad) else
                    "write the six numbers of GOTO again: x, y, z, then i, j, k of length 1")
     return unit(rows.axis)
+
+
+def _whole(rows: PointRows, bad: Bools) -> bool:
+    """True where all six numbers of such points are whole: a decimal comma may have split three."""
+    six = np.hstack([rows.tip[bad], rows.axis[bad]])
+    return bool((six == np.round(six)).all())
 
 
 def _normals(b: ToolpathBuilder, rows: PointRows) -> tuple[Floats | None, Floats | None]:

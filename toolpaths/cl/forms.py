@@ -132,7 +132,9 @@ def check_forms(program: StatementList, log: DiagnosticLog, allowed: Iterable[st
         if fault:
             name = statement.major.removeprefix(DATA_COMMENT)
             between = "/" if statement.body and statement.slash else " " if statement.body else ""
-            log.error("cl.form", f"{name}{between}{statement.body[:60]}: {fault}", line, "check the record in the CAM "
+            comma = name == "FEDRAT" and len(statement.numbers) == 2 and all(n == int(n) for n in statement.numbers)
+            log.error("cl.form", f"{name}{between}{statement.body[:60]}: {fault}", line,
+                      "write a point for a decimal comma: 1.5 for 1,5" if comma else "check the record in the CAM "
                       f"system; if it is right, --allow-unknown {shlex.quote(statement.major)} takes it as it stands",
                       key=f"{name} {fault}")
 

@@ -29,13 +29,15 @@ def goto(b: ToolpathBuilder, s: Statement) -> None:
     numbers = s.numbers
     if s.tail and s.tail != ("CONTACT",):
         b.log.error("cl.number", f"GOTO/{s.body[:60]}: {s.tail[0] or 'an empty field'} is not a number", b.line,
+                    f"put commas between the numbers: GOTO/{s.body[:60].replace(';', ',')}" if ";" in s.body else
                     "GOTO takes 3, 6 or 9 numbers")
         return
     if len(numbers) == 2 and b.zsurf is not None:
         numbers = [*numbers, b.zsurf]
     if len(numbers) in (4, 7):
         b.log.error("cl.goto-feed", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9: the last may be a feed, or a "
-                    "comma or a blank splits a number", b.line, "state the feed by FEDRAT before the GOTO")
+                    "comma or a blank splits a number", b.line, "state the feed by FEDRAT before the GOTO, "
+                    "or write points for decimal commas: 10.25 for 10,25")
         return
     if len(numbers) not in (3, 6, 9):
         b.log.error("cl.goto", f"GOTO has {len(numbers)} numbers, it takes 3, 6 or 9", b.line,

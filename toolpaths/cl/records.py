@@ -8,7 +8,7 @@ from operator import attrgetter
 from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT
 from toolpaths.cl.text.words import NEUTRAL, UNSUPPORTED_MOTION
-from toolpaths.diagnostics import has_errors
+from toolpaths.diagnostics import REPORT, has_errors
 from toolpaths.toolpath import RecordCounts
 
 
@@ -46,4 +46,4 @@ def _report(b: ToolpathBuilder, dropped: int, unmoved: list[tuple[int, str]]) ->
              or [(line, "(TEXT)") for line, _ in b.texts] or [(0, "WORD")])
     line, word = min(found)
     b.log.error("cl.dropped", f"{dropped:,} records are not executed, the first is {word}", line,
-                f"have the CAM system write the points; --allow-unknown {word} leaves such records out")
+                f"{REPORT}; have the CAM system write the points; --allow-unknown {word} leaves such records out")

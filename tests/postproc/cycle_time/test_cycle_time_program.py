@@ -13,10 +13,11 @@ from postproc.controllers.model import load_controller
 from postproc.cycle_time.blocks import Cause, CornerMode, MotionBlocks
 from postproc.cycle_time.estimate import estimate
 from postproc.cycle_time.shape import shape
-from postproc.cycle_time.source import from_conversion, from_gcode, looks_like_gcode
+from postproc.cycle_time.source import from_conversion, from_gcode
 from postproc.setup.model import SetupFile
 from tests.postproc.kit import SAMPLES, TOOLS
 from tests.postproc.time_kit import HEAD, blocks, machine, model
+from toolpaths.cl.text.kinds_of_file import looks_like_gcode
 
 
 def pauses(b: MotionBlocks, cause: Cause) -> list[tuple[int, float]]:

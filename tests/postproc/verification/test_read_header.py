@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from textwrap import wrap
 
 import pytest
 
 from postproc.base import header_words as words
 from postproc.base.header_words import AxesNamed, ProgramHeader, SetupNamed, read_header, same_name, with_feeds_mark
+from postproc.controllers.model import load_controller
+from postproc.writing.state import comment_room
+from toolpaths.diagnostics import read_value
 
 BEGIN = ["postproc 0.1.0", "part plate", "source plate.cls"]
 STYLES: dict[str, Callable[[str], str]] = {
@@ -41,6 +45,31 @@ def test_what_a_head_does_not_say_is_not_read(style: str) -> None:
     header = read_header(text([*BEGIN, *more], style))
     assert header.by_control and header.corrected is None and header.feeds == "" and not header.planned
     assert header.setup is not None and (header.setup.name.lower(), header.setup.mark) == (words.NO_FILE, "")
+
+
+LONG = "bracket for the rear axle of the small trailer, second clamping, revision 14.setup.toml"
+
+
+@pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc", "heidenhain-tnc640", "siemens-840d", "linuxcnc"])
+@pytest.mark.parametrize("name", [LONG, "x" * 130 + ".toml"])
+def test_long_names_leave_the_marks_readable(controller: str, name: str) -> None:
+    """Comments end where the block of the control does: names go on in the next one, the mark may be torn from its name."""
+    spec = read_value(load_controller(controller))
+    style = STYLES["brackets" if spec.comment.open == "(" else "semicolons"]
+    room = comment_room(spec)
+    for shift in range(12):
+        lines = [*BEGIN, words.setup_line("a" * shift + name, "0123abcd"), words.corrected_here("e" * shift + name),
+                 words.model_mark("89abcdef"), words.hooks_line("hooks.toml")]
+        folded = [part for line in lines for part in (
+            [line] if len(line) <= room else wrap(line, room, break_on_hyphens=False))]
+        header = read_header("\n".join([style(line) for line in folded] + ["G0 X1.", ""]).encode())
+        assert header.setup is not None and header.setup.mark == "0123abcd" and header.hooks == "hooks.toml"
+        assert header.setup.name.replace(" ", "") == ("a" * shift + name).replace(" ", "")
+        assert header.corrected is not None and header.model == "89abcdef" and not header.by_control
+        line = words.corrected_by_control("e" * shift + name)
+        folded = [style(part) for part in (*BEGIN, *wrap(line, room, break_on_hyphens=False))]
+        header = read_header("\n".join([*folded, "G0 X1.", ""]).encode())
+        assert header.by_control and header.corrected is None and header.setup is None
 
 
 def test_only_the_place_in_the_head_is_filled() -> None:

@@ -9,6 +9,7 @@ import pytest
 import toolpaths
 from tests.practice_files import CASES, SHAPES, practice_file
 from toolpaths.cl.systems.recognise import recognised
+from toolpaths.cl.text.kinds_of_file import looks_like_gcode, what_is
 from toolpaths.cl.text.other_formats import other_format
 
 ROOT = Path(__file__).parents[3]
@@ -19,6 +20,10 @@ STEP = ("ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(({}),'2;1');\nFILE_SCHEMA(({})
         "#20=MACHINING_WORKPLAN('x','','','');\n")
 
 
+IGES = f"{'G1 part':<72}S      1\n{'more of it':<72}S      2\n{'1H,,1H;,4Hpart;':<72}G      1\n"
+"""its first line reads as a block of a program"""
+
+
 @pytest.mark.parametrize(("text", "said"), [
     (POF, "a POF file of hyperMILL"),
     (STEP.format("'ARM_SCHEMA: ap238_arm_schema'", "'INTEGRATED_CNC_SCHEMA'"), "a STEP-NC file"),
@@ -26,11 +31,26 @@ STEP = ("ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(({}),'2;1');\nFILE_SCHEMA(({})
     ('{"operations": [{"moves": []}]}', "a JSON file"), ("\ufeff<?xml version='1.0'?>\n<toolpath/>", "an XML or HTML file"),
     ("0 BEGIN PGM PART MM\n1 TOOL CALL 1 Z S900\n", "a Heidenhain program"), ("PK\x03\x04FCStd", "a document or archive"),
     ('{"format": "OpenToolpath", "version": "1.0"}', "an OpenToolpath file"), (OTP, "an OpenToolpath file"),
-    ("%PDF-1.4\n", "a document or archive")])
+    ("%PDF-1.4\n", "a document or archive"), (IGES, "an IGES file"), ("solid a\n  facet normal 0 0 1\n", "an STL mesh"),
+    ("\0" * 80 + "\1\0\0\0" + "\0" * 50, "an STL mesh"), ("  0\nSECTION\n  2\nHEADER\n", "a DXF drawing"),
+    ("999\nmade by hand\n0\r\nSECTION\n2\nENTITIES\n", "a DXF drawing")])
 def test_what_a_file_is_is_one_line(text: str, said: str) -> None:
     path, found = toolpaths.read_bytes(text.encode())
     assert [d.code for d in found] == ["cl.format"] and said in found[0].message and found[0].hint
     assert len(path) == 0
+
+
+def test_shapes_of_a_cad_system_are_no_program() -> None:
+    assert not looks_like_gcode(IGES.encode()) and what_is(IGES.encode()).startswith("an IGES file")
+    assert looks_like_gcode(IGES[:72].encode())
+
+
+@pytest.mark.parametrize(("text", "is_"), [
+    ("GOTO/1,2,3\n", "a CL file"), ("%\nG0 X1\n", "G-code, a program of a control"), (STEP, "a STEP-NC file"),
+    ("base = 'mill-3axis'\nG1 X\n", ""), ("x1 = 5\nGOTO/1\n", ""), ("[axes.X]\ntravel = [0, 1\n", ""), ("travel 5\n", "")])
+def test_what_stands_in_the_place_of_a_toml_file(text: str, is_: str) -> None:
+    """A file with keys or tables is TOML that is broken, whatever else is in it."""
+    assert what_is(text.encode()).startswith(is_) and bool(is_) is bool(what_is(text.encode()))
 
 
 def test_no_cl_file_is_taken_for_another_form() -> None:
