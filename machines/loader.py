@@ -47,26 +47,7 @@ def load(source: str | Path) -> Machine:
 
 
 def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
-    """The machine of a built-in name or a path, or None and every fault of its file; built-in ones are loaded once."""
-    if not isinstance(source, str) or source not in builtin():
-        return _from_file(source)
-    try:
-        machine, found = _built_in(source)
-    except DiagnosticError as fault:
-        return None, list(fault.diagnostics)
-    return machine, list(found)
-
-
-@cache
-def _built_in(name: str) -> tuple[Machine, tuple[Diagnostic, ...]]:
-    """One that cannot be read now is raised, and so not kept."""
-    machine, found = _from_file(name)
-    if machine is None:
-        raise DiagnosticError(found)
-    return machine, tuple(found)
-
-
-def _from_file(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
+    """The machine of a built-in name or a path, or None and every fault of its file."""
     file, diagnostics = read_toml(source, builtin(), "machine")
     if file is None:
         return None, diagnostics
