@@ -29,8 +29,6 @@ DATA = Path(__file__).parent / "data"
 CATALOGUE = Path(__file__).parent / "catalogue"
 KIND, OLDER = ("kinematics", "kind"), ("kinematics", "family")
 """the key that names the kind of machine, and the older word for it, which files may still have"""
-_loaded: dict[str, tuple[Machine, tuple[Diagnostic, ...]]] = {}
-"""built-in machines by name, with what was found in their files"""
 
 
 @cache
@@ -50,13 +48,22 @@ def load(source: str | Path) -> Machine:
 
 def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
     """The machine of a built-in name or a path, or None and every fault of its file; built-in ones are loaded once."""
-    if isinstance(source, str) and source in _loaded:
-        machine, known = _loaded[source]
-        return machine, list(known)
-    read, found = _from_file(source)
-    if read is not None and isinstance(source, str) and source in builtin():
-        _loaded[source] = read, tuple(found)
-    return read, found
+    if not isinstance(source, str) or source not in builtin():
+        return _from_file(source)
+    try:
+        machine, found = _built_in(source)
+    except DiagnosticError as fault:
+        return None, list(fault.diagnostics)
+    return machine, list(found)
+
+
+@cache
+def _built_in(name: str) -> tuple[Machine, tuple[Diagnostic, ...]]:
+    """One that cannot be read now is raised, and so not kept."""
+    machine, found = _from_file(name)
+    if machine is None:
+        raise DiagnosticError(found)
+    return machine, tuple(found)
 
 
 def _from_file(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
