@@ -67,18 +67,32 @@ def _texts_of(tree: ast.Module) -> dict[str, str]:
             if isinstance(target, ast.Name) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)}
 
 
+def _parameters(node: ast.FunctionDef) -> list[str]:
+    return [a.arg for a in (*node.args.posonlyargs, *node.args.args) if a.arg != "self"]
+
+
 def _signatures(trees: Iterable[ast.Module]) -> dict[str, set[Signature]]:
-    """Parameters of all functions with a hint, and fields of classes with one, by name."""
+    """Parameters of all functions with a hint, and fields or parameters of classes with one, by name."""
     found: dict[str, set[Signature]] = {}
     for node in (n for one in trees for n in walked(one)):
         names: list[str] = []
         if isinstance(node, ast.FunctionDef):
-            names = [a.arg for a in (*node.args.posonlyargs, *node.args.args) if a.arg != "self"]
+            names = _parameters(node)
         elif isinstance(node, ast.ClassDef):
-            names = [n.target.id for n in node.body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)]
+            made = next((n for n in node.body if isinstance(n, ast.FunctionDef) and n.name == "__init__"), None)
+            names = _parameters(made) if made else [
+                n.target.id for n in node.body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)]
         if "hint" in names:
             found.setdefault(node.name, set()).add(tuple(names))
     return found
+
+
+def _usual(trees: Iterable[ast.Module]) -> dict[str, ast.Constant]:
+    """The hint that a class says where it is given none, by its name."""
+    made = ((node.name, n.args, _texts_of(one)) for one in trees for node in one.body if isinstance(node, ast.ClassDef)
+            for n in node.body if isinstance(n, ast.FunctionDef) and n.name == "__init__" and n.args.defaults)
+    return {name: ast.Constant(text) for name, given, known in made if given.args[-1].arg == "hint"
+            and (text := _words(given.defaults[-1], known)).strip(".")}
 
 
 def _is_text(node: ast.AST) -> bool:
@@ -99,7 +113,8 @@ def _given(node: ast.Call, name: str, at: int, signatures: set[Signature]) -> as
     return None
 
 
-def _said(tree: ast.Module, signatures: dict[str, set[Signature]]) -> Iterator[tuple[str, str, str]]:
+def _said(tree: ast.Module, signatures: dict[str, set[Signature]],
+          usual: dict[str, ast.Constant]) -> Iterator[tuple[str, str, str]]:
     """(code, message, hint) of a file; texts "" where a code stands by itself."""
     known = {"REPORT": REPORT, **_texts_of(tree)}
     for node in walked(tree):
@@ -108,7 +123,7 @@ def _said(tree: ast.Module, signatures: dict[str, set[Signature]]) -> Iterator[t
                 assert isinstance(node, ast.Call)
                 own = signatures.get(_called(node), set())
                 message = _given(node, "message", k, own) or next(iter(node.args[k + 1:]), None)
-                for hint in _choices(_given(node, "hint", k, own)):
+                for hint in _choices(_given(node, "hint", k, own) or usual.get(_called(node))):
                     yield one.value, _words(message, known), _words(hint, known)
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.match(node.value):
             yield node.value, "", ""
@@ -123,7 +138,8 @@ def _found(node: ast.AST) -> Iterator[tuple[str, str, str]]:
             yield f"witness.{FOUND[one.value]}", f"second witness: {said}", "do not run this program"
 
 
-SAYS = frozenset({"error", "warning", "info", "fault", "problem", "KeyProblem", "Diagnostic", "note", "warn", "many", "add"})
+SAYS = frozenset({"error", "warning", "info", "fault", "problem", "KeyProblem", "Diagnostic", "note", "warn", "many", "add",
+                  "MacroFault"})
 """names of calls that make a diagnostic"""
 
 
@@ -150,9 +166,9 @@ def codes() -> dict[str, dict[str, list[str]]]:
     areas = frozenset(tomllib.loads((DATA / "areas.toml").read_text("utf-8")))
     found: dict[str, dict[str, list[str]]] = {code: {"messages": [], "remedies": []} for code in MADE}
     trees = _trees()
-    signatures = _signatures(trees)
+    signatures, usual = _signatures(trees), _usual(trees)
     found_by_witness = (said for one in _trees("postproc/witness") for node in walked(one) for said in _found(node))
-    for code, message, hint in itertools.chain((said for one in trees for said in _said(one, signatures)),
+    for code, message, hint in itertools.chain((said for one in trees for said in _said(one, signatures, usual)),
                                                found_by_witness):
         if code in NONE or code.split(".")[0] not in areas:
             continue

@@ -146,6 +146,8 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
     if source is None:
         return Testimony((), (NotCompared("all", "the path is not as it was read from a file"),)), []
     found, said = list[Diagnostic](), list[Testimony]()
+    unread = _unread_text(job, program)
+    program = b"" if unread else program
     executed, shops = executed_of(comparison, comparison.poses, job), at_places(setup)
     for k, place in enumerate(job.places):
         case, name = _case(source, shops[k], options, job, comparison, program, k), place.name and f"place {place.name}: "
@@ -166,7 +168,19 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
         found += [error(f"witness.{f.code}", f"second witness: {name}{f.message} (line {f.block} of the program)",
                         file=job.toolpath.file, lines=[f.line] if f.line else [], count=f.count,
                         hint="do not run this program") for f in said[-1].findings]
-    return together(said), [*found, *_order(setup, comparison, job)]
+    heard = together(said)
+    return replace(heard, not_compared=(*heard.not_compared, *unread)), [*found, *_order(setup, comparison, job)]
+
+
+def _unread_text(job: Job, program: bytes | str) -> list[NotCompared]:
+    """What this witness would read of the text itself, clamps and turns of modulo axes, where variables, loops or calls of
+    the program are executed: words in it are not what they are on the control."""
+    what = [name for name, some in (("turns of modulo axes", bool(job.control.rolls)),
+                                    ("clamps", bool(job.machine.clamp_codes))) if some]
+    reader = reader_for(job.controller, job.machine.axis_names)
+    if not what or not program or not reader.in_macros(as_bytes(program)):
+        return []
+    return [NotCompared("text", f"{' and '.join(what)}: a program with variables, read back alone")]
 
 
 def _order(setup: SetupFile, comparison: Comparison, job: Job) -> list[Diagnostic]:

@@ -12,10 +12,11 @@ from tests.hints.file_cases import FILE
 from tests.hints.gcode_cases import GCODE
 from tests.hints.import_cases import IMPORTS
 from tests.hints.machine_cases import MACHINE
+from tests.hints.macro_cases import MACROS
 from tests.hints.own_room_cases import OWN_ROOMS
 from tests.hints.place_cases import PLACE
 from tests.hints.tool_cases import TOOLS
 from tests.hints.verify_cases import VERIFY
 
 CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE, *ALIGN, *PLACE, *VERIFY, *EXCHANGE,
-         *OWN_ROOMS]
+         *OWN_ROOMS, *MACROS]

@@ -136,11 +136,15 @@ class Reader(ABC):
                             self.axes, file)
         return [*found, *two_meanings(self.clamps, own, file)]
 
+    def in_macros(self, data: bytes) -> bool:
+        """True where a file has variables, loops or calls that only their execution explains."""
+        return self.language != "" and needed(data, self.language, self.passive)
+
     def read(self, data: bytes | str, file: str = "", others: Mapping[str, bytes] | None = None,
              ) -> tuple[Canonical | None, list[Diagnostic]]:
         """A program, with the files of its subprograms by name, as canonical words; None where it cannot be read."""
         self.main_file = file
-        if self.language and needed(as_bytes(data), self.language, self.passive):
+        if self.in_macros(as_bytes(data)):
             return self.executed(as_bytes(data), file, others or {})
         found: list[Diagnostic] = []
         programs: dict[str, ParsedProgram] = {}
@@ -149,7 +153,7 @@ class Reader(ABC):
         stems = {PurePath(name).stem.upper(): name for name in others}
         while waiting:
             name = next(iter(waiting))
-            if programs and self.language and needed(as_bytes(waiting[name]), self.language, self.passive):
+            if programs and self.in_macros(as_bytes(waiting[name])):
                 return self.executed(as_bytes(data), file, others)
             numbered, more = self.numbered(as_bytes(waiting.pop(name)), name)
             found += more

@@ -140,9 +140,9 @@ class KlartextReader(Reader):
         for b, s in here:
             name = str(s.args[0]) if s.args else ""
             if s.name == "CALL LBL" and s.keys.get("REP", 0.0) > 0.0:
-                first = next((a for a, n in labels if n == name and a < b), b)
-                subprograms[f"REP {name} {b}"] = (first, b - 1)
-                calls[b] = Call(b, f"REP {name} {b}", int(s.keys["REP"]))
+                if first := next((a for a, n in labels if n == name and a < b), 0):
+                    subprograms[f"REP {name} {b}"] = (first, b - 1)
+                calls[b] = Call(b, f"REP {name} {b}" if first else f"LBL {name} before its REP", int(s.keys["REP"]))
             elif s.name in ("CALL LBL", "CALL PGM"):
                 calls[b] = Call(b, f"{s.name[5:]} {name}")
         if not any(s.name == "BEGIN PGM" and s.args[1] for _, s in here):

@@ -30,7 +30,7 @@ _NEEDED = {
     "fanuc": re.compile(rb"[#\[]|GOTO|M0*99[ \t]*P|G0*(?:10|30|52|92|6[567])(?![\d.])"),
     "linuxcnc": re.compile(rb"[#\[]|G0*(?:10|28|30|52|92)(?![\d])|\bO\s*(?:<|\d+\s*[A-Z])"),
     "siemens": re.compile(
-        rb"\b(?:DEF|IF|GOTO[FBC]?|FOR|WHILE|REPEATB?|LOOP|CASE|EXTERN|A?TRANS|A?ROTS?|A?SCALE|A?MIRROR|EXTCALL|SETAL|G53|G153|G20|G21)\b"
+        rb"\b(?:DEF|IF|GOTO[FBCS]?|FOR|WHILE|REPEATB?|LOOP|CASE|EXTERN|A?TRANS|A?ROTS?|A?SCALE|A?MIRROR|EXTCALL|SETAL|G53|G153|G20|G21)\b"
         rb"|\bR\d+[ \t]*=|=[ \t]*[-+]*[ \t]*(?!(?:IC|AC|DC|ACP|ACN)[ \t]*\([ \t]*[-+.\d]+[ \t]*\))[A-Z_$(\[]"
         rb"|=[ \t]*[-+]?[\d.]+[ \t]*[-+*/]|\bT[ \t]*=[ \t]*\"|\bPROC\b[^\n]*\("),
     "klartext": re.compile(rb"FN[ \t]*\d+[ \t]*:|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}

@@ -104,7 +104,7 @@ class SiemensMacros:
         c = Cursor(row.body, len(row.head.split(" ", 1)[0]))
         head = row.head
         if head.startswith("GOTO"):
-            self.jump(head, self._target(c))
+            self.jump(head, "" if head == "GOTOS" else self._target(c))
         elif head == "IF GOTO":
             self._if_jump(c)
         elif head in ("IF", "ELSE", "ENDIF", "FOR", "ENDFOR", "WHILE", "ENDWHILE", "REPEAT", "UNTIL", "LOOP", "ENDLOOP"):

@@ -60,7 +60,7 @@ class Track:
     def work(self, register: float, axis: str) -> float:
         """A work offset of the set-up in machine coordinates."""
         if self.held.work is None:
-            raise MacroFault("gcode.offset_unknown", "a work offset in machine coordinates needs the set-up",
+            raise MacroFault("gcode.position_unknown", "a work offset in machine coordinates needs the set-up",
                              "name the set-up of the program with --setup")
         return float(self.held.work(register)[self.held.axes.index(axis)])
 
