@@ -112,3 +112,11 @@ def test_a_program_without_an_end_is_refused(control: str, text: str) -> None:
 def test_numbers_and_rows_that_no_control_takes_are_faults_of_their_line(control: str, text: str, code: str) -> None:
     last = {FANUC: 7, LINUXCNC: 7, SIEMENS: 4, TNC: 3}[control]
     assert faults(control, text) == {code: [last]}
+
+
+@pytest.mark.parametrize("call", ["M98 P50000005", "M98 P5 L90000000"])
+def test_repeats_without_macro_language_are_bounded_as_well(call: str) -> None:
+    program = HEAD + f"{call}\nM30\nO0005\nG91 G0 X1.\nG90\nM99\n%\n"
+    with most_blocks(500):
+        assert faults(FANUC, program) == {"gcode.endless": [6]}
+    assert not faults(FANUC, program.replace(call, "M98 P90005"))
