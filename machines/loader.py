@@ -29,6 +29,8 @@ DATA = Path(__file__).parent / "data"
 CATALOGUE = Path(__file__).parent / "catalogue"
 KIND, OLDER = ("kinematics", "kind"), ("kinematics", "family")
 """the key that names the kind of machine, and the older word for it, which files may still have"""
+_loaded: dict[str, tuple[Machine, tuple[Diagnostic, ...]]] = {}
+"""built-in machines by name, with what was found in their files"""
 
 
 @cache
@@ -48,16 +50,13 @@ def load(source: str | Path) -> Machine:
 
 def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
     """The machine of a built-in name or a path, or None and every fault of its file; built-in ones are loaded once."""
-    if isinstance(source, str) and source in builtin():
-        machine, found = _built_in(source)
-        return machine, list(found)
-    return _from_file(source)
-
-
-@cache
-def _built_in(name: str) -> tuple[Machine | None, tuple[Diagnostic, ...]]:
-    machine, found = _from_file(name)
-    return machine, tuple(found)
+    if isinstance(source, str) and source in _loaded:
+        machine, known = _loaded[source]
+        return machine, list(known)
+    read, found = _from_file(source)
+    if read is not None and isinstance(source, str) and source in builtin():
+        _loaded[source] = read, tuple(found)
+    return read, found
 
 
 def _from_file(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:

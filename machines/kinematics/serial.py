@@ -115,8 +115,13 @@ class Serial(Kinematics):
 
     def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
         """(tip (N, 3), axis (N, 3)) of joints q (N, J)."""
-        tip, axis = self._placed(as_points(q, self.joints, "q"), [self.tool_axis])
+        q = as_points(q, self.joints, "q")
+        tip, axis = self._loop.poses(q, self._ends) if self._loop.pays(len(q)) else self._placed(q, [self.tool_axis])
         return tip, axis
+
+    @cached_property
+    def _ends(self) -> Floats:
+        return np.array([-self.tool_length * self.tool_axis, self.tool_axis])
 
     def _tool_frame(self) -> list[Floats]:
         return [self.tool_axis, reference_x(self.tool_axis[None])[0]]
@@ -278,6 +283,15 @@ class Serial(Kinematics):
         if out.any():
             q[:, out] = np.nan
 
+    def at_tip(self, tip: Floats, q: Floats, solved: Ints) -> Floats:
+        """See the base class: of all slides as the inverse has them."""
+        at = [self.axis_names.index(joint.name) for joint in self._slides]
+        if sorted(at) != sorted(solved.tolist()):
+            return super().at_tip(tip, q, solved)
+        result, to = np.array(q), columns.of_rows(np.broadcast_to(tip, (len(q), 3)))
+        result[:, at] = np.stack(self._slides_to(to, self._turning(q)), axis=1)
+        return result
+
     def _angles(self, axis: Columns, from_pole: Floats, wanted: Floats) -> Iterator[tuple[Floats, ...]]:
         """For each branch the angles (N,) of the rotary axes in chain order that take the tool to the unit `axis`."""
         turns = self._turns
@@ -357,8 +371,7 @@ class Serial(Kinematics):
 
     def _in_reach(self, from_pole: Floats) -> Bools:
         low, high = self.reach()
-        result: Bools = (from_pole >= low - ROUND_OFF) & (from_pole <= high + ROUND_OFF)
-        return result
+        return np.asarray((from_pole >= low - ROUND_OFF) & (from_pole <= high + ROUND_OFF))
 
     def nearest_axis(self, axis: Floats) -> Floats:
         """Tool directions (N, 3) nearest to `axis` (N, 3), unchanged where the machine can take them.
@@ -371,25 +384,17 @@ class Serial(Kinematics):
         from_pole = angle_between(wanted, pole)
         kept = np.clip(from_pole, low, high)[:, None]
         across = wanted - dot(wanted, pole)[:, None] * pole
-        side = np.where(_along(pole, wanted)[:, None], perpendicular(pole, self.tool_axis), across)
+        side = np.where((lengths(cross(wanted, pole)) < ROUND_OFF)[:, None], perpendicular(pole, self.tool_axis), across)
         side = unit(np.where(np.linalg.norm(side, axis=1, keepdims=True) > 0.0, side, basis(pole)[0]))
         projected = np.cos(kept) * pole + np.sin(kept) * side
-        result: Floats = np.where(self._in_reach(from_pole)[:, None], axis, projected)
-        return result
+        return np.asarray(np.where(self._in_reach(from_pole)[:, None], axis, projected))
 
     def singular(self, q: Floats) -> Bools:
         """True (N,) where the tool lies along the rotary axis nearest the part, whose value is then free."""
         q = as_points(q, self.joints, "q")
-        turns = self._turns
-        if not turns:
+        if not (turns := self._turns):
             return np.zeros(len(q), dtype=np.bool_)
         _, carried = self._sweep(turns[1:], None, self._turning(q), [columns.of_one(np.zeros(3)),
                                                                      columns.of_one(self.tool_axis)])
         found = columns.along(turns[0].along, carried, ROUND_OFF)
         return np.broadcast_to(found, (len(q),)).copy()
-
-
-def _along(direction: Floats, v: Floats) -> Bools:
-    """True (N,) where v (N, 3) lies along +-direction."""
-    result: Bools = lengths(cross(v, direction)) < ROUND_OFF
-    return result

@@ -88,20 +88,15 @@ class FrameTable:
         return result
 
     def position(self, number: Ints, coordinates: Floats) -> Floats:
-        """(N, J) machine positions of coordinates (N, J) in the frames `number` (N,).
-
-        The tip is an affine function of the slides, t = t0(rotaries) + D(rotaries) s, solved for s.
-        """
+        """(N, J) machine positions of coordinates (N, J) in the frames `number` (N,)."""
         if self.plain:
             return coordinates
         result = np.array(coordinates)
         for control, kin, k in self._parts(number):
-            q, at = coordinates[k] / control.unit, number[k]
-            q[:, control.slides] = 0.0
+            at = number[k]
             tip = np.einsum("nij,nj->ni", self.rotation[at], coordinates[np.ix_(k, control.xyz)]) + self.origin[at]
-            rest = tip - kin.forward(q)[0]
-            slopes = kin.slide_directions(q, control.slides)
-            result[np.ix_(k, control.slides)] = np.linalg.solve(slopes, rest[:, :, None])[:, :, 0]
+            q = kin.at_tip(tip, coordinates[k] / control.unit, control.slides)
+            result[np.ix_(k, control.slides)] = q[:, control.slides]
         return result
 
     def _parts(self, number: Ints) -> Iterator[tuple[Control, Kinematics, Ints]]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from machines import loader
 from postproc import __main__
 from postproc.base.version import VERSION
 from postproc.cli.app import app
@@ -130,7 +131,8 @@ def test_a_reader_of_standard_output_that_goes_away(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("arguments", [("inspect", POCKET), ("machine", "check", "uranesx"), ("errors", "schema")])
-def test_every_command_has_the_largest_size(arguments: tuple[str, ...]) -> None:
+def test_every_command_has_the_largest_size(arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(loader, "_loaded", {})  # as in a process of its own
     run = CliRunner().invoke(app, [*arguments, "--max-file-size", "0.001"])
     assert run.exit_code == (0 if "schema" in arguments else 1), run.output
     assert "schema" in arguments or "raise the limit with --max-file-size" in run.stderr
