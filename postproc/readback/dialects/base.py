@@ -165,7 +165,7 @@ class Reader(ABC):
             wanted = {stems[s] for call in programs[name][1].calls.values() for s in self.stems(call.name) if s in stems}
             waiting |= {n: others[n] for n in sorted(wanted - set(programs) - set(waiting))}
         texts, structures = zip(*programs.values(), strict=True)
-        text, line, more = expand(list(texts), list(structures), file)
+        text, line, more = expand(list(texts), list(structures), file, most_now())
         before = np.cumsum([0, *(t.words.lines for t in texts)]).tolist()
         files = tuple(zip(programs, before, strict=False)) if len(programs) > 1 else ()
         if has_errors(more):

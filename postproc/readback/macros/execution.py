@@ -94,6 +94,10 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
     except RecursionError:
         deep = MacroFault("gcode.expression", "brackets too deep", "write the expression in steps")
         return None, [*sources.found, *placed([deep.at(file, run.line)], sources.files)]
+    except (ArithmeticError, ValueError):
+        large = MacroFault("gcode.expression", "a number that the block needs is too large, or is none",
+                           "the control stops there: test the value before")
+        return None, [*sources.found, *placed([large.at(file, run.line)], sources.files)]
     judged = run.judged() if isinstance(run, SiemensMacros) else run.blocks.judged()
     found = [*sources.found, *placed(judged, sources.files)]
     if has_errors(found):

@@ -25,15 +25,15 @@ HINT = "write it as the control's manual has it, or give the figures themselves"
 
 
 class MacroFault(Exception):
-    """A block that cannot be executed: code, message, remedy."""
+    """A block that cannot be executed: code, message, remedy; its line, where it is not the one that runs."""
 
-    def __init__(self, code: str, message: str, hint: str = HINT) -> None:
+    def __init__(self, code: str, message: str, hint: str = HINT, line: int = 0) -> None:
         super().__init__(message)
-        self.code, self.message, self.hint = code, message, hint
+        self.code, self.message, self.hint, self.line = code, message, hint, line
 
     def at(self, file: str, line: int) -> Diagnostic:
         """The error, with the line of the block."""
-        return error(self.code, self.message, file=file, lines=[line], hint=self.hint)
+        return error(self.code, self.message, file=file, lines=[self.line or line], hint=self.hint)
 
 
 class Cursor:
@@ -141,6 +141,13 @@ def _decimal_bits(a: float) -> float:
     return float(int(f"{round(abs(a))}", 16))
 
 
+def _binary(a: float) -> float:
+    digits = f"{round(abs(a)):x}"
+    if not digits.isdigit():
+        raise ValueError
+    return float(digits)
+
+
 COMMON: dict[str, Callable[[float], float]] = {
     "SIN": _sine(math.sin), "COS": _sine(math.cos), "TAN": _sine(math.tan), "ASIN": _degrees(math.asin),
     "ACOS": _degrees(math.acos), "SQRT": math.sqrt, "ABS": abs, "ROUND": rounded, "LN": math.log, "EXP": math.exp}
@@ -163,7 +170,7 @@ FANUC = Grammar({
     "*": (3, _arithmetic(lambda a, b: a * b)), "/": (3, _arithmetic(_divided)),
     "MOD": (3, _arithmetic(_fanuc_modulo)), "AND": (3, _bits(lambda a, b: a & b))},
     {**COMMON, "SQR": math.sqrt, "RND": rounded, "FIX": lambda a: float(math.trunc(a)), "FUP": _up,
-     "BIN": lambda a: float(f"{round(abs(a)):x}"), "BCD": _decimal_bits}, True)
+     "BIN": _binary, "BCD": _decimal_bits}, True)
 LINUXCNC = Grammar({
     "AND": (1, _arithmetic(lambda a, b: float(a != 0.0 and b != 0.0))),
     "OR": (1, _arithmetic(lambda a, b: float(a != 0.0 or b != 0.0))),
@@ -182,7 +189,8 @@ class Expressions:
     def __init__(self, grammar: Grammar, variable: Callable[[Cursor], MacroValue],
                  special: Callable[[str, Cursor], MacroValue]) -> None:
         self.grammar, self.variable, self.special = grammar, variable, special
-        self.signs = sorted(grammar.operators, key=len, reverse=True)
+        signs = sorted(grammar.operators, key=len, reverse=True)
+        self.signs = re.compile("|".join(re.escape(sign) for sign in signs))
 
     def value(self, c: Cursor) -> MacroValue:
         """A number, a variable, a function or brackets, each with signs before it."""
@@ -193,7 +201,8 @@ class Expressions:
         if c.take("#"):
             return self.variable(c)
         if c.take("-"):
-            return -plain(self.value(c))
+            inner = self.value(c)
+            return None if inner is None else -inner
         if c.take("+"):
             return self.value(c)
         number = c.match(_NUMBER)
@@ -202,6 +211,8 @@ class Expressions:
         name = c.match(_NAME)
         if name == "ATAN":
             return self._arc_tangent(c)
+        if name == "POW" and self.grammar.full_turn:
+            return self._to_the_power(c)
         if name not in self.grammar.functions:
             return self.special(name, c)
         c.need("[")
@@ -224,15 +235,24 @@ class Expressions:
         angle = math.degrees(math.atan2(rise, run))
         return angle + 360.0 if angle < 0.0 and two and self.grammar.full_turn else angle
 
+    def _to_the_power(self, c: Cursor) -> float:
+        """POW[a,b] of Fanuc."""
+        c.need("[")
+        base = plain(self.expression(c))
+        c.need(",")
+        power = plain(self.expression(c))
+        c.need("]")
+        return _power(base, power)
+
     def expression(self, c: Cursor, rank: int = 0) -> MacroValue:
         """Values joined by operators that bind at least as `rank` does, from the left."""
         left = self.value(c)
         while True:
-            sign = next((s for s in self.signs if c.text.startswith(s, c.at)), "")
-            if not sign or self.grammar.operators[sign][0] < rank:
+            found = self.signs.match(c.text, c.at)
+            if found is None or self.grammar.operators[found[0]][0] < rank:
                 return left
-            c.take(sign)
-            binds, f = self.grammar.operators[sign]
+            c.at = found.end()
+            binds, f = self.grammar.operators[found[0]]
             left = f(left, self.expression(c, binds + 1))
 
 

@@ -20,6 +20,7 @@ _SEQUENCE = re.compile(r"N\d+")
 _PROGRAM = re.compile(r"O(\d+)")
 _PLAIN = re.compile(r"(?:[A-Z][-+]?(?:\d+\.?\d*|\.\d+))+")
 _WORD = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+))")
+_PRINTED = re.compile(r"(?:POPEN|PCLOS|[BD]PRNT\[.*\]|SETVN#.*)$")
 _LETTER = re.compile(r"[A-Z]")
 _DIGITS = re.compile(r"\d+")
 FIRST = {"A": 1, "B": 2, "C": 3, "I": 4, "J": 5, "K": 6, "D": 7, "E": 8, "F": 9, "H": 11, "M": 13, "Q": 17, "R": 18, "S": 19,
@@ -103,7 +104,7 @@ class FanucMacros:
         elif m := _PROGRAM.match(row):
             if len(self.levels) == 1:
                 self.blocks.write(m[0], self.line)
-        elif row:
+        elif row and not _PRINTED.match(row):
             self.block(self.words(row))
 
     def _unknown(self, name: str, c: Cursor) -> MacroValue:

@@ -193,6 +193,9 @@ class SiemensMacros:
         elif head == "FOR":
             self._for(level, c, k, partner[k])
         elif head == "ENDFOR":
+            if partner[k] not in level.ends:
+                raise MacroFault("gcode.jump", "a jump has led into a FOR loop: where it ends is not known",
+                                 "jump to the row of FOR, or before it")
             name = self._loop_variable(level, partner[k])
             self.names.put(name, (), number(self.names.get(name, ())) + 1.0)
             if number(self.names.get(name, ())) <= level.ends[partner[k]]:

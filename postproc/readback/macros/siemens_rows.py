@@ -84,5 +84,5 @@ def listing(source: SourceFile) -> Listing:
 
 
 def _alone(source: SourceFile, k: int, what: str) -> MacroFault:
-    return MacroFault("gcode.jump", f"{what} (line {k + 1} of {source.name or 'the program'})",
-                      "each of them begins and ends in one program")
+    return MacroFault("gcode.jump", what,
+                      "each of them begins and ends in one program", source.before + k + 1)

@@ -65,7 +65,7 @@ class SiemensNames(Names):
     def get(self, name: str, index: tuple[SiemensValue, ...]) -> SiemensValue:
         """A value by name."""
         if name == "R" or (name[0] == "R" and name[1:].isdigit()):
-            place = int(number(index[0])) if name == "R" else int(name[1:])
+            place = _place(name, index)
             if place not in self.parameters:
                 raise MacroFault("gcode.variable", f"R{place} is read before the program sets it: what it holds was left "
                                                    f"there "
@@ -92,12 +92,29 @@ class SiemensNames(Names):
     def put(self, name: str, index: tuple[SiemensValue, ...], value: SiemensValue) -> None:
         """A variable set."""
         if name == "R" or (name[0] == "R" and name[1:].isdigit()):
-            self.parameters[int(number(index[0])) if name == "R" else int(name[1:])] = number(value)
+            self.parameters[_place(name, index)] = number(value)
             return
         held = self._declared(name)
         if held is None:
             raise MacroFault("gcode.variable", f"{name} is set, and no DEF declares it", f"declare it: DEF REAL {name}")
         held.put(self._within(held, name, index), value)
+
+    def put_list(self, c: Cursor, name: str, index: tuple[SiemensValue, ...]) -> bool:
+        """NAME[i] = SET(...) or REP(...) behind the =: elements from the one that is named; False for other values."""
+        skip(c)
+        held, repeats = self._declared(name), c.text.startswith("REP(", c.at)
+        if held is None or not held.sizes or not (take(c, "SET(") or take(c, "REP(")):
+            return False
+        values, count = listed(c, self, ")"), math.prod(held.sizes)
+        first = _position(self._within(held, name, index), held.sizes)
+        if not values or (not repeats and len(values) > count - first):
+            raise MacroFault("gcode.variable", f"{len(values)} values from {name}{list(index)} on",
+                             f"{name} has {count} elements")
+        if repeats:
+            values = values[:1] * (min(round(number(values[1])), count - first) if len(values) > 1 else count - first)
+        for k, value in enumerate(values, first):
+            held.put(_index(k, held.sizes), value)
+        return True
 
     def _within(self, held: DeclaredVariable, name: str, index: tuple[SiemensValue, ...]) -> tuple[int, ...]:
         where = tuple(int(number(i)) for i in index)
@@ -145,11 +162,7 @@ class SiemensNames(Names):
         else:
             values = [expression(c, self)] * (math.prod(made.sizes) if made.sizes else 1)
         for k, value in enumerate(values[:math.prod(made.sizes) if made.sizes else 1]):
-            index, rest = list[int](), k
-            for size in reversed(made.sizes):
-                rest, i = divmod(rest, size)
-                index.insert(0, i)
-            made.put(tuple(index), value)
+            made.put(_index(k, made.sizes), value)
 
     def jump_name(self, c: Cursor) -> str:
         """The label behind GOTO: a name, N and a number, or characters that an expression makes."""
@@ -161,3 +174,28 @@ class SiemensNames(Names):
                 return m[0]
         return text(expression(c, self)).upper()
 
+
+def _place(name: str, index: tuple[SiemensValue, ...]) -> int:
+    """The number of an R parameter: R5 or R[5]."""
+    if name != "R":
+        return int(name[1:])
+    if len(index) != 1:
+        raise MacroFault("gcode.variable", "R without one number in brackets", "write R5, or R[5]")
+    return int(number(index[0]))
+
+
+def _index(k: int, sizes: tuple[int, ...]) -> tuple[int, ...]:
+    """Indices of the k-th element, counted from 0, the last index first to run."""
+    index, rest = list[int](), k
+    for size in reversed(sizes):
+        rest, i = divmod(rest, size)
+        index.insert(0, i)
+    return tuple(index)
+
+
+def _position(index: tuple[int, ...], sizes: tuple[int, ...]) -> int:
+    """Which element, counted from 0, has these indices."""
+    k = 0
+    for i, size in zip(index, sizes, strict=True):
+        k = k * size + i
+    return k

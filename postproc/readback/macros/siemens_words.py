@@ -160,7 +160,8 @@ class SiemensWords:
                   done: RowDone) -> None:
         """NAME=..., R1=..., X=..., X=IC(...), T="..."."""
         if self.names.known(key):
-            self.names.put(key, index, expression(c, self.names))
+            if not self.names.put_list(c, key, index):
+                self.names.put(key, index, expression(c, self.names))
             return
         if index:
             raise MacroFault("gcode.variable", f"{key}[...] is set, and no DEF declares it",

@@ -13,7 +13,8 @@ from toolpaths.diagnostics import Diagnostic, error
 
 DEEPEST = 10
 """levels of subprograms: the fewest that the controls take (Fanuc 30i: 10 with M98)"""
-MOST_BLOCKS = 20_000_000
+MOST_REPEATED = 1_000_000
+"""blocks run over and above those of the files, before a program counts as endless"""
 LineSpan = tuple[int, int, int]
 """number of the file, first and last line"""
 
@@ -42,16 +43,18 @@ class Structure:
 
 
 def expand(texts: list[ProgramText], structures: list[Structure],
-           file: str) -> tuple[ProgramText, Ints, list[Diagnostic]]:
+           file: str, most: int = MOST_REPEATED) -> tuple[ProgramText, Ints, list[Diagnostic]]:
     """(text whose lines are blocks in running order, line of each block (B + 1,) counted through all files, faults).
 
     The first file holds the main program; the names of all files are one list, the calling file's own come first.
+    Subprograms may repeat up to `most` blocks.
     """
     if not structures[0].calls and structures[0].main == (1, texts[0].words.lines):
         return texts[0], np.arange(texts[0].words.lines + 1), []
     found: list[Diagnostic] = []
     spans: list[LineSpan] = []
-    _run(0, *structures[0].main, structures, spans, found, file, 0)
+    left = most + sum(t.words.lines for t in texts)
+    _run((0, *structures[0].main), structures, _Running(spans, found, file, most, left), 0)
     if found:
         return texts[0], np.arange(texts[0].words.lines + 1), found[:1]
     statements = tuple(s for t in texts for s in t.statements)
@@ -76,23 +79,49 @@ def _slice(words: Words, first: int, last: int, at: int, statements: int) -> Wor
     return Words(part.letter, value, part.line - first + 1 + at, words.lines, point)
 
 
-def _run(k: int, first: int, last: int, structures: list[Structure], spans: list[LineSpan], found: list[Diagnostic],
-         file: str, depth: int) -> None:
-    """The spans of lines first..last of file k, with those of the subprograms that they call."""
-    here = first
-    for line in sorted(n for n in structures[k].calls if first <= n <= last):
+@dataclass
+class _Running:
+    """Spans in running order, faults; blocks that may be repeated, and those that may still run."""
+
+    spans: list[LineSpan]
+    found: list[Diagnostic]
+    file: str
+    most: int
+    left: int
+
+    def add(self, span: LineSpan) -> None:
+        """A span run."""
+        self.spans.append(span)
+        self.left -= span[2] - span[1] + 1
+
+
+def _run(span: LineSpan, structures: list[Structure], run: _Running, depth: int) -> None:
+    """The spans of a span of lines, with those of the subprograms that they call."""
+    k, here, last = span
+    for line in sorted(n for n in structures[k].calls if here <= n <= last):
         call = structures[k].calls[line]
         where: LineSpan | None = next(((j, *structures[j].subprograms[call.name]) for j in (k, *range(len(structures)))
                       if call.name in structures[j].subprograms), None)
-        if where is None or depth >= DEEPEST or sum(b - a for _, a, b in spans) > MOST_BLOCKS:
-            found.append(_cannot(where is None, call, structures, file))
+        if where is None or depth >= DEEPEST:
+            run.found.append(_cannot(where is None, call, structures, run.file))
             return
-        spans.append((k, here, line))
+        run.add((k, here, line))
         for _ in range(call.times):
-            _run(where[0], where[1], where[2], structures, spans, found, file, depth + 1)
+            run.left -= where[2] < where[1]
+            _run(where, structures, run, depth + 1)
+            if run.left < 0 and not run.found:
+                run.found.append(_endless(call, run))
+            if run.found:
+                return
         here = line + 1
     if here <= last:
-        spans.append((k, here, last))
+        run.add((k, here, last))
+
+
+def _endless(call: Call, run: _Running) -> Diagnostic:
+    return error("gcode.endless", f"subprograms repeat more than {run.most} blocks: the program has no end", file=run.file,
+                 lines=[call.line], hint="look at how often this block calls; a longer program: --max-blocks with a larger "
+                                         "number")
 
 
 def _cannot(missing: bool, call: Call, structures: list[Structure], file: str) -> Diagnostic:

@@ -34,7 +34,9 @@ def track(control: str, body: str, **others: bytes) -> list[list[float]]:
     ("#100=1\nM98 P20077\nG0 X9.\n@O77\nG91 X#100\nG90\n#100=#100+1\nM99\n", [[1, 0, 0], [3, 0, 0], [9, 0, 0]]),
     ("M98 P77 L1\nG0 X9.\nN50 G0 Y1.\n@O77\nIF[1EQ1]THEN#101=0\nM99 P50\n", [[0, 1, 0]]),
     ("G52 X10.\nG0 X1.\nG91 X1.\nG90\nG52 X0.\nX1.\nG92 X5. Y2.\nX6. Y2.\n", [[11, 0, 0], [12, 0, 0], [1, 0, 0], [2, 0, 0]]),
-    ("G0 X4. Y3.\n#1=#5001 #2=#4001\nG0 Y[#1*2+#2]\n", [[4, 3, 0], [4, 8, 0]])])
+    ("G0 X4. Y3.\n#1=#5001 #2=#4001\nG0 Y[#1*2+#2]\n", [[4, 3, 0], [4, 8, 0]]),
+    ("#1=#0\nG0 X1.\nX-#1 Y[POW[2.,3.]]\n", [[1, 0, 0], [1, 8, 0]]),
+    ("#1=2.\nPOPEN\nDPRNT[X#1[32]]\nPCLOS\nSETVN #100[LAST]\nG0 X#1\n", [[2, 0, 0]])])
 @pytest.mark.parametrize("control", [FANUC, HAAS])
 def test_custom_macro_b(control: str, body: str, ends: list[list[float]]) -> None:
     if control == HAAS:
@@ -50,6 +52,8 @@ def test_custom_macro_b(control: str, body: str, ends: list[list[float]]) -> Non
     ("R1=2\nCASE R1 OF 1 GOTOF AA 2 GOTOF BB DEFAULT GOTOF CC\nAA: X1\nBB: X2\nCC: Y=IC(R1)\n", [[2, 0, 0], [2, 2, 0]]),
     ("R1=0\nREPEAT\nR1=R1+1\nUNTIL R1>=4\nWHILE R1>3\nX=R1\nR1=R1-1\nENDWHILE\n", [[4, 0, 0]]),
     ("G91\nPART: X1\nG90\nG91\nREPEAT PART P2\nG90\n", [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
+    ("DEF REAL _LIST[2,2]\n_LIST[0,1]=SET(7,8)\nX=_LIST[0,1] Y=_LIST[1,0]\n_LIST[0,0]=REP(5)\nX=_LIST[1,1]\n",
+     [[7, 8, 0], [5, 8, 0]]),
     ("TRANS X10\nATRANS Y=2*3\nX1 Y1\nTRANS\nX1\n", [[11, 7, 0], [1, 7, 0]])])
 def test_sinumerik(body: str, ends: list[list[float]]) -> None:
     assert track(SIEMENS, body) == ends
@@ -92,3 +96,27 @@ def test_faults_stand_at_the_line_that_was_written() -> None:
 def test_a_program_without_an_end_is_refused(control: str, text: str) -> None:
     with most_blocks(500):
         assert set(faults(control, text)) == {"gcode.endless"}
+
+
+@pytest.mark.parametrize(("control", "text", "code"), [
+    (FANUC, HEAD + "#1=EXP[700.]*EXP[700.]\n#2=#1AND1\nM30\n%\n", "gcode.expression"),
+    (FANUC, HEAD + "#1=EXP[700.]\nM98 P[#1*#1]\nM30\n%\n", "gcode.expression"),
+    (FANUC, HEAD + "#1=485\n#2=BIN[#1]\nM30\n%\n", "gcode.expression"),
+    (LINUXCNC, HEAD + "#1=[10**300]\nO1 REPEAT [#1*#1]\nO1 ENDREPEAT\nM2\n", "gcode.expression"),
+    (SIEMENS, SINUMERIK + "R1=1EX300\nR2=B_NOT(R1*R1)\nM30\n", "gcode.expression"),
+    (SIEMENS, SINUMERIK + "R1=2\nR=3\nM30\n", "gcode.variable"),
+    (SIEMENS, "G17 G40 G90 G94 G54 G71\nGOTOF INSIDE\nFOR R1=1 TO 2\nINSIDE: ENDFOR\nM30\n", "gcode.jump"),
+    (SIEMENS, SINUMERIK + "R1=1\nIF R1==1\nM30\n", "gcode.jump"),
+    (SIEMENS, SINUMERIK + "DEF REAL _LIST[2]\n_LIST[1]=SET(7,8)\nM30\n", "gcode.variable"),
+    (TNC, "BEGIN PGM A MM\nQ1 = 0\nQ2 = Q1 ^ -1\nEND PGM A MM\n", "gcode.expression")])
+def test_numbers_and_rows_that_no_control_takes_are_faults_of_their_line(control: str, text: str, code: str) -> None:
+    last = {FANUC: 7, LINUXCNC: 7, SIEMENS: 4, TNC: 3}[control]
+    assert faults(control, text) == {code: [last]}
+
+
+@pytest.mark.parametrize("call", ["M98 P50000005", "M98 P5 L90000000"])
+def test_repeats_without_macro_language_are_bounded_as_well(call: str) -> None:
+    program = HEAD + f"{call}\nM30\nO0005\nG91 G0 X1.\nG90\nM99\n%\n"
+    with most_blocks(500):
+        assert faults(FANUC, program) == {"gcode.endless": [6]}
+    assert not faults(FANUC, program.replace(call, "M98 P90005"))
