@@ -12,7 +12,7 @@ from toolpaths.arrays import Floats, Ints
 from toolpaths.compiled import compiled, loop, wanted
 from toolpaths.shapes import arrays
 
-_NUMBERS, _ROWS = ("float64", 1), ("float64", 2)
+_ROWS = ("float64", 2)
 COMPILE_FROM = 20_000
 """points that are worth compiling for; fewer take the loop where any is compiled anyway"""
 

@@ -35,7 +35,12 @@ _NEEDED = {
         rb"|=[ \t]*[-+]?[\d.]+[ \t]*[-+*/]|\bT[ \t]*=[ \t]*\"|\bPROC\b[^\n]*\("),
     "klartext": re.compile(rb"FN[ \t]*\d+[ \t]*:|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}
 _CONTINUED = re.compile(rb"~[ \t]*\n")
-_STRINGS = re.compile(rb'(?<!T=)"[^"\n]*"|;[^\n]*')
+_COMMENT, _STRING = re.compile(rb";[^\n]*"), re.compile(rb'(?<!T=)"[^"\n]*"')
+_SIGNS = re.compile(rb"=[ \t]*[-+]*[ \t]*(?:[A-Z_$(\[]|[\d.]+[ \t]*[-+*/])")
+_PARAMETERS = re.compile(rb"R\d+[ \t]*=")
+_WORDS = (b"DEF", b"IF", b"GOTO", b"FOR", b"WHILE", b"REPEAT", b"LOOP", b"CASE", b"EXT", b"TRANS", b"ROT", b"SCALE",
+          b"MIRROR", b"SETAL", b"G53", b"G153", b"G20", b"G21", b"PROC", b'"')
+"""one of these, signs or parameters stand where `_NEEDED` finds anything in a program of SINUMERIK: absent is soon known"""
 
 
 @dataclass(frozen=True)
@@ -56,10 +61,13 @@ def needed(data: bytes, language: MacroLanguage, passive: tuple[str, ...] = ()) 
     """True where a program, comments aside, has what only its execution explains."""
     form = _NEEDED["fanuc" if language == "haas" else language]
     text = data.upper()
+    if language == "siemens":
+        bare = _COMMENT.sub(b"", text) if b";" in text else text
+        bare = _STRING.sub(b"", bare) if b'"' in bare else bare
+        likely = any(word in bare for word in _WORDS) or _SIGNS.search(bare) or _PARAMETERS.search(bare)
+        return bool(likely) and form.search(bare) is not None
     if not form.search(text):
         return False
-    if language == "siemens":
-        return form.search(_STRINGS.sub(b"", text)) is not None
     if language == "klartext":
         return form.search(_CONTINUED.sub(b" ", re.sub(rb";[^~\n]*", b"", lines_of(text)))) is not None
     found = {m[0] for m in form.finditer(plain(text))}

@@ -1,10 +1,8 @@
 """Expressions of Fanuc's custom macro B and of LinuxCNC: values of words, conditions, assignments.
 
-Fanuc B-64484EN, custom macro (arithmetic and logic operation): functions, then * / AND MOD, then + - OR XOR, then
-comparisons;
-a variable that was never set is vacant: it counts as 0, and EQ and NE know it from 0. LinuxCNC (G-code overview): **
-before * / MOD,
-+ -, comparisons, AND OR XOR, which are 1 or 0; numbers nearer than 0.0001 are equal.
+Fanuc B-64484EN (arithmetic and logic operation): functions, then * / AND MOD, then + - OR XOR, then comparisons;
+a variable that was never set is vacant: it counts as 0, and EQ and NE know it from 0. LinuxCNC (G-code overview): ** before
+* / MOD, + -, comparisons, AND OR XOR, which are 1 or 0; numbers nearer than 0.0001 are equal.
 """
 
 from __future__ import annotations

@@ -351,9 +351,8 @@ def arguments(words: Sequence[Word]) -> dict[int, MacroValue]:
     sets, before = 0, ""
     for w in words:
         if w.letter in _SCALED and w.text and "." not in w.text and w.value:
-            raise MacroFault("gcode.decimal_point", f"argument {w.text} has no decimal point: its unit is a parameter of "
-                                                    f"the "
-                             "control", "write the decimal point")
+            raise MacroFault("gcode.decimal_point", f"argument {w.text} has no decimal point: its unit is a parameter "
+                             "of the control", "write the decimal point")
         if w.letter not in FIRST:
             raise MacroFault("gcode.subprogram", f"{w.letter} is no argument of a macro", "G, L, N, O and P are none")
         if w.letter in "IJK":

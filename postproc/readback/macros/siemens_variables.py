@@ -67,9 +67,9 @@ class SiemensNames(Names):
         if name == "R" or (name[0] == "R" and name[1:].isdigit()):
             place = _place(name, index)
             if place not in self.parameters:
-                raise MacroFault("gcode.variable", f"R{place} is read before the program sets it: what it holds was left "
-                                                   f"there "
-                                 "by another program, or by hand", f"set it first, in a copy of the program: R{place}=...")
+                raise MacroFault("gcode.variable", f"R{place} is read before the program sets it: what it holds was "
+                                 "left there by another program, or by hand",
+                                 f"set it first, in a copy of the program: R{place}=...")
             return self.parameters[place]
         held = self._declared(name)
         if held is not None:

@@ -51,9 +51,8 @@ class Track:
         """Of an axis in the coordinates that the program sees."""
         here = self.at.get(axis)
         if here is None:
-            raise MacroFault("gcode.position_unknown", f"where {axis} stands here is not known: no block since its last "
-                                                       f"move in "
-                             "machine coordinates, or change of offset or length, states it absolutely",
+            raise MacroFault("gcode.position_unknown", f"where {axis} stands here is not known: no block since its "
+                             "last move in machine coordinates, or change of offset or length, states it absolutely",
                              f"state {axis} with G90 before this block")
         return here - self.shift(axis)
 
