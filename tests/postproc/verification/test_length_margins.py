@@ -12,6 +12,7 @@ import pytest
 
 from postproc.job.job import prepare
 from postproc.report.summary import as_text, tools_of
+from postproc.verification import length_limits
 from postproc.verification.read_back import read_back
 from tests.postproc.kit import SAMPLES, convert, good, setup_of, toolpath
 from toolpaths import read
@@ -69,6 +70,19 @@ LIMITS = {"tolerance": "verify.tip", "axis": "verify.axis", "travel": "verify.tr
 def test_a_program_verifies_with_lengths_inside_its_margins_and_not_outside(name: str) -> None:
     """1.1 um: what rounded words may pass travel by."""
     assert margins_hold(made(name), LIMITS)
+
+
+def test_where_joints_stay_the_tip_goes_along_the_tool(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same margins as from executing the program with longer tools."""
+    result, kept = made("delta"), length_limits._Look._keeps_joints
+    margins = []
+    for executed in (False, True):
+        monkeypatch.setattr(length_limits._Look, "_keeps_joints",
+                            lambda look, rows, own=not executed: kept(look, rows) & own)
+        found, _ = read_back(result.text, replace(result.job, errors=result.job.errors), "part.cls", margins=True)
+        assert found is not None
+        margins.append([(one.shorter, one.longer) for one in found.lengths])
+    np.testing.assert_allclose(margins[0], margins[1], rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
