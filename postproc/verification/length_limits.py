@@ -150,9 +150,10 @@ class _Look:
             if len(rows):
                 yield rows
 
-    def _poses(self, rows: Ints, t: float | Floats) -> _Places:
+    def _poses(self, rows: Ints, t: float | Floats, keeps: bool) -> _Places:
+        """Places of blocks that all keep their joints, or of which none does."""
         here = self.executed.poses(self.motion, rows, t)
-        if self._keeps_joints(rows).all():
+        if keeps:
             return _Places(*here, -here[1], np.zeros_like(here[1]))
         return _Places.of(here, self.longer.poses(self.again, rows, t))
 
@@ -169,28 +170,29 @@ class _Look:
         """Tolerances in cuts, clearance of links, at the places of `check_links` and `compare`."""
         for rows in self._rows():
             run_by, keeps = self.moves.run_by(self.c.owner[rows]), self._keeps_joints(rows)
-            for alike in (keeps, ~keeps):
+            for kept in (True, False):
+                alike = keeps == kept
                 cuts, links = rows[run_by & alike], rows[~run_by & alike & (rows > 0)]
                 for which, look in ((cuts, self._cuts), (links, self._links)):
                     if len(which):
-                        look(which)
+                        look(which, kept)
 
-    def _times(self, rows: Ints) -> list[float | Floats]:
+    def _times(self, rows: Ints, keeps: bool) -> list[float | Floats]:
         """Fractions at which blocks are looked at; poses with longer tools are made at once too."""
         times = self.executed.times(self.motion, rows)
-        if not self._keeps_joints(rows).all():
+        if not keeps:
             self.longer.look_ahead(self.again, rows, times)
         return times
 
-    def _cuts(self, rows: Ints) -> None:
+    def _cuts(self, rows: Ints, keeps: bool) -> None:
         moves, tolerance = self.moves, self.job.options.tolerance
         curves = moves.curves(self.c.owner[rows])
         begin, share = place_on_moves(self.motion, self.executed, rows, self.c.owner, moves)
         tool = self._tool(rows)
         level = (moves.phase[self.c.owner[rows]] == Phase.POSITION) & (self.motion.code[rows] == 0) & (
             self.executed.bent(self.motion, rows) | self.job.corrects)
-        for t in self._times(rows):
-            places, guess = self._poses(rows, t), np.minimum(begin + t * share, 1.0)
+        for t in self._times(rows, keeps):
+            places, guess = self._poses(rows, t, keeps), np.minimum(begin + t * share, 1.0)
 
             def left(k: Ints, x: Floats, places: _Places = places, guess: Floats = guess) -> Floats:
                 some, (tip, axis) = curves.take(k), places.at(k, x)
@@ -204,11 +206,11 @@ class _Look:
             self.ends.leave(tool, lengths(places.d_tip), left, "tolerance")
             self.ends.leave(tool, lengths(places.d_axis), left_of_axis, "axis tolerance")
 
-    def _links(self, rows: Ints) -> None:
+    def _links(self, rows: Ints, keeps: bool) -> None:
         near, moves = self.job.options.tolerance + self.executed.corrected_between(self.motion, rows), self.moves
         tool, owner = self._tool(rows), self.c.owner[rows]
-        for t in self._times(rows):
-            places = self._poses(rows, t)
+        for t in self._times(rows, keeps):
+            places = self._poses(rows, t, keeps)
 
             def left(k: Ints, x: Floats, places: _Places = places) -> Floats:
                 return _room(self.job, moves, owner[k], *places.at(k, x), near[k])
@@ -224,7 +226,8 @@ class _Look:
             done, rows = done[keep], rows[keep]
         for first in range(0, len(rows), CHUNK):
             part = slice(first, first + CHUNK)
-            places, to = self._poses(rows[part], 1.0), self.moves.tip[done[part]]
+            keeps = bool(self._keeps_joints(rows[part]).all())
+            places, to = self._poses(rows[part], 1.0, keeps), self.moves.tip[done[part]]
 
             def left(k: Ints, x: Floats, places: _Places = places, to: Floats = to) -> Floats:
                 return np.asarray(tolerance - lengths(places.at(k, x)[0] - to[k]))
@@ -237,7 +240,7 @@ class _Look:
         for first in range(0, len(self.motion), CHUNK):
             rows = np.arange(first, min(first + CHUNK, len(self.motion)))
             tool = self._tool(rows)
-            for t in self._times(rows):
+            for t in self._times(rows, bool(self._keeps_joints(rows).all())):
                 q, other = self.executed.joints(self.motion, rows, t), self.longer.joints(self.again, rows, t)
                 slope = (other - q) / STEP
                 for j in np.flatnonzero((np.abs(slope) > LEAST).any(axis=0)).tolist():

@@ -15,7 +15,7 @@ import numpy as np
 
 from machines.kinematics.base import ErrorForm, ErrorForms, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry
-from machines.kinematics.legs.attitudes import tilt_of
+from machines.kinematics.legs.attitudes import direction_of, tilt_of
 from machines.kinematics.legs.bounds import MovingLoops
 from machines.kinematics.legs.over_workspace import OverWorkspace
 from machines.kinematics.legs.poses import UP, PosesOfLegs
@@ -85,12 +85,8 @@ class OnLegs(PosesOfLegs):
 
         A platform that turns in every direction tilts in another one at every place, GOLDEN rad farther each.
         """
-        tilt, heading = platform[:, 3], np.full(len(platform), 0.0 if self.loops.turns == "b" else -0.5 * np.pi)
-        if self.loops.turns == "abc":
-            heading = GOLDEN * np.arange(len(platform))
-        s = np.sin(tilt)
-        axis = np.column_stack([s * np.cos(heading), s * np.sin(heading), np.cos(tilt)])
-        axis = self._within(axis)
+        heading = GOLDEN * np.arange(len(platform), dtype=np.float64)
+        axis = self._within(direction_of(self.loops.turns, platform[:, 3], heading))
         gauge = self.turn_of(axis, np.zeros(len(axis))) @ self.gauge
         return np.asarray(self.inverse(platform[:, :3] + gauge - self.tool_length * axis, axis)[0])
 

@@ -14,12 +14,12 @@ from postproc.readback.macros.expressions import MacroFault
 from postproc.readback.macros.fanuc import FanucMacros
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.klartext import KlartextMacros, klartext_rows
-from postproc.readback.macros.linuxcnc import LinuxCncMacros, linuxcnc_rows
+from postproc.readback.macros.linuxcnc import LinuxCncMacros
 from postproc.readback.macros.siemens import SiemensMacros
 from postproc.readback.macros.siemens_rows import siemens_rows
-from postproc.readback.macros.sources import Cleaned, ProgramFiles
+from postproc.readback.macros.sources import Cleaned, ProgramFiles, word_rows
 from postproc.readback.text.canonical import Files, placed
-from postproc.readback.text.words import block_delete, lines_of, plain
+from postproc.readback.text.words import lines_of, plain
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shapes import arrays
@@ -75,23 +75,17 @@ def needed(data: bytes, language: MacroLanguage, passive: tuple[str, ...] = ()) 
     return bool({f for f in found if not f[1:].isdigit()} or codes - set(passive))
 
 
-def fanuc_rows(data: bytes, file: str) -> tuple[list[str], list[Diagnostic]]:
-    """Rows without comments, blanks and tape marks, in capitals."""
-    text, found = block_delete(re.sub(rb"(?m)^[ \t]*%[^\n]*", b"", plain(data).upper()), file)
-    return re.sub(r"[ \t]", "", text.decode("ascii", "replace")).split("\n")[:-1], found
-
-
 def executed(data: bytes, file: str, others: Mapping[str, bytes], language: MacroLanguage, held: Held,
              numbered: ToolsNumbered) -> tuple[PlainProgram | None, list[Diagnostic]]:
     """The plain program; None, and why, where a block cannot be executed.
 
     Work is bounded: `held.most` blocks. `numbered` puts numbers in the place of the names of tools.
     """
-    rows: dict[MacroLanguage, Cleaned] = {"linuxcnc": linuxcnc_rows, "siemens": siemens_rows, "klartext": klartext_rows}
+    rows: dict[MacroLanguage, Cleaned] = {"siemens": siemens_rows, "klartext": klartext_rows}
 
     def cleaned(text: bytes, name: str) -> tuple[list[str], list[Diagnostic]]:
         text, found = (text, []) if language == "siemens" else numbered(text, name)
-        made, more = rows.get(language, fanuc_rows)(text, name)
+        made, more = rows.get(language, word_rows)(text, name)
         return made, [*found, *more]
     sources = ProgramFiles(data, file, others, cleaned)
     run = _run(language, sources, held)

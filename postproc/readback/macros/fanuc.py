@@ -13,7 +13,7 @@ from postproc.readback.macros.expressions import FANUC, Cursor, Expressions, Mac
 from postproc.readback.macros.fanuc_variables import Variables
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
-from postproc.readback.macros.word_blocks import Blocks, Word
+from postproc.readback.macros.word_blocks import Blocks, Word, coded
 from postproc.readback.text.flow import DEEPEST
 
 _SEQUENCE = re.compile(r"N\d+")
@@ -55,9 +55,9 @@ class ModalCall:
 class FanucMacros:
     """Executes a program; `haas` where the control is one."""
 
-    def __init__(self, sources: ProgramFiles, held: Held, haas: bool, linuxcnc: bool = False) -> None:
+    def __init__(self, sources: ProgramFiles, held: Held, haas: bool) -> None:
         self.sources, self.held, self.haas = sources, held, haas
-        self.blocks = Blocks(held, linuxcnc, sources.read[0].name)
+        self.blocks = Blocks(held, False, sources.read[0].name)
         self.levels: list[Level] = []
         self.modal: ModalCall | None = None
         self.variables = Variables(self.blocks, held)
@@ -71,7 +71,6 @@ class FanucMacros:
         last = next((k - 1 for k, row in enumerate(first.rows) if _PROGRAM.match(row) and any(
             _PROGRAM.match(r) for r in first.rows[:k])), len(first.rows) - 1)
         self.levels = [Level(first, 0, last, 0, {})]
-        executed = 0
         while self.levels and not self.ended:
             level = self.levels[-1]
             if level.at > level.last:
@@ -80,10 +79,8 @@ class FanucMacros:
                 return
             row, self.line = level.source.rows[level.at], level.source.before + level.at + 1
             level.at += 1
-            executed += bool(row)
-            if executed > self.held.most:
-                raise too_many(self.held.most)
             if row:
+                self.blocks.count()
                 self.statement(row)
 
     def statement(self, row: str) -> None:
@@ -326,23 +323,6 @@ def _ends(row: str, sign: str, behind: bool) -> bool:
     """True where a row, its number aside, is that END, or ends with that DO."""
     row = _SEQUENCE.sub("", row, count=1) if row.startswith("N") else row
     return row.endswith(sign) and row.startswith(("WHILE[", "DO")) if behind else row == sign
-
-
-def too_many(most: int) -> MacroFault:
-    """A program without an end."""
-    return MacroFault("gcode.endless", f"more than {most} blocks are executed: the program has no end",
-                      "look for a loop whose condition never fails; a longer program: --max-blocks with a larger number")
-
-
-def coded(letter: str, value: float) -> float:
-    """The number of a word that was worked out: codes to a tenth, tools and registers whole."""
-    if letter == "G":
-        return rounded(value * 10.0) / 10.0
-    if letter in "MTSHDNOL":
-        if abs(value - rounded(value)) > 1e-4:
-            raise MacroFault("gcode.expression", f"{letter} with {value:g}", "it takes a whole number")
-        return rounded(value)
-    return value
 
 
 def arguments(words: Sequence[Word]) -> dict[int, MacroValue]:

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from pathlib import PurePath
 
 from postproc.readback.macros.expressions import Cursor, MacroFault, applied, written
-from postproc.readback.macros.fanuc import too_many
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks
@@ -122,7 +121,6 @@ class KlartextMacros:
             self.blocks.write(main.rows[end], end + 1)
 
     def _rows(self) -> None:
-        executed = 0
         while not self.ended:
             level = self.levels[-1]
             if level.at >= len(level.source.rows):
@@ -132,10 +130,8 @@ class KlartextMacros:
                 continue
             row, self.line = level.source.rows[level.at], level.source.before + level.at + 1
             level.at += 1
-            executed += bool(row)
-            if executed > self.held.most:
-                raise too_many(self.held.most)
             if row:
+                self.blocks.count()
                 self.statement(level, row)
 
     def _back(self, level: KlartextLevel) -> None:

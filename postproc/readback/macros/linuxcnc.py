@@ -6,15 +6,11 @@ import re
 from collections.abc import Callable
 
 from postproc.readback.macros.expressions import LINUXCNC, Cursor, Expressions, MacroFault, MacroValue, plain
-from postproc.readback.macros.fanuc import coded, too_many
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.linuxcnc_parameters import OLevel, Parameters
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
-from postproc.readback.macros.word_blocks import Blocks, Word
+from postproc.readback.macros.word_blocks import Blocks, Word, coded
 from postproc.readback.text.flow import DEEPEST
-from postproc.readback.text.words import block_delete
-from postproc.readback.text.words import plain as uncommented
-from toolpaths.diagnostics import Diagnostic
 
 _SEQUENCE = re.compile(r"N\d+(?:\.\d*)?")
 _LABEL = re.compile(r"O(<[^<>]+>|\d+)([A-Z]*)")
@@ -28,12 +24,6 @@ _NAME = re.compile(r"<[^<>]*>")
 _ENDS = {"IF": ("ELSEIF", "ELSE", "ENDIF"), "ELSEIF": ("ENDIF",), "ELSE": ("ENDIF",), "WHILE": ("ENDWHILE",),
          "REPEAT": ("ENDREPEAT",), "SUB": ("ENDSUB",)}
 ARGUMENTS = 30
-
-
-def linuxcnc_rows(data: bytes, file: str) -> tuple[list[str], list[Diagnostic]]:
-    """Rows without comments, blanks and tape marks, in capitals."""
-    text, found = block_delete(re.sub(rb"(?m)^[ \t]*%[^\n]*", b"", uncommented(data).upper()), file)
-    return re.sub(r"[ \t]", "", text.decode("ascii", "replace")).split("\n")[:-1], found
 
 
 class LinuxCncMacros:
@@ -55,7 +45,6 @@ class LinuxCncMacros:
 
     def run(self) -> None:
         """From the first row to M2 or M30."""
-        executed = 0
         while not self.ended:
             level = self.levels[-1]
             if level.at >= len(level.source.rows):
@@ -64,10 +53,8 @@ class LinuxCncMacros:
                 return
             row, self.line = level.source.rows[level.at], level.source.before + level.at + 1
             level.at += 1
-            executed += bool(row)
-            if executed > self.held.most:
-                raise too_many(self.held.most)
             if row:
+                self.blocks.count()
                 self.statement(level, row)
 
     def statement(self, level: OLevel, row: str) -> None:

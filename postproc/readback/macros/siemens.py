@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import PurePath
 
 from postproc.readback.macros.expressions import Cursor, MacroFault
-from postproc.readback.macros.fanuc import too_many
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.siemens_expressions import SiemensValue, equal, expression, number, skip, take
 from postproc.readback.macros.siemens_rows import Listing, SiemensRow, listing
@@ -56,7 +55,7 @@ class SiemensMacros:
         self.names: SiemensNames = self.words.names
         self.listings: dict[str, Listing] = {}
         self.levels: list[SiemensLevel] = []
-        self.line, self.ended, self.executed = 0, False, 0
+        self.line, self.ended = 0, False
         self.modal: tuple[str, str] | None = None
 
     def judged(self) -> list[Diagnostic]:
@@ -86,9 +85,8 @@ class SiemensMacros:
                 continue
             row, self.line = self.listed(level.source).rows[level.at], level.source.before + level.at + 1
             level.at += 1
-            self.executed += bool(row.body)
-            if self.executed > self.held.most:
-                raise too_many(self.held.most)
+            if row.body:
+                self.blocks.count()
             if row.body and not row.body.startswith("%"):
                 self.statement(level, row)
 

@@ -7,11 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from postproc.readback.macros.expressions import Cursor, MacroFault, written
-from postproc.readback.macros.fanuc import coded
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.siemens_expressions import NAME, SiemensValue, expression, indices, number, skip, take
 from postproc.readback.macros.siemens_variables import SiemensNames
-from postproc.readback.macros.word_blocks import Blocks
+from postproc.readback.macros.word_blocks import Blocks, coded
 
 _WORD = re.compile(r"([A-Z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)(?![\d.]|[ \t]*=)")
 _KEY = re.compile(r"(\$?[A-Z_$][A-Z0-9_$]*)")

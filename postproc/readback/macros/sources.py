@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePath
 
 from postproc.readback.text.canonical import Files
+from postproc.readback.text.words import block_delete, plain
 from toolpaths.diagnostics import Diagnostic
 
 Cleaned = Callable[[bytes, str], tuple[list[str], list[Diagnostic]]]
@@ -59,3 +61,9 @@ class ProgramFiles:
     def files(self) -> Files:
         """Names, with the lines before each, as `Canonical.files` has them."""
         return tuple((s.name, s.before) for s in self.read) if len(self.read) > 1 else ()
+
+
+def word_rows(data: bytes, file: str) -> tuple[list[str], list[Diagnostic]]:
+    """Rows of a program of words without comments, blanks and tape marks, in capitals."""
+    text, found = block_delete(re.sub(rb"(?m)^[ \t]*%[^\n]*", b"", plain(data).upper()), file)
+    return re.sub(r"[ \t]", "", text.decode("ascii", "replace")).split("\n")[:-1], found

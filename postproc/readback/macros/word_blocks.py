@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from postproc.readback.macros.expressions import MacroFault, written
+from postproc.readback.macros.expressions import MacroFault, rounded, written
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.track import NO_LENGTH, Track
 from postproc.readback.text.canonical import EXTENDED_OFFSETS
@@ -56,6 +56,15 @@ class Blocks:
         self.tool = 0.0
         self.drill_plane: float | None = None
         self.first: float | None = None
+        self.executed = 0
+
+    def count(self) -> None:
+        """One more block is executed; a program without an end is refused."""
+        self.executed += 1
+        if self.executed > self.held.most:
+            raise MacroFault("gcode.endless", f"more than {self.held.most} blocks are executed: the program has no end",
+                             "look for a loop whose condition never fails; a longer program: --max-blocks with a larger "
+                             "number")
 
     def write(self, row: str, line: int) -> None:
         """A row of the plain program."""
@@ -243,3 +252,13 @@ class Blocks:
                         "the machine file is taken for it", file=self.file, lines=self.second[:6], count=len(self.second),
                         hint="write G28 where that is meant, or G53 with the position")]
 
+
+def coded(letter: str, value: float) -> float:
+    """The number of a word that was worked out: codes to a tenth, tools and registers whole."""
+    if letter == "G":
+        return rounded(value * 10.0) / 10.0
+    if letter in "MTSHDNOL":
+        if abs(value - rounded(value)) > 1e-4:
+            raise MacroFault("gcode.expression", f"{letter} with {value:g}", "it takes a whole number")
+        return rounded(value)
+    return value
