@@ -102,9 +102,23 @@ def _held(kinematics: OnLegs, pairs: Sequence[Floats | None], rods: Floats, arms
                            *(np.concatenate([0.0 * row, size * row], axis=1)[:, None]
                              for row, size in zip(held, apart, strict=True))], axis=1)
     columns = [0, 1, 2, 3, 4, 5] if "z" in loops.freedoms else [0, 1, 5]
-    least = (np.linalg.svd(rows[:, :, columns], compute_uv=False)[:, -1] if rows.shape[1] >= len(columns) else np.zeros(1))
-    if least.min() < LEAST:
+    least = least_singular(rows[:, :, columns]) if rows.shape[1] >= len(columns) else 0.0
+    if least < LEAST:
         yield KeyProblem("machine.mobility", ("legs",), f"{rods.shape[1]} legs and {len(held)} pairs of rods do not hold "
-                         f"the platform everywhere (least singular value {least.min():.3g}): it moves otherwise than "
+                         f"the platform everywhere (least singular value {least:.3g}): it moves otherwise than "
                          f"freedoms = {list(loops.freedoms)}",
                          "give `rods` of the legs that are pairs, or the freedoms that the machine has")
+
+
+def least_singular(rows: Floats) -> float:
+    """The least singular value of any of (N, R, C), R >= C; a lower bound of it where that is above LEAST.
+
+    With p their product and f2 the sum of their squares it is at least p ((C - 1) / f2)^((C - 1) / 2), as the product of
+    the others is largest where they are equal.
+    """
+    square = np.swapaxes(rows, 1, 2) @ rows
+    n = square.shape[-1] - 1
+    product = np.sqrt(np.maximum(np.linalg.det(square), 0.0))
+    bound = product * (n / np.trace(square, axis1=1, axis2=2)) ** (0.5 * n)
+    low = rows[bound < LEAST]
+    return float(np.linalg.svd(low, compute_uv=False)[:, -1].min() if len(low) else bound.min())

@@ -17,6 +17,11 @@ COMPILE_FROM = 20_000
 """points that are worth compiling for; fewer take the loop where any is compiled anyway"""
 
 
+def pays(n: int) -> bool:
+    """True where a loop over a chain is faster than its columns for n points."""
+    return wanted(n, COMPILE_FROM)
+
+
 @dataclass(frozen=True)
 @arrays(turn="C", column="C", along="C 3", place="C 3", turning="R")
 class ChainLoop:
@@ -36,10 +41,6 @@ class ChainLoop:
         turn = [turning.index(at) if joint.rotary else -1 for at, joint in zip(column, chain, strict=True)]
         return cls(np.array(turn), np.array(column), np.array([joint.along for joint in chain]),
                    np.array([joint.place for joint in chain]), np.array(turning, dtype=np.int64))
-
-    def pays(self, n: int) -> bool:
-        """True where the loop is faster for n points."""
-        return wanted(n, COMPILE_FROM)
 
     def poses(self, q: Floats, carried: Floats) -> Floats:
         """(1 + C, N, 3), see `chain_poses`; sines as numpy has them, whose bits the columns have too."""

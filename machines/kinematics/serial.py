@@ -23,7 +23,7 @@ import numpy as np
 from machines.kinematics import columns
 from machines.kinematics.base import ErrorForm, ErrorForms, Kinematics, as_points
 from machines.kinematics.chain import Joint, unit_vector
-from machines.kinematics.chain_loop import ChainLoop
+from machines.kinematics.chain_loop import ChainLoop, pays
 from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x, spin_about
 from machines.kinematics.spherical import angle, azimuth, basis, meet, perpendicular
@@ -116,7 +116,7 @@ class Serial(Kinematics):
     def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
         """(tip (N, 3), axis (N, 3)) of joints q (N, J)."""
         q = as_points(q, self.joints, "q")
-        tip, axis = self._loop.poses(q, self._ends) if self._loop.pays(len(q)) else self._placed(q, [self.tool_axis])
+        tip, axis = self._loop.poses(q, self._ends) if pays(len(q)) else self._placed(q, [self.tool_axis])
         return tip, axis
 
     @cached_property
@@ -128,7 +128,7 @@ class Serial(Kinematics):
 
     def _placed(self, q: Floats, carried: Sequence[Floats]) -> list[Floats]:
         """The tip and the vectors `carried` (each (3,)) by the tool, moved by every axis in turn, each (N, 3)."""
-        if self._loop.pays(len(q)):
+        if pays(len(q)):
             return list(self._loop.poses(q, np.array([-self.tool_length * self.tool_axis, *carried])))
         result = [np.empty((len(q), 3)) for _ in range(1 + len(carried))]
         for part in columns.blocks(len(q)):

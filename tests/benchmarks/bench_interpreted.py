@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from unittest.mock import patch
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
@@ -20,13 +21,16 @@ import numpy as np
 import trimesh
 
 import machines
-from machines.geometric_error.actual import rods
+from machines.geometric_error.actual import actual_chain_loop, rods
+from machines.geometric_error.actual.actual_chain_loop import ActualChainLoop
+from machines.geometric_error.actual.actual_serial import ActualSerial
 from machines.kinematics import chain_loop
 from postproc.collision import search
 from postproc.collision.solid import solid
 from postproc.feedrate import interior_packed, paths, tightening
 from postproc.feedrate.interior import NumpySteps
 from postproc.feedrate.windows import solve_problem
+from tests.machines.error_models import serial_errors
 from tests.machines.geometric_error.test_geometric_error_rods import kinematics, platform, rod_errors, rod_frame
 from tests.postproc.collision.test_collision_search import HERE, random_case
 from tests.postproc.feedrate_kit import MIKRON, random_path, uniform
@@ -88,6 +92,14 @@ def main() -> None:
              lambda: frame.solve(slides, where, turned, errors))
     serial, q = machines.load("mikron-ucp710").kinematics, rng.normal(size=(300, 5))
     compared("chain_loop.py, 300 poses", chain_loop, lambda: serial.forward(q), lambda: serial.forward(q))
+    actual = ActualSerial(serial, serial_errors(serial))
+    chain = ActualChainLoop.of(actual.lines)
+    with patch.object(chain_loop, "wanted", lambda *_: False):
+        columns = seconds(lambda: actual.place(q))
+    with patch.object(actual_chain_loop, "compiled", lambda function: function), np.errstate(all="ignore"):
+        interpreted = seconds(lambda: chain.poses(q, None, actual.errors, np.array(actual.tool)))
+    print(f"actual_chain_loop.py, 300 poses: {1e3 * columns:.3f} ms, interpreted {1e3 * interpreted:.1f} ms, "
+          f"{interpreted / columns:.0f} times")
     moving, pieces = random_case(rng)
     body = solid(trimesh.creation.icosphere(2, radius=12.0), HERE)
     compared(f"search.py, {len(moving)} moves", search, lambda: search.nearest(body, moving, pieces, 2.0),

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from machines.geometric_error.actual.actual import EDGE, Actual, ToolPlace
+from machines.geometric_error.actual.actual_chain_loop import ActualChainLoop
 from machines.geometric_error.actual.axis_motion import Line, actual_line, actual_tool, along, driven
 from machines.geometric_error.actual.error_rates import ErrorRates, serial_rates
 from machines.geometric_error.actual.serial_errors import SerialErrors
@@ -20,6 +21,7 @@ from machines.geometric_error.actual.transforms import carried
 from machines.geometric_error.tables.names import SPINDLE, parse
 from machines.kinematics import columns
 from machines.kinematics.chain import Joint
+from machines.kinematics.chain_loop import pays
 from machines.kinematics.columns import Columns
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Bools, Floats
@@ -78,6 +80,10 @@ class ActualSerial(Actual):
 
     def _sweep(self, q: Floats, direction: Floats | None, tool: Sequence[Floats]) -> Floats:
         """Point and directions (V, N, 3) of the tool."""
+        if pays(len(q)):
+            found = self._loop.poses(q, direction, self.errors, np.array(tool))
+            if found is not None:
+                return found
         result = np.empty((len(tool), len(q), 3))
         for part in columns.blocks(len(q)):
             carried_along: list[Columns] = [columns.of_one(v) for v in tool]
@@ -87,6 +93,10 @@ class ActualSerial(Actual):
             for rows, vector in zip(result, carried_along, strict=True):
                 rows[part] = columns.to_rows(vector, len(q[part]))
         return result
+
+    @cached_property
+    def _loop(self) -> ActualChainLoop:
+        return ActualChainLoop.of(self.lines)
 
     @cached_property
     def tool(self) -> tuple[Floats, Floats, Floats]:

@@ -109,6 +109,15 @@ class SerialErrors:
             result[axis] = [([mine[k].name.part for k in numbers], bank) for numbers, bank in banks([c.curve for c in mine])]
         return result
 
+    @cached_property
+    def _positioning(self) -> dict[str, list[Curve]]:
+        """By axis: what has another value by the approach direction along or about the axis."""
+        found: dict[str, list[Curve]] = {}
+        for c in self.components:
+            if c.name.positioning and isinstance(c.curve, TableCurve) and c.curve.both:
+                found.setdefault(c.name.axis, []).append(c.curve)
+        return found
+
     def bidirectional(self, names: tuple[str, ...]) -> list[int]:
         """Numbers of the axes `names` that have any error with two approach directions."""
         found = {c.name.axis for c in self.components if isinstance(c.curve, TableCurve) and c.curve.both}
@@ -119,9 +128,8 @@ class SerialErrors:
         the approach direction, and no less than the grain of words."""
         result = np.zeros((len(q), len(joints)))
         for k, j in enumerate(joints):
-            for component in self.components:
-                if component.name.axis == names[j] and component.name.positioning:
-                    result[:, k] += component.curve.at(q[:, j], 1.0) - component.curve.at(q[:, j], -1.0)
+            for curve in self._positioning.get(names[j], ()):
+                result[:, k] += curve.apart_at(q[:, j])
         least = np.array([GRAIN[1 if names[j] in ROTARY else 0] for j in joints])
         return np.asarray(np.maximum(np.abs(result), least))
 

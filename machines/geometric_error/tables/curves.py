@@ -67,6 +67,10 @@ class Curve(ABC):
         result: Floats = self.basis(x, np.broadcast_to(np.asarray(direction, dtype=np.float64), x.shape)) @ self.values
         return result
 
+    def apart_at(self, x: Floats) -> Floats:
+        """By how much values (N,) at positions (N,) reached forwards are more than those reached backwards."""
+        return np.zeros(len(x))
+
     def outside(self, x: Floats, margin: float = 0.0) -> Bools:
         """True (N,) where x lies outside the range by more than `margin`."""
         result: Bools = (x < self.range[0] - margin) | (x > self.range[1] + margin)
@@ -145,18 +149,25 @@ class TableCurve(Curve):
 
     def at(self, x: Floats, direction: Floats | float = 0.0) -> Floats:
         """See the base class."""
-        inside = self.inside(x)
+        values = self._by_approach(self.inside(x))
         if not self.both:
-            return self._approach(inside, self.values)
-        forward, backward = (self._approach(inside, half) for half in np.split(self.values, 2))
+            return values[0]
+        forward, backward = values
         share = 0.5 * (1.0 + np.clip(direction, -1.0, 1.0))
         result: Floats = backward + share * (forward - backward)
         return result
 
+    def apart_at(self, x: Floats) -> Floats:
+        """See the base class."""
+        if not self.both:
+            return np.zeros(len(x))
+        forward, backward = self._by_approach(self.inside(x))
+        return np.asarray(forward - backward)
+
     def basis(self, x: Floats, direction: Floats) -> Floats:
         """See the base class."""
         inside = self.inside(x)
-        hats = self._spline(np.eye(len(self.x)), inside) if self.rule == "spline" else self._hats(inside)
+        hats = self._curve(np.eye(len(self.x)))(inside) if self.rule == "spline" else self._hats(inside)
         if not self.both:
             return hats
         share = 0.5 * (1.0 + np.clip(direction, -1.0, 1.0))[:, None]
@@ -175,12 +186,19 @@ class TableCurve(Curve):
             return self.x, values
         return np.append(self.x, self.x[0] + self.period), np.concatenate([values, values[:1]])
 
-    def _approach(self, x: Floats, values: Floats) -> Floats:
-        return self._spline(values, x) if self.rule == "spline" else np.interp(x, *self.closed(values))
+    def _by_approach(self, x: Floats) -> list[Floats]:
+        """Values (N,) at positions (N,) within the table: of both directions, or of the one there is."""
+        if self.rule == "spline":
+            return [curve(x) for curve in self._splines]
+        return [np.interp(x, *table) for table in self._tables]
 
-    def _spline(self, values: Floats, x: Floats) -> Floats:
-        result: Floats = self._curve(values)(x)
-        return result
+    @cached_property
+    def _splines(self) -> list[CubicSpline]:
+        return [self._curve(values) for values in self._approaches]
+
+    @cached_property
+    def _tables(self) -> list[tuple[Floats, Floats]]:
+        return [self.closed(values) for values in self._approaches]
 
     def _curve(self, values: Floats) -> CubicSpline:
         from scipy.interpolate import CubicSpline

@@ -70,7 +70,9 @@ def _leaves(motion: Motion, executed: BlockPoses, blocks: Ints, first: Ints, beg
     """(K,) True for moves whose blocks (B,), from `first` (K,) on, leave the line from `begin` to `end` (B, 3), as each axis
     runs at its own speed."""
     line, away = end - begin, np.zeros(len(blocks))
-    for t in executed.corners(motion, blocks).T:
+    corners = list(executed.corners(motion, blocks).T)
+    executed.look_ahead(motion, blocks, corners)
+    for t in corners:
         offset = executed.poses(motion, blocks, t)[0] - begin
         share = np.clip((offset * line).sum(axis=1) / (line * line).sum(axis=1), 0.0, 1.0)
         away = np.maximum(away, lengths(offset - share[:, None] * line))

@@ -232,9 +232,12 @@ def bound_of_blocks(motion: Motion, executed: BlockPoses, moves: Moves, owner: I
     some = as_slice(np.flatnonzero(~level))
     found = deviation_bound(motion, executed, moves, rows[some], owner[rows[some]], begin[some],
                             share[some], allowed, judge)
-    for corner in (0.0, 0.5, *executed.corners(motion, rows[level]).T) if level.any() else ():
-        tip, _ = executed.poses(motion, rows[level], corner)
-        height = float(off_level(moves.curves(owner[rows[level]]), tip).max())
+    high = rows[level]
+    corners = (0.0, 0.5, *executed.corners(motion, high).T) if len(high) else ()
+    executed.look_ahead(motion, high, corners)
+    for corner in corners:
+        tip, _ = executed.poses(motion, high, corner)
+        height = float(off_level(moves.curves(owner[high]), tip).max())
         found = replace(found, tip=max(found.tip, height))
     return found
 

@@ -60,7 +60,7 @@ class ActualBlockPoses(BlockPoses):
 
     def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[float | Floats]) -> None:
         """See `BlockPoses`."""
-        if len(times) <= PLACES and len(rows) * len(times) <= AT_ONCE:
+        if len(times) <= PLACES and 0 < len(rows) * len(times) <= AT_ONCE:
             shares = np.concatenate([np.broadcast_to(np.asarray(t), len(rows)) for t in times])
             found = self._at(motion, np.tile(rows, len(times)), shares)
             pose, q, approach = (part.reshape(len(times), len(rows), -1) for part in found)

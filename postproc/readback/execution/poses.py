@@ -37,7 +37,7 @@ class BlockPoses:
     before: Floats | None = None
     _asked: list[tuple[Motion, Ints, BlockMotions]] = field(default_factory=list, init=False, repr=False,
                                                             compare=False)
-    _ahead: list[_Ahead] = field(default_factory=list, init=False, repr=False, compare=False)
+    _ahead: list[tuple[Motion, Ints, _Ahead]] = field(default_factory=list, init=False, repr=False, compare=False)
 
     def _approaches(self, motion: Motion, rows: Ints) -> BlockMotions:
         """Those of the blocks asked for last are kept: the same ones are asked for at several fractions."""
@@ -47,13 +47,11 @@ class BlockPoses:
 
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
-        for ahead in self._ahead:
-            k = ahead.number(motion, rows, t)
-            if k >= 0:
-                if not ahead.poses:
-                    every = np.concatenate(ahead.positions), np.tile(rows, len(ahead.times))
-                    ahead.poses.extend(a.reshape(-1, len(rows), 3) for a in self._placed(motion, every[1], every[0]))
-                return ahead.poses[0][k], ahead.poses[1][k]
+        for ahead, k in self._known(motion, rows, t):
+            if not ahead.poses:
+                every = np.concatenate(ahead.positions), np.tile(rows, len(ahead.times))
+                ahead.poses.extend(a.reshape(-1, len(rows), 3) for a in self._placed(motion, every[1], every[0]))
+            return ahead.poses[0][k], ahead.poses[1][k]
         return self._placed(motion, rows, self._position(motion, rows, t))
 
     def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[float | Floats]) -> None:
@@ -65,14 +63,20 @@ class BlockPoses:
             shares = np.concatenate([np.broadcast_to(np.asarray(t), len(rows)) for t in between])
             found = BlockMotions.of(motion, self.control, np.tile(rows, len(between))).at(shares)
             parts = iter(found.reshape(len(between), len(rows), -1))
-            self._ahead.append(_Ahead(motion, rows, times, [motion.end[rows] if _whole(t) else next(parts) for t in times]))
+            positions = [motion.end[rows] if _whole(t) else next(parts) for t in times]
+            self._ahead.append((motion, rows, _Ahead(times, positions)))
+
+    def _known(self, motion: Motion, rows: Ints, t: float | Floats) -> Iterator[tuple[_Ahead, int]]:
+        """What was made ahead of just these blocks, with the number of the fraction t in it; nothing of others."""
+        for blocks, asked, ahead in self._ahead:
+            if blocks is motion and asked is rows and (k := ahead.number(t)) >= 0:
+                yield ahead, k
 
     def _position(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """Machine coordinates (K, J) of the blocks `rows` at fraction t."""
         if _whole(t):
             return motion.end[rows]
-        known = (ahead.positions[k] for ahead in self._ahead if (k := ahead.number(motion, rows, t)) >= 0)
-        found = next(known, None)
+        found = next((ahead.positions[k] for ahead, k in self._known(motion, rows, t)), None)
         return self._approaches(motion, rows).at(t) if found is None else found
 
     def at_coordinates(self, motion: Motion, rows: Ints, beginning: Floats, xyz: Floats) -> Floats:
@@ -200,21 +204,16 @@ class BlockPoses:
 
 
 @dataclass(frozen=True)
-@arrays(rows="K")
 class _Ahead:
-    """Machine coordinates, each (K, J), of blocks `rows` (K,) at several fractions, and poses there where asked for."""
+    """Machine coordinates, each (K, J), of some blocks at several fractions, and poses there where asked for."""
 
-    motion: Motion
-    rows: Ints
     times: Sequence[float | Floats]
     positions: list[Floats]
     poses: list[Floats] = field(default_factory=list)
     """none, or tips and axes (T, K, 3)"""
 
-    def number(self, motion: Motion, rows: Ints, t: float | Floats) -> int:
-        """Which of the fractions t is; -1 for none, or where these are others' blocks."""
-        if self.motion is not motion or self.rows is not rows:
-            return -1
+    def number(self, t: float | Floats) -> int:
+        """Which of the fractions t is; -1 for none."""
         return next((k for k, time in enumerate(self.times) if time is t), -1)
 
 
