@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from postproc.readback.macros.expressions import MacroFault
+from postproc.readback.macros.frame import AXES, Frame
 from postproc.readback.macros.held import Held
 
 ROTARY = "ABC"
@@ -21,6 +22,7 @@ class Track:
         at: by axis, None where it is not known; motion: code in force, None before any
         local, zero: shifts by G52 (TRANS) and G92; moved: shifts of each register by G10; lengthened: mm by length register
         register: of the work offset in force, None before any; length: register in force, None where nothing states it
+        frame: that turns, scales or mirrors the coordinates of the program, None for none
     """
 
     def __init__(self, held: Held) -> None:
@@ -34,6 +36,7 @@ class Track:
         self.register: float | None = None
         self.length: int | None = None
         self.shifted = False
+        self.frame: Frame | None = None
 
     def scale(self, axis: str) -> float:
         """mm, or degrees, of a unit of a word."""
@@ -49,12 +52,20 @@ class Track:
 
     def position(self, axis: str) -> float:
         """Of an axis in the coordinates that the program sees."""
+        if self.frame is not None and axis in AXES:
+            back = self.frame.inverse()[AXES.index(axis)]
+            return sum(share * (self.known(a) - self.frame.shift[k])
+                       for k, (a, share) in enumerate(zip(AXES, back, strict=True)) if share)
+        return self.known(axis) - self.shift(axis)
+
+    def known(self, axis: str) -> float:
+        """Of an axis in the work offset of the set-up."""
         here = self.at.get(axis)
         if here is None:
             raise MacroFault("gcode.position_unknown", f"where {axis} stands here is not known: no block since its "
                              "last move in machine coordinates, or change of offset or length, states it absolutely",
                              f"state {axis} with G90 before this block")
-        return here - self.shift(axis)
+        return here
 
     def work(self, register: float, axis: str) -> float:
         """A work offset of the set-up in machine coordinates."""
