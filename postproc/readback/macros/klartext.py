@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import PurePath
 
-from postproc.readback.macros.expressions import Cursor, MacroFault, applied, written
+from postproc.readback.macros.expressions import Cursor, MacroFault, applied, unsure, written
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.klartext_strings import NUMBERS, Strings
 from postproc.readback.macros.klartext_system import SystemData
@@ -35,7 +35,7 @@ _NAMED = re.compile(r"(TOOL (?:CALL|DEF)[ \t]+)\"([^\"]*)\"")
 _USED = re.compile(r"([-+]?)[ \t]*Q([LRS]?)(\d+)(?![\d]|[ \t]*=)")
 _FN = re.compile(r"FN[ \t]*(\d+)[ \t]*:[ \t]*")
 _JUMP = re.compile(r"IF[ \t]*(.+?)[ \t]*(EQU|NE|GT|LT|IS UNDEFINED|IS DEFINED)[ \t]*(.*?)[ \t]*GOTO LBL[ "
-                    "\t]*\"?([^\"\\s]+)\"?")
+                    "\t]*(?:\"([^\"]+)\"|(\\S+))")
 _LABEL = re.compile(r"LBL[ \t]+\"?([^\"]+?)\"?")
 _CALL = re.compile(r"CALL LBL[ \t]+\"?([^\"]+?)\"?(?:[ \t]+REP[ \t]?(\d+))?")
 _PROGRAM = re.compile(r"CALL PGM[ \t]+(\"[^\"]+\"|\S+)")
@@ -138,7 +138,7 @@ class KlartextMacros:
             row, self.line = level.source.rows[level.at], level.source.before + level.at + 1
             level.at += 1
             if row:
-                self.blocks.count()
+                self.blocks.count(self.line)
                 self.statement(level, row)
 
     def _back(self, level: KlartextLevel) -> None:
@@ -206,7 +206,8 @@ class KlartextMacros:
         """A parameter."""
         held = self.levels[-1].local.get(index) if kind == "L" else self.parameters.get((kind, index))
         if kind == "S":
-            raise MacroFault("gcode.variable", f"QS{index} holds characters, where a number is asked for", "TONUMB makes one of it")
+            raise MacroFault("gcode.variable", f"QS{index} holds characters, where a number is asked for",
+                             "TONUMB makes one of it")
         if held is None:
             raise MacroFault("gcode.variable", f"Q{kind}{index} is read before the program sets it: the control, another "
                                                f"program or "
@@ -319,7 +320,7 @@ class KlartextMacros:
     def _branch(self, rest: str) -> None:
         """IF a EQU b GOTO LBL n."""
         m = _JUMP.fullmatch(rest.strip())
-        if m is not None and m[4].startswith("QS"):
+        if m is not None and (m[5] or "").startswith("QS"):
             m = _JUMP.fullmatch(self.strings.filled(rest.strip()))
         if m is None:
             raise Cursor(rest).fault("a jump that is not read")
@@ -330,9 +331,11 @@ class KlartextMacros:
             holds = held == (m[2] == "IS DEFINED")
         else:
             a, b = self._whole_term(m[1]), self._whole_term(m[3])
+            if unsure(a, b):
+                self.blocks.compared.setdefault(self.line, f"{a!r} {m[2]} {b!r}")
             holds = {"EQU": a == b, "NE": a != b, "GT": a > b, "LT": a < b}[m[2]]
         if holds:
-            self.levels[-1].at = self._label(self.levels[-1].source, m[4])
+            self.levels[-1].at = self._label(self.levels[-1].source, m[4] or m[5])
 
     def _label(self, source: SourceFile, name: str) -> int:
         """The row behind a label."""

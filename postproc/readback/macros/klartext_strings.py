@@ -1,8 +1,8 @@
 """String parameters of Klartext: QS parameters, what joins and cuts them, numbers that are made of them.
 
-HEIDENHAIN TNC 640, Klartext Programming (34059x), string parameters: || joins; TOCHAR( DAT+Q1 DECIMALS3 ), SUBSTR( SRC_QS1 BEG0
-LEN4 ); TONUMB( SRC_QS1 ), STRLEN( SRC_QS1 ), INSTR( SRC_QS1 SEA_QS2 BEG0 ), STRCOMP( SRC_QS1 SEA_QS2 ) are numbers; places count
-from 0.
+HEIDENHAIN TNC 640, Klartext Programming (34059x), string parameters: || joins; TOCHAR( DAT+Q1 DECIMALS3 ) and
+SUBSTR( SRC_QS1 BEG0 LEN4 ) are strings; TONUMB( SRC_QS1 ), STRLEN( SRC_QS1 ), INSTR( SRC_QS1 SEA_QS2 BEG0 ) and
+STRCOMP( SRC_QS1 SEA_QS2 ) are numbers; places count from 0.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class Strings:
     def get(self, index: int) -> str:
         """A string; a fault where the program has not set it."""
         if index not in self.held:
-            raise MacroFault("gcode.variable", f"QS{index} is read before the program sets it: the control, another program or "
-                             "the operator has set it", f'set it first, in a copy of the program: QS{index} = "..."')
+            raise MacroFault("gcode.variable", f"QS{index} is read before the program sets it: the control, another program "
+                             "or the operator has set it", f'set it first, in a copy of the program: QS{index} = "..."')
         return self.held[index]
 
     def put(self, index: int, c: Cursor) -> None:

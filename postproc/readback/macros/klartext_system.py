@@ -11,7 +11,8 @@ from collections.abc import Callable
 from postproc.readback.macros.expressions import Cursor, MacroFault
 from postproc.readback.macros.held import Held
 
-_DATA = re.compile(r"SYSREAD[ \t]+(Q[LR]?\d+)[ \t]*=[ \t]*ID[ \t]*(\d+)(?:[ \t]*N[RO]\.?[ \t]*(\d+))?(?:[ \t]*IDX[ \t]*(.+))?")
+_DATA = re.compile(r"SYSREAD[ \t]+(Q[LR]?\d+)[ \t]*=[ \t]*ID[ \t]*(\d+)"
+                   r"(?:[ \t]*N[RO]\.?[ \t]*(\d+))?(?:[ \t]*IDX[ \t]*(.+))?")
 _TOOL = re.compile(r"TOOL CALL[ \t]+(\d+)(?![\d.])")
 _SPEED = re.compile(r"[ \t]S[ \t]*(\d+\.?\d*)")
 _TOOL_AXIS = re.compile(r"TOOL CALL[ \t]+\S+[ \t]+([XYZ])\b")
@@ -43,9 +44,9 @@ class SystemData:
         index = value(m[4]) if m[4] else None
         made = self._value(group, number, index)
         if made is None:
-            raise MacroFault("gcode.variable", f"FN 18 with ID{group} NR{number} is not read: what it holds is not in the program, "
-                             "nor in the set-up", "put the figure that the control would find there in its place, in a copy of "
-                             "the program")
+            raise MacroFault("gcode.variable", f"FN 18 with ID{group} NR{number} is not read: what it holds is not in the "
+                             "program, nor in the set-up", "put the figure that the control would find there in its place, "
+                             "in a copy of the program")
         return m[1], made
 
     def _value(self, group: int, number: int, index: float | None) -> float | None:

@@ -1,7 +1,8 @@
 """Blocks of a SINUMERIK program in a frame that turns, scales or mirrors: their words in the work offset.
 
-Ends and centres are taken over exactly; circles only where they stay circles of the plane in force (the control refuses SCALE of
-unequal factors for them), with G2 and G3, G41 and G42 changed where the plane is mirrored, as the control does by itself.
+Ends and centres are taken over exactly; circles only where they stay circles of the plane in force (the control refuses
+SCALE of unequal factors for them), with G2 and G3, G41 and G42 changed where the plane is mirrored, as the control does by
+itself.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import math
 import re
 
 from postproc.readback.macros.expressions import MacroFault, written
-from postproc.readback.macros.frame import AXES, Frame
+from postproc.readback.macros.frame import AXES, CoordinateFrame
 from postproc.readback.macros.track import Track
 
 CENTRES = "IJK"
@@ -21,15 +22,16 @@ _HINT = "write the blocks in the coordinates of the work offset, or CYCLE800"
 
 
 class TurnedBlocks:
-    """What a frame does to blocks: `frame` in force, `motion` and `side` as the program has them, and as they were written.
+    """What a frame does to blocks: `frame` in force, `motion` and `side` as the program has them.
 
     Attributes:
         ends, centres: mm of the block that is read, in the coordinates of the frame
+        written: motion that was written last, None where it is that of the program
         oriented: TRAORI is on
     """
 
     def __init__(self, track: Track) -> None:
-        self.track, self.frame = track, Frame()
+        self.track, self.frame = track, CoordinateFrame()
         self.ends: dict[str, float] = {}
         self.centres: dict[str, tuple[float, bool]] = {}
         self.radius: float | None = None
@@ -43,11 +45,13 @@ class TurnedBlocks:
         """True where the frame does more than shift."""
         return self.frame.turned
 
-    def take(self, frame: Frame) -> None:
+    def take(self, frame: CoordinateFrame) -> None:
         """Another frame in force."""
         if self.side != 40 and math.copysign(1.0, self._size(frame)) != math.copysign(1.0, self._size(self.frame)):
             raise MacroFault("gcode.frame_turned", f"MIRROR while G{self.side} holds is not executed",
-                             "write G40 before it, and the radius anew behind it")
+                             "write G40 before it, and G41 or G42 again behind it")
+        if frame.turned and not self.on and self.written is None:
+            self.written = self.motion
         self.frame = frame
         self.track.frame = frame if frame.turned else None
         for axis, value in zip(AXES, frame.shift, strict=True):
@@ -56,7 +60,7 @@ class TurnedBlocks:
                 self.track.local[axis] = value
         self.track.shifted |= any(frame.shift)
 
-    def _size(self, frame: Frame) -> float:
+    def _size(self, frame: CoordinateFrame) -> float:
         size = frame.flat(self.track.plane)
         return 1.0 if math.isnan(size) else size
 
@@ -79,14 +83,13 @@ class TurnedBlocks:
 
     def row(self, out: list[str]) -> list[str]:
         """The words of a block in the work offset, behind those that no frame touches."""
+        if not self.on and self.written is None:
+            return out
         ends, centres, radius, self.ends, self.centres, self.radius = self.ends, self.centres, self.radius, {}, {}, None
         size = self.frame.flat(self.track.plane)
-        if not self.on and self.written in (None, self.motion):
-            self.written = next((int(m[1]) for w in out if (m := _CODE.fullmatch(w)) and int(m[1]) in _MOTION), self.written)
-            return out
         if self.on and (self.oriented or any(w.startswith("CYCLE800(") for w in out)):
-            raise MacroFault("gcode.frame_turned", "a frame that turns, scales or mirrors next to TRAORI or before CYCLE800 is "
-                             "not executed", "write ROT alone before it, to cancel the frame")
+            raise MacroFault("gcode.frame_turned", "a frame that turns, scales or mirrors next to TRAORI or before CYCLE800 "
+                             "is not executed", "write ROT alone before it, to cancel the frame")
         self._judge(size, out, bool(ends))
         made = [self._changed(w, size) for w in out]
         if (ends or not self.on) and self.motion is not None and not any(
@@ -94,6 +97,8 @@ class TurnedBlocks:
             code = self._swapped(self.motion, size)
             made = [*([f"G{code}"] if code != self.written else []), *made]
         self.written = next((int(m[1]) for w in made if (m := _CODE.fullmatch(w)) and int(m[1]) in _MOTION), self.written)
+        if not self.on and self.written == self.motion:
+            self.written = None
         start = {a: self.track.at[a] for a in AXES if a in self.track.at}
         moved = self._ends(ends)
         return [*made, *moved, *self._centres(centres, start, bool(ends)), *self._radius(radius, size)]
@@ -110,8 +115,8 @@ class TurnedBlocks:
         if not self.on:
             return
         if math.isnan(size) and ((self.motion in (2, 3) and moves) or self.side != 40):
-            raise MacroFault("gcode.frame_turned", "a circle, or G41 and G42, in a frame that turns the plane, or scales its axes "
-                             "unequally", _HINT)
+            raise MacroFault("gcode.frame_turned", "a circle, or G41 and G42, in a frame that turns the plane, or scales "
+                             "its axes unequally", _HINT)
         drills = any(re.match(r"CYCLE8\d", w) for w in out)
         if drills and not (self.frame.keeps(2) and not math.isnan(size)):
             raise MacroFault("gcode.frame_turned", "a drilling cycle in a frame that turns or scales the tool's axis", _HINT)
@@ -119,7 +124,7 @@ class TurnedBlocks:
     def _ends(self, ends: dict[str, float]) -> list[str]:
         """Axis words of the work offset: those that a stated coordinate decides."""
         made, at = list[str](), dict[str, float]()
-        known = {a: ends[a] if a in ends else None for a in AXES}
+        known = {a: ends.get(a) for a in AXES}
         for i, axis in enumerate(AXES):
             inputs = self.frame.needed(i)
             if axis not in self.track.at or not any(AXES[j] in ends for j in inputs):
@@ -130,8 +135,6 @@ class TurnedBlocks:
                 values[j] = self.track.position(AXES[j]) if here is None else here
             a, b, c = values
             at[axis] = self.frame.vector((a, b, c))[i] + self.frame.shift[i]
-        if len([a for a in ends if a in self.track.at]) and not at:
-            raise MacroFault("gcode.frame_turned", "the machine has no axis for the frame", _HINT)
         for axis, value in at.items():
             self.track.at[axis] = value
             made.append(f"{axis}=AC({written(value / self.track.unit)})")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from postproc.readback.macros.expressions import Cursor, MacroFault, written
-from postproc.readback.macros.frame import AXES, Frame, rotated, scaled, shifted
+from postproc.readback.macros.frame import AXES, rotated, scaled, shifted
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.siemens_expressions import NAME, SiemensValue, expression, indices, number, skip, take
 from postproc.readback.macros.siemens_patterns import PATTERNS, positions
@@ -312,7 +312,7 @@ class SiemensWords:
         return made
 
     def _frame(self, head: str, c: Cursor) -> None:
-        """TRANS, ROT, SCALE, MIRROR begin anew, ATRANS, AROT, ASCALE, AMIRROR go on."""
+        """TRANS, ROT, SCALE, MIRROR start from the work offset, ATRANS, AROT, ASCALE, AMIRROR go on."""
         given = dict[str, float]()
         while True:
             skip(c)
@@ -337,21 +337,21 @@ class SiemensWords:
             raise MacroFault("gcode.frame_turned", f"{head} with a factor of 0 or below", "a factor above 0; MIRROR mirrors")
         self._take_frame(kind, given, not head.startswith("A"))
 
-    def _take_frame(self, kind: str, given: dict[str, float], anew: bool) -> None:
+    def _take_frame(self, kind: str, given: dict[str, float], fresh: bool) -> None:
         """A frame in force, with what TRANS says of rotary axes."""
         made = {"TRANS": shifted, "SCALE": scaled}.get(kind, rotated)
         mm = {a: v * (self.track.scale(a) if kind == "TRANS" else 1.0) for a, v in given.items()}
         frame = scaled(dict.fromkeys(mm, -1.0)) if kind == "MIRROR" else made(mm)
-        if anew:
+        if fresh:
             self.track.local.clear()
         for axis in mm if kind == "TRANS" else ():
             if axis not in AXES:
                 self.track.local[axis] += mm[axis]
                 self.track.shifted = True
-        self.turned.take(frame if anew else self.turned.frame.before(frame))
+        self.turned.take(frame if fresh else self.turned.frame.before(frame))
         if self.drilled_level is not None and self._level() != self.drilled_level:
             raise MacroFault("gcode.frame_turned", "a frame moves the tool's axis while MCALL holds a drilling cycle",
-                             "write MCALL alone before it, and call the cycle anew behind it")
+                             "write MCALL alone before it, and call the cycle again behind it")
 
     def _level(self) -> float:
         """mm by which levels of cycles lie higher in the work offset."""
@@ -367,7 +367,7 @@ class SiemensWords:
         self.patterns.setdefault(name, self.line)
         motion = self.turned.motion
         for x, y in positions(name, values, here):
-            self.blocks.count()
+            self.blocks.count(self.line)
             self.row("", Cursor(f"G0 X=AC({written(x)}) Y=AC({written(y)})"), self.line)
         if motion is not None:
             out.append(f"G{motion}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from postproc.readback.macros.expressions import MacroFault
-from postproc.readback.macros.frame import AXES, Frame
+from postproc.readback.macros.frame import AXES, CoordinateFrame
 from postproc.readback.macros.held import Held
 
 ROTARY = "ABC"
@@ -22,6 +22,9 @@ class Track:
         at: by axis, None where it is not known; motion: code in force, None before any
         local, zero: shifts by G52 (TRANS) and G92; moved: shifts of each register by G10; lengthened: mm by length register
         register: of the work offset in force, None before any; length: register in force, None where nothing states it
+        line: of the block that runs
+        set_itself: registers and axes that the program has set itself; taken: registers that the set-up does not state, with
+            the line that reads the set-up's own offset in their place
         frame: that turns, scales or mirrors the coordinates of the program, None for none
     """
 
@@ -36,7 +39,10 @@ class Track:
         self.register: float | None = None
         self.length: int | None = None
         self.shifted = False
-        self.frame: Frame | None = None
+        self.frame: CoordinateFrame | None = None
+        self.line = 0
+        self.set_itself: set[tuple[float, str]] = set()
+        self.taken: dict[float, int] = {}
 
     def scale(self, axis: str) -> float:
         """mm, or degrees, of a unit of a word."""
@@ -73,6 +79,13 @@ class Track:
             raise MacroFault("gcode.position_unknown", "a work offset in machine coordinates needs the set-up",
                              "name the set-up of the program with --setup")
         return float(self.held.work(register)[self.held.axes.index(axis)])
+
+    def offset(self, register: float, axis: str) -> float:
+        """What a register holds, mm."""
+        stated = self.held.stated
+        if stated is not None and register not in stated and (register, axis) not in self.set_itself:
+            self.taken.setdefault(register, self.line)
+        return self.work(register, axis) + self.moved[register][axis]
 
     def take_offset(self, register: float) -> None:
         """Another work offset in force: the axes stand still."""
@@ -113,6 +126,8 @@ class Track:
         """G10 L2: a work offset is `value` mm in machine coordinates, or that more than it was."""
         held = self.moved[register][axis]
         self.moved[register][axis] = held + value if added else value - self.work(register, axis)
+        if not added:
+            self.set_itself.add((register, axis))
         self.shifted = True
 
     def set_position(self, register: float, axis: str, value: float) -> None:
