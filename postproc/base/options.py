@@ -42,7 +42,8 @@ class Options:
     """True: errors at the ends of their measured ranges count beyond them too"""
 
     require_proof: bool = False
-    """True: programs whose deviation is not bounded in every block are refused"""
+    """True: programs whose deviation is not bounded in every block, or whose clamps or turns of modulo axes the second
+    witness has not compared, are refused"""
     setup_mark: str = ""
     """fingerprint of the set-up that was given, as a file or as a SetupFile; put here by what reads it"""
     hooks: str = ""

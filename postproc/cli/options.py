@@ -67,7 +67,8 @@ Orient = Annotated[Orientation, word_option("--orient", Orientation, "keep: the 
                                             "cutters)")]
 Beyond = Annotated[bool, typer.Option("--error-model-beyond", help="hold the end value outside the measured range")]
 RequireProof = Annotated[bool, typer.Option("--require-proof", help="refuse a program in which the deviation of some "
-                                            "block has no proved bound and is only sampled")]
+                                            "block has no proved bound and is only sampled, or whose clamps or "
+                                            "turns of modulo axes are read back alone")]
 ProofOption = Annotated[bool, typer.Option("--proof",
                                            help="write what was proved, and the hashes of all files that it rests on, "
                                            "next to the program: OUT.proof.json")]

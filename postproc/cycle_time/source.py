@@ -107,7 +107,7 @@ def _executed(data: bytes, controller: ControllerFile, controls: dict[str, Contr
     reader = reader_for(controller, machine.axis_names, home, machine.stop, control.rolls,
                         machine.clamp_codes)
     held = {reader.offset_of(program.offset_text(name)): one.work_offset for name, one in controls.items()}
-    reader.given(lambda register: held.get(register, control.work_offset), lengths)
+    reader.given(lambda register: held.get(register, control.work_offset), lengths, frozenset(held))
     code, found = reader.read(data, file, others)
     if code is None or has_errors(found):
         return None, None, found

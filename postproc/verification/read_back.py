@@ -152,7 +152,8 @@ def _offsets(job: Job, reader: Reader, home: Floats) -> Offsets:
 def _give(reader: Reader, job: Job) -> None:
     """What the control holds by the set-up, for programs that ask for it."""
     held = dict(_others(job, reader))
-    reader.given(lambda register: held.get(register, job.control).work_offset, job.register_lengths())
+    reader.given(lambda register: held.get(register, job.control).work_offset, job.register_lengths(),
+                 frozenset(registers_of(job, reader)))
 
 
 def _others(job: Job, reader: Reader) -> tuple[tuple[float, Control], ...]:

@@ -169,6 +169,9 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
                         file=job.toolpath.file, lines=[f.line] if f.line else [], count=f.count,
                         hint="do not run this program") for f in said[-1].findings]
     heard = together(said)
+    found += [error("verify.not_compared", f"the second witness has not compared {one.why}", file=job.toolpath.file,
+                    hint="leave --require-proof out, where the read-back alone is enough")
+              for one in unread if options.require_proof]
     return replace(heard, not_compared=(*heard.not_compared, *unread)), [*found, *_order(setup, comparison, job)]
 
 

@@ -46,6 +46,14 @@ _OUTPUT = [
          part("FINI", "CUTTER/10,5\nFEDRAT/MMPM,600\nRAPID\n\\1/0,0,5\n\\1/0,0,0\n\\1/9,0,0\nFINI"),
          part_apt="UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFROM/0,0,50\nFINI\n"),
 ]
+CLAMPED = (ROOT / "machines" / "data" / "mikron-ucp710.toml").read_text("utf-8").replace(
+    "[axes.C]\n", '[axes.C]\nclamp = "M10"\nunclamp = "M11"\n')
+_PROOFS = [
+    _own("verify.not_compared", "verify p.nc part.apt -m m.toml -c fanuc-30i --setup s.toml --require-proof",
+         "leave (--require-proof) out", Edit(COMMAND, " --require-proof", ""),
+         first=("convert part.apt -m m.toml -c fanuc-30i --setup s.toml -o p.nc",),
+         harm=(Edit("p.nc", "F600.", "F[300.*2]"),), m_toml=CLAMPED),
+]
 _CUTTERS = [
     _body("collision.corner", r"add (corner_radius = )\.\.\. to \[tools\.1\]", sheet("110.0\n", "110.0\n\\g<1>0.0\n"),
           tool=LENGTH + "diameter = 10.0\n", cutter="REMARK"),
@@ -124,4 +132,4 @@ _MACHINES = [
              (Edit(COMMAND, "right.nc", "own/right.nc"),),
              first=("convert part.cls -m mikron-ucp710 -c fanuc-30i --setup s.toml -o left.nc",)),
 ]
-OWN_ROOMS = [*_MACHINES, *_OUTPUT, *_CUTTERS, *_TABLES, *_AXES]
+OWN_ROOMS = [*_MACHINES, *_OUTPUT, *_PROOFS, *_CUTTERS, *_TABLES, *_AXES]

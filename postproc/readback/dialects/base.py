@@ -41,7 +41,7 @@ from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
 ParsedProgram = tuple[ProgramText, Structure]
 UNITS_UNSTATED = "gcode.units_unstated"
-ASSUMED = frozenset({"gcode.second_reference", "gcode.tool_name"})
+ASSUMED = frozenset({"gcode.second_reference", "gcode.tool_name", "gcode.offset_unstated", "gcode.comparison", "gcode.skip"})
 """what is taken to be so where a program is timed, and refused where it is verified"""
 STOPS = (0.0, 1.0)
 """M codes of stops"""
@@ -102,6 +102,7 @@ class Reader(ABC):
         self.passive = controller.program.passive if controller is not None else ()
         self.work: Callable[[float], Floats] | None = None
         self.lengths: dict[int, float] = {}
+        self.stated: frozenset[float] | None = None
         self.switches = switched_by(controller.codes if controller is not None else None)
         """(bits on, bits off) by M number, see `postproc.reference.coolant`"""
 
@@ -177,7 +178,8 @@ class Reader(ABC):
         """A program in macro language, as the plain blocks that it comes to."""
         assert self.language
         held = Held(self.axes, self.home, self.work, self.lengths,
-                    self.controller.tools.names if self.controller is not None else {}, self.passive, most_now())
+                    self.controller.tools.names if self.controller is not None else {}, self.passive, most_now(),
+                    self.stated)
         program, found = executed(data, file, others, self.language, held, self.numbered)
         if program is None:
             return None, found
@@ -188,9 +190,10 @@ class Reader(ABC):
         code, last = self.judged(read[0], program.line, file)
         return replace(code, files=program.files), [*found, *placed(last, program.files)]
 
-    def given(self, work: Callable[[float], Floats], lengths: dict[int, float]) -> None:
-        """What the control holds by the set-up: work offsets (J,) by register, tool lengths by register, mm."""
-        self.work, self.lengths = work, lengths
+    def given(self, work: Callable[[float], Floats], lengths: dict[int, float], stated: frozenset[float]) -> None:
+        """What the control holds by the set-up: work offsets (J,) by register, tool lengths by register, mm; registers that
+        the set-up states."""
+        self.work, self.lengths, self.stated = work, lengths, stated
 
     def judged(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words of blocks in running order, their units and smoothing looked at."""

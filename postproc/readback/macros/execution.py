@@ -27,19 +27,20 @@ from toolpaths.shapes import arrays
 ToolsNumbered = Callable[[bytes, str], tuple[bytes, list[Diagnostic]]]
 MacroLanguage = Literal["fanuc", "haas", "linuxcnc", "siemens", "klartext"]
 _NEEDED = {
-    "fanuc": re.compile(rb"[#\[]|GOTO|M0*99[ \t]*P|G0*(?:10|30|52|92|6[567])(?![\d.])"),
+    "fanuc": re.compile(rb"[#\[]|GOTO|M0*99[ \t]*P|M0*198(?!\d)|G0*(?:10|30|31|52|92|6[567])(?![\d.])"),
     "linuxcnc": re.compile(rb"[#\[]|G0*(?:10|28|30|52|92)(?![\d])|\bO\s*(?:<|\d+\s*[A-Z])"),
     "siemens": re.compile(
-        rb"\b(?:DEF|IF|GOTO[FBCS]?|FOR|WHILE|REPEATB?|LOOP|CASE|EXTERN|A?TRANS|A?ROTS?|A?SCALE|A?MIRROR|EXTCALL|SETAL|G53|G153|G20|G21)\b"
+        rb"\b(?:DEF|IF|GOTO[FBCS]?|FOR|WHILE|REPEATB?|LOOP|CASE|EXTERN|A?TRANS|A?ROTS?|A?SCALE|A?MIRROR|HOLES[12]|CYCLE801|EXTCALL|SETAL|G53|G153|G20|G21)\b"
         rb"|\bR\d+[ \t]*=|=[ \t]*[-+]*[ \t]*(?!(?:IC|AC|DC|ACP|ACN)[ \t]*\([ \t]*[-+.\d]+[ \t]*\))[A-Z_$(\[]"
         rb"|=[ \t]*[-+]?[\d.]+[ \t]*[-+*/]|\bT[ \t]*=[ \t]*\"|\bPROC\b[^\n]*\("),
-    "klartext": re.compile(rb"FN[ \t]*\d+[ \t]*:|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}
+    "klartext": re.compile(rb"DECLARE STRING|FN[ \t]*\d+[ \t]*:"
+                           rb"|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}
 _CONTINUED = re.compile(rb"~[ \t]*\n")
 _COMMENT, _STRING = re.compile(rb";[^\n]*"), re.compile(rb'(?<!T=)"[^"\n]*"')
 _SIGNS = re.compile(rb"=[ \t]*[-+]*[ \t]*(?:[A-Z_$(\[]|[\d.]+[ \t]*[-+*/])")
 _PARAMETERS = re.compile(rb"R\d+[ \t]*=")
 _WORDS = (b"DEF", b"IF", b"GOTO", b"FOR", b"WHILE", b"REPEAT", b"LOOP", b"CASE", b"EXT", b"TRANS", b"ROT", b"SCALE",
-          b"MIRROR", b"SETAL", b"G53", b"G153", b"G20", b"G21", b"PROC", b'"')
+          b"MIRROR", b"HOLES", b"CYCLE801", b"SETAL", b"G53", b"G153", b"G20", b"G21", b"PROC", b'"')
 """one of these, signs or parameters stand where `_NEEDED` finds anything in a program of SINUMERIK: absent is soon known"""
 
 
@@ -72,7 +73,7 @@ def needed(data: bytes, language: MacroLanguage, passive: tuple[str, ...] = ()) 
         return form.search(_CONTINUED.sub(b" ", re.sub(rb";[^~\n]*", b"", lines_of(text)))) is not None
     found = {m[0] for m in form.finditer(plain(text))}
     codes = {f"G{int(f[1:])}" for f in found if f[:1] == b"G" and f[1:].isdigit()}
-    return bool({f for f in found if not f[1:].isdigit()} or codes - set(passive))
+    return bool({f for f in found if not (f[:1] == b"G" and f[1:].isdigit())} or codes - set(passive))
 
 
 def executed(data: bytes, file: str, others: Mapping[str, bytes], language: MacroLanguage, held: Held,

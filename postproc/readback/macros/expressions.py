@@ -19,6 +19,9 @@ MacroValue = float | None
 _NUMBER = re.compile(r"\d+\.?\d*|\.\d+")
 _NAME = re.compile(r"[A-Z]+")
 LINUXCNC_EQUAL = 1e-4
+ROUNDING = 1e-9
+"""share by which two numbers that were worked out may differ and mean the same: controls have eight digits and more"""
+_COMPARISONS = frozenset({"EQ", "NE", "GT", "GE", "LT", "LE"})
 HINT = "write it as the control's manual has it, or give the figures themselves"
 
 
@@ -181,31 +184,58 @@ LINUXCNC = Grammar({
     {**COMMON, "FIX": lambda a: float(math.floor(a)), "FUP": lambda a: float(math.ceil(a))}, False)
 
 
-class Expressions:
-    """Values from text without blanks, in capitals; `variable` reads what stands behind a #."""
+ValueLater = Callable[[], MacroValue]
+"""a value as it is at the time of the call"""
 
-    def __init__(self, grammar: Grammar, variable: Callable[[Cursor], MacroValue],
-                 special: Callable[[str, Cursor], MacroValue]) -> None:
+
+class Expressions:
+    """Values from text without blanks, in capitals, each place taken apart once.
+
+    `variable` takes apart what stands behind a #, `special` what stands behind a name that is no function.
+    """
+
+    def __init__(self, grammar: Grammar, variable: Callable[[Cursor], ValueLater],
+                 special: Callable[[str, Cursor], ValueLater]) -> None:
         self.grammar, self.variable, self.special = grammar, variable, special
         signs = sorted(grammar.operators, key=len, reverse=True)
         self.signs = re.compile("|".join(re.escape(sign) for sign in signs))
+        self.values: dict[tuple[str, int], tuple[ValueLater, int]] = {}
+        self.whole: dict[tuple[str, int], tuple[ValueLater, int]] = {}
+        self.unsure: list[str] = []
 
     def value(self, c: Cursor) -> MacroValue:
         """A number, a variable, a function or brackets, each with signs before it."""
+        return self.once(self.values, c, self.compiled)
+
+    def expression(self, c: Cursor) -> MacroValue:
+        """Values joined by operators."""
+        return self.once(self.whole, c, self.joined)
+
+    def once(self, known: dict[tuple[str, int], tuple[ValueLater, int]], c: Cursor,
+             compiled: Callable[[Cursor], ValueLater]) -> MacroValue:
+        """The value at a cursor, its text taken apart the first time only."""
+        key = c.text, c.at
+        found = known.get(key)
+        if found is None:
+            found = known[key] = compiled(c), c.at
+        c.at = found[1]
+        return found[0]()
+
+    def compiled(self, c: Cursor) -> ValueLater:
+        """As `value`, to be asked for later."""
         if c.take("["):
-            result = self.expression(c)
+            result = self.joined(c)
             c.need("]")
             return result
         if c.take("#"):
             return self.variable(c)
         if c.take("-"):
-            inner = self.value(c)
-            return None if inner is None else -inner
+            return _negative(self.compiled(c))
         if c.take("+"):
-            return self.value(c)
+            return self.compiled(c)
         number = c.match(_NUMBER)
         if number:
-            return float(number)
+            return _constant(float(number))
         name = c.match(_NAME)
         if name == "ATAN":
             return self._arc_tangent(c)
@@ -213,45 +243,80 @@ class Expressions:
             return self._to_the_power(c)
         if name not in self.grammar.functions:
             return self.special(name, c)
-        c.need("[")
-        argument = plain(self.expression(c))
-        c.need("]")
-        return applied(name, self.grammar.functions[name], argument)
+        function = self.grammar.functions[name]
+        argument = self._within(c)
+        return lambda: applied(name, function, plain(argument()))
 
-    def _arc_tangent(self, c: Cursor) -> float:
+    def _within(self, c: Cursor) -> ValueLater:
         c.need("[")
-        rise, run = plain(self.expression(c)), 1.0
-        two = c.take(",")
-        if two:
-            run = plain(self.expression(c))
+        result = self.joined(c)
         c.need("]")
-        if not two and c.take("/"):
-            two = True
-            c.need("[")
-            run = plain(self.expression(c))
-            c.need("]")
-        angle = math.degrees(math.atan2(rise, run))
-        return angle + 360.0 if angle < 0.0 and two and self.grammar.full_turn else angle
+        return result
 
-    def _to_the_power(self, c: Cursor) -> float:
+    def _arc_tangent(self, c: Cursor) -> ValueLater:
+        c.need("[")
+        rise = self.joined(c)
+        run = self.joined(c) if c.take(",") else None
+        c.need("]")
+        if run is None and c.take("/"):
+            run = self._within(c)
+
+        def angle() -> float:
+            made = math.degrees(math.atan2(plain(rise()), 1.0 if run is None else plain(run())))
+            return made + 360.0 if made < 0.0 and run is not None and self.grammar.full_turn else made
+        return angle
+
+    def _to_the_power(self, c: Cursor) -> ValueLater:
         """POW[a,b] of Fanuc."""
         c.need("[")
-        base = plain(self.expression(c))
+        base = self.joined(c)
         c.need(",")
-        power = plain(self.expression(c))
+        power = self.joined(c)
         c.need("]")
-        return _power(base, power)
+        return lambda: _power(plain(base()), plain(power()))
 
-    def expression(self, c: Cursor, rank: int = 0) -> MacroValue:
+    def joined(self, c: Cursor, rank: int = 0) -> ValueLater:
         """Values joined by operators that bind at least as `rank` does, from the left."""
-        left = self.value(c)
+        left = self.compiled(c)
         while True:
             found = self.signs.match(c.text, c.at)
             if found is None or self.grammar.operators[found[0]][0] < rank:
                 return left
             c.at = found.end()
             binds, f = self.grammar.operators[found[0]]
-            left = f(left, self.expression(c, binds + 1))
+            right = self.joined(c, binds + 1)
+            compared = self.grammar.full_turn and found[0] in _COMPARISONS
+            left = self._compared(found[0], f, left, right) if compared else _operated(f, left, right)
+
+    def _compared(self, sign: str, f: Callable[[MacroValue, MacroValue], float], left: ValueLater,
+                  right: ValueLater) -> ValueLater:
+        """A comparison; two values that differ by no more than rounding are kept in `unsure`."""
+        def made() -> float:
+            a, b = left(), right()
+            if a != b and unsure(a, b):
+                self.unsure.append(f"{plain(a)!r} {sign} {plain(b)!r}")
+            return f(a, b)
+        return made
+
+
+def unsure(a: MacroValue, b: MacroValue) -> bool:
+    """True for two numbers that are one but for rounding: which is the larger one depends on the digits of the control."""
+    return a is not None and b is not None and a != b and abs(a - b) <= ROUNDING * max(abs(a), abs(b))
+
+
+def _constant(value: float) -> ValueLater:
+    return lambda: value
+
+
+def _negative(of: ValueLater) -> ValueLater:
+    def made() -> MacroValue:
+        value = of()
+        return None if value is None else -value
+    return made
+
+
+def _operated(f: Callable[[MacroValue, MacroValue], float], left: ValueLater, right: ValueLater) -> ValueLater:
+    return lambda: f(left(), right())
 
 
 def applied(name: str, f: Callable[[float], float], argument: float) -> float:

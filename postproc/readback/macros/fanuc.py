@@ -9,7 +9,16 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from postproc.readback.macros.expressions import FANUC, Cursor, Expressions, MacroFault, MacroValue, plain, rounded
+from postproc.readback.macros.expressions import (
+    FANUC,
+    Cursor,
+    Expressions,
+    MacroFault,
+    MacroValue,
+    ValueLater,
+    plain,
+    rounded,
+)
 from postproc.readback.macros.fanuc_variables import Variables
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
@@ -26,6 +35,7 @@ _DIGITS = re.compile(r"\d+")
 FIRST = {"A": 1, "B": 2, "C": 3, "I": 4, "J": 5, "K": 6, "D": 7, "E": 8, "F": 9, "H": 11, "M": 13, "Q": 17, "R": 18, "S": 19,
          "T": 20, "U": 21, "V": 22, "W": 23, "X": 24, "Y": 25, "Z": 26}
 """local variables of the arguments (specification I); I, J, K once more are #7 to #9 and so on (specification II)"""
+_CALLS = (("G", 65.0), ("G", 66.0), ("G", 66.1), ("M", 98.0), ("M", 198.0), ("M", 97.0), ("M", 99.0), ("G", 67.0))
 _SCALED = frozenset("ABCEIJKQRUVWXYZ")
 """arguments whose unit, without a point, is a parameter of the control"""
 
@@ -80,8 +90,11 @@ class FanucMacros:
             row, self.line = level.source.rows[level.at], level.source.before + level.at + 1
             level.at += 1
             if row:
-                self.blocks.count()
+                self.blocks.count(self.line)
                 self.statement(row)
+                if self.expressions.unsure:
+                    self.blocks.compared.setdefault(self.line, self.expressions.unsure[0])
+                    self.expressions.unsure.clear()
 
     def statement(self, row: str) -> None:
         """One row: a macro statement, or a block of words."""
@@ -104,22 +117,22 @@ class FanucMacros:
         elif row and not _PRINTED.match(row):
             self.block(self.words(row))
 
-    def _unknown(self, name: str, c: Cursor) -> MacroValue:
+    def _unknown(self, name: str, c: Cursor) -> ValueLater:
         raise c.fault(f"{name or 'nothing'} stands where a value is asked for")
 
-    def variable(self, c: Cursor) -> MacroValue:
+    def variable(self, c: Cursor) -> ValueLater:
         """#n, #[...] or ##n."""
-        return self.variables.get(self.index(c), self.levels[-1].local)
+        digits = c.match(_DIGITS)
+        if digits:
+            index = int(digits)
+            return lambda: self.variables.get(index, self.levels[-1].local)
+        place = self.expressions.compiled(c)
+        return lambda: self.variables.get(_index(plain(place())), self.levels[-1].local)
 
     def index(self, c: Cursor) -> int:
         """The number behind a #."""
         digits = c.match(_DIGITS)
-        if digits:
-            return int(digits)
-        number = plain(self.expressions.value(c))
-        if number != rounded(number):
-            raise c.fault("the number of a variable is not whole")
-        return int(number)
+        return int(digits) if digits else _index(plain(self.expressions.value(c)))
 
     def number(self, c: Cursor) -> int:
         """A whole number, a variable or an expression, to the end of the row."""
@@ -225,14 +238,13 @@ class FanucMacros:
         """A block of words, with calls and returns."""
         passive = self.held.passive
         codes = {(w.letter, w.value) for w in words if w.letter in "GM" and f"{w.letter}{w.value:g}" not in passive}
-        call = next((k for k in (("G", 65.0), ("G", 66.0), ("G", 66.1), ("M", 98.0), ("M", 97.0), ("M", 99.0), ("G", 67.0))
-                     if k in codes), None)
+        call = next((k for k in _CALLS if k in codes), None)
         if call in (("G", 65.0), ("G", 66.0), ("G", 66.1)):
             self.macro_call(words, call[1])
             return
         if call == ("G", 67.0):
             self.modal, words = None, [w for w in words if (w.letter, w.value) != call]
-        elif call is not None and call[1] in (98.0, 97.0) and (call[1] == 98.0 or self.haas):
+        elif call is not None and call[1] in (98.0, 198.0, 97.0) and (call[1] != 97.0 or self.haas):
             self.subprogram(words, call[1])
             return
         elif call == ("M", 99.0):
@@ -244,7 +256,7 @@ class FanucMacros:
             self.call(self.modal.program, self.modal.times, self.modal.local, modal=True)
 
     def subprogram(self, words: Sequence[Word], code: float) -> None:
-        """M98 P L, and Haas' M97; other words of the block come first."""
+        """M98 P L, M198 (of another folder or store: a file next to the program), and Haas' M97; other words come first."""
         stated = {w.letter: w.value for w in words}
         if "P" not in stated:
             raise MacroFault("gcode.subprogram", f"M{code:g} without P", "state the number of the program: M98 P1000")
@@ -317,6 +329,13 @@ class FanucMacros:
         self.levels.pop()
         if target is not None:
             self.jump(target)
+
+
+def _index(number: float) -> int:
+    """The whole number of a variable."""
+    if number != rounded(number):
+        raise MacroFault("gcode.expression", f"the number of a variable is not whole: #[{number:g}]")
+    return int(number)
 
 
 def _ends(row: str, sign: str, behind: bool) -> bool:

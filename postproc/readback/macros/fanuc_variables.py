@@ -104,7 +104,7 @@ class Variables:
     def _offset(self, index: int) -> float:
         register, axis = self._place(index)
         track = self.blocks.track
-        return (track.work(register, axis) + track.moved[register][axis]) / track.scale(axis)
+        return track.offset(register, axis) / track.scale(axis)
 
 
 def _refused(index: int) -> MacroFault:

@@ -42,6 +42,7 @@ class Held:
         tools: names of the tools by number, as the control calls them
         passive: codes of the shop that change nothing
         most: blocks that are executed before a program counts as endless
+        stated: registers whose work offsets the set-up states, None where they are not known
     """
 
     axes: tuple[str, ...]
@@ -51,3 +52,4 @@ class Held:
     tools: dict[int, str] = field(default_factory=dict)
     passive: tuple[str, ...] = ()
     most: int = MOST_BLOCKS
+    stated: frozenset[float] | None = None

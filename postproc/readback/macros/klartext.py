@@ -13,8 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import PurePath
 
-from postproc.readback.macros.expressions import Cursor, MacroFault, applied, written
+from postproc.readback.macros.expressions import Cursor, MacroFault, applied, unsure, written
 from postproc.readback.macros.held import Held
+from postproc.readback.macros.klartext_strings import NUMBERS, Strings
+from postproc.readback.macros.klartext_system import SystemData
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks
 from postproc.readback.text.flow import DEEPEST
@@ -28,15 +30,19 @@ _Q = re.compile(r"Q([LRS]?)(\d+)")
 _SIGN = re.compile(r"[-+*/^%]")
 _FUNCTION = re.compile(r"SQRT|SQ|SIN|COS|TAN|ASIN|ACOS|ATAN|LN|LOG|EXP|NEG|INT|ABS|FRAC|SGN|PI")
 _GIVEN = re.compile(r"(Q[LRS]?\d+)[ \t]*=[ \t]*")
+_STRING = re.compile(r"(?:DECLARE STRING[ \t]+)?QS(\d+)[ \t]*=[ \t]*")
+_NAMED = re.compile(r"(TOOL (?:CALL|DEF)[ \t]+)\"([^\"]*)\"")
 _USED = re.compile(r"([-+]?)[ \t]*Q([LRS]?)(\d+)(?![\d]|[ \t]*=)")
 _FN = re.compile(r"FN[ \t]*(\d+)[ \t]*:[ \t]*")
 _JUMP = re.compile(r"IF[ \t]*(.+?)[ \t]*(EQU|NE|GT|LT|IS UNDEFINED|IS DEFINED)[ \t]*(.*?)[ \t]*GOTO LBL[ "
-                    "\t]*\"?([^\"\\s]+)\"?")
+                    "\t]*(?:\"([^\"]+)\"|(\\S+))")
 _LABEL = re.compile(r"LBL[ \t]+\"?([^\"]+?)\"?")
-_CALL = re.compile(r"CALL LBL[ \t]+\"?([^\"\s]+)\"?(?:[ \t]+REP[ \t]?(\d+))?")
-_PROGRAM = re.compile(r"CALL PGM[ \t]+(\S+)")
+_CALL = re.compile(r"CALL LBL[ \t]+\"?([^\"]+?)\"?(?:[ \t]+REP[ \t]?(\d+))?")
+_PROGRAM = re.compile(r"CALL PGM[ \t]+(\"[^\"]+\"|\S+)")
 _BEGIN = re.compile(r"(BEGIN|END) PGM[ \t]+\S+[ \t]*(MM|INCH)?")
 _TOOL = re.compile(r"(TOOL CALL[ \t]+)\+?(\d+)\.(?!\d)")
+PASSIVE = (16, 20, 38)
+"""functions that print, wait for the blocks before to be done, and send"""
 _END = re.compile(r"(?<![A-Z0-9])M0?(?:2|30)(?![0-9])")
 _TWO: dict[int, tuple[str, Callable[[float, float], float]]] = {
     1: (r"\+", lambda a, b: a + b), 2: ("-", lambda a, b: a - b), 3: (r"\*", lambda a, b: a * b),
@@ -109,6 +115,7 @@ class KlartextMacros:
         self.blocks = Blocks(held, False, sources.read[0].name)
         self.levels = [KlartextLevel(sources.read[0], 0, False)]
         self.parameters: dict[tuple[str, int], float] = {}
+        self.strings, self.system = Strings(self.term), SystemData(held)
         self.units = ""
         self.line, self.ended = 0, False
 
@@ -131,7 +138,7 @@ class KlartextMacros:
             row, self.line = level.source.rows[level.at], level.source.before + level.at + 1
             level.at += 1
             if row:
-                self.blocks.count()
+                self.blocks.count(self.line)
                 self.statement(level, row)
 
     def _back(self, level: KlartextLevel) -> None:
@@ -143,6 +150,8 @@ class KlartextMacros:
         """One row."""
         if m := _FN.match(row):
             self._fn(int(m[1]), row[m.end():])
+        elif m := _STRING.match(row):
+            self.strings.put(int(m[1]), Cursor(row, m.end()))
         elif (m := _GIVEN.match(row)) is not None:
             self.put(m[1], self.formula(Cursor(row, m.end())))
         elif m := _LABEL.fullmatch(row):
@@ -150,7 +159,7 @@ class KlartextMacros:
                 self.levels.pop()
         elif m := _CALL.fullmatch(self.filled(row) if "Q" in row else row):
             self._call(level, m[1].rstrip("."), m[2])
-        elif m := _PROGRAM.fullmatch(row):
+        elif m := _PROGRAM.fullmatch(self.strings.filled(row) if "QS" in row else row):
             self._program(m[1])
         elif m := _BEGIN.fullmatch(row):
             self._frame(level, row, m[1], m[2] or "")
@@ -159,7 +168,10 @@ class KlartextMacros:
 
     def _plain(self, row: str) -> None:
         """Words with figures in the place of parameters; CYCL DEF sets the parameters that it states."""
-        self.blocks.write(self.filled(row, row.startswith("CYCL DEF")), self.line)
+        row = self.filled(row, row.startswith("CYCL DEF"))
+        if row.startswith("TOOL CALL"):
+            self.system.called(row)
+        self.blocks.write(row, self.line)
         self.ended = len(self.levels) >= 1 and bool(_END.search(row)) and not row.startswith("CYCL")
 
     def _frame(self, level: KlartextLevel, row: str, which: str, units: str) -> None:
@@ -167,7 +179,7 @@ class KlartextMacros:
             if self.units and units != self.units:
                 raise MacroFault("gcode.units", "programs in mm and in inches that call one another",
                                  "write all of them in mm, or all in inches")
-            self.units = self.units or units
+            self.units = self.system.units = self.units or units
         if len(self.levels) == 1:
             self.blocks.write(row, self.line)
             self.ended = which == "END"
@@ -180,6 +192,8 @@ class KlartextMacros:
             for m in _GIVEN.finditer(row):
                 value = self.term(Cursor(row, m.end()))
                 self.put(m[1], value)
+        if "QS" in row:
+            row = _NAMED.sub(lambda m: m[1] + str(self._tool(m[2])), self.strings.filled(row))
         row = _USED.sub(lambda m: self._figure(m), row)
         return _TOOL.sub(r"\1\2", row)
 
@@ -192,7 +206,8 @@ class KlartextMacros:
         """A parameter."""
         held = self.levels[-1].local.get(index) if kind == "L" else self.parameters.get((kind, index))
         if kind == "S":
-            raise MacroFault("gcode.variable", f"QS{index} holds characters: it is not executed", "write the name itself")
+            raise MacroFault("gcode.variable", f"QS{index} holds characters, where a number is asked for",
+                             "TONUMB makes one of it")
         if held is None:
             raise MacroFault("gcode.variable", f"Q{kind}{index} is read before the program sets it: the control, another "
                                                f"program or "
@@ -203,7 +218,7 @@ class KlartextMacros:
         """A parameter set."""
         m = _Q.fullmatch(name)
         if m is None or m[1] == "S":
-            raise MacroFault("gcode.variable", f"{name} holds characters: it is not executed", "write the name itself")
+            raise MacroFault("gcode.variable", f"{name} holds characters, where a number is set", "use a Q parameter")
         if m[1] == "L":
             self.levels[-1].local[int(m[2])] = value
         else:
@@ -227,6 +242,8 @@ class KlartextMacros:
             m = _Q.fullmatch(name)
             assert m is not None
             return self.get(m[1], int(m[2]))
+        if of_strings := c.match(NUMBERS):
+            return self.strings.number(of_strings, c)
         function = c.match(_FUNCTION)
         if function == "PI":
             return math.pi
@@ -253,6 +270,14 @@ class KlartextMacros:
             raise c.fault("a formula that is not read")
         return value
 
+    def _tool(self, name: str) -> int:
+        """The number of a tool that is called by its name."""
+        known = {called.upper(): n for n, called in self.held.tools.items()}
+        if name.upper() not in known:
+            raise MacroFault("gcode.tool_name", f'no tool is called "{name}"',
+                             '[tools.N] called = "..." of the set-up: the number of the tool that the control calls so')
+        return known[name.upper()]
+
     def _whole_term(self, text: str) -> float:
         c = Cursor(text)
         value = self.term(c)
@@ -262,7 +287,12 @@ class KlartextMacros:
         return value
 
     def _fn(self, number: int, rest: str) -> None:
-        """FN 0 to FN 14."""
+        """FN 0 to FN 18; what FN 16, FN 20 and FN 38 print, wait for and send moves nothing."""
+        if number in PASSIVE:
+            return
+        if number == 18:
+            self.put(*self.system.read(rest, self._whole_term))
+            return
         if number in (9, 10, 11, 12):
             self._branch(rest)
             return
@@ -271,7 +301,8 @@ class KlartextMacros:
                              "it tests what its head sets: state what it asks for")
         given = _GIVEN.match(rest)
         if given is None or number not in (0, *_TWO, *_ONE):
-            raise MacroFault("gcode.variable", f"FN {number} is not executed", "allowed are FN 0 to FN 13, and formulas")
+            raise MacroFault("gcode.variable", f"FN {number} is not executed", "allowed are FN 0 to FN 13, FN 16, FN 18, "
+                             "FN 20, FN 38, and formulas")
         text = rest[given.end():].strip()
         if number == 0:
             value = self._whole_term(text)
@@ -289,6 +320,8 @@ class KlartextMacros:
     def _branch(self, rest: str) -> None:
         """IF a EQU b GOTO LBL n."""
         m = _JUMP.fullmatch(rest.strip())
+        if m is not None and (m[5] or "").startswith("QS"):
+            m = _JUMP.fullmatch(self.strings.filled(rest.strip()))
         if m is None:
             raise Cursor(rest).fault("a jump that is not read")
         if m[2].startswith("IS"):
@@ -298,9 +331,11 @@ class KlartextMacros:
             holds = held == (m[2] == "IS DEFINED")
         else:
             a, b = self._whole_term(m[1]), self._whole_term(m[3])
+            if unsure(a, b):
+                self.blocks.compared.setdefault(self.line, f"{a!r} {m[2]} {b!r}")
             holds = {"EQU": a == b, "NE": a != b, "GT": a > b, "LT": a < b}[m[2]]
         if holds:
-            self.levels[-1].at = self._label(self.levels[-1].source, m[4])
+            self.levels[-1].at = self._label(self.levels[-1].source, m[4] or m[5])
 
     def _label(self, source: SourceFile, name: str) -> int:
         """The row behind a label."""

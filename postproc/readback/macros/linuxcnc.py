@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from postproc.readback.macros.expressions import LINUXCNC, Cursor, Expressions, MacroFault, MacroValue, plain
+from postproc.readback.macros.expressions import LINUXCNC, Cursor, Expressions, MacroFault, ValueLater, plain
 from postproc.readback.macros.held import Held
+from postproc.readback.macros.linuxcnc_nesting import misplaced
 from postproc.readback.macros.linuxcnc_parameters import OLevel, Parameters
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks, Word, coded
@@ -36,6 +37,7 @@ class LinuxCncMacros:
         self.expressions = Expressions(LINUXCNC, self.variable, self._special)
         self.levels = [OLevel(sources.read[0], 0)]
         self.words_of: dict[str, list[Word]] = {}
+        self.misplaced: dict[str, dict[int, tuple[str, str]]] = {}
         self.line, self.ended = 0, False
         self.keywords: dict[str, Callable[[OLevel, str, Cursor], None]] = {
             "SUB": self._over, "ENDSUB": self._back, "RETURN": self._back, "CALL": self._call, "IF": self._if,
@@ -54,7 +56,7 @@ class LinuxCncMacros:
             row, self.line = level.source.rows[level.at], level.source.before + level.at + 1
             level.at += 1
             if row:
-                self.blocks.count()
+                self.blocks.count(self.line)
                 self.statement(level, row)
 
     def statement(self, level: OLevel, row: str) -> None:
@@ -74,9 +76,19 @@ class LinuxCncMacros:
         else:
             raise c.fault("not an O word")
         if word in self.keywords:
+            self._judge(level)
             self.keywords[word](level, label, c)
         elif word or not c.done:
             raise c.fault("not an O word")
+
+    def _judge(self, level: OLevel) -> None:
+        """An O word that belongs to nothing, or whose block crosses another."""
+        source = level.source
+        if source.name not in self.misplaced:
+            named = ((k, _named(row)) for k, row in enumerate(source.rows))
+            self.misplaced[source.name] = misplaced((k, *one) for k, one in named if one is not None)
+        if wrong := self.misplaced[source.name].get(level.at - 1):
+            raise MacroFault("gcode.jump", *wrong)
 
     def block(self, row: str) -> None:
         """Words, and assignments, which hold from behind the block on."""
@@ -114,26 +126,31 @@ class LinuxCncMacros:
         """What stands behind a #: a number or a name."""
         if name := c.match(_NAME):
             return name[1:-1]
-        if digits := c.match(_DIGITS):
-            return int(digits)
-        number = plain(self.expressions.value(c))
-        if abs(number - round(number)) > 1e-4:
-            raise c.fault("the number of a parameter is not whole")
-        return round(number)
+        digits = c.match(_DIGITS)
+        return int(digits) if digits else _whole(plain(self.expressions.value(c)))
 
-    def variable(self, c: Cursor) -> MacroValue:
+    def _asked(self, c: Cursor) -> Callable[[], int | str]:
+        """What stands behind a #, to be asked for later."""
+        if (name := c.match(_NAME)) or (digits := c.match(_DIGITS)):
+            place = name[1:-1] if name else int(digits)
+            return lambda: place
+        number = self.expressions.compiled(c)
+        return lambda: _whole(plain(number()))
+
+    def variable(self, c: Cursor) -> ValueLater:
         """The value of a parameter."""
-        return self.parameters.get(self._place(c), self.levels[-1])
+        place = self._asked(c)
+        return lambda: self.parameters.get(place(), self.levels[-1])
 
-    def _special(self, name: str, c: Cursor) -> MacroValue:
+    def _special(self, name: str, c: Cursor) -> ValueLater:
         """EXISTS[#<name>]."""
         if name != "EXISTS":
             raise c.fault(f"{name or 'nothing'} stands where a value is asked for")
         c.need("[")
         c.need("#")
-        place = self._place(c)
+        place = self._asked(c)
         c.need("]")
-        return float(self.parameters.exists(place, self.levels[-1]))
+        return lambda: float(self.parameters.exists(place(), self.levels[-1]))
 
     def _condition(self, c: Cursor) -> float:
         c.need("[")
@@ -245,6 +262,13 @@ class LinuxCncMacros:
             raise MacroFault("gcode.jump", "endsub or return outside of a sub", "take it out, or begin the sub")
         self.parameters.returned(self._condition(c) if not c.done else None)
         self.levels.pop()
+
+
+def _whole(number: float) -> int:
+    """The number of a parameter."""
+    if abs(number - round(number)) > 1e-4:
+        raise MacroFault("gcode.expression", f"the number of a parameter is not whole: #[{number:g}]")
+    return round(number)
 
 
 def _label(text: str) -> str:

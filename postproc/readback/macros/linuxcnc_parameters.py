@@ -98,7 +98,7 @@ class Parameters:
             return track.zero[_AXES[place - 5211]] / track.scale(_AXES[place - 5211])
         if 5221 <= place <= 5386 and (place - 5221) % 20 < 6 and _AXES[(place - 5221) % 20] in self.held.axes:
             register, axis = _OFFSETS[(place - 5221) // 20], _AXES[(place - 5221) % 20]
-            return (track.work(register, axis) + track.moved[register][axis]) / track.scale(axis)
+            return track.offset(register, axis) / track.scale(axis)
         if place == 5400 and "T" in self.blocks.state:
             return self.blocks.state["T"]
         if place == 5403 and track.length is not None:

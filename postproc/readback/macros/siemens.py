@@ -14,7 +14,7 @@ from postproc.readback.macros.siemens_variables import KINDS, DeclaredVariable, 
 from postproc.readback.macros.siemens_words import SiemensWords
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks
-from toolpaths.diagnostics import Diagnostic, warning
+from toolpaths.diagnostics import Diagnostic, info, warning
 
 DEEPEST = 16
 """levels of programs (840D sl)"""
@@ -59,8 +59,11 @@ class SiemensMacros:
         self.modal: tuple[str, str] | None = None
 
     def judged(self) -> list[Diagnostic]:
-        """Tools whose names the set-up has not."""
-        return [warning("gcode.tool_name", f'no tool of the set-up is called "{name}": its length counts as 0',
+        """Tools whose names the set-up has not, and the order of patterns, which the control chooses."""
+        order = [info("gcode.hole_order", f"{name}: the holes are taken in the order that keeps travel short, from where "
+                      "the tool stands, as the control chooses it", file=self.blocks.file, lines=[line])
+                 for name, line in self.words.patterns.items() if name != "HOLES2"]
+        return order + [warning("gcode.tool_name", f'no tool of the set-up is called "{name}": its length counts as 0',
                         file=self.blocks.file, lines=[line], hint='[tools.N] called = "..." of the set-up: the number of '
                         'the tool that the control calls so') for name, line in self.words.unknown_tools.items()]
 
@@ -86,7 +89,7 @@ class SiemensMacros:
             row, self.line = self.listed(level.source).rows[level.at], level.source.before + level.at + 1
             level.at += 1
             if row.body:
-                self.blocks.count()
+                self.blocks.count(self.line)
             if row.body and not row.body.startswith("%"):
                 self.statement(level, row)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Protocol
 
 from postproc.readback.macros.expressions import COMMON, Cursor, MacroFault, applied
@@ -20,6 +21,7 @@ _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?")
 _CODED = re.compile(r"'(H[0-9A-F]+|B[01]+)'")
 _STRING = re.compile(r'"[^"]*"')
 _SIGN = re.compile(r"==|<>|<=|>=|<<|[-+*/<>]|(?:B_AND|B_XOR|B_OR|AND|XOR|OR|DIV|MOD)(?![A-Z0-9_$])")
+_AXIS = re.compile(r"[ \t]*([A-Z]\d*)[ \t]*\]")
 _EQUAL = 1e-12
 
 
@@ -28,6 +30,10 @@ class Names(Protocol):
 
     def get(self, name: str, index: tuple[SiemensValue, ...]) -> SiemensValue:
         """A variable, an element of one, or a system variable."""
+
+
+SiemensValueLater = Callable[[Names], SiemensValue]
+"""a value as it is at the time of the call"""
 
 
 def number(value: SiemensValue) -> float:
@@ -111,62 +117,31 @@ def listed(c: Cursor, names: Names, end: str) -> list[SiemensValue]:
         need(c, ",")
 
 
-def value_of(c: Cursor, names: Names) -> SiemensValue:
-    """A number, characters, a name, a function or brackets, with a sign before it."""
-    skip(c)
-    if c.take("("):
-        result = expression(c, names)
-        need(c, ")")
-        return result
-    if c.take("-"):
-        return -number(value_of(c, names))
-    if c.take("+"):
-        return value_of(c, names)
-    if found := c.match(_STRING):
-        return found[1:-1]
-    if found := c.match(_NUMBER):
-        return float(found.replace("EX", "e"))
-    if found := c.match(_CODED):
-        return float(int(found[2:-1], 16 if found[1] == "H" else 2))
-    name = c.match(NAME) or ("R" if c.text.startswith("R[", c.at) and c.take("R") else "")
-    if not name:
-        raise c.fault("a value is missing")
-    return _named(name, c, names)
-
-
-def _named(name: str, c: Cursor, names: Names) -> SiemensValue:
-    if name in ("NOT", "B_NOT"):
-        inner = number(value_of(c, names))
-        return float(not inner) if name == "NOT" else float(~int(inner))
-    if name in ("TRUE", "FALSE"):
-        return float(name == "TRUE")
-    if name == "$PI":
-        return math.pi
-    if name in FUNCTIONS:
-        need(c, "(")
-        given = listed(c, names, ")")
-        if name in _ONE and len(given) == 1:
-            return applied(name, _ONE[name], number(given[0]))
-        try:
-            return _MORE[name](*given)
-        except (KeyError, TypeError, ValueError) as fault:
-            raise c.fault(f"{name} with these values is no number") from fault
-    index = tuple(indices(c, names)) if take(c, "[") else ()
-    return names.get(name, index)
-
-
 def indices(c: Cursor, names: Names) -> list[SiemensValue]:
     """What stands between [ and ]: numbers, or names of axes, which stand for themselves."""
-    axis = re.compile(r"[ \t]*([A-Z]\d*)[ \t]*\]").match(c.text, c.at)
+    axis = _AXIS.match(c.text, c.at)
     if axis and not re.fullmatch(r"R\d+", axis[1]):
         c.at = axis.end()
         return [axis[1]]
     return listed(c, names, "]")
 
 
-def expression(c: Cursor, names: Names, rank: int = 0) -> SiemensValue:
+def expression(c: Cursor, names: Names) -> SiemensValue:
+    """Values joined by operators."""
+    f, c.at = _parsed(c.text, c.at)
+    return f(names)
+
+
+@lru_cache(maxsize=20_000)
+def _parsed(text_: str, at: int) -> tuple[SiemensValueLater, int]:
+    """(an expression taken apart, where it ends)."""
+    c = Cursor(text_, at)
+    return _joined(c, 0), c.at
+
+
+def _joined(c: Cursor, rank: int) -> SiemensValueLater:
     """Values joined by operators that bind at least as `rank` does, from the left."""
-    left = value_of(c, names)
+    left = _value_of(c)
     while True:
         at = c.at
         skip(c)
@@ -175,4 +150,89 @@ def expression(c: Cursor, names: Names, rank: int = 0) -> SiemensValue:
             c.at = at
             return left
         binds, f = OPERATORS[sign]
-        left = f(left, expression(c, names, binds + 1))
+        left = _operated(f, left, _joined(c, binds + 1))
+
+
+def _operated(f: Callable[[SiemensValue, SiemensValue], SiemensValue], left: SiemensValueLater,
+              right: SiemensValueLater) -> SiemensValueLater:
+    return lambda names: f(left(names), right(names))
+
+
+def _constant(value: SiemensValue) -> SiemensValueLater:
+    return lambda names: value
+
+
+def _negative(of: SiemensValueLater) -> SiemensValueLater:
+    return lambda names: -number(of(names))
+
+
+def _value_of(c: Cursor) -> SiemensValueLater:
+    """A number, characters, a name, a function or brackets, with a sign before it."""
+    skip(c)
+    if c.take("("):
+        result = _joined(c, 0)
+        need(c, ")")
+        return result
+    if c.take("-"):
+        return _negative(_value_of(c))
+    if c.take("+"):
+        return _value_of(c)
+    if found := c.match(_STRING):
+        return _constant(found[1:-1])
+    if found := c.match(_NUMBER):
+        return _constant(float(found.replace("EX", "e")))
+    if found := c.match(_CODED):
+        return _constant(float(int(found[2:-1], 16 if found[1] == "H" else 2)))
+    name = c.match(NAME) or ("R" if c.text.startswith("R[", c.at) and c.take("R") else "")
+    if not name:
+        raise c.fault("a value is missing")
+    return _named(name, c)
+
+
+def _several(c: Cursor, end: str) -> list[SiemensValueLater]:
+    result = list[SiemensValueLater]()
+    if take(c, end):
+        return result
+    while True:
+        result.append(_joined(c, 0))
+        if take(c, end):
+            return result
+        need(c, ",")
+
+
+def _named(name: str, c: Cursor) -> SiemensValueLater:
+    if name in ("NOT", "B_NOT"):
+        inner = _value_of(c)
+        return (lambda names: float(not number(inner(names)))) if name == "NOT" else \
+            (lambda names: float(~int(number(inner(names)))))
+    if name in ("TRUE", "FALSE", "$PI"):
+        return _constant(math.pi if name == "$PI" else float(name == "TRUE"))
+    if name in FUNCTIONS:
+        need(c, "(")
+        return _function(name, _several(c, ")"), c)
+    if not take(c, "["):
+        return lambda names: names.get(name, ())
+    axis = _AXIS.match(c.text, c.at)
+    if axis and not re.fullmatch(r"R\d+", axis[1]):
+        c.at, letter = axis.end(), axis[1]
+        return lambda names: names.get(name, (letter,))
+    index = _several(c, "]")
+    return lambda names: names.get(name, tuple([f(names) for f in index]))
+
+
+def _function(name: str, given: list[SiemensValueLater], c: Cursor) -> SiemensValueLater:
+    if name in _ONE and len(given) == 1:
+        one, argument = _ONE[name], given[0]
+        return lambda names: applied(name, one, number(argument(names)))
+    fault = c.fault(f"{name} with these values is no number")
+    more = _MORE.get(name)
+
+    def made(names: Names) -> SiemensValue:
+        values = [f(names) for f in given]
+        if more is None:
+            raise fault
+        try:
+            return more(*values)
+        except (TypeError, ValueError) as why:
+            raise fault from why
+    return made

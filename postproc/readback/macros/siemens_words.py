@@ -7,8 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from postproc.readback.macros.expressions import Cursor, MacroFault, written
+from postproc.readback.macros.frame import AXES, rotated, scaled, shifted
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.siemens_expressions import NAME, SiemensValue, expression, indices, number, skip, take
+from postproc.readback.macros.siemens_patterns import PATTERNS, positions
+from postproc.readback.macros.siemens_turned import CENTRES, TurnedBlocks
 from postproc.readback.macros.siemens_variables import SiemensNames
 from postproc.readback.macros.word_blocks import Blocks, coded
 
@@ -42,7 +45,9 @@ class SiemensWords:
         self.track = blocks.track
         self.state: dict[str, float] = {}
         self.names = SiemensNames(self.track, self.state)
-        self.tools: dict[str, int] = {}
+        self.turned = TurnedBlocks(self.track)
+        self.patterns: dict[str, int] = {}
+        self.drilled_level: float | None = None
         self.unknown_tools: dict[str, int] = {}
         self.line = 0
 
@@ -73,16 +78,33 @@ class SiemensWords:
                 done.call = (*calls[-1], times)
         elif out == ["MCALL"]:
             done.modal = ("", "")
+            self.drilled_level = None
+        elif "MCALL" in out:
+            self.drilled_level = self._level()
+        out = self._framed(out, machine)
         if machine and out:
             out = ["SUPA", *(w for w in out if w not in ("SUPA", "G53", "G153"))]
         if out:
             self.blocks.write(" ".join(out), line)
         return done
 
+    def _framed(self, out: list[str], machine: bool) -> list[str]:
+        """The words of a row in the work offset; where modes with other coordinates begin, the position is not known."""
+        if any(w == "TRAORI" or w.startswith("TRAORI(") for w in out):
+            self.turned.oriented = True
+        elif "TRAFOOF" in out:
+            self.turned.oriented = False
+        if not machine or self.turned.side != 40:
+            out = self.turned.row(out)
+        if any(w.startswith(("TRAORI", "TRAFOOF", "CYCLE800(")) for w in out):
+            self.track.at.update(dict.fromkeys(a for a in AXES if a in self.track.at))
+        return out
+
     def _modes(self, body: str) -> None:
         """What G codes of a row change before its words are read."""
         for m in re.finditer(r"(?<![A-Z0-9_])G[ \t]*0*(\d+)(?![A-Z0-9_.])", body):
             code = int(m[1])
+            self.turned.codes(code)
             if code in (70, 71, 700, 710, 20, 21):
                 self.track.unit = 25.4 if code in (70, 700, 20) else 1.0
             elif code in (90, 91):
@@ -134,6 +156,8 @@ class SiemensWords:
             done.back = True
             return
         self.state[letter] = value
+        if self._kept(letter, value, None, machine, done):
+            return
         if letter in self.held.axes:
             done.moved = True
             went = self._go(letter, value, machine)
@@ -143,6 +167,22 @@ class SiemensWords:
         else:
             self._length(letter)
             out.append(f"{letter}{word[2]}")
+
+    def _kept(self, key: str, value: float, how: str | None, machine: bool, done: RowDone) -> bool:
+        """True for ends, centres and radii of circles that a frame changes: they are written at the end of the row."""
+        turned, track = self.turned, self.track
+        if not turned.on or machine:
+            return False
+        if key in AXES and key in self.held.axes:
+            done.moved = True
+            turned.end(key, value * track.unit, track.absolute if how is None else how == "AC")
+        elif key in CENTRES:
+            turned.centre(key, value * track.unit, how == "AC")
+        elif key == "CR":
+            turned.radius = value * track.unit
+        else:
+            return False
+        return True
 
     def _length(self, letter: str) -> None:
         """Tools and edges change the length: Z is known again behind its next word."""
@@ -172,9 +212,13 @@ class SiemensWords:
             value = number(expression(c, self.names))
             if not take(c, ")"):
                 raise c.fault("')' is missing")
+            if self._kept(key, value, how[1], machine, done):
+                return
             out.append(f"{key}={how[1]}({written(self._how(key, how[1], value, machine, done))})")
             return
         held = expression(c, self.names)
+        if (len(key) == 1 or key == "CR") and not isinstance(held, str) and self._kept(key, held, None, machine, done):
+            return
         if key == "T" and isinstance(held, str):
             out.append(f"T{self._tool(held)}")
             self._length(key)
@@ -193,6 +237,9 @@ class SiemensWords:
 
     def _how(self, key: str, how: str, value: float, machine: bool, done: RowDone) -> float:
         """The number of IC(), AC() and their like."""
+        if key in CENTRES and how == "AC":
+            axis = AXES[CENTRES.index(key)]
+            return value + self.track.shift(axis) / self.track.scale(axis)
         if key not in self.held.axes:
             return value
         done.moved = True
@@ -233,7 +280,9 @@ class SiemensWords:
         if depth:
             raise c.fault("')' is missing")
         given = c.text[start:c.at - 1]
-        if name not in _LEVELS and self.runnable(name):
+        if name in PATTERNS and not self.runnable(name):
+            self._pattern(name, given, out)
+        elif name not in _LEVELS and self.runnable(name):
             calls.append((name, given))
         elif name != "MSG":
             out.append(f"{name}({','.join(self._values(name, given))})")
@@ -255,7 +304,7 @@ class SiemensWords:
             if isinstance(value, str):
                 made.append(f'"{value}"')
                 continue
-            shift = self.track.shift("Z") / self.track.scale("Z") if k in _LEVELS.get(name, ()) else 0.0
+            shift = self._level() / self.track.scale("Z") if k in _LEVELS.get(name, ()) else 0.0
             if name == "CYCLE800" and any(self.track.shift(a) for a in self.held.axes):
                 raise MacroFault("gcode.mode", "CYCLE800 in coordinates that TRANS has shifted is not executed",
                                  "write TRANS alone before it, and state the origin in CYCLE800")
@@ -263,7 +312,7 @@ class SiemensWords:
         return made
 
     def _frame(self, head: str, c: Cursor) -> None:
-        """TRANS and ATRANS; others only where they turn and scale nothing, or alone, to cancel."""
+        """TRANS, ROT, SCALE, MIRROR start from the work offset, ATRANS, AROT, ASCALE, AMIRROR go on."""
         given = dict[str, float]()
         while True:
             skip(c)
@@ -274,18 +323,63 @@ class SiemensWords:
                 raise c.fault("not a block of words")
             take(c, "=")
             given[key] = number(expression(c, self.names))
-        local = self.track.local
-        if not head.startswith("A"):
-            local.clear()
-        neutral = 1.0 if head.endswith("SCALE") else 0.0
-        if not head.endswith("TRANS") and (any(v != neutral for v in given.values()) or (given and head.endswith("MIRROR"))):
-            raise MacroFault("gcode.frame_turned", f"{head} that turns, scales or mirrors the coordinates is not executed",
-                             "write the blocks in the coordinates of the work offset, or CYCLE800")
-        if head.endswith("TRANS"):
-            for axis, value in given.items():
-                if axis not in self.held.axes:
-                    raise MacroFault("gcode.unknown_word", f"{head} {axis}: the machine has no such axis",
-                                     f"its axes are {', '.join(self.held.axes)}")
-                local[axis] += value * self.track.scale(axis)
-                self.track.shifted = True
+        kind = head.removeprefix("A") if head != "A" else head
+        if kind == "ROTS" and given:
+            raise MacroFault("gcode.frame_turned", f"{head} with solid angles is not executed", "ROT with X, Y, Z or RPL")
+        if "RPL" in given and kind == "ROT":
+            given["XYZ"[{17: 2, 18: 1, 19: 0}[self.track.plane]]] = given.pop("RPL")
+        allowed = self.held.axes if kind == "TRANS" else tuple(AXES)
+        for axis in given:
+            if axis not in allowed:
+                raise MacroFault("gcode.unknown_word", f"{head} {axis}: the machine has no such axis" if kind == "TRANS" else
+                                 f"{head} {axis}: not an axis of the frame", f"its axes are {', '.join(allowed)}")
+        if kind == "SCALE" and any(v <= 0.0 for v in given.values()):
+            raise MacroFault("gcode.frame_turned", f"{head} with a factor of 0 or below", "a factor above 0; MIRROR mirrors")
+        self._take_frame(kind, given, not head.startswith("A"))
 
+    def _take_frame(self, kind: str, given: dict[str, float], fresh: bool) -> None:
+        """A frame in force, with what TRANS says of rotary axes."""
+        made = {"TRANS": shifted, "SCALE": scaled}.get(kind, rotated)
+        mm = {a: v * (self.track.scale(a) if kind == "TRANS" else 1.0) for a, v in given.items()}
+        frame = scaled(dict.fromkeys(mm, -1.0)) if kind == "MIRROR" else made(mm)
+        if fresh:
+            self.track.local.clear()
+        for axis in mm if kind == "TRANS" else ():
+            if axis not in AXES:
+                self.track.local[axis] += mm[axis]
+                self.track.shifted = True
+        self.turned.take(frame if fresh else self.turned.frame.before(frame))
+        if self.drilled_level is not None and self._level() != self.drilled_level:
+            raise MacroFault("gcode.frame_turned", "a frame moves the tool's axis while MCALL holds a drilling cycle",
+                             "write MCALL alone before it, and call the cycle again behind it")
+
+    def _level(self) -> float:
+        """mm by which levels of cycles lie higher in the work offset."""
+        return self.turned.frame.shift[2] if self.turned.on else self.track.shift("Z")
+
+    def _pattern(self, name: str, given: str, out: list[str]) -> None:
+        """A block for each place of a pattern; the code of motion holds on behind it."""
+        values = [self._value(part) for part in self.split(given)]
+        try:
+            here = self.track.position("X") / self.track.unit, self.track.position("Y") / self.track.unit
+        except MacroFault:
+            here = None
+        self.patterns.setdefault(name, self.line)
+        motion = self.turned.motion
+        for x, y in positions(name, values, here):
+            self.blocks.count(self.line)
+            self.row("", Cursor(f"G0 X=AC({written(x)}) Y=AC({written(y)})"), self.line)
+        if motion is not None:
+            out.append(f"G{motion}")
+            self.turned.motion = motion
+
+    def _value(self, part: str) -> float | str | None:
+        """A value of a pattern; None where nothing stands."""
+        if not part.strip():
+            return None
+        c = Cursor(part)
+        value = expression(c, self.names)
+        skip(c)
+        if not c.done:
+            raise c.fault("a value of a call is not read")
+        return value

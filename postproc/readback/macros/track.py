@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from postproc.readback.macros.expressions import MacroFault
+from postproc.readback.macros.frame import AXES, CoordinateFrame
 from postproc.readback.macros.held import Held
 
 ROTARY = "ABC"
@@ -21,6 +22,10 @@ class Track:
         at: by axis, None where it is not known; motion: code in force, None before any
         local, zero: shifts by G52 (TRANS) and G92; moved: shifts of each register by G10; lengthened: mm by length register
         register: of the work offset in force, None before any; length: register in force, None where nothing states it
+        line: of the block that runs
+        set_itself: registers and axes that the program has set itself; taken: registers that the set-up does not state, with
+            the line that reads the set-up's own offset in their place
+        frame: that turns, scales or mirrors the coordinates of the program, None for none
     """
 
     def __init__(self, held: Held) -> None:
@@ -34,6 +39,10 @@ class Track:
         self.register: float | None = None
         self.length: int | None = None
         self.shifted = False
+        self.frame: CoordinateFrame | None = None
+        self.line = 0
+        self.set_itself: set[tuple[float, str]] = set()
+        self.taken: dict[float, int] = {}
 
     def scale(self, axis: str) -> float:
         """mm, or degrees, of a unit of a word."""
@@ -49,12 +58,20 @@ class Track:
 
     def position(self, axis: str) -> float:
         """Of an axis in the coordinates that the program sees."""
+        if self.frame is not None and axis in AXES:
+            back = self.frame.inverse()[AXES.index(axis)]
+            return sum(share * (self.known(a) - self.frame.shift[k])
+                       for k, (a, share) in enumerate(zip(AXES, back, strict=True)) if share)
+        return self.known(axis) - self.shift(axis)
+
+    def known(self, axis: str) -> float:
+        """Of an axis in the work offset of the set-up."""
         here = self.at.get(axis)
         if here is None:
             raise MacroFault("gcode.position_unknown", f"where {axis} stands here is not known: no block since its "
                              "last move in machine coordinates, or change of offset or length, states it absolutely",
                              f"state {axis} with G90 before this block")
-        return here - self.shift(axis)
+        return here
 
     def work(self, register: float, axis: str) -> float:
         """A work offset of the set-up in machine coordinates."""
@@ -62,6 +79,13 @@ class Track:
             raise MacroFault("gcode.position_unknown", "a work offset in machine coordinates needs the set-up",
                              "name the set-up of the program with --setup")
         return float(self.held.work(register)[self.held.axes.index(axis)])
+
+    def offset(self, register: float, axis: str) -> float:
+        """What a register holds, mm."""
+        stated = self.held.stated
+        if stated is not None and register not in stated and (register, axis) not in self.set_itself:
+            self.taken.setdefault(register, self.line)
+        return self.work(register, axis) + self.moved[register][axis]
 
     def take_offset(self, register: float) -> None:
         """Another work offset in force: the axes stand still."""
@@ -102,6 +126,8 @@ class Track:
         """G10 L2: a work offset is `value` mm in machine coordinates, or that more than it was."""
         held = self.moved[register][axis]
         self.moved[register][axis] = held + value if added else value - self.work(register, axis)
+        if not added:
+            self.set_itself.add((register, axis))
         self.shifted = True
 
     def set_position(self, register: float, axis: str, value: float) -> None:

@@ -53,13 +53,16 @@ class Blocks:
         self.state: dict[int | str, float] = {}
         self.tilted = False
         self.second: list[int] = []
+        self.skips: list[int] = []
+        self.compared: dict[int, str] = {}
         self.tool = 0.0
         self.drill_plane: float | None = None
         self.first: float | None = None
         self.executed = 0
 
-    def count(self) -> None:
+    def count(self, line: int) -> None:
         """One more block is executed; a program without an end is refused."""
+        self.track.line = line
         self.executed += 1
         if self.executed > self.held.most:
             raise MacroFault("gcode.endless", f"more than {self.held.most} blocks are executed: the program has no end",
@@ -77,6 +80,8 @@ class Blocks:
         self._modes(words, codes)
         if self.linuxcnc and 43 in codes and not any(w.letter == "H" for w in words):
             words = [*words, Word("H", self.tool)]
+        if 31 in codes and not self.linuxcnc:
+            return self._skip(words, line)
         for code in codes:
             if code == 10:
                 return self._data(words, line)
@@ -243,14 +248,43 @@ class Blocks:
             self.write(back, line)
         return True
 
+    def _skip(self, words: Sequence[Word], line: int) -> bool:
+        """G31: a feed move to its end, for this block alone."""
+        track = self.track
+        before, track.motion = track.motion, 1.0
+        self.skips.append(line)
+        made = [Word("G", 1.0) if (w.letter, w.value) == ("G", 31.0) else w for w in words if w.letter not in "PL"]
+        self.write("".join(w.written() for w in self._moved(made, [w.value for w in made if w.letter == "G"])), line)
+        track.motion = before
+        if before in (0, 2, 3):
+            self.write(f"G{before:g}", line)
+        return True
+
     def judged(self) -> list[Diagnostic]:
         """What is taken to be so, though the control may have it otherwise."""
-        if not self.second:
-            return []
-        return [warning("gcode.second_reference", "G30: the second reference position is a parameter of the control, the "
-                                                  "home of "
-                        "the machine file is taken for it", file=self.file, lines=self.second[:6], count=len(self.second),
-                        hint="write G28 where that is meant, or G53 with the position")]
+        found = [warning("gcode.offset_unstated", f"the program reads the work offset {_named(register)}, which the set-up "
+                         "does not state: that of the set-up's own register counts", file=self.file, lines=[line],
+                         hint="a set-up with [[places]] that states it, or G10 L2 in the program before")
+                 for register, line in self.track.taken.items()]
+        found += [warning("gcode.comparison", f"two numbers that are one but for rounding are compared: {what}: which of "
+                          "them is the larger one depends on the digits that the control computes with", file=self.file,
+                          lines=[line], hint="compare with a margin, or round both before")
+                  for line, what in list(self.compared.items())[:6]]
+        if self.skips:
+            found.append(warning("gcode.skip", "G31 runs to its end here, as a feed move: where the signal stops it only "
+                                 "the control knows", file=self.file, lines=self.skips[:6], count=len(self.skips),
+                                 hint="write G1 where no signal is meant"))
+        if self.second:
+            found.append(warning("gcode.second_reference", "G30: the second reference position is a parameter of the "
+                                 "control, the home of the machine file is taken for it", file=self.file,
+                                 lines=self.second[:6], count=len(self.second),
+                                 hint="write G28 where that is meant, or G53 with the position"))
+        return found
+
+
+def _named(register: float) -> str:
+    """The code of a work offset."""
+    return f"G{register:g}" if register < EXTENDED_OFFSETS else f"P{register - EXTENDED_OFFSETS:g}"
 
 
 def coded(letter: str, value: float) -> float:

@@ -12,6 +12,7 @@ import pytest
 import postproc
 import toolpaths
 from machines.machine import ClampCodes
+from postproc.base.options import Options
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.source import from_gcode
 from postproc.pipeline.result import VerifyResult
@@ -78,6 +79,9 @@ def test_what_is_read_of_the_text_alone_is_not_claimed_of_variables(tmp_path: Pa
         result = postproc.verify(tmp_path / "p.nc", plate(), trunnion, controller="fanuc-30i", setup=tool_setup())
         assert result.ok and result.witness is not None, [str(d) for d in result.diagnostics]
         said.append(([one.what for one in result.witness.compared], [str(one) for one in result.witness.not_compared]))
+    strict = postproc.verify(tmp_path / "p.nc", plate(), trunnion, controller="fanuc-30i", setup=tool_setup(),
+                             options=Options(require_proof=True))
+    assert not strict.ok and "verify.not_compared" in codes(strict.diagnostics)
     (plain, nothing), (computed, left) = said
     assert nothing == [] and len(left) == 1 and "clamps" in left[0]
     assert [one for one in plain if one not in computed] == ["clamps"]
