@@ -81,13 +81,12 @@ def _off_plane(machine: Machine, kin: Kinematics, tip: Floats, lines: list[int],
     if abs(gap[worst]) <= _ASIDE:
         return []
     (x, y, z), across = tip[worst], float(np.ptp(gap))
-    hint = f"the path leaves every plane, by {across:.4f} mm: take a machine with a slide that leaves it"
-    if across <= _ASIDE:
-        shift = np.round(gap[worst] * kin.plane, 4) + 0.0
-        hint = f"add {shift.tolist()} to part.origin of the set-up, which is the place of the part in the table frame"
+    shift = (np.round(gap[worst] * kin.plane, 4) + 0.0).tolist()
     return [error("reach.plane", f"the tip position ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table frame is "
                   f"{abs(gap[worst]):.4f} mm off the plane in which {machine.name} moves the tip of this tool", file=file,
-                  lines=lines, count=count, hint=hint)]
+                  lines=lines, count=count, hint=f"add {shift} to part.origin of the set-up; tools of other gauge lengths "
+                  "are then off that plane" if across <= _ASIDE else
+                  f"the path leaves every plane, by {across:.4f} mm: take a machine with a slide that leaves it")]
 
 
 def spun(kin: Kinematics, moves: Moves, rows: Ints, axis: Floats, q: Floats, tolerance: float,
