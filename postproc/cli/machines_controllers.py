@@ -48,8 +48,8 @@ setup_app.command("new", epilog=EXAMPLES)(setup_new)
 setup_app.command("align", epilog=ALIGNED)(setup_align)
 
 
-At = Annotated[list[str] | None, typer.Option("--at", metavar="AXIS=POSITION", help="mm or degrees at which the figure "
-                                              "shows an axis, instead of home")]
+ShownAt = Annotated[list[str] | None, typer.Option("--at", metavar="AXIS=POSITION", help="mm or degrees at which the figure "
+                                                   "shows an axis, instead of home")]
 
 
 @machine_app.command("list")
@@ -70,7 +70,7 @@ def machine_list(json: Json = "") -> None:
 def machine_show(name: Annotated[str, typer.Argument(help="name or TOML file")],
                  figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="a machine on legs, "
                                                              ".png or .svg")] = None,
-                 at: At = None,
+                 at: ShownAt = None,
                  json: Json = "") -> None:
     """Show a machine: axes, travel, limits, which values are assumed."""
     from postproc.cli.catalogue import machine_dict, machine_text
