@@ -132,7 +132,7 @@ def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_ang
         k = int(cuts[0])
         found += _finding(w, cuts, lines, "path", f"the tool is {w.away[k]:.6f} mm and {np.degrees(w.tilt[k]):.6f} degrees "
                           "off the path of the CL file")
-    rest = bad[~np.isin(bad, cuts) & ~(flat & (w.code[bad] == 0))]
+    rest = bad[~np.isin(bad, cuts) & ~(flat & ((w.code[bad] == 0) | (bent and fed_rapids)))]
     return found + _finding(w, rest, lines, "clearance", "motion that the CL file does not command comes nearer to what is "
                             "cut than the margin of the set-up")
 

@@ -14,6 +14,7 @@ from postproc.report.summary import as_text
 from postproc.verification.second_witness import machine_tables
 from postproc.witness.machine import Rods, kinematics_of, merged
 from tests.postproc.kit import codes, convert, good, machine, setup_of, toolpath
+from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Toolpath
 
 TOOL = "[tools.1]\ngauge_length = 110.0\n[part]\norigin = [0.0, 0.0, -110.0]\n"
@@ -22,7 +23,7 @@ IN_PLANE = TOOL + "[clearance]\nin_plane = true\n"
 
 @cache
 def path() -> Toolpath:
-    return toolpath("RAPID", "GOTO/-50,-40,0", "GOTO/20,0,0", "GOTO/20,20,0", "RAPID", "GOTO/-20,20,0", "GOTO/-20,0,0")
+    return toolpath("RAPID", "GOTO/-50,-40,0", "GOTO/-46,-40,0", "RAPID", "GOTO/-46,-36,0", "GOTO/-50,-36,0")
 
 
 @cache
@@ -62,3 +63,10 @@ def test_the_witness_knows_by_itself_which_machines_stay_in_a_plane(name: str) -
     plane = machine(name).kinematics.plane
     rods = kinematics_of(merged(machine_tables(machine(name))))
     assert isinstance(rods, Rods) and rods.flat == (plane is not None) == (name == "planar-delta")
+
+
+def test_on_controls_with_dog_leg_rapids_they_are_fed_where_the_set_up_asks_for_it(tmp_path: Path) -> None:
+    file = tmp_path / "m.toml"
+    file.write_text('base = "planar-delta"\n[control]\nrapids = "dog-leg"\n')
+    result = postproc.convert(path(), file, "fanuc-30i", setup_of(IN_PLANE + "[output]\nrapids_as_feed = true\n"))
+    assert not [str(d) for d in result.diagnostics if d.severity is Severity.ERROR] and result.text
