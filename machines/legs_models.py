@@ -103,7 +103,7 @@ class LegsModel(KinematicsModel):
         space = self.workspace.build()
         moves = "z" in self.freedoms or any(carrier.direction[2] for carrier in self.carriers.values())
         flat = np.array([1.0, 1.0, 0.0])
-        return space if moves else replace(space, lower=space.lower * flat, upper=space.upper * flat)
+        return space if moves else replace(space, lower=space.lower * flat + 0.0, upper=space.upper * flat + 0.0)
 
     def control(self, module: str) -> ControlKinematics:
         """Pins of LinuxCNC's lineardeltakins, where the machine is one: three slides X, Y, Z and no carrier.

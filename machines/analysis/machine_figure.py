@@ -36,11 +36,11 @@ def machine_figure(machine: Machine, ending: FigureEnding, q: Floats | None = No
     """
     parts = machine.kinematics.clearance_parts
     if parts is None:
-        raise ValueError(f"{machine.name} has no legs")
+        raise ValueError(f"{machine.name} has no legs: only machines on legs are drawn")
     at = machine.home if q is None else q
     rig = machine.kinematics.rig(at[None])
     if not np.isfinite(rig.ends).all():
-        raise ValueError(f"the legs of {machine.name} meet at no platform there")
+        raise ValueError(f"the legs of {machine.name} meet at no platform at {position_words(machine, at)}")
     feet = foot_paths(machine, at)
 
     def fill(sheet: Figure) -> None:
@@ -48,7 +48,13 @@ def machine_figure(machine: Machine, ending: FigureEnding, q: Floats | None = No
             _view(axes, machine, parts, rig, feet, right, up)
             axes.set_title(name)
 
-    return image(_SIZE, f"{machine.name}: {machine.structure}", fill, ending)
+    return image(_SIZE, f"{machine.name}: {machine.structure}\nat {position_words(machine, at)}", fill, ending)
+
+
+def position_words(machine: Machine, q: Floats) -> str:
+    """Joints (J,) mm and rad as the words of a program, mm and degrees."""
+    shown = np.round(np.where(machine.rotary, np.degrees(q), q), 3) + 0.0
+    return " ".join(f"{letter}{value:g}" for letter, value in zip(machine.axis_names, shown.tolist(), strict=True))
 
 
 def foot_paths(machine: Machine, at: Floats) -> Floats:

@@ -91,6 +91,11 @@ class Kinematics(ABC):
     singular_names: tuple[str, ...] = ()
     """what `singular_distance` measures; () where it measures nothing"""
 
+    @property
+    def plane(self) -> Floats | None:
+        """(3,) unit normal of the plane that the tip never leaves; None where it moves in every direction."""
+        return None
+
     # ---- what a kind gives ---------------------------------------------------------------------------------
 
     @abstractmethod

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -29,6 +30,7 @@ from toolpaths.table_text import table_text
 
 if TYPE_CHECKING:
     from machines.machine import Machine
+    from toolpaths.arrays import Floats
     from toolpaths.choices import FigureEnding
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
@@ -44,6 +46,10 @@ machine_app.command("import", epilog=IMPORTED)(machine_import)
 machine_app.command("export", epilog=EXPORTED)(machine_export)
 setup_app.command("new", epilog=EXAMPLES)(setup_new)
 setup_app.command("align", epilog=ALIGNED)(setup_align)
+
+
+ShownAt = Annotated[list[str] | None, typer.Option("--at", metavar="AXIS=POSITION", help="mm or degrees at which the figure "
+                                                   "shows an axis, instead of home")]
 
 
 @machine_app.command("list")
@@ -62,29 +68,49 @@ def machine_list(json: Json = "") -> None:
 
 @machine_app.command("show")
 def machine_show(name: Annotated[str, typer.Argument(help="name or TOML file")],
-                 figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="a machine on legs at home, "
-                                                             ".png or .svg")] = None, json: Json = "") -> None:
+                 figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="a machine on legs, "
+                                                             ".png or .svg")] = None,
+                 at: ShownAt = None,
+                 json: Json = "") -> None:
     """Show a machine: axes, travel, limits, which values are assumed."""
     from postproc.cli.catalogue import machine_dict, machine_text
 
     ending = figure_ending(figure)
+    if at and figure is None:
+        raise typer.BadParameter("it is the pose of a figure: --figure FILE is missing", param_hint="--at")
     refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the machine": name})
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json):
         m = machine_of(name)
         if figure is not None and ending is not None:
-            outputs[figure] = _figure(m, ending)
+            outputs[figure] = _figure(m, ending, at)
     report((), json, machine_dict(m), machine_text(m), outputs)
 
 
-def _figure(machine: Machine, ending: FigureEnding) -> bytes:
-    """Of a machine at home; wrong use where it has no legs."""
+def _figure(machine: Machine, ending: FigureEnding, at: Sequence[str] | None) -> bytes:
+    """Of a machine at home, axes of `at` elsewhere; wrong use where it has no legs or they do not meet."""
     from machines.analysis.machine_figure import machine_figure
 
     try:
-        return machine_figure(machine, ending)
+        return machine_figure(machine, ending, _joints(machine, at))
     except ValueError as fault:
-        raise typer.BadParameter(f"{fault}: only machines on legs are drawn", param_hint="--figure") from fault
+        raise typer.BadParameter(str(fault), param_hint="--at" if at else "--figure") from fault
+
+
+def _joints(machine: Machine, at: Sequence[str] | None) -> Floats:
+    """(J,) mm and rad: home, but for the axes of `at`; wrong use outside their travel."""
+    from postproc.cli.error_files import pairs
+    from toolpaths.units import DEG
+
+    q = machine.home.copy()
+    for letter, value in pairs("--at", at, machine.axis_names).items():
+        j = machine.axis_names.index(letter)
+        size, unit = (DEG, "degrees") if machine.rotary[j] else (1.0, "mm")
+        q[j] = value * size
+        low, high = machine.limits.lower[j] / size, machine.limits.upper[j] / size
+        if not low - 1e-9 <= value <= high + 1e-9:
+            raise typer.BadParameter(f"{letter}={value:g}: travel {low:g} to {high:g} {unit}", param_hint="--at")
+    return q
 
 
 @machine_app.command("check", epilog="Example: postproc machine check my-machine.toml")

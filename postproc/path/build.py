@@ -174,7 +174,7 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
         _add_link(out, moves, first, link, _Legs(before.frame, leaving if by_home else travel, travel, run.frame, before.kin,
                                                  run.kin, before.pose, entry, down))
         if not link.clear:
-            found.append(faults.no_path(moves, first, road.file))
+            found.append(faults.no_path(modes.control.machine, moves, first, road.file))
         if progress:
             progress("blocks", run.last, len(moves))
     return stand, longer, found

@@ -19,6 +19,9 @@ from toolpaths.units import DEG
 _ELSEWHERE = 1e-3
 """mm: a tip that its joints miss by more is not reached"""
 
+_ASIDE = 1e-6
+"""mm off the plane of a machine that moves in one"""
+
 
 def merged(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
     """Diagnostics of the same code and message as one, with the lines of all."""
@@ -62,9 +65,28 @@ def unreachable(control: Control, kin: Kinematics, moves: Moves, rows: Ints, axi
                       f"direction is {off[worst] / DEG:.4f} degrees away", file=file,
                       lines=[int(lines[worst]), *lines[:5].tolist()], count=len(bad), hint=hint)]
     x, y, z = moves.tip[rows[bad[0]]]
+    if off_plane := _off_plane(control.machine, kin, moves.tip[rows], lines[:6].tolist(), len(bad), file):
+        return off_plane
     return [error("reach.position", f"{name} cannot reach the tip position ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table "
                   "frame with that tool axis", file=file, lines=lines[:6].tolist(), count=len(bad),
                   hint="move the part in the set-up (part.origin)")]
+
+
+def _off_plane(machine: Machine, kin: Kinematics, tip: Floats, lines: list[int], count: int, file: str) -> list[Diagnostic]:
+    """The error where tips (N, 3) are off the one plane in which a machine moves them."""
+    if kin.plane is None:
+        return []
+    gap = (kin.forward(machine.home[None])[0] - tip) @ kin.plane
+    worst = int(np.abs(gap).argmax())
+    if abs(gap[worst]) <= _ASIDE:
+        return []
+    (x, y, z), across = tip[worst], float(np.ptp(gap))
+    shift = (np.round(gap[worst] * kin.plane, 4) + 0.0).tolist()
+    return [error("reach.plane", f"the tip position ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table frame is "
+                  f"{abs(gap[worst]):.4f} mm off the plane in which {machine.name} moves the tip of this tool", file=file,
+                  lines=lines, count=count, hint=f"add {shift} to part.origin of the set-up; tools of other gauge lengths "
+                  "are then off that plane" if across <= _ASIDE else
+                  f"the path leaves every plane, by {across:.4f} mm: take a machine with a slide that leaves it")]
 
 
 def spun(kin: Kinematics, moves: Moves, rows: Ints, axis: Floats, q: Floats, tolerance: float,
@@ -87,8 +109,13 @@ def _elsewhere(kin: Kinematics, tip: Floats, q: Floats) -> Bools:
     return np.asarray(~(np.linalg.norm(there - tip, axis=1) <= _ELSEWHERE))
 
 
-def no_path(moves: Moves, row: int, file: str) -> Diagnostic:
+def no_path(machine: Machine, moves: Moves, row: int, file: str) -> Diagnostic:
     """The error where no linking move leads to row `row` of the moves."""
+    if machine.kinematics.plane is not None:
+        return error("link.in_plane", f"{machine.name} moves the tool in one plane alone, so no linking move leaves what is "
+                     "cut", file=file, lines=[int(moves.line[row])], hint="write in_plane = true under [clearance] of "
+                     "the set-up where the tool is lifted or switched off by other means: linking moves then go straight in "
+                     "that plane; or give the machine file a slide that leaves it ([kinematics.carriers.Z])")
     return error("link.blocked", "no linking move stays above the safe planes", file=file, lines=[int(moves.line[row])],
                  hint="move the part in the set-up (part.origin), or lower clearance.margin")
 

@@ -50,6 +50,8 @@ class SafeSpace:
     distance: float | None
     margin: float
     centres: Floats
+    in_plane: bool = False
+    """linking moves may go straight in the plane that the machine never leaves"""
 
     def plane(self, axis: Floats, turning: bool, share: float) -> float:
         """Distance of the safe plane square to `axis` from the centre; `share` of the margin."""
@@ -90,7 +92,8 @@ def safe_space(moves: Moves, setup: SetupFile, placement: Placement, place: Ints
     if place is not None:
         centres = np.array([[0.5 * (x.min() + x.max()) for x in _cut(moves, np.flatnonzero(place == k)).T]
                             for k in np.unique(place)])
-    return SafeSpace(centre, radius, box_corners(low, high), setup.clearance.distance, setup.clearance.margin, centres)
+    return SafeSpace(centre, radius, box_corners(low, high), setup.clearance.distance, setup.clearance.margin, centres,
+                     setup.clearance.in_plane)
 
 
 def _cut(moves: Moves, rows: Ints | slice) -> Floats:
@@ -188,6 +191,8 @@ def _inside(q: Floats, machine: Machine) -> bool:
 
 def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, before: Pose | None,
           after: Pose | None, by_home: bool, turning: bool, share: float) -> Link:
+    if kin1.plane is not None:
+        return _in_plane(control, kin0, kin1, space, before, after, by_home)
     none = np.zeros((0, kin0.joints))
     up0 = _above(kin0, space, before, turning, share) if before is not None else None
     up1 = _above(kin1, space, after, turning, share) if after is not None else None
@@ -209,6 +214,27 @@ def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace
     begin = home[-1] if by_home else up0.q if up0 is not None else control.machine.home
     index, clear = _index(control, kin1, space, begin, up1, space.plane(up1.axis, turning, share), slack)
     return Link(retract, home, index, approach, home_state, np.full(index.shape, by_home), clear and travel)
+
+
+def _in_plane(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace, before: Pose | None,
+              after: Pose | None, by_home: bool) -> Link:
+    """The path of a machine that cannot lift the tool: the tip straight in its plane, by home where asked for."""
+    none = np.zeros((0, kin0.joints))
+    retract = home = index = none
+    if by_home:
+        home = (control.machine.home if before is None else control.parked(before.q))[None]
+        retract = none if before is None else _leg(control, kin0, before, _standing(kin0, home[0]))[:-1]
+    if after is not None:
+        start = before if before is not None and not by_home else _standing(
+            kin1, home[0] if len(home) else control.machine.home)
+        index = _leg(control, kin1, start, after)
+    return Link(retract, home, index, none, np.ones(home.shape, dtype=bool), np.zeros(index.shape, dtype=bool),
+                space.in_plane)
+
+
+def _standing(kin: Kinematics, q: Floats) -> Pose:
+    tip, axis = kin.forward(q[None])
+    return Pose(tip[0], axis[0], q)
 
 
 def _above(kin: Kinematics, space: SafeSpace, pose: Pose, turning: bool, share: float) -> Pose:

@@ -65,6 +65,10 @@ def drawing_of(setup: SetupFile, placement: Placement, space: SafeSpace, machine
     if rewind.stock is not None and not (np.array(rewind.stock.low) < np.array(rewind.stock.high)).all():
         diagnostics.append(error("setup.stock", f"rewind.stock: low {rewind.stock.low} must be below high "
                                  f"{rewind.stock.high} in x, y and z", file=file))
+    if setup.clearance.in_plane and machine.kinematics.plane is None:
+        diagnostics.append(error("setup.in_plane", f"clearance.in_plane = true: {machine.name} lifts the tool out of every "
+                                 "plane", file=file, hint="take in_plane out of [clearance]: linking moves go by the safe "
+                                 "planes"))
     if diagnostics:
         return RetractPlan(space), diagnostics
     index = machine.axis_names.index

@@ -61,6 +61,9 @@ class LinkClearance(UserModel):
     between: Literal["home", "plane"] = "home"
     """where the tool goes between two [[places]]: with the retract axis to home (G53 Z0), or along the safe plane above
     all of them"""
+    in_plane: bool = False
+    """true: on a machine that moves the tool in one plane alone, linking moves go straight in that plane, the tool lifted
+    or switched off by other means ([hooks]); false: they are refused"""
 
 
 TOOL_LIMITS = ("tip_acceleration", "tip_jerk", "axis_rate")

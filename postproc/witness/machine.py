@@ -130,6 +130,11 @@ class Rods:
     wrong: bool = False
     """every rod is a leg of its own, the platform turns as it must; of two pairs in a plane the mean of each counts"""
 
+    @property
+    def flat(self) -> bool:
+        """True where platform and carriers leave the tip in one plane."""
+        return int(np.linalg.matrix_rank(np.array([*np.diag(1.0 - self.held), *self.carriers.values()]))) < 3
+
     def misfit(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array, length: Array) -> Array:
         """(N,) mm: the worst of rods off their length, and of the axis off what the platform can do (times
         1000); infinite where the foot of a rod stands on the wrong side of it."""

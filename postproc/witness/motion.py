@@ -100,11 +100,11 @@ class Walked:
 
 
 def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_angle: float, bent: bool,
-               table: dict[str, object], fed_rapids: bool) -> list[Finding]:
+               table: dict[str, object], fed_rapids: bool, flat: bool = False) -> list[Finding]:
     """Blocks off their path that are no retract, approach or move clear of what is cut; rapids in cuts and the reverse.
 
     Rapids that turn the tool axis by more than `link_angle` (degrees) have to be clear, or on such a line, themselves;
-    where they are dog-legs (`bent`) they may be fed if the set-up asks for that."""
+    where they are dog-legs (`bent`) they may be fed if the set-up asks for that; `flat`: no rapid has to be clear."""
     good = w.on_path()
     step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
     moved = np.sqrt((step * step).sum(axis=1))
@@ -132,7 +132,7 @@ def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_ang
         k = int(cuts[0])
         found += _finding(w, cuts, lines, "path", f"the tool is {w.away[k]:.6f} mm and {np.degrees(w.tilt[k]):.6f} degrees "
                           "off the path of the CL file")
-    rest = bad[~np.isin(bad, cuts)]
+    rest = bad[~np.isin(bad, cuts) & ~(flat & ((w.code[bad] == 0) | (bent and fed_rapids)))]
     return found + _finding(w, rest, lines, "clearance", "motion that the CL file does not command comes nearer to what is "
                             "cut than the margin of the set-up")
 

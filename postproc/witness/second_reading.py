@@ -26,6 +26,7 @@ from postproc.witness.turning import check_turning
 
 ZERO = 1e-6
 """mm that reckoning may move the zero of the work offset"""
+PASSED = NotCompared("linking moves", "in the one plane of the machine, as [clearance] in_plane says")
 
 
 def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
@@ -104,10 +105,11 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     w = Walked(poses, targets, owner, there, along, (case.tolerance, case.axis_tolerance))
     w.measure()
     clearance = case.setup.get("clearance") or {}
+    flat = clearance.get("in_plane") is True and isinstance(rods := kinematics_of(table), Rods) and rods.flat
     margin, link_angle = float(clearance.get("margin", 50.0)), float(clearance.get("link_angle", 5.0))
     if not len(lost):
         found += check_path(w, c.line, cut, margin, link_angle, case.bent_rapids, table,
-                            bool((case.setup.get("output") or {}).get("rapids_as_feed")))
+                            bool((case.setup.get("output") or {}).get("rapids_as_feed")), flat)
         found += check_arcs(w, turns, c.line)
     faults, rests = check_rests(w, c, match) if not len(lost) else ([], 0)
     found += faults
@@ -136,7 +138,7 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
         "positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()), "holes": holes, "feeds": feeds,
         **states, "cutter compensation": sides, "rests and stops": rests, "work offset": zeros,
         "turns of modulo axes": turned, "clamps": clamped}
-    return found, worst, counts, silent
+    return found, worst, counts, [*silent, *[PASSED] * flat]
 
 
 def _zero(case: Case, c: Commanded, place: tuple[Array, Array], poses: Poses) -> tuple[list[Finding], int]:

@@ -30,6 +30,18 @@ _REACH = [
     convert("reach.clearance", START + CUT, r"\(part\.(origin)\)", sheet("190.0", "-60.0"), machine=DELTA,
             setup=AT.format(z=190.0)),
 ]
+FLAT = START + "RAPID\nGOTO/0,0,0\nGOTO/9,0,0\nRAPID\nGOTO/9,9,0\n"
+PLANAR = "planar-delta"
+_PLANE = [
+    convert("reach.plane", FLAT, r"add \[0\.0, 0\.0, (.*?)\] to part\.origin", sheet("5.0]", r"-110.0]"), machine=PLANAR,
+            setup=AT.format(z=5.0), stops=("link.in_plane",)),
+    convert("reach.plane", FLAT.replace("9,9,0", "9,9,5"), r"a machine with a slide that leaves it",
+            option("planar-delta-z", PLANAR), machine=PLANAR, setup=AT.format(z=-110.0)),
+    convert("link.in_plane", FLAT, r"write (in_plane = true) under (\[clearance\])", sheet("", r"\2\n\1\n"), machine=PLANAR,
+            setup=AT.format(z=-110.0)),
+    convert("setup.in_plane", START + CUT, r"take (in_plane) out of \[clearance\]", sheet("in_plane = true\n", ""),
+            setup=LENGTH + "[clearance]\nin_plane = true\n"),
+]
 _CHECK = [
     convert("check.no_rotary", START + CUT, "convert without (--check-program)", option("", " --check-program c.ngc"),
             more=" --check-program c.ngc"),
@@ -44,4 +56,4 @@ _CHECK = [
              {"m.toml": 'base = "delta-star"\n[kinematics.workspace]\nz = [-200, 1200]\n'}, "make the workspace smaller",
              (Edit("m.toml", "[kinematics.workspace]\nz = [-200, 1200]\n", ""),)),
 ]
-PLACE = [*_REACH, *_CHECK]
+PLACE = [*_REACH, *_PLANE, *_CHECK]

@@ -142,6 +142,12 @@ class PosesOfLegs(Kinematics):
         linear = self.loops.basis[:3]
         return np.column_stack([linear[:, linear.any(axis=0)], self.carriers.T])
 
+    @cached_property
+    def plane(self) -> Floats | None:
+        """See the base class: where platform and carriers move along two directions."""
+        moves = self._moves
+        return None if moves.shape[1] > 2 else unit(cross(moves[None, :, 0], moves[None, :, 1]))[0]
+
     # ---- forward -------------------------------------------------------------------------------------------
 
     @cached_property

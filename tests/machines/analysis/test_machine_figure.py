@@ -31,6 +31,12 @@ def test_the_command_draws_machines_on_legs_and_refuses_others(tmp_path: Path) -
     svg, png = tmp_path / "m.svg", tmp_path / "m.png"
     assert show("rotary-delta", "--figure", str(svg)) == 0 and svg.read_text().startswith("<?xml")
     assert "workspace of the platform" in svg.read_text()
+    assert show("rotary-delta", "--figure", str(svg), "--at", "A=20", "--at", "B=-5.5") == 0
+    assert "at A20 B-5.5 C13.271" in svg.read_text()
+    assert show("triaglide", "--figure", str(png), "--at", "X=50", "--at", "Y=-1600", "--at", "Z=1600") == 2
+    for wrong in (["--at", "A=81"], ["--at", "X=1"], ["--at", "A=x"]):
+        assert show("rotary-delta", "--figure", str(png), *wrong) == 2 and not png.exists(), wrong
+    assert show("rotary-delta", "--at", "A=20") == 2
     assert show("mill-3axis", "--figure", str(png)) == 2 and not png.exists()
     assert show("uranesx", "--figure", str(tmp_path / "m.pdf")) == 2
 

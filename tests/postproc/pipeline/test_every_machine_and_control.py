@@ -13,6 +13,7 @@ import toolpaths
 from postproc.base.options import Options
 from postproc.controllers.model import builtin_files
 from postproc.setup.model import load_setup
+from tests.postproc.kit import setup_of
 from toolpaths.diagnostics import Severity
 
 SAMPLES = Path(__file__).parents[3] / "samples"
@@ -44,11 +45,31 @@ GOTO/8,4,30
 FINI
 """
 
+FLAT = b"""UNITS/MM
+LOAD/TOOL,1
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/2,3,0
+FEDRAT/MMPM,400
+GOTO/9,5,0
+CIRCLE/9,9,0,0,0,1,4
+GOTO/13,9,0
+STOP
+SPINDL/RPM,3000,CLW
+RAPID
+GOTO/2,8,0
+FINI
+"""
+"""what a machine can do that moves the tool in one plane alone"""
+IN_PLANE = "[tools.1]\ngauge_length = 110.0\n[part]\norigin = [0.0, 0.0, -110.0]\n[clearance]\nin_plane = true\n"
+
 
 @cache
 def part_for(machine: str) -> tuple[toolpaths.Toolpath, object]:
     """The part, and the set-up that puts it where the machine reaches."""
     own = machines.load(machine)
+    if own.kinematics.plane is not None:
+        return toolpaths.read_bytes(FLAT)[0], setup_of(IN_PLANE)
     kind = "tools" if own.kinematics.workspace is None or own.control_kinematics else (
         "h4a" if machine.startswith("h4a") else "delta")
     setup, _ = load_setup(SAMPLES / f"{kind}.setup.toml")
