@@ -61,7 +61,7 @@ class BlockPoses:
         self._ahead.clear()
         if 0 < len(rows) * len(between) <= FEW:
             shares = np.concatenate([np.broadcast_to(np.asarray(t), len(rows)) for t in between])
-            found = BlockMotions.of(motion, self.control, np.tile(rows, len(between))).at(shares)
+            found = BlockMotions.of(motion, self.control, rows).tiled(len(between)).at(shares)
             parts = iter(found.reshape(len(between), len(rows), -1))
             positions = [motion.end[rows] if _whole(t) else next(parts) for t in times]
             self._ahead.append((motion, rows, _Ahead(times, positions)))
@@ -261,8 +261,14 @@ class BlockMotions:
     def of(cls, motion: Motion, control: Control, rows: Ints) -> BlockMotions:
         """What `at` needs."""
         before, end, frame = begins(motion, rows), motion.end[rows], taken(motion.frame, rows)
-        first, last = motion.table.coordinates(frame, before), motion.table.coordinates(frame, end)
-        return cls(motion, control, rows, before, end, frame, first, last)
+        return cls(motion, control, rows, before, end, frame, *coordinates(motion, rows))
+
+    def tiled(self, times: int) -> BlockMotions:
+        """The blocks `times` times one after the other, (times K) of them."""
+        ends = (np.tile(a, (times, 1)) for a in (self.before, self.end))
+        coordinates = (np.tile(a, (times, 1)) for a in (self.first, self.last))
+        return BlockMotions(self.motion, self.control, np.tile(self.rows, times), *ends, np.tile(self.frame, times),
+                            *coordinates)
 
     def at(self, t: float | Floats) -> Floats:
         """Machine coordinates (K, J) at fraction t, one or (K,)."""
@@ -321,9 +327,22 @@ def signed_sweep(first: Floats, last: Floats, ccw: Bools) -> Floats:
 
 
 def coordinates(motion: Motion, rows: Ints) -> tuple[Floats, Floats]:
-    """Coordinates (K, J) where blocks begin and end, each in the frame of its block."""
-    table, frame = motion.table, motion.frame[rows]
-    return table.coordinates(frame, begins(motion, rows)), table.coordinates(frame, motion.end[rows])
+    """Coordinates (K, J) where blocks begin and end, each in the frame of its block.
+
+    A block that follows the one before it in `rows`, in the same frame, begins where that one ends: each such
+    place is computed once.
+    """
+    frame, before, end = taken(motion.frame, rows), begins(motion, rows), motion.end[rows]
+    if motion.table.plain:
+        return before, end
+    follows = np.zeros(len(rows), dtype=bool)
+    follows[1:] = (np.diff(rows) == 1) & (np.diff(frame) == 0)
+    apart = np.flatnonzero(~follows)
+    found = motion.table.coordinates(np.concatenate([frame[apart], frame]), np.concatenate([before[apart], end]))
+    last = found[len(apart):]
+    first = np.roll(last, 1, axis=0)
+    first[apart] = found[:len(apart)]
+    return first, last
 
 
 def arc_sweeps(motion: Motion, control: Control) -> Floats:
