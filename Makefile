@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile -rfEs
 SOURCES := toolpaths machines postproc
 NUMERIC = $(shell grep -rl --include='test_*.py' 'mark\.numeric' tests)
 
-.PHONY: demo test quick numeric hard damage changes slow mutants programs lint lock clean
+.PHONY: demo test quick numeric hard damage changes slow mutants programs faults lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -46,6 +46,11 @@ mutants: $(STAMP)
 # Changes of written programs alone, by control: caught, warned of, silent and harmful.
 programs: $(STAMP)
 	$(BIN)/python -m tests.mutants --programs "$(ONLY)"
+
+# Every command that writes: killed at MOMENTS random moments, full disk, lost folder, two writers, closed pipe, clock, memory.
+MOMENTS ?= 200
+faults: $(STAMP)
+	$(BIN)/python tests/faults/run.py --count $(MOMENTS)
 
 # Under a minute on two processors once compiled code is kept (tests/tiers.py says what belongs to it).
 quick: $(STAMP)
