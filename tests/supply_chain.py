@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "licences.md"
 HEAD = """# Licences of what an installation brings
 
-Written by `python tests/supply_chain.py` from the metadata of the packages; versions stand in `requirements.lock`. The licence
+Written by `python tests/supply_chain.py` from the metadata of the packages; versions: `requirements.lock`. The licence
 of the project itself is MIT (`LICENSE`).
 
 | package | licence | needed by |
