@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile -rfEs
 SOURCES := toolpaths machines postproc
 NUMERIC = $(shell grep -rl --include='test_*.py' 'mark\.numeric' tests)
 
-.PHONY: demo test quick numeric hard damage changes slow mutants programs lint lock clean
+.PHONY: demo test quick numeric hard damage changes slow mutants programs faults fuzz lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -46,6 +46,20 @@ mutants: $(STAMP)
 # Changes of written programs alone, by control: caught, warned of, silent and harmful.
 programs: $(STAMP)
 	$(BIN)/python -m tests.mutants --programs "$(ONLY)"
+
+# Every command that writes: killed at MOMENTS random moments, full disk, lost folder, two writers, closed pipe, clock, memory.
+MOMENTS ?= 200
+faults: $(STAMP)
+	$(BIN)/python tests/faults/run.py --count $(MOMENTS)
+
+# Every reader under coverage-guided fuzzing, TIME seconds each; ONLY="cl fanuc" takes these. Findings are files in out/fuzz.
+TIME ?= 1200
+FUZZ = cl fanuc haas siemens klartext linuxcnc iso setup machine controller log stl off obj ply
+fuzz: $(STAMP)
+	@test -d .venv/fuzz/atheris || $(BIN)/pip install --quiet --disable-pip-version-check --target .venv/fuzz \
+		-r tests/fuzz/requirements.txt
+	@failed=0; for one in $(if $(ONLY),$(ONLY),$(FUZZ)); do echo "target: $$one"; \
+		$(BIN)/python tests/fuzz/run.py $$one --seconds $(TIME) || failed=1; done; exit $$failed
 
 # Under a minute on two processors once compiled code is kept (tests/tiers.py says what belongs to it).
 quick: $(STAMP)

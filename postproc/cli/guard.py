@@ -16,6 +16,11 @@ from typing import TextIO
 INTERNAL = 70
 """exit code of a fault of the program itself (EX_SOFTWARE of BSD's sysexits.h)"""
 INTERRUPTED = 130
+_LEAST_MEMORY = 500 * 2**20
+"""bytes of address space below which numpy's OpenBLAS neither loads nor fails: its threads wait for each other without
+end, or it ends the process without a word"""
+_NO_ROOM = ("failed to map segment", "cannot allocate memory", "can't start new thread", "cannot allocate write+execute")
+"""what loaders of libraries, threads and compiled code say where memory is used up"""
 _ROOMS = ("postproc", "machines", "toolpaths")
 _CONSOLE = (errno.EPIPE, errno.ENOSPC, errno.EIO, errno.EBADF, errno.EFBIG, errno.EAGAIN)
 """what printing fails with; files that are read and written have their own diagnostics"""
@@ -30,6 +35,9 @@ def guarded(command: Callable[[], object]) -> int:
     pipe end quietly.
     """
     try:
+        if short := _too_little_memory():
+            _say(short)
+            return 1
         try:
             command()
             code = 0
@@ -40,9 +48,9 @@ def guarded(command: Callable[[], object]) -> int:
     except KeyboardInterrupt:
         return _interrupted()
     except OSError as fault:
-        return _console_gone(fault) if _of_console(fault) else _internal(fault)
+        return _console_gone(fault) if _of_console(fault) else _failed(fault)
     except Exception as fault:
-        return _internal(fault)
+        return _failed(fault)
 
 
 def fingerprint(fault: BaseException) -> str:
@@ -69,6 +77,42 @@ def report_text(fault: BaseException, arguments: list[str]) -> str:
         "traceback:", "".join(traceback.format_exception(fault)).rstrip(), ""])
 
 
+def _failed(fault: Exception) -> int:
+    """Memory that is used up is no fault of the program; all else is."""
+    if not _of_memory(fault):
+        return _internal(fault)
+    fault.__traceback__ = fault.__context__ = fault.__cause__ = None  # what the command held is free for the message
+    _say("memory is used up; the command ended; each of its files is whole, new or as it was; allow it more (ulimit -v, "
+         "the limit of the container), end other programs, or convert the operations of the file one by one")
+    return 1
+
+
+def _of_memory(fault: BaseException | None) -> bool:
+    """True where an exception, or one that it came from, says that there is no memory."""
+    seen: set[int] = set()
+    while fault is not None and id(fault) not in seen:
+        seen.add(id(fault))
+        if isinstance(fault, MemoryError) or getattr(fault, "errno", None) == errno.ENOMEM:
+            return True
+        if isinstance(fault, (ImportError, RuntimeError, OSError)) and any(w in str(fault).lower() for w in _NO_ROOM):
+            return True
+        fault = fault.__cause__ or fault.__context__
+    return False
+
+
+def _too_little_memory() -> str:
+    """What is said where the limit of this process (setrlimit(2), RLIMIT_AS) is too small to begin; "" where it is not."""
+    try:
+        import resource
+    except ImportError:  # systems without such limits
+        return ""
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit == resource.RLIM_INFINITY or limit >= _LEAST_MEMORY:
+        return ""
+    return (f"the memory limit of {limit >> 20} MB is too small, at least {_LEAST_MEMORY >> 20} MB are needed; "
+            f"nothing was written; raise it: ulimit -v {_LEAST_MEMORY >> 10}")
+
+
 def _internal(fault: BaseException) -> int:
     """One line on standard error, and the report file."""
     code = fingerprint(fault)
@@ -82,8 +126,6 @@ def _internal(fault: BaseException) -> int:
 
 def _named(fault: BaseException) -> str:
     """The kind of exception, in words where it has some."""
-    if isinstance(fault, MemoryError):
-        return "memory is used up"
     return "nested too deeply" if isinstance(fault, RecursionError) else type(fault).__name__
 
 

@@ -53,9 +53,10 @@ def _asked(sheet: Path) -> bool:
     """The sheet, written from the answers; where they end too soon it is not."""
     from machines.sheet.questions import sheet_text
     from toolpaths.diagnostics import DiagnosticError, error
+    from toolpaths.transaction import write_together
 
     try:
-        sheet.write_text(sheet_text(_ask), "utf-8")
+        write_together({sheet: sheet_text(_ask)})
     except EOFError:
         raise DiagnosticError([error("sheet.unanswered", f"the answers ended before {sheet} was whole; nothing was written",
                                      hint=f"answer on a terminal, or write {sheet} and name it again")]) from None

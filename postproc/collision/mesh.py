@@ -23,6 +23,9 @@ FORMATS = (".stl", ".ply", ".obj", ".off")
 _SMALL, _LARGE = 1.0, 20000.0
 """mm: a solid whose largest side is outside is likely in another unit"""
 
+_LARGEST = 1e7
+"""mm or inches of a coordinate: merging vertices counts steps of 1e-8 in integers of 64 bits"""
+
 
 def load_mesh(path: str | FilePath, units: LengthUnit = "mm",
               key: str = "") -> tuple[Trimesh | None, list[Diagnostic]]:
@@ -92,6 +95,10 @@ def _broken(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
     bad = np.flatnonzero(~np.isfinite(mesh.vertices).all(axis=1))
     if len(bad):
         return (error("mesh.number", f"{len(bad)} of {len(mesh.vertices)} vertices are not finite numbers", file=path,
+                      hint="export it again"),)
+    largest = float(np.abs(mesh.vertices).max())
+    if largest > _LARGEST:
+        return (error("mesh.number", f"a vertex lies at {largest:g}, at most {_LARGEST:g} is read", file=path,
                       hint="export it again"),)
     return ()
 

@@ -77,7 +77,7 @@ def _full() -> int:
     raise PermissionError(13, "Permission denied")
 
 
-@pytest.mark.parametrize("fault", [MemoryError(), RecursionError("deep"), AssertionError(), OSError(2, "gone", "x.txt")])
+@pytest.mark.parametrize("fault", [RecursionError("deep"), AssertionError(), OSError(2, "gone", "x.txt")])
 def test_every_kind_of_exception(fault: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                  capsys: pytest.CaptureFixture[str]) -> None:
     def command() -> None:
@@ -136,3 +136,35 @@ def test_every_command_has_the_largest_size(arguments: tuple[str, ...]) -> None:
     assert "schema" in arguments or "raise the limit with --max-file-size" in run.stderr
     assert CliRunner().invoke(app, [*arguments, "--max-file-size", "2"]).exit_code == 0
     assert CliRunner().invoke(app, [*arguments, "--max-file-size", "0"]).exit_code == 2
+
+
+def _caused(fault: Exception) -> Exception:
+    """An exception that another one led to, as libraries wrap what their parts raise."""
+    outer = ImportError("no numbers")
+    outer.__cause__ = fault
+    return outer
+
+
+@pytest.mark.parametrize("fault", [
+    MemoryError(), OSError(12, "Cannot allocate memory"), RuntimeError("can't start new thread"),
+    _caused(ImportError("libopenblas.so: failed to map segment from shared object"))])
+def test_memory_that_is_used_up_is_no_fault_of_the_program(fault: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                           capsys: pytest.CaptureFixture[str]) -> None:
+    def command() -> None:
+        raise fault
+
+    monkeypatch.chdir(tmp_path)
+    assert guarded(command) == 1
+    assert capsys.readouterr().err.startswith("memory is used up;") and not list(tmp_path.iterdir())
+
+
+def test_a_limit_too_small_to_begin_is_said(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Below it OpenBLAS waits without end, or ends the process as if Ctrl-C had been pressed."""
+    resource = pytest.importorskip("resource")
+    ran: list[int] = []
+    for limit, code, said in ((200 << 20, 1, "the memory limit of 200 MB is too small, at least 500 MB"),
+                              (600 << 20, 0, ""), (resource.RLIM_INFINITY, 0, "")):
+        monkeypatch.setattr(resource, "getrlimit", lambda kind, limit=limit: (limit, limit))
+        assert guarded(lambda: ran.append(1)) == code
+        assert capsys.readouterr().err.startswith(said)
+    assert len(ran) == 2

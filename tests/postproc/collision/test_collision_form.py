@@ -311,3 +311,12 @@ def test_setup_check_says_where_bodies_stand(tmp_path: Path) -> None:
 
 def test_a_setup_without_bodies_has_none() -> None:
     assert SetupFile().bodies is None
+
+
+@pytest.mark.parametrize("far", ["7e39", "1e300", "2e7"])
+def test_vertices_beyond_counting_are_refused(tmp_path: Path, far: str) -> None:
+    """A number that a damaged file may hold: merging vertices would count it in integers, and wrap round."""
+    path = tmp_path / "far.off"
+    path.write_text(f"OFF\n4 4 0\n0 0 0\n{far} 0 0\n0 9 0\n0 0 9\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n")
+    mesh, found = load_mesh(path)
+    assert mesh is None and [d.code for d in found] == ["mesh.number"] and "at most 1e+07" in found[0].message
