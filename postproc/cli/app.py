@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.base.options import FeedModeChoice, FeedSource, OutputMode
+from postproc.base.json_values import rounded as rounded
 from postproc.cli.calibrate import calibrate
 from postproc.cli.console import (
     Json,
@@ -24,7 +25,6 @@ from postproc.cli.console import (
     report,
     shown_errors,
 )
-from postproc.cli.console import rounded as rounded
 from postproc.cli.errors import errors_app
 from postproc.cli.group import Group
 from postproc.cli.guard import guarded
@@ -54,6 +54,8 @@ from postproc.cli.orient import EXAMPLES
 from postproc.cli.orient import orient as orient_command
 from postproc.cli.place import EXAMPLES as PLACES
 from postproc.cli.place import place
+from postproc.cli.report import EXAMPLE as REPORTS
+from postproc.cli.report import report_command
 from postproc.cli.time import time
 from toolpaths.choices import FieldEnding, GivenDialect, GivenUnit
 
@@ -74,6 +76,7 @@ app.command(short_help="Identify a machine's errors from measurements, each with
 app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc")(time)
 app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog=PLACES)(place)
+app.command("report", epilog=REPORTS)(report_command)
 
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "

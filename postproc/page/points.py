@@ -1,0 +1,179 @@
+"""The points that the page draws: ends of executed blocks and places between, with time, joints and what limits each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.choices import MotionOrder
+from postproc.cycle_time.blocks import MotionBlocks
+from postproc.cycle_time.estimate import Estimate
+from postproc.cycle_time.shares import CAUSES, FELT, shares
+from postproc.cycle_time.shape import shape
+from postproc.page.columns import Column
+from postproc.pipeline.result import PostResult
+from postproc.readback.comparison.compare import Comparison, place_on_moves
+from postproc.readback.text.canonical import in_files
+from postproc.report.residuals import residuals
+from toolpaths.arrays import Floats, Ints
+from toolpaths.shapes import arrays
+from toolpaths.units import DEG
+
+FINE, COARSE = 1e-4, 1e-3
+"""mm or degrees: steps of positions, up to MANY points and beyond"""
+MANY = 200_000
+ARC_STEP, TURN_STEP, MOST = 0.1, 5.0 * DEG, 64
+"""rad of an arc and of a rotary axis from one point to the next; points of a block at most"""
+CHUNK = 200_000
+"""points whose poses are found at once"""
+ORDERS: tuple[MotionOrder, ...] = ("velocity", "acceleration", "jerk")
+
+
+@dataclass(frozen=True)
+@arrays(block="P", row="P", share="P")
+class DrawnPoints:
+    """P points: block (P,) of the estimate, row (P,) of the executed motion, and at which share of that row."""
+
+    block: Ints
+    row: Ints
+    share: Floats
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+
+def drawn_points(blocks: MotionBlocks) -> DrawnPoints:
+    """The end of every block that moves; of arcs and of blocks that turn far also places between."""
+    if blocks.row is None:
+        raise ValueError("blocks of no executed motion are not drawn")
+    row = np.asarray(blocks.row)
+    new = np.diff(row, prepend=-1) != 0
+    group = np.cumsum(new) - 1
+    size = np.bincount(group) if len(row) else np.zeros(0, dtype=np.int64)
+    within = np.arange(len(row)) - np.flatnonzero(new)[group]
+    count = _pieces(blocks)
+    block = np.repeat(np.arange(len(row)), count)
+    part = (np.arange(len(block)) - (np.cumsum(count) - count)[block] + 1.0) / count[block]
+    share = (within[block] + part) / size[group[block]]
+    return DrawnPoints(block, row[block], np.minimum(share, 1.0))
+
+
+def _pieces(blocks: MotionBlocks) -> Ints:
+    turning = np.abs(np.where(blocks.axes.rotary, blocks.end - blocks.start, 0.0)).max(axis=1, initial=0.0)
+    around = np.where(blocks.arc, blocks.sweep / ARC_STEP, 0.0)
+    return np.clip(np.ceil(np.maximum(turning / TURN_STEP, around)), 1, MOST).astype(np.int64)
+
+
+def columns(result: PostResult, e: Estimate) -> list[Column]:
+    """All that the page knows of each point; the first row is where the program begins."""
+    c, job = result.comparison, result.job
+    if c is None or job is None:
+        raise ValueError("a conversion that was not read back has no points")
+    drawn = drawn_points(e.blocks)
+    tip, axis, q = _poses(c, drawn)
+    back = job.placement.inverse()
+    tip, axis = back.points(tip), back.directions(axis)
+    step = FINE if len(drawn) <= MANY else COARSE
+    units = job.control.unit
+    found = [Column(f"part {name}", tip[:, k], step, "mm") for k, name in enumerate("xyz")]
+    found += [Column(f"axis {name}", axis[:, k], 1e-4) for k, name in enumerate("ijk")
+              ] if not result.machine.kinematics.chain else []
+    found += [Column(letter, q[:, j] * units[j], step, "deg" if result.machine.rotary[j] else "mm")
+              for j, letter in enumerate(result.machine.axis_names)]
+    return found + _times(e, drawn) + _lines(c, e, drawn) + _limits(e, drawn) + _deviations(result, c, drawn)
+
+
+def _first(values: Floats) -> Floats:
+    """With the first value twice: where the program begins belongs to its first block."""
+    return np.concatenate([values[:1], values])
+
+
+def _poses(c: Comparison, drawn: DrawnPoints) -> tuple[Floats, Floats, Floats]:
+    """(tip, axis (P + 1, 3) in the table frame, joints (P + 1, J)) of where the program begins and of points."""
+    motion = c.executed[1]
+    every, share_of_row = np.concatenate([drawn.row[:1], drawn.row]), np.concatenate([[0.0], drawn.share])
+    tip, axis = np.empty((len(every), 3)), np.empty((len(every), 3))
+    q = np.empty((len(every), motion.end.shape[1]))
+    for at in range(0, len(every), CHUNK):
+        rows, share = every[at:at + CHUNK], share_of_row[at:at + CHUNK]
+        whole = share >= 1.0
+        for some, t in ((np.flatnonzero(whole), 1.0), (np.flatnonzero(~whole), share[~whole])):
+            if len(some):
+                tip[at + some], axis[at + some] = c.poses.poses(motion, rows[some], t)
+                q[at + some] = c.poses.joints(motion, rows[some], t)
+    return tip, axis, q
+
+
+def _times(e: Estimate, drawn: DrawnPoints) -> list[Column]:
+    """Milliseconds from point to point, and how much of them the machine rests before it moves on."""
+    begin, seconds = e.timed.begin, e.timed.seconds
+    rest = np.maximum(np.diff(begin, prepend=begin[:1]) - np.concatenate([[0.0], seconds[:-1]]), 0.0)
+    count = np.bincount(drawn.block, minlength=len(begin))
+    first = np.diff(drawn.block, prepend=-1) != 0
+    resting = np.where(first, rest[drawn.block], 0.0)
+    end = np.cumsum(resting + (seconds / np.maximum(count, 1))[drawn.block])
+    at = np.diff(np.round(np.concatenate([[0.0], end]) * 1e3), prepend=0.0)
+    return [Column("time step", at, 1.0, "ms"), Column("rest", np.concatenate([[0.0], resting]) * 1e3, 1.0, "ms")]
+
+
+def _lines(c: Comparison, e: Estimate, drawn: DrawnPoints) -> list[Column]:
+    """Lines of program and CL file, number of the program's file, operation, kind (0 rapid, 1 feed, 2 arc)."""
+    code, b = c.executed[0], e.blocks
+    line = np.asarray(b.line)[drawn.block]
+    file = np.maximum(np.searchsorted([n for _, n in code.files], line) - 1, 0) if code.files else np.zeros(len(line))
+    cl = np.asarray(b.cl_line)[drawn.block] if b.cl_line is not None else np.full(len(line), -1)
+    kind = np.where(b.rapid, 0, np.where(b.arc, 2, 1))[drawn.block]
+    named = (("NC line", in_files(line, code.files)), ("NC file", file), ("CL line", cl),
+             ("operation", np.asarray(b.operation)[drawn.block]), ("kind", kind))
+    return [Column(name, _first(np.asarray(values, dtype=np.float64)), 1.0) for name, values in named]
+
+
+def _limits(e: Estimate, drawn: DrawnPoints) -> list[Column]:
+    """Feed asked for and reached, the cause of the time, and the limit that holds: 3 J + order, -1 for the feed word.
+
+    `reached` is the largest speed within the block by the time model; `of velocity` is the share of the nearest velocity
+    limit that this takes; `ramps`, `builds up` are 1 where the block changes speed, and acceleration.
+    """
+    b, times = e.blocks, e.timed
+    form = shape(b)
+    ratio = [form.share / limit for limit in (b.axes.velocity, b.axes.acceleration, b.axes.jerk)]
+    held = times.peak * ratio[0].max(axis=1) >= 1.0 - FELT
+    spent = np.stack([np.where(held | b.rapid, times.steady, 0.0), times.ramp, times.jerk])
+    order = spent.argmax(axis=0)
+    axis = np.stack([r.argmax(axis=1) for r in ratio])[order, np.arange(len(b))]
+    limit = np.where(spent.max(axis=0) > np.where(held | b.rapid, 0.0, times.steady), 3 * axis + order, -1)
+    by_cause = shares(e).by_cause
+    cause = np.argmax(np.stack([by_cause[name] for name in CAUSES]), axis=0)
+    asked = np.where(np.isfinite(b.speed), b.speed, np.nan)
+    slow = np.where(b.arc | (form.length > 0.0), 1.0, np.nan)
+    turning = np.where((b.axes.xyz >= 0).any() & (np.abs((b.end - b.start)[:, b.axes.xyz[b.axes.xyz >= 0]]).max(
+        axis=1, initial=0.0) > 1e-9), 60.0, 60.0 / DEG)
+    rows = (("feed asked", asked * turning, 0.1, "mm/min"), ("feed reached", times.peak * turning * slow, 0.1, "mm/min"),
+            ("of velocity", times.peak * ratio[0].max(axis=1), 1e-3, ""), ("limit", limit, 1.0, ""), ("cause", cause, 1.0, ""),
+            ("ramps", times.ramp > 0.0, 1.0, ""), ("builds up", times.jerk > 0.0, 1.0, ""))
+    return [Column(name, _first(np.asarray(values, dtype=np.float64)[drawn.block]), step, unit)
+            for name, values, step, unit in rows]
+
+
+def _deviations(result: PostResult, c: Comparison, drawn: DrawnPoints) -> list[Column]:
+    """Deviation of the tip at the end of each block from the CL file, and what geometric errors asked to correct; um."""
+    moves, motion = c.moves.without_pecks(), c.executed[1]
+    rows = np.flatnonzero(moves.run_by(c.owner))
+    off = np.full(len(motion), np.nan)
+    begin, share = place_on_moves(motion, c.poses, rows, c.owner, moves) if len(rows) else (np.zeros(0), np.zeros(0))
+    for at in range(0, len(rows), CHUNK):
+        here = slice(at, at + CHUNK)
+        k = rows[here]
+        off[k], _, _ = moves.curves(c.owner[k]).deviation(c.tip[k], c.axis[k], np.minimum(begin[here] + share[here], 1.0),
+                                                        result.options.tolerance)
+    found = [Column("deviation", _first(off[drawn.row] * 1e3), 0.01, "um")]
+    field = residuals(result) if result.compensation is not None else None
+    if field is not None and len(field.line):
+        order = np.argsort(field.line, kind="stable")
+        sizes = np.linalg.norm(field.before[:, :3], axis=1)[order] * 1e3
+        line = moves.line[np.clip(c.owner, 0, len(moves) - 1)]
+        at = np.clip(np.searchsorted(field.line[order], line, side="right") - 1, 0, len(order) - 1)
+        there = (field.line[order][at] == line) & moves.run_by(c.owner)
+        found.append(Column("correction", _first(np.where(there, sizes[at], np.nan)[drawn.row]), 0.1, "um"))
+    return found
