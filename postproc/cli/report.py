@@ -36,8 +36,11 @@ from postproc.cli.options import (
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
+    from postproc.base.progress import Progress
+    from postproc.cycle_time.estimate import Estimate
     from postproc.page.run import Run
     from postproc.pipeline.result import PostResult
+    from postproc.proof.hashes import Hashes, ProofInput
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
 
@@ -58,8 +61,8 @@ def report_command(file: ClFile, machine: Machines, controller: Controllers,
                    no_texts: NoTexts = False, figures: Figures = None,
                    feed: Annotated[FeedSource, word_option("--feed", FeedSource, "as of convert")] = "programmed",
                    orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-                   setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe "
-                                                      "distances")] = "",
+                   setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, "
+                                                      "safe distances")] = "",
                    hooks: HooksFile = "", tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
                    units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
                    error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's "
@@ -73,12 +76,13 @@ def report_command(file: ClFile, machine: Machines, controller: Controllers,
         inputs |= {f"{what} {name}": place for what, place in own_files(name).items()}
     for name in controller:
         inputs |= {f"{what} {name}": place for what, place in own_files("", name).items()}
-    refuse_overwriting({"-o": str(output), "--json": json, **_figure_files(figures)}, inputs)
+    refuse_overwriting({"-o": str(output), "--json": json, **_figure_files(figures, len(machine) * len(controller))}, inputs)
     from postproc.base.options import Options
     from postproc.page.document import document, report_dict, texts_of
 
-    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, tuple(w.upper() for w in allow_unknown or ()),
-                      feed=feed, error_model=error_model, hooks=hooks, error_beyond=beyond, orient=orient, max_tilt=max_tilt,
+    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect,
+                      tuple(w.upper() for w in allow_unknown or ()), feed=feed, error_model=error_model, hooks=hooks,
+                      error_beyond=beyond, orient=orient, max_tilt=max_tilt,
                       name=file.stem)
     values: dict[str, Any] = {}
     outputs: dict[Path, str | bytes] = {}
@@ -98,9 +102,26 @@ def report_command(file: ClFile, machine: Machines, controller: Controllers,
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
+def pages(page: Path | None, path: Toolpath, result: PostResult, known: dict[ProofInput, Hashes] | None, name: str,
+          time: Estimate | None) -> dict[Path, str | bytes]:
+    """The page of `convert --report` by its place, of a conversion that writes the program `name`; none without one."""
+    if page is None:
+        return {}
+    from postproc.page.document import document, report_dict, texts_of
+    from postproc.page.run import Run
+
+    runs = [Run(result, time, known or {}, name)]
+    return {page: document(report_dict(path, runs), texts_of(runs))}
+
+
+def check_page(page: Path, option: str) -> None:
+    """Wrong use where a page is no .html file."""
+    if page.suffix.lower() not in (".html", ".htm"):
+        raise typer.BadParameter(f"{page.name} is no .html file", param_hint=option)
+
+
 def _check(output: Path, machines: list[str], controllers: list[str]) -> None:
-    if output.suffix.lower() not in (".html", ".htm"):
-        raise typer.BadParameter(f"{output.name} is no .html file", param_hint="-o")
+    check_page(output, "-o")
     for option, names in (("-m", machines), ("-c", controllers)):
         twice = [name for k, name in enumerate(names) if name in names[:k]]
         if twice:
@@ -111,31 +132,26 @@ def _check(output: Path, machines: list[str], controllers: list[str]) -> None:
                                  param_hint="-m, -c")
 
 
-def _figure_files(folder: Path | None) -> dict[str, str]:
+def _figure_files(folder: Path | None, runs: int) -> dict[str, str]:
     if folder is None:
         return {}
-    from postproc.page.drawings import NAMES
+    from postproc.page.drawings import names
 
-    return {f"--figures {name}": str(folder / name) for name in NAMES}
+    return {f"--figures {name}": str(folder / name) for name in names(runs)}
 
 
-def _run(path: Toolpath, machine: str, controller: str, options: Options, read: list[Diagnostic], progress: Any) -> Run:
+def _run(path: Toolpath, machine: str, controller: str, options: Options, read: list[Diagnostic],
+         progress: Progress) -> Run:
     """One combination, converted and timed."""
+    from postproc.cycle_time.conversion import estimate_of
+    from postproc.page.run import Run
     from postproc.pipeline.convert import convert
     from postproc.proof.command import hashed
 
     known = hashed(machine, controller, options)
     result = convert(path, machine_of(machine), controller_of(controller), options=options, diagnostics=list(read),
                      progress=progress)
-    return made_run(result, known or {}, f"{options.name}.nc")
-
-
-def made_run(result: PostResult, known: Any, name: str, time: Any = None) -> Run:
-    """A conversion as the report takes it; `time` where it has been estimated already."""
-    from postproc.cycle_time.conversion import estimate_of
-    from postproc.page.run import Run
-
-    return Run(result, time or estimate_of(result), known, name)
+    return Run(result, estimate_of(result), known or {}, f"{options.name}.nc")
 
 
 def _line(run: dict[str, Any]) -> str:

@@ -59,8 +59,8 @@ class Lanes {
       return [axis.letter, axis.unit, low === null ? used[0] : low, high === null ? used[1] : high, (i) => values[i]];
     });
     let most = 0;
-    for (let i = 1; i < run.count; i++) for (const n of ["feed asked", "feed reached"]) if (c.kind[i] !== 0 && c[n][i] > most) most = c[n][i];
-    return [...rows, ["feed", "mm/min", 0, most || 1, (i) => (c.kind[i] ? c["feed reached"][i] : NaN), (i) => (c.kind[i] ? c["feed asked"][i] : NaN)]];
+    for (let i = 1; i < run.count; i++) for (const n of ["feed programmed", "feed reached"]) if (c.kind[i] !== 0 && c[n][i] > most) most = c[n][i];
+    return [...rows, ["feed", "mm/min", 0, most || 1, (i) => (c.kind[i] ? c["feed reached"][i] : NaN), (i) => (c.kind[i] ? c["feed programmed"][i] : NaN)]];
   }
 
   draw() {

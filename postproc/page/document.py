@@ -33,7 +33,7 @@ def report_dict(toolpath: Toolpath, runs: Sequence[Run]) -> dict[str, Any]:
 
 
 def document(report: dict[str, Any], texts: Sequence[tuple[str, str, bytes]]) -> str:
-    """The page of a report; `texts` as (kind, name, bytes) of files that it can show line by line: "cl", "nc0", "nc1", ..."""
+    """The page of a report; `texts` as (kind, name, bytes) of the files that it shows: "cl", "nc0-0", "nc0-1", ..."""
     folder = files("postproc.page")
     style, *scripts = (folder.joinpath(name).read_text("utf-8") for name in ("page.css", *SCRIPTS))
     # figures of points stand in elements of their own, so that reading the rest of the report does not wait for them

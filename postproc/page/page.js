@@ -1,22 +1,27 @@
 // Puts the parts together: one run, one time, one point are shown everywhere.
-const shown = {run: null, time: 0, point: 0, playing: 0, texts: null, lanes: null, view: null};
+const shown = {run: null, time: 0, point: 0, playing: 0, fade: false, texts: null, lanes: null, view: null};
 
-async function pickRun(k) {
-  stop();
-  const run = shown.run = await loaded(k);
-  byId("run").value = String(k);
+// All that is said in words and numbers.
+function words(k, info) {
   verdict(k, byId("verdict"));
-  const found = run.info.conversion.diagnostics.filter((d) => d.severity !== "info");
+  const found = info.conversion.diagnostics.filter((d) => d.severity !== "info");
   byId("first").replaceChildren(...(found.length ? [messageItems(found, jumpTo)] : [make("p", {class: "note"}, "No warnings.")]));
   byId("compare").replaceChildren(...[compareTable(pickRun)].filter(Boolean));
   byId("head").replaceChildren(...headParts(k));
-  byId("causes").replaceChildren(...(run.info.conversion.time ? [waterfall(k)] : []));
+  byId("causes").replaceChildren(...(info.conversion.time ? [waterfall(k)] : []));
   byId("what-if").replaceChildren(whatIf(k));
   byId("operations").replaceChildren(...[operationTable(k)].filter(Boolean));
   byId("sheet-body").replaceChildren(...sheetParts(k));
   byId("orientation-body").replaceChildren(...orientationParts(k));
   byId("errors-body").replaceChildren(...errorParts(k, openText));
-  byId("messages-body").replaceChildren(run.info.conversion.diagnostics.length ? messageItems(run.info.conversion.diagnostics, jumpTo) : "None.");
+  byId("messages-body").replaceChildren(info.conversion.diagnostics.length ? messageItems(info.conversion.diagnostics, jumpTo) : "None.");
+}
+
+async function pickRun(k) {
+  stop();
+  const run = shown.run = await loaded(k);
+  byId("run").value = String(k);
+  words(k, run.info);
   pathParts(run);
 }
 
@@ -33,13 +38,15 @@ function pathParts(run) {
   byId("bed").disabled = !run.info.skeleton;
   byId("view-note").textContent = "Drag to turn, with Shift to move, wheel to zoom, click a point. " + (run.info.skeleton || run.legs ? "Machine: axes as lines and circles, not its covers." : "The machine is not drawn: its parts are not known as lines.");
   shown.lanes.set(run);
-  setPoint(Math.min(1, run.count - 1));
+  setPoint(Math.max(run.columns.kind.findIndex((kind, i) => i > 0 && kind !== 0), 0));
 }
 
 function recolour() {
   const {colours, legend} = coloured(shown.run, byId("colour").value, byId("rapids").checked);
-  shown.view.setColours(colours); showLegend(legend); draw();
+  shown.view.setColours(colours); showLegend([...legend, ...axisLegend()]); draw();
 }
+
+const axisLegend = () => (!byId("machine").checked || !shown.run.info.skeleton ? [] : shown.run.info.skeleton.axes.map((axis) => ({colour: AXIS_COLOURS[axis.letter] || [90, 90, 90], text: "axis " + axis.letter})));
 
 const cutCorners = (run) => {
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity], names = ["part x", "part y", "part z"];
@@ -79,7 +86,7 @@ function drawNow() {
   if (axis) toolLines(tip, axis, toolLength(run, now.next), 0.012 * size, lines);
   const p = ["part x", "part y", "part z"].map((n) => run.columns[n][shown.point]), r = 0.015 * size;
   for (let k = 0; k < 3; k++) lines.push([...p.map((v, i) => v - (i === k ? r : 0)), ...p.map((v, i) => v + (i === k ? r : 0)), 156, 28, 18]);
-  view.done = now.i + 1;
+  view.done = shown.fade ? now.i + 1 : 1e9; // what is still to come is pale while time runs
   view.draw(lines);
 }
 
@@ -99,7 +106,7 @@ function setTime(seconds, follow) {
 }
 
 function setPoint(i) {
-  shown.point = Math.min(Math.max(i, 0), shown.run.count - 1);
+  shown.point = Math.min(Math.max(i, 0), shown.run.count - 1); shown.fade = false;
   setTime(shown.run.time[shown.point], false);
   showPoint(shown.run, shown.point, openText);
 }
@@ -111,6 +118,7 @@ function play() {
   const end = shown.run.time[shown.run.count - 1];
   if (shown.time >= end) setTime(0);
   let last = performance.now();
+  shown.fade = true;
   byId("play").textContent = "Pause";
   const step = (at) => {
     const next = shown.time + (at - last) / 1000 * Number(byId("speed").value);
@@ -206,8 +214,8 @@ function handleCanvas(canvas) {
 
 function listen() {
   const on = (id, kind, what) => byId(id).addEventListener(kind, what);
-  on("colour", "change", recolour); on("rapids", "change", recolour); on("machine", "change", fit); on("bed", "change", fit);
-  on("fit", "click", fit); on("play", "click", play); on("slider", "input", () => setTime(Number(byId("slider").value)));
+  on("colour", "change", recolour); on("rapids", "change", recolour); on("machine", "change", () => { recolour(); fit(); }); on("bed", "change", fit);
+  on("fit", "click", fit); on("play", "click", play); on("slider", "input", () => { shown.fade = true; setTime(Number(byId("slider").value)); });
   on("run", "change", () => pickRun(Number(byId("run").value)));
   on("text-file", "change", async () => { await openText(byId("text-file").value, 0, 0); });
   on("search", "keydown", async (e) => { if (e.key === "Enter") { await openText(byId("text-file").value, 0, 0); search(e.shiftKey ? -1 : 1); } });
@@ -223,11 +231,14 @@ function listen() {
 }
 
 async function begin() {
+  
   byId("title").textContent = report.part;
   byId("subtitle").textContent = `${report.cl_file}, ${report.runs.map(lineOf).join("; ")}`;
   byId("foot").textContent = `postproc ${report.postproc}, report version ${report.report_version}. This page loads nothing from anywhere.`;
   byId("run").replaceChildren(...report.runs.map((run, k) => make("option", {value: k}, lineOf(run))));
   byId("run-choice").hidden = report.runs.length < 2;
+  words(0, report.runs[0]);
+  await new Promise((after) => requestAnimationFrame(() => setTimeout(after)));  // words first: a picture may take a moment
   shown.view = new View(byId("view"));
   if (!shown.view.gl) byId("view-note").textContent = "This browser has no WebGL2: the path is not drawn; all else is there.";
   shown.lanes = new Lanes(byId("lanes"), (t) => { stop(); setTime(t); });

@@ -9,14 +9,15 @@ import numpy as np
 from machines.choices import MotionOrder
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.estimate import Estimate
-from postproc.cycle_time.shares import CAUSES, FELT, shares
 from postproc.cycle_time.shape import shape
+from postproc.cycle_time.shares import CAUSES, FELT, shares
 from postproc.page.columns import Column
 from postproc.pipeline.result import PostResult
 from postproc.readback.comparison.compare import Comparison, place_on_moves
 from postproc.readback.text.canonical import in_files
 from postproc.report.residuals import residuals
 from toolpaths.arrays import Floats, Ints
+from toolpaths.rotations import lengths
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -62,7 +63,8 @@ def drawn_points(blocks: MotionBlocks) -> DrawnPoints:
 def _pieces(blocks: MotionBlocks) -> Ints:
     turning = np.abs(np.where(blocks.axes.rotary, blocks.end - blocks.start, 0.0)).max(axis=1, initial=0.0)
     around = np.where(blocks.arc, blocks.sweep / ARC_STEP, 0.0)
-    return np.clip(np.ceil(np.maximum(turning / TURN_STEP, around)), 1, MOST).astype(np.int64)
+    count: Ints = np.clip(np.ceil(np.maximum(turning / TURN_STEP, around)), 1, MOST).astype(np.int64)
+    return count
 
 
 def columns(result: PostResult, e: Estimate) -> list[Column]:
@@ -81,7 +83,8 @@ def columns(result: PostResult, e: Estimate) -> list[Column]:
               ] if not result.machine.kinematics.chain else []
     found += [Column(letter, q[:, j] * units[j], step, "deg" if result.machine.rotary[j] else "mm")
               for j, letter in enumerate(result.machine.axis_names)]
-    return found + _times(e, drawn) + _lines(c, e, drawn) + _limits(e, drawn) + _deviations(result, c, drawn)
+    return found + _times(e, drawn) + _lines(c, e, drawn) + _feeds(c, e, drawn, tip) + _limits(e, drawn) + _deviations(
+        result, c, drawn)
 
 
 def _first(values: Floats) -> Floats:
@@ -129,31 +132,37 @@ def _lines(c: Comparison, e: Estimate, drawn: DrawnPoints) -> list[Column]:
     return [Column(name, _first(np.asarray(values, dtype=np.float64)), 1.0) for name, values in named]
 
 
-def _limits(e: Estimate, drawn: DrawnPoints) -> list[Column]:
-    """Feed asked for and reached, the cause of the time, and the limit that holds: 3 J + order, -1 for the feed word.
+def _feeds(c: Comparison, e: Estimate, drawn: DrawnPoints, tip: Floats) -> list[Column]:
+    """Feed of the tip in mm/min: as the CL file has it, and reached in the mean from point to point by the time model."""
+    moves = c.moves.without_pecks()
+    own = moves.run_by(c.owner)
+    asked = np.where(own, moves.feed[np.clip(c.owner, 0, len(moves) - 1)], np.nan)[drawn.row] * 60.0
+    count = np.bincount(drawn.block, minlength=len(e.blocks))
+    seconds = (e.timed.seconds / np.maximum(count, 1))[drawn.block]
+    reached = np.where(seconds > 0.0, lengths(np.diff(tip, axis=0)) / np.where(seconds > 0.0, seconds, 1.0), np.nan) * 60.0
+    return [Column("feed programmed", _first(asked), 0.1, "mm/min"), Column("feed reached", _first(reached), 0.1, "mm/min")]
 
-    `reached` is the largest speed within the block by the time model; `of velocity` is the share of the nearest velocity
-    limit that this takes; `ramps`, `builds up` are 1 where the block changes speed, and acceleration.
+
+def _limits(e: Estimate, drawn: DrawnPoints) -> list[Column]:
+    """The cause of the time, and the limit that holds: 3 J + order, -1 for the feed word.
+
+    `of velocity` is the share of the nearest velocity limit that the largest speed within the block takes by the time
+    model; `ramps`, `builds up` are 1 where the block changes speed, and acceleration.
     """
     b, times = e.blocks, e.timed
-    form = shape(b)
-    ratio = [form.share / limit for limit in (b.axes.velocity, b.axes.acceleration, b.axes.jerk)]
-    held = times.peak * ratio[0].max(axis=1) >= 1.0 - FELT
-    spent = np.stack([np.where(held | b.rapid, times.steady, 0.0), times.ramp, times.jerk])
-    order = spent.argmax(axis=0)
+    share = shape(b).share
+    ratio = [share / limit for limit in (b.axes.velocity, b.axes.acceleration, b.axes.jerk)]
+    of_velocity = times.peak * ratio[0].max(axis=1)
+    by_axis = b.rapid | (of_velocity >= 1.0 - FELT)
+    spent = np.stack([np.where(by_axis, times.steady, 0.0), times.ramp, times.jerk])
+    order: Ints = spent.argmax(axis=0)
     axis = np.stack([r.argmax(axis=1) for r in ratio])[order, np.arange(len(b))]
-    limit = np.where(spent.max(axis=0) > np.where(held | b.rapid, 0.0, times.steady), 3 * axis + order, -1)
+    limit = np.where(by_axis | (spent.max(axis=0) > times.steady), len(ORDERS) * axis + order, -1)
     by_cause = shares(e).by_cause
-    cause = np.argmax(np.stack([by_cause[name] for name in CAUSES]), axis=0)
-    asked = np.where(np.isfinite(b.speed), b.speed, np.nan)
-    slow = np.where(b.arc | (form.length > 0.0), 1.0, np.nan)
-    turning = np.where((b.axes.xyz >= 0).any() & (np.abs((b.end - b.start)[:, b.axes.xyz[b.axes.xyz >= 0]]).max(
-        axis=1, initial=0.0) > 1e-9), 60.0, 60.0 / DEG)
-    rows = (("feed asked", asked * turning, 0.1, "mm/min"), ("feed reached", times.peak * turning * slow, 0.1, "mm/min"),
-            ("of velocity", times.peak * ratio[0].max(axis=1), 1e-3, ""), ("limit", limit, 1.0, ""), ("cause", cause, 1.0, ""),
-            ("ramps", times.ramp > 0.0, 1.0, ""), ("builds up", times.jerk > 0.0, 1.0, ""))
-    return [Column(name, _first(np.asarray(values, dtype=np.float64)[drawn.block]), step, unit)
-            for name, values, step, unit in rows]
+    cause: Ints = np.stack([by_cause[name] for name in CAUSES]).argmax(axis=0)
+    rows = (("of velocity", of_velocity, 1e-3), ("limit", limit, 1.0), ("cause", cause, 1.0),
+            ("ramps", times.ramp > 0.0, 1.0), ("builds up", times.jerk > 0.0, 1.0))
+    return [Column(name, _first(np.asarray(values, dtype=np.float64)[drawn.block]), step) for name, values, step in rows]
 
 
 def _deviations(result: PostResult, c: Comparison, drawn: DrawnPoints) -> list[Column]:
@@ -173,7 +182,7 @@ def _deviations(result: PostResult, c: Comparison, drawn: DrawnPoints) -> list[C
         order = np.argsort(field.line, kind="stable")
         sizes = np.linalg.norm(field.before[:, :3], axis=1)[order] * 1e3
         line = moves.line[np.clip(c.owner, 0, len(moves) - 1)]
-        at = np.clip(np.searchsorted(field.line[order], line, side="right") - 1, 0, len(order) - 1)
-        there = (field.line[order][at] == line) & moves.run_by(c.owner)
-        found.append(Column("correction", _first(np.where(there, sizes[at], np.nan)[drawn.row]), 0.1, "um"))
+        place = np.clip(np.searchsorted(field.line[order], line, side="right") - 1, 0, len(order) - 1)
+        there = (field.line[order][place] == line) & moves.run_by(c.owner)
+        found.append(Column("correction", _first(np.where(there, sizes[place], np.nan)[drawn.row]), 0.1, "um"))
     return found

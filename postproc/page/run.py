@@ -109,15 +109,22 @@ def _axes(result: PostResult) -> list[dict[str, Any]]:
         unit = DEG if result.machine.rotary[j] else 1.0
         low, high = travel(result.machine, j)
         used = (result.extents or {}).get(letter)
-        bounded = used is not None and low is not None and high is not None and high > low
-        rows.append({"letter": letter, "rotary": bool(result.machine.rotary[j]), "unit": "deg" if unit != 1.0 else "mm",
+        share, margin = _of_travel(used, low, high)
+        rows.append({"letter": letter, "rotary": bool(result.machine.rotary[j]),
+                     "unit": "deg" if result.machine.rotary[j] else "mm",
                      "travel": [low, high], "used": None if used is None else [float(used[0]), float(used[1])],
-                     "used_percent": 100.0 * (used[1] - used[0]) / (high - low) if bounded and used else None,
-                     "margin": min(used[0] - low, high - used[1]) if bounded and used else None,
+                     "used_percent": share, "margin": margin,
                      "velocity": finite(limits.velocity[j] / unit), "acceleration": finite(limits.acceleration[j] / unit),
                      "jerk": finite(limits.jerk[j] / unit),
                      "assumed": sorted(name.split(".")[1] for name in limits.assumed if name.split(".")[0] == letter)})
     return rows
+
+
+def _of_travel(used: tuple[float, float] | None, low: float | None, high: float | None) -> tuple[float | None, float | None]:
+    """Percent of the travel that is used, and what is left to its nearer end; None of an axis without ends."""
+    if used is None or low is None or high is None or high <= low:
+        return None, None
+    return float(100.0 * (used[1] - used[0]) / (high - low)), float(min(used[0] - low, high - used[1]))
 
 
 def _feeds(result: PostResult) -> dict[str, Any] | None:

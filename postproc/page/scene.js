@@ -120,7 +120,7 @@ function showPoint(run, i, jump) {
   const rows = [["Program", go("nc", c["NC line"][i])], ["CL file", go("cl", c["CL line"][i])],
     ["Operation", COLOURINGS.operation.named(run, c.operation[i])], ["Motion", kind], ["Time", clockText(run.time[i])],
     ["Part x, y, z", ["part x", "part y", "part z"].map((n) => number(c[n][i], 3)).join(", ") + " mm"],
-    ["Feed", number(c["feed asked"][i], 0) + " asked, " + number(c["feed reached"][i], 0) + " mm/min reached"],
+    ["Feed", number(c["feed programmed"][i], 0) + " programmed, " + number(c["feed reached"][i], 0) + " mm/min reached in the mean"],
     ["Time goes to", cause + "; " + why], ["Tilt", number(Math.acos(Math.min(1, toolAxis(run, i)[2])) * 180 / Math.PI, 2) + " deg"],
     ["Deviation", c.deviation[i] === c.deviation[i] ? number(c.deviation[i], 2) + " um at the end of the block" : "not on a move of the CL file"]];
   const axes = info.axes.map((axis, j) => [axis.letter, number(c[axis.letter][i], 3) + " " + axis.unit,

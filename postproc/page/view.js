@@ -1,18 +1,19 @@
 // Lines in WebGL2: the path as one strip with a colour for each piece, other lines on top; parallel projection, z up.
 const LINE_VERTEX = `#version 300 es
-in vec3 place; in vec4 colour; uniform mat4 matrix; uniform float done; uniform float stride; flat out vec4 shade;
+in vec3 place; in vec4 colour; uniform mat4 matrix; uniform float done; uniform float stride; out vec4 shade;
 void main() { gl_Position = matrix * vec4(place, 1.0); shade = colour;
   if (float(gl_VertexID) * stride > done) shade.a *= 0.22; }`;
 const LINE_PIXEL = `#version 300 es
-precision mediump float; flat in vec4 shade; out vec4 pixel; void main() { if (shade.a < 0.01) discard; pixel = shade; }`;
-const COARSE_FROM = 150000; // points from which only every n-th is drawn while the picture moves
+precision mediump float; in vec4 shade; out vec4 pixel; void main() { if (shade.a < 0.01) discard; pixel = shade; }`;
+const COARSE_FROM = 50000; // points from which only every n-th is drawn while the picture moves
+const SMOOTH_TO = 200000; // points up to which edges are smoothed: without a graphics card that costs most of the time
 
 class View {
   constructor(canvas) {
     this.canvas = canvas;
     this.turn = [-0.7, 0.95]; this.middle = [0, 0, 0]; this.span = 100; this.count = 0; this.done = 0; this.coarse = false;
     this.model = null;
-    const gl = this.gl = canvas.getContext("webgl2", {antialias: true, preserveDrawingBuffer: true});
+    const gl = this.gl = canvas.getContext("webgl2", {antialias: report.runs.every((run) => !run.points || run.points.count <= SMOOTH_TO), preserveDrawingBuffer: true});
     if (!gl) return;
     const program = this.program = gl.createProgram();
     for (const [kind, text] of [[gl.VERTEX_SHADER, LINE_VERTEX], [gl.FRAGMENT_SHADER, LINE_PIXEL]]) {
@@ -102,7 +103,7 @@ class View {
     gl.enable(gl.BLEND); gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.useProgram(this.program);
     gl.uniformMatrix4fv(this.uniform.matrix, false, this.matrix());
-    const stride = this.coarse && this.count > COARSE_FROM ? Math.min(Math.ceil(this.count / COARSE_FROM), 20) : 1;
+    const stride = this.coarse && this.count > COARSE_FROM ? Math.min(Math.ceil(this.count / COARSE_FROM), 30) : 1;
     gl.uniform1f(this.uniform.done, this.done);
     if (this.count > 1) this.strip("place", "colour", gl.LINE_STRIP, this.count, stride);
     if (!lines.length) return;
