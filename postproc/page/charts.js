@@ -36,10 +36,10 @@ class Lanes {
     this.left = 96;
   }
 
-  set(run) { this.run = run; this.from = 0; this.to = run.count ? run.time[run.count - 1] : 1; this.drawn = null; this.draw(); }
+  set(run) { this.run = run; this.from = 0; this.to = run.count ? run.end : 1; this.drawn = null; this.draw(); }
 
   zoom(factor) {
-    const end = this.run.time[this.run.count - 1], half = Math.min((this.to - this.from) * factor, end) / 2;
+    const end = this.run.end, half = Math.min((this.to - this.from) * factor, end) / 2;
     const middle = Math.min(Math.max(this.cursor, half), end - half);
     this.from = middle - half; this.to = middle + half; this.drawn = null; this.draw();
   }

@@ -83,7 +83,8 @@ async function loaded(k) {
   const count = info.points.count, time = new Float64Array(count);
   let total = 0;
   for (let i = 0; i < count; i++) { total += columns["time step"][i] / 1000; time[i] = total; }
-  const run = {k, info, count, columns, time, legs: null, solids: []};
+  const end = Math.max(total, info.conversion.cycle_time_s || 0); // the machine may rest behind its last block
+  const run = {k, info, count, columns, time, end, legs: null, solids: []};
   if (info.points.legs) run.legs = readColumns(await inflated(info.points.legs.data), info.points.legs.columns);
   for (const solid of info.solids) run.solids.push(readColumns(await inflated(solid.data), solid.columns));
   runs.set(k, run);

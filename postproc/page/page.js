@@ -31,7 +31,7 @@ function pathParts(run) {
   const colour = byId("colour"), wanted = colour.value;
   colour.replaceChildren(...colouringsOf(run).map((name) => make("option", {value: name}, COLOURINGS[name].title)));
   if (colouringsOf(run).includes(wanted)) colour.value = wanted;
-  byId("slider").max = run.time[run.count - 1];
+  byId("slider").max = run.end;
   shown.view.setPath(run.columns["part x"], run.columns["part y"], run.columns["part z"]);
   recolour(); fit(); textChoices(run);
   byId("machine").disabled = byId("bed").disabled = !run.info.skeleton && !run.legs;
@@ -97,7 +97,7 @@ function toolLength(run, i) {
 }
 
 function setTime(seconds, follow) {
-  shown.time = Math.min(Math.max(seconds, 0), shown.run.time[shown.run.count - 1]);
+  shown.time = Math.min(Math.max(seconds, 0), shown.run.end);
   byId("slider").value = shown.time; byId("clock").textContent = clockText(shown.time);
   byId("slider").setAttribute("aria-valuetext", clockText(shown.time));
   shown.lanes.cursor = shown.time; shown.lanes.draw();
@@ -115,7 +115,7 @@ function stop() { cancelAnimationFrame(shown.playing); shown.playing = 0; byId("
 
 function play() {
   if (shown.playing) { stop(); setTime(shown.time); return; }
-  const end = shown.run.time[shown.run.count - 1];
+  const end = shown.run.end;
   if (shown.time >= end) setTime(0);
   let last = performance.now();
   shown.fade = true;

@@ -109,14 +109,17 @@ def _poses(c: Comparison, drawn: DrawnPoints) -> tuple[Floats, Floats, Floats]:
 
 
 def _times(e: Estimate, drawn: DrawnPoints) -> list[Column]:
-    """Milliseconds from point to point, and how much of them the machine rests before it moves on."""
+    """Milliseconds from point to point, and how much of them the machine rests before it moves on; the first row has what
+    it rests before it moves at all."""
+    pauses = e.blocks.pauses
+    lead = float(e.timed.pause[pauses.block < 0].sum())
     begin, seconds = e.timed.begin, e.timed.seconds
     rest = np.maximum(np.diff(begin, prepend=begin[:1]) - np.concatenate([[0.0], seconds[:-1]]), 0.0)
     count = np.bincount(drawn.block, minlength=len(begin))
     first = np.diff(drawn.block, prepend=-1) != 0
     resting = np.where(first, rest[drawn.block], 0.0)
     end = np.cumsum(resting + (seconds / np.maximum(count, 1))[drawn.block])
-    at = np.diff(np.round(np.concatenate([[0.0], end]) * 1e3), prepend=0.0)
+    at = np.diff(np.round(np.concatenate([[lead], lead + end]) * 1e3), prepend=0.0)
     return [Column("time step", at, 1.0, "ms"), Column("rest", np.concatenate([[0.0], resting]) * 1e3, 1.0, "ms")]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -15,8 +16,9 @@ from postproc.cli.app import app
 from tests.postproc.kit import SAMPLES
 
 HOSTILE = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=2>"
+CUTS = [f"GOTO/{2 * k},{k % 3},{10 + k % 2},{math.sin(0.02 * k):.8f},0,{math.cos(0.02 * k):.8f}" for k in range(12)]
 LINES = ["PARTNO " + HOSTILE, "UNITS/MM", "MULTAX/ON", "LOADTL/4", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600", "RAPID",
-         "GOTO/0,0,50,0,0,1", *(f"GOTO/{2 * k},{k % 3},{10 + k % 2},{0.02 * k:.3f},0,1" for k in range(12)), "RAPID",
+         "GOTO/0,0,50,0,0,1", *CUTS, "RAPID",
          "GOTO/30,0,60,0,0,1", "FINI"]
 
 

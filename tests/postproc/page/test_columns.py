@@ -9,7 +9,8 @@ from postproc.page.columns import Column, packed, unpacked
 
 
 @pytest.mark.parametrize("values", [
-    [], [0.0], [1.0, -1.0, 1e5, -1e5], [np.nan, 3.0, np.nan, np.nan, -2.0], [214748.3, -214748.3, 214748.3], [0.00004, 0.00006]])
+    [], [0.0], [1.0, -1.0, 1e5, -1e5], [np.nan, 3.0, np.nan, np.nan, -2.0], [214748.3, -214748.3, 214748.3],
+    [0.00004, 0.00006]])
 def test_a_column_comes_back(values: list[float]) -> None:
     given = np.array(values)
     found = unpacked(*packed([Column("first", given, 1e-4), Column("second", given[::-1], 1e-3)]))
