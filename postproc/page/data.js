@@ -24,7 +24,7 @@ function number(value, digits) {
 
 // A number of the report as the page shows it, with the key that it stands under in the JSON.
 function figure(path, digits, unit) {
-  return make("span", {"data-key": path, "data-digits": digits}, number(valueAt(path), digits) + (unit ? " " + unit : ""));
+  return make("span", {"data-key": path, "data-digits": digits}, number(valueAt(path), digits) + (unit && typeof valueAt(path) === "number" ? " " + unit : ""));
 }
 
 function clockText(seconds) {

@@ -26,14 +26,15 @@ async function pickRun(k) {
 }
 
 function pathParts(run) {
-  byId("path").hidden = byId("time").hidden = !run.count;
-  if (!run.count) return;
+  byId("time").hidden = document.querySelector(".stage").hidden = byId("point").hidden = !run.count;
+  textChoices(run);
+  if (!run.count) return; // its messages still lead to the CL file
   const colour = byId("colour"), wanted = colour.value;
   colour.replaceChildren(...colouringsOf(run).map((name) => make("option", {value: name}, COLOURINGS[name].title)));
   if (colouringsOf(run).includes(wanted)) colour.value = wanted;
   byId("slider").max = run.end;
   shown.view.setPath(run.columns["part x"], run.columns["part y"], run.columns["part z"]);
-  recolour(); fit(); textChoices(run);
+  recolour(); fit();
   byId("machine").disabled = byId("bed").disabled = !run.info.skeleton && !run.legs;
   byId("bed").disabled = !run.info.skeleton;
   byId("view-note").textContent = "Drag to turn, with Shift to move, wheel to zoom, click a point. " + (run.info.skeleton || run.legs ? "Machine: axes as lines and circles, not its covers." : "The machine is not drawn: its parts are not known as lines.");
@@ -62,6 +63,16 @@ function fit() {
   draw();
 }
 
+// All lines that are drawn, the machine among them.
+function fitWhole() {
+  if (!shown.lines || !shown.lines.length) return;
+  const low = [...shown.view.bounds[0]], high = [...shown.view.bounds[1]];
+  for (const line of shown.lines) for (let k = 0; k < 6; k++) { low[k % 3] = Math.min(low[k % 3], line[k]); high[k % 3] = Math.max(high[k % 3], line[k]); }
+  shown.view.fit(low, high);
+  if (shown.view.model) shown.view.middle = moved(shown.view.model, shown.view.middle);
+  draw();
+}
+
 const bedAt = () => { const now = between(shown.run, shown.time); return bedOf(shown.run.info.skeleton, now.at); };
 
 let asked = false;
@@ -86,6 +97,7 @@ function drawNow() {
   if (axis) toolLines(tip, axis, toolLength(run, now.next), 0.012 * size, lines);
   const p = ["part x", "part y", "part z"].map((n) => run.columns[n][shown.point]), r = 0.015 * size;
   for (let k = 0; k < 3; k++) lines.push([...p.map((v, i) => v - (i === k ? r : 0)), ...p.map((v, i) => v + (i === k ? r : 0)), 156, 28, 18]);
+  shown.lines = lines;
   view.done = shown.fade ? now.i + 1 : 1e9; // what is still to come is pale while time runs
   view.draw(lines);
 }
@@ -151,6 +163,7 @@ function jumpTo(d, line) {
 
 // The first point of a line, of the nearest line behind it where it moves nothing.
 function pointOfLine(kind, line) {
+  if (!shown.run.count) return;
   const c = shown.run.columns, column = kind === "cl" ? c["CL line"] : c["NC line"], file = kind === "cl" ? -1 : Number(kind.split("-")[1] || 0);
   let best = -1, far = Infinity;
   for (let i = 1; i < shown.run.count; i++) {
@@ -215,7 +228,7 @@ function handleCanvas(canvas) {
 function listen() {
   const on = (id, kind, what) => byId(id).addEventListener(kind, what);
   on("colour", "change", recolour); on("rapids", "change", recolour); on("machine", "change", () => { recolour(); fit(); }); on("bed", "change", fit);
-  on("fit", "click", fit); on("play", "click", play); on("slider", "input", () => { shown.fade = true; setTime(Number(byId("slider").value)); });
+  on("fit", "click", fit); on("whole", "click", fitWhole); on("play", "click", play); on("slider", "input", () => { shown.fade = true; setTime(Number(byId("slider").value)); });
   on("run", "change", () => pickRun(Number(byId("run").value)));
   on("text-file", "change", async () => { await openText(byId("text-file").value, 0, 0); });
   on("search", "keydown", async (e) => { if (e.key === "Enter") { await openText(byId("text-file").value, 0, 0); search(e.shiftKey ? -1 : 1); } });

@@ -15,7 +15,7 @@ function verdict(k, box) {
 function messageItems(list, jump) {
   return make("ul", {class: "messages"}, ...list.map((d) => make("li", {}, make("span", {class: d.severity}, d.severity), ` [${d.code}] ${d.message}`,
     d.count > 1 ? ` (${d.count} times)` : "", d.hint ? make("div", {class: "note"}, "What to do: " + d.hint) : null,
-    ...(d.lines || []).slice(0, 8).map((line) => make("button", {type: "button", class: "jump", onclick: () => jump(d, line)}, "line " + line)))));
+    ...[...new Set(d.lines || [])].slice(0, 8).map((line) => make("button", {type: "button", class: "jump", onclick: () => jump(d, line)}, "line " + line)))));
 }
 
 function timeCell(k) {
@@ -26,6 +26,7 @@ function timeCell(k) {
 
 function bandCell(k) {
   const base = `runs.${k}.conversion`, run = report.runs[k].conversion;
+  if (run.cycle_time_s === null) return "-";
   return run.band_s ? make("span", {}, figure(base + ".band_s.0", 2, ""), " to ", figure(base + ".band_s.1", 2, "s")) : "not counted for long programs";
 }
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.postproc.page.page_kit import HOSTILE, LINES, small
+from tests.postproc.page.page_kit import HOSTILE, LINES, refused, small
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
@@ -204,3 +204,13 @@ def test_it_prints_on_a4_with_the_picture(opened: Session, tmp_path: Path) -> No
     opened.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     assert opened.page.get_attribute("#printed", "src").startswith("data:image/png")
     assert opened.said == [], "nothing was complained of to the end"
+
+
+def test_messages_of_what_was_not_converted_lead_to_the_cl_file(opened: Session) -> None:
+    page = opened.page
+    page.goto(refused().page.as_uri())
+    page.wait_for_selector("html[data-ready]", state="attached")
+    assert "NOT CONVERTED" in page.inner_text("#verdict") and not page.is_visible("#view")
+    page.click("#first button.jump >> nth=0")
+    page.wait_for_selector("#text .row.here")
+    assert "9000" in page.inner_text("#text .row.here") and opened.said == []

@@ -46,6 +46,12 @@ def reported(*arguments: str, lines: tuple[str, ...] = tuple(LINES)) -> Made:
 
 
 @cache
+def refused() -> Made:
+    """The same with a point that the machine does not reach."""
+    return reported(lines=tuple(line.replace("GOTO/30,0,60", "GOTO/30,0,9000") for line in LINES))
+
+
+@cache
 def small() -> Made:
     """The small path under two controls."""
     return reported("-c", "linuxcnc", "-c", "siemens-840d")

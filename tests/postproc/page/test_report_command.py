@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from postproc.cli.app import app
 from postproc.page import drawings
 from tests.postproc.kit import SAMPLES
-from tests.postproc.page.page_kit import HOSTILE, LINES, reported, small
+from tests.postproc.page.page_kit import HOSTILE, LINES, refused, reported, small
 
 SETUP = str(SAMPLES / "tools.setup.toml")
 
@@ -64,8 +64,7 @@ def test_texts_are_the_bytes_of_the_files_and_may_be_left_out(tmp_path: Path) ->
 
 
 def test_what_cannot_be_converted_is_on_the_page_with_its_reasons() -> None:
-    lines = tuple(line.replace("GOTO/30,0,60", "GOTO/30,0,9000") for line in LINES)
-    made = reported(lines=lines)
+    made = refused()
     run = made.values["runs"][0]
     assert made.code == 1 and not made.values["ok"] and not run["converted"] and run["points"] is None
     assert any(d["severity"] == "error" for d in run["conversion"]["diagnostics"])
