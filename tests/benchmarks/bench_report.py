@@ -25,7 +25,9 @@ FRAMES = """(coarse) => new Promise((done) => { const view = shown.view, g = vie
   const from = performance.now(), pixel = new Uint8Array(4);
   const step = () => {
     view.turn[0] += 0.02; drawNow(); g.readPixels(0, 0, 1, 1, g.RGBA, g.UNSIGNED_BYTE, pixel); n++;
-    const span = performance.now() - from; if (span > 2000) done(1000 * n / span); else requestAnimationFrame(step); }; step(); })"""
+    const span = performance.now() - from; if (span > 2000) done(1000 * n / span); else requestAnimationFrame(step);
+  };
+  step(); })"""
 
 
 def made(count: int, folder: Path) -> tuple[Path, float, float]:
@@ -67,7 +69,7 @@ def main() -> None:
             figures = sum(size for name, size in parts.items() if name.startswith("points"))
             texts = sum(size for name, size in parts.items() if name.startswith("text"))
             seconds, frames = opened(page)
-            print(f"{count:>9,} points: page {len(text) / 1e6:.2f} MB (texts {texts / 1e6:.2f}, points {figures / 1e6:.2f} = "
+            print(f"{count:>9,} points: {len(text) / 1e6:.2f} MB (texts {texts / 1e6:.2f}, points {figures / 1e6:.2f} = "
                   f"{figures / count:.1f} bytes each, all else {(len(text) - texts - figures) / 1e6:.2f}); made in "
                   f"{processor:.1f} s of processor, {memory:.0f} MB; open in {', '.join(f'{s:.2f}' for s in seconds)} s; "
                   f"{frames[0]:.0f} frames per second turning, {frames[1]:.0f} in full")
