@@ -102,10 +102,10 @@ function drawNow() {
   view.draw(lines);
 }
 
-// Gauge length of the tool that runs at a point: of the last one whose first position is not behind it; mm.
+// Gauge length of the tool that runs at a point, mm; where none is stated something that can be seen.
 function toolLength(run, i) {
-  const tools = run.info.tools.filter((t) => t.gauge_length_mm);
-  return tools.length ? tools[Math.min(tools.length - 1, run.columns.operation[i])].gauge_length_mm : 0.3 * shown.view.span;
+  const tool = run.info.tools.find((t) => t.number === run.columns.tool[i]);
+  return (tool && tool.gauge_length_mm) || 0.3 * shown.view.span;
 }
 
 function setTime(seconds, follow) {

@@ -124,14 +124,14 @@ def _times(e: Estimate, drawn: DrawnPoints) -> list[Column]:
 
 
 def _lines(c: Comparison, e: Estimate, drawn: DrawnPoints) -> list[Column]:
-    """Lines of program and CL file, number of the program's file, operation, kind (0 rapid, 1 feed, 2 arc)."""
-    code, b = c.executed[0], e.blocks
+    """Lines of program and CL file, number of the program's file, operation, tool, kind (0 rapid, 1 feed, 2 arc)."""
+    (code, motion), b = c.executed, e.blocks
     line = np.asarray(b.line)[drawn.block]
     file = np.maximum(np.searchsorted([n for _, n in code.files], line) - 1, 0) if code.files else np.zeros(len(line))
     cl = np.asarray(b.cl_line)[drawn.block] if b.cl_line is not None else np.full(len(line), -1)
     kind = np.where(b.rapid, 0, np.where(b.arc, 2, 1))[drawn.block]
     named = (("NC line", in_files(line, code.files)), ("NC file", file), ("CL line", cl),
-             ("operation", np.asarray(b.operation)[drawn.block]), ("kind", kind))
+             ("operation", np.asarray(b.operation)[drawn.block]), ("tool", motion.tool[drawn.row]), ("kind", kind))
     return [Column(name, _first(np.asarray(values, dtype=np.float64)), 1.0) for name, values in named]
 
 

@@ -118,7 +118,7 @@ function showPoint(run, i, jump) {
   const kind = ["rapid or linking move", "feed", "arc"][c.kind[i]];
   const why = c.limit[i] < 0 ? "runs at the programmed feed" : "held by " + limitName(info, c.limit[i]);
   const rows = [["Program", go("nc", c["NC line"][i])], ["CL file", go("cl", c["CL line"][i])],
-    ["Operation", COLOURINGS.operation.named(run, c.operation[i])], ["Motion", kind], ["Time", clockText(run.time[i])],
+    ["Operation", COLOURINGS.operation.named(run, c.operation[i])], ["Tool", "T" + c.tool[i]], ["Motion", kind], ["Time", clockText(run.time[i])],
     ["Part x, y, z", ["part x", "part y", "part z"].map((n) => number(c[n][i], 3)).join(", ") + " mm"],
     ["Feed", number(c["feed programmed"][i], 0) + " programmed, " + number(c["feed reached"][i], 0) + " mm/min reached in the mean"],
     ["Time goes to", cause + "; " + why], ["Tilt", number(Math.acos(Math.min(1, toolAxis(run, i)[2])) * 180 / Math.PI, 2) + " deg"],

@@ -41,6 +41,7 @@ def read(run: int = 0) -> dict[str, Floats]:
 def test_every_commanded_position_is_drawn_in_the_part_frame() -> None:
     found = read()
     cuts = found["CL line"] >= 9
+    assert set(found["tool"][cuts]) == {4.0}
     tips = np.stack([found[f"part {name}"] for name in "xyz"], axis=1)[cuts]
     for k in range(12):
         wanted = np.array([2.0 * k, k % 3, 10.0 + k % 2])
