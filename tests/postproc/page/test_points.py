@@ -17,7 +17,7 @@ from postproc.page.points import columns
 from postproc.page.skeleton import chain, legs
 from postproc.page.what_if import FACTORS, ORDERS, scaled, what_if
 from postproc.pipeline.result import PostResult
-from tests.postproc.kit import convert, good, machine, toolpath
+from tests.postproc.kit import convert, good, machine, setup_of, toolpath
 from tests.postproc.page.page_kit import small
 from toolpaths.arrays import Floats
 
@@ -72,6 +72,18 @@ def test_feed_is_that_of_the_cl_file_and_is_not_passed_in_the_mean() -> None:
     cut = np.isfinite(found["feed programmed"]) & (found["kind"] > 0)
     assert set(found["feed programmed"][cut]) == {600.0}
     assert found["feed reached"][cut].max() < 600.0 * 1.02 and found["feed reached"][cut].max() > 300.0
+
+
+def test_a_part_that_stands_elsewhere_is_drawn_in_its_own_frame() -> None:
+    setup = setup_of('[part]\norigin = [40.0, -25.0, 12.0]\nx_axis = [0, 1, 0]\ny_axis = [-1, 0, 0]\n'
+                     '[tools.1]\ngauge_length = 120.0\n')
+    result = good(convert(toolpath("GOTO/0,0,10", "GOTO/7,0,0", "GOTO/7,9,0"), "mill-3axis", setup=setup))
+    made = estimate_of(result)
+    assert made is not None
+    found = {one.name: one.values for one in columns(result, made)}
+    cuts = np.flatnonzero(found["kind"] == 1)
+    assert [found[f"part {name}"][cuts[-1]] for name in "xyz"] == pytest.approx([7.0, 9.0, 0.0], abs=0.002)
+    assert found["X"][cuts[-1]] == pytest.approx(40.0 - 9.0, abs=0.002)
 
 
 def _turn(direction: list[float], point: list[float], degrees: float) -> np.ndarray:
