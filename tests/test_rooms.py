@@ -65,6 +65,7 @@ FLOORS = (
     ("postproc.alignment", "a part that is not where it was meant, measured"),
     ("postproc.report", "summary, trace, residual field"),
     ("postproc.setup_sheet", "a new set-up: facts, questions, a place that fits"),
+    ("postproc.page", "the report: a page that opens offline, and the same as JSON"),
     ("postproc.explain", "a page for each code of a message"),
     ("postproc.cli", "the command line"),
 )

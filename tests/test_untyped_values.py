@@ -33,7 +33,9 @@ BORDERS = {
     "machines/exchange/draft.py": TABLES, "machines/sheet/file_text.py": TABLES,
     "machines/value_words.py": "what pydantic says of a fault",
     "machines/analysis/report.py": FIGURES, "machines/geometric_error/exchange/survey.py": FIGURES,
-    "postproc/report/places.py": FIGURES,
+    "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,
+    **{f"postproc/page/{name}.py": FIGURES for name in (
+        "columns", "document", "drawings", "run", "skeleton", "solids", "tools", "what_if")},
     "postproc/report/summary.py": FIGURES, "postproc/report/trace.py": FIGURES, "postproc/report/unwinding.py": FIGURES,
     "postproc/placement/report.py": FIGURES, "postproc/cycle_time/report.py": FIGURES,
     "postproc/cycle_time/conversion.py": FIGURES, "postproc/cycle_time/shares.py": FIGURES,
@@ -64,6 +66,7 @@ LOOP = "arguments of a compiled loop: numba gives them their types"
 DRAWN = "axes of matplotlib"
 LAZY = "names of a package that are imported when they are first asked for"
 ANYTHING = {
+    "postproc/base/json_values.py": FIGURES,
     "machines/geometric_error/actual/rods_loop.py": LOOP, "postproc/collision/kernel.py": LOOP,
     "postproc/correction/backlash_steps_loop.py": LOOP, "postproc/cycle_time/linuxcnc_kernels.py": LOOP,
     "postproc/feedrate/kernels/coefficients.py": LOOP, "postproc/feedrate/kernels/interior.py": LOOP,

@@ -24,7 +24,6 @@ from postproc.cli.console import (
     report,
     shown_errors,
 )
-from postproc.cli.console import rounded as rounded
 from postproc.cli.errors import errors_app
 from postproc.cli.group import Group
 from postproc.cli.guard import guarded
@@ -54,6 +53,8 @@ from postproc.cli.orient import EXAMPLES
 from postproc.cli.orient import orient as orient_command
 from postproc.cli.place import EXAMPLES as PLACES
 from postproc.cli.place import place
+from postproc.cli.report import EXAMPLE as REPORTS
+from postproc.cli.report import check_page, pages, report_command
 from postproc.cli.time import time
 from toolpaths.choices import FieldEnding, GivenDialect, GivenUnit
 
@@ -74,6 +75,7 @@ app.command(short_help="Identify a machine's errors from measurements, each with
 app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc")(time)
 app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog=PLACES)(place)
+app.command("report", epilog=REPORTS)(report_command)
 
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
@@ -95,6 +97,8 @@ ResidualFiles = Annotated[list[Path] | None, typer.Option("--residuals", metavar
 CheckProgram = Annotated[Path | None, typer.Option("--check-program", metavar="FILE", help="write a program too that checks "
                                                    "the pivots at the machine: five poses of a ball or probe, with the "
                                                    "readings expected")]
+PageFile = Annotated[Path | None, typer.Option("--report", metavar="R.html", help="write the report of the conversion too, "
+                                              "a page that opens offline; also where the conversion has errors")]
 OutputModeOption = Annotated[OutputMode, word_option("--output-mode", OutputMode, (
     "axes: machine coordinates, no RTCP; tcp: tool-centre-point control (G43.4, TRAORI, TCPM, G234); tilted: tilted work "
     "plane, 3+2 (G68.2, CYCLE800, PLANE SPATIAL, G254)"))]
@@ -124,7 +128,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             axis_tolerance: AxisToleranceOption = 0.05,
             units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
             error_model: Errors = "", beyond: Beyond = False, residuals: ResidualFiles = None,
-            check_program: CheckProgram = None,
+            check_program: CheckProgram = None, page: PageFile = None,
             require_proof: RequireProof = False, proof: ProofOption = False, json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
@@ -133,8 +137,10 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                       require_proof=require_proof)
     only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
+    if page is not None:
+        check_page(page, "--report")
     refuse_overwriting({"-o": str(output), "--json": json, "--proof": f"{output}.proof.json" if proof else "",
-                        "--check-program": str(check_program or ""),
+                        "--check-program": str(check_program or ""), "--report": str(page or ""),
                         **{f"--residuals {name}": str(name) for name in fields}},
                        inputs := {"the CL file": str(file), "the set-up": setup, "the hooks": hooks,
                                   "the error model": error_model, **own_files(machine, controller)})
@@ -148,7 +154,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
 
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
-        known = command.hashed(machine, controller, options) if proof else None
+        known = command.hashed(machine, controller, options) if proof or page else None
         m, spec = machine_of(machine), controller_of(controller)
         path, found = read_cl(file, options, progress, options.tolerance)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
@@ -157,13 +163,14 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         time = estimate_of(result)  # all before a file is written
         values, text = summary.as_dict(result, str(output), time), summary.as_text(result, str(output), time)
         more = offers(result, path, machine, controller)
+        outputs |= pages(page, path, result, known, output.name, time)
         if result.ok:
             texts, more = program_files(output, result.text, result.files or {})
             refuse_inputs(list(texts)[:-1], inputs)
             kept, unlike = command.kept(result, machine, controller, proof, known, output)
             more += unlike
             check = checked_file(result, spec, check_program)
-            outputs = {**dict(zip(fields, noted, strict=True)), **kept, **check, **texts}
+            outputs = {**outputs, **dict(zip(fields, noted, strict=True)), **kept, **check, **texts}
     found = [*result.diagnostics, *more]
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from postproc.base.job_place import NAME
+from postproc.base.json_values import plain, rounded
 from postproc.cli.says import SAYS
 
 if TYPE_CHECKING:
@@ -171,17 +172,11 @@ def _say(stage: str, said: list[str]) -> None:
         typer.echo(stage, err=True)
 
 
-def _plain(value: object) -> object:
-    """JSON of what is no JSON by itself: a number or truth of an array as what it is, all else (paths) in words."""
-    item = getattr(value, "item", None)
-    return item() if callable(item) and getattr(value, "ndim", None) == 0 else str(value)
-
-
 def print_json(values: object) -> None:
     """JSON on standard output."""
     import json
 
-    typer.echo(json.dumps(values, indent=2, allow_nan=False, default=_plain))
+    typer.echo(json.dumps(values, indent=2, allow_nan=False, default=plain))
 
 
 def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, Any], text: str,
@@ -282,7 +277,7 @@ def _written(target: str, values: dict[str, Any],
     import json
 
     if target and target != "-":
-        figures = json.dumps(rounded(values), indent=2, allow_nan=False, default=_plain) + "\n"
+        figures = json.dumps(rounded(values), indent=2, allow_nan=False, default=plain) + "\n"
         outputs = {Path(target): figures, **outputs}
     if not outputs:
         return [], False
@@ -293,15 +288,6 @@ def _written(target: str, values: dict[str, Any],
         return write_together(outputs), False
     except DiagnosticError as fault:
         return list(fault.diagnostics), True
-
-
-def rounded(value: Any) -> Any:
-    """JSON values with numbers of at most 9 decimals, no -0."""
-    if isinstance(value, float):
-        return round(value, 9) + 0.0
-    if isinstance(value, dict):
-        return {key: rounded(v) for key, v in value.items()}
-    return [rounded(v) for v in value] if isinstance(value, (list, tuple)) else value
 
 
 def refuse_overwriting(outputs: dict[str, str], inputs: dict[str, str]) -> None:

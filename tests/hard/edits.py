@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 
 import machines.machine
-from postproc.cli.console import rounded
+from postproc.base.json_values import rounded
 from postproc.controllers.model import ControllerFile
 from postproc.cycle_time import report
 from postproc.cycle_time.estimate import estimate

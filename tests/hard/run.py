@@ -147,8 +147,8 @@ def _asked(task: Task, controller: str, options: Any) -> Any:
 
 def _converted(task: Task, controller: str) -> Any:
     """The conversion, with all that is said of it."""
+    from postproc.base.json_values import rounded
     from postproc.base.options import Options
-    from postproc.cli.console import rounded
     from postproc.cycle_time import report
     from postproc.cycle_time.conversion import estimate_of
     from postproc.cycle_time.estimate import estimate

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import postproc
-from postproc.cli.console import rounded
+from postproc.base.json_values import rounded
 from tests.postproc.cli.test_cli import MILL, POCKET, cl, run
 from tests.postproc.kit import SAMPLES, TOOLS
 

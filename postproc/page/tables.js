@@ -1,0 +1,105 @@
+// Everything of the report that is words and numbers.
+const lineOf = (run) => `${run.machine}, ${run.controller}`;
+
+function verdict(k, box) {
+  const run = report.runs[k], found = run.conversion.diagnostics, count = (s) => found.filter((d) => d.severity === s).length;
+  box.className = !run.converted ? "bad" : !run.proved || count("warning") ? "warn" : "good";
+  const word = !run.converted ? "NOT CONVERTED" : run.proved ? "PROVED" : "CHECKED, NOT PROVED";
+  box.replaceChildren(make("b", {}, word), " ", run.statement || "No program was written: the errors below say why.");
+  if (run.converted) {
+    box.append(make("div", {}, "Allowed: ", figure(`runs.${k}.tolerance_mm`, 4, "mm"), ", ", figure(`runs.${k}.axis_tolerance_deg`, 4, "degrees"),
+      "; bound: ", figure(`runs.${k}.conversion.worst_tip_deviation_mm`, 6, "mm"), ", ", figure(`runs.${k}.conversion.worst_axis_deviation_deg`, 6, "degrees")));
+  }
+}
+
+function messageItems(list, jump) {
+  return make("ul", {class: "messages"}, ...list.map((d) => make("li", {}, make("span", {class: d.severity}, d.severity), ` [${d.code}] ${d.message}`,
+    d.count > 1 ? ` (${d.count} times)` : "", d.hint ? make("div", {class: "note"}, "What to do: " + d.hint) : null,
+    ...[...new Set(d.lines || [])].slice(0, 8).map((line) => make("button", {type: "button", class: "jump", onclick: () => jump(d, line)}, "line " + line)))));
+}
+
+function timeCell(k) {
+  const base = `runs.${k}.conversion`, run = report.runs[k].conversion;
+  if (run.cycle_time_s === null) return "-";
+  return make("span", {}, clockText(run.cycle_time_s) + " (", figure(base + ".cycle_time_s", 2, "s"), ")");
+}
+
+function bandCell(k) {
+  const base = `runs.${k}.conversion`, run = report.runs[k].conversion;
+  if (run.cycle_time_s === null) return "-";
+  return run.band_s ? make("span", {}, figure(base + ".band_s.0", 2, ""), " to ", figure(base + ".band_s.1", 2, "s")) : "not counted for long programs";
+}
+
+function compareTable(pick) {
+  if (report.runs.length < 2) return null;
+  const rows = report.runs.map((run, k) => [make("button", {type: "button", onclick: () => pick(k)}, lineOf(run)),
+    !run.converted ? "not converted" : run.proved ? "proved" : "checked", figure(`runs.${k}.conversion.worst_tip_deviation_mm`, 5, "mm"), timeCell(k), bandCell(k),
+    run.conversion.cycle_time_s === null ? "-" : figure(`runs.${k}.conversion.lower_bound_s`, 2, "s"), figure(`runs.${k}.conversion.blocks_out`, 0, ""),
+    make("span", {}, ...run.axes.flatMap((axis, j) => (axis.used_percent === null ? [] : [axis.letter + " ", figure(`runs.${k}.axes.${j}.used_percent`, 0, "%  ")]))),
+    String(run.conversion.diagnostics.filter((d) => d.severity === "warning").length)]);
+  return make("div", {}, make("h3", {}, "Machines and controls side by side"),
+    table(["Machine, control", "State", "Bound", "Time", "95 % of runs", "Lower bound", "Blocks", "Travel used", "Warnings"], rows, [2, 3, 4, 5, 6, 8]));
+}
+
+function headParts(k) {
+  const run = report.runs[k], base = `runs.${k}`, c = run.conversion, witness = c.witness;
+  const axes = run.axes.map((axis, j) => [axis.letter, axis.used ? make("span", {}, figure(`${base}.axes.${j}.used.0`, 3, ""), " to ", figure(`${base}.axes.${j}.used.1`, 3, axis.unit)) : "-",
+    axis.travel.map((v) => (v === null ? "no end" : v)).join(" to "), axis.used_percent === null ? "-" : figure(`${base}.axes.${j}.used_percent`, 1, "%"),
+    axis.margin === null ? "-" : figure(`${base}.axes.${j}.margin`, 3, axis.unit)]);
+  const feeds = run.feeds || {}, collisions = run.collisions;
+  const facts = [["Time", timeCell(k)], ["95 % of runs", c.cycle_time_s === null ? "-" : bandCell(k)], ["Lower bound", figure(base + ".conversion.lower_bound_s", 2, "s")],
+    ["Time model", c.time ? c.time.model : "-"], ["Blocks", figure(base + ".conversion.blocks_out", 0, "")], ["CL points", figure(base + ".conversion.points_in", 0, "")],
+    ["Feeds of cuts", run.feeds ? make("span", {}, figure(base + ".feeds.least_mm_per_min", 0, ""), " to ", figure(base + ".feeds.greatest_mm_per_min", 0, "mm/min")) : "-"],
+    ["Blocks slowed for an axis", run.feeds ? figure(base + ".feeds.reduced_blocks", 0, "") : "-"],
+    ["Spindle", c.tools.map((t) => `T${t.number}: ${t.spindle_rpm.map((v) => Math.abs(v) + (v < 0 ? " CCLW" : " CLW")).join(", ") || "off"}`).join("; ") || "-"],
+    ["Collisions", collisions.checked ? (collisions.messages ? `${collisions.messages} found, see messages` : "none with part, table and fixtures of the set-up") : "not checked: the set-up has no [bodies]"],
+    ["Rewinds", figure(base + ".conversion.rewinds", 0, "")], ["Singular directions passed", figure(base + ".conversion.singular_events", 0, "")]];
+  const proof = witness ? make("div", {}, make("h3", {}, "What the proof covers"), make("p", {}, "Compared a second time, by other code: " + (witness.compared.join(", ") || "nothing") + "."),
+    make("p", {}, witness.not_compared.length ? "Not compared: " + witness.not_compared.join("; ") + "." : "Nothing was left out."),
+    make("p", {class: "note"}, "The proof is about the program, the CL file and the machine as its files describe it; not about deflection, heat, wear or following error.")) : null;
+  const files = make("div", {}, make("h3", {}, "What it rests on (SHA-256)"), table(["", "File", "SHA-256"], run.files.map((f) => [f.role.replace("_", " "), f.file, f.sha256]), []));
+  files.querySelectorAll("td:last-child").forEach((cell) => cell.classList.add("hash"));
+  return [make("div", {}, make("h3", {}, "Figures"), table(["", ""], facts, [])), make("div", {}, make("h3", {}, "Travel used"), table(["Axis", "Used", "Travel", "Share", "Margin"], axes, [1, 2, 3, 4]), proof), files].filter(Boolean);
+}
+
+function operationTable(k) {
+  const time = report.runs[k].conversion.time;
+  if (!time) return null;
+  const base = `runs.${k}.conversion.time.operations`;
+  return make("div", {}, make("h3", {}, "Operations"), table(["Operation", "Time", "Cutting", "Rapids", "Tool changes"], time.operations.map((op, n) => [op.operation || "without a name",
+    figure(`${base}.${n}.time_s`, 2, "s"), figure(`${base}.${n}.cutting_s`, 2, "s"), figure(`${base}.${n}.rapids_s`, 2, "s"), figure(`${base}.${n}.tool_change_s`, 2, "s")]), [1, 2, 3, 4]));
+}
+
+function sheetParts(k) {
+  const run = report.runs[k], base = `runs.${k}`, position = (values, unit) => (values ? Object.entries(values).map(([a, v]) => a + " " + number(v, 3)).join("  ") : "-");
+  const tools = run.tools.map((t, n) => ["T" + t.number, t.name || "-", t.gauge_length_mm === null ? "not stated" : figure(`${base}.tools.${n}.gauge_length_mm`, 4, "mm"),
+    t.length_register === null ? "-" : "H" + t.length_register, make("span", {}, figure(`${base}.tools.${n}.time_s`, 1, "s"), " (" + number(t.time_s / 60, 1) + " min)"),
+    number(t.cutting_mm / 1000, 3) + " m", position(t.first_axes)]);
+  const offset = run.work_offset;
+  return [make("p", {}, `${report.part} on ${lineOf(run)}; program ${run.files.filter((f) => f.role === "program").map((f) => f.file).join(", ") || "not written"}`),
+    make("h3", {}, "Tools in the order of use"), table(["Tool", "Name", "Gauge length", "Register", "Time", "At feed", "First position (machine coordinates, mm and degrees)"], tools, [2, 4, 5]),
+    offset ? make("div", {}, make("h3", {}, "Work offset"), make("p", {}, `${offset.register}: ${position(offset.values)}`)) : null,
+    run.conversion.places.length ? table(["Place", "Work offset", "Offset"], run.conversion.places.map((p) => [p.place, p.work_offset, position(p.offset)]), []) : null,
+    make("h3", {}, "What the header of the program says: offsets, lengths, pivots, what is relied on"), make("div", {class: "header-lines"}, run.header.join("\n") || "-"),
+    operationTable(k)].filter(Boolean);
+}
+
+function orientationParts(k) {
+  const found = report.runs[k].orientation, base = `runs.${k}.orientation`;
+  if (!found) return [make("p", {}, "The tool axes are those of the CL file (--orient keep): none were chosen.")];
+  const angles = (values) => Object.entries(values || {}).map(([a, v]) => `${a} ${number(v, 2)}`).join("  ");
+  return [make("p", {}, "Each pass is machined with a fixed tool axis (3+2). The table gives the chosen rotary positions, the time with them and with the axes of the CL file, and why other directions lost."),
+    table(["Pass", "Rotary position, deg", "Time", "With the CL file's axes", "Held by", "Rejected candidates"], found.passes.map((p, n) => [String(p.pass), angles(p.orientation_deg),
+      figure(`${base}.passes.${n}.time_s`, 3, "s"), figure(`${base}.passes.${n}.reference_time_s`, 3, "s"), p.limiting_axis || "-",
+      (p.rejected || []).map((r) => (typeof r === "string" ? r : [r.count, r.reason || r.why].filter((v) => v !== undefined).join(" "))).join("; ") || "-"]), [2, 3]),
+    table(["Plan", "Time"], Object.keys(found.plans).filter((name) => found.plans[name]).map((name) => [name.replaceAll("_", " "), figure(`${base}.plans.${name}.time_s`, 3, "s")]), [1])];
+}
+
+function errorParts(k, jump) {
+  const found = report.runs[k].errors, base = `runs.${k}.errors`;
+  if (!found) return [make("p", {}, "No geometric errors were corrected: no --error-model was given, or the control corrects them.")];
+  return [make("p", {}, found.title + ": worst before ", figure(base + ".worst_before_um", 2, "um"), ", after ", figure(base + ".worst_after_um", 3, "um"), ", bound ",
+    figure(base + ".bound_um", 3, "um"), ", uncertainty (k = 2) ", found.uncertainty_k2_um === null ? "not known" : figure(base + ".uncertainty_k2_um", 2, "um")),
+  table(["CL line", "Part x, y, z, mm", "Error x, y, z before, um", "Before", "After"], found.worst.map((p, n) => [make("button", {type: "button", class: "jump", onclick: () => jump("cl", p.cl_line, 0)}, "line " + p.cl_line),
+    p.part_mm.map((v) => number(v, 3)).join(", "), p.vector_um.map((v) => number(v, 2)).join(", "), figure(`${base}.worst.${n}.before_um`, 2, "um"), figure(`${base}.worst.${n}.after_um`, 3, "um")]), [3, 4])];
+}

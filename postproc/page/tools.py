@@ -1,0 +1,42 @@
+"""The tools of a program for the set-up sheet: how long each runs, how far it cuts, where it begins."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from postproc.cycle_time.estimate import Estimate
+from postproc.pipeline.result import PostResult
+from postproc.report.summary import tools_of
+from toolpaths.rotations import lengths
+
+
+def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
+    """`summary.tools_of` with length register, s (rapids and the rests behind its blocks among them), mm at feed, the
+    greatest feed reached (mm/min) and the first position (axes in mm and degrees, part in mm) of each tool."""
+    c, job, b = result.comparison, result.job, e.blocks
+    if c is None or job is None or b.row is None:
+        return []
+    motion, row = c.executed[1], np.asarray(b.row)
+    number = motion.tool[row]
+    span = np.diff(np.concatenate([e.timed.begin, e.timed.end[-1:]]))
+    travel = lengths(np.diff(c.tip, axis=0, prepend=c.tip[:1]))
+    cuts = motion.code > 0
+    back, unit, found = job.placement.inverse(), job.control.unit, list[dict[str, Any]]()
+    for tool in tools_of(result):
+        blocks = np.flatnonzero(number == tool["number"])
+        if not len(blocks):
+            found.append(tool | {"length_register": None, "time_s": 0.0, "cutting_mm": 0.0, "first_axes": None,
+                                 "first_part_mm": None})
+            continue
+        first = row[blocks[:1]]
+        q = c.poses.joints(motion, first, 1.0)[0] * unit
+        registers = np.unique(motion.register[row[blocks]])
+        here = (motion.tool == tool["number"]) & cuts
+        found.append(tool | {
+            "length_register": next((int(r) for r in registers.tolist() if r >= 0), None),
+            "time_s": float(span[blocks].sum()), "cutting_mm": float(travel[here].sum()),
+            "first_axes": dict(zip(result.machine.axis_names, q.tolist(), strict=True)),
+            "first_part_mm": back.points(c.tip[first])[0].tolist()})
+    return found

@@ -1,0 +1,216 @@
+"""The report in a real browser: headless Chromium, one session for the file; skipped where it is not there."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import reduce
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.postproc.page.page_kit import HOSTILE, LINES, refused, small
+
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
+BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium here: apt-get install chromium")
+NUMBERS = "all => all.map(e => [e.dataset.key, e.dataset.digits, e.textContent])"
+PLACE = """() => { const i = shown.run.columns["CL line"].indexOf(14), p = shown.view.places.slice(3 * i, 3 * i + 3);
+  const m = shown.view.matrix(), w = shown.view.canvas.clientWidth, h = shown.view.canvas.clientHeight;
+  const f = (k) => m[k] * p[0] + m[4 + k] * p[1] + m[8 + k] * p[2] + m[12 + k];
+  return [(f(0) + 1) * w / 2, (1 - f(1)) * h / 2]; }"""
+"""pixels at which the point of CL line 14 is drawn"""
+DARK = """() => { drawNow(); const g = shown.view.gl, w = g.drawingBufferWidth, h = g.drawingBufferHeight;
+  const p = new Uint8Array(4 * w * h); g.readPixels(0, 0, w, h, g.RGBA, g.UNSIGNED_BYTE, p);
+  return p.some((v, i) => i % 4 < 3 && v < 160); }"""
+OFF = """() => { const run = shown.run, s = run.info.skeleton; let most = 0;
+  for (let i = 0; i < run.count; i++) {
+    const f = framesOf(s, (a) => run.columns[a][i]), last = f[f.length - 1], axis = turned(last, s.tool_axis);
+    ["part x", "part y", "part z"].forEach((n, k) => {
+      most = Math.max(most, Math.abs(last.o[k] - 130.25 * axis[k] - run.columns[n][i])); }); }
+  return most; }"""
+POOR = """() => { const parts = (c) => (c.match(/[\\d.]+/g) || []).map(Number);
+  const linear = (v) => { v /= 255; return v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4; };
+  const light = (c) => { const [r, g, b] = c.slice(0, 3).map(linear); return 0.2126 * r + 0.7152 * g + 0.0722 * b; };
+  const ground = (e) => { for (; e; e = e.parentElement) { const c = parts(getComputedStyle(e).backgroundColor);
+    if (c.length === 3 || c[3] > 0) return c; } return [255, 255, 255]; };
+  const worded = (e) => [...e.childNodes].some((n) => n.nodeType === 3 && n.data.trim());
+  return [...document.querySelectorAll("main *, header *, footer *")].filter(worded).map((e) => {
+    const style = getComputedStyle(e), b = light(ground(e));
+    const a = light(parts(e instanceof SVGElement ? style.fill : style.color));
+    return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), e.outerHTML.slice(0, 80)];
+  }).filter((one) => one[0] < 4.5); }"""
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
+@dataclass
+class Session:
+    """A page that is open, what it has complained of, and what it has asked for besides itself."""
+
+    page: Any
+    said: list[str] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+
+
+def until(page: Any, what: str) -> None:
+    """Wait for a truth; the page itself may evaluate no texts."""
+    for _ in range(200):
+        if page.evaluate(what):
+            return
+        page.wait_for_timeout(25)
+    raise AssertionError(f"never: {what}")
+
+
+@pytest.fixture(scope="module")
+def opened() -> Iterator[Session]:
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=BROWSER, args=FLAGS)
+        session = Session(browser.new_page(viewport={"width": 1300, "height": 900}))
+        session.page.on("console", lambda message: session.said.append(message.text))
+        session.page.on("pageerror", lambda fault: session.said.append(str(fault)))
+        session.page.on("request", lambda request: session.asked.append(request.url))
+        session.page.goto(small().page.as_uri())
+        session.page.wait_for_selector("html[data-ready]", state="attached")
+        yield session
+        browser.close()
+
+
+def test_it_opens_without_a_complaint_and_asks_for_nothing(opened: Session) -> None:
+    assert opened.page.get_attribute("html", "data-ready") != "failed"
+    assert opened.said == []
+    assert [url for url in opened.asked if not url.startswith(("data:", "blob:"))] == [small().page.as_uri()]
+
+
+def test_a_hostile_name_is_shown_as_it_stands_and_does_nothing(opened: Session) -> None:
+    assert opened.page.inner_text("h1") == HOSTILE
+    assert opened.page.evaluate("window.hacked") is None and opened.page.locator("main img[src=x]").count() == 0
+
+
+@pytest.mark.parametrize("run", [0, 1])
+def test_every_number_on_the_page_is_that_of_the_json(opened: Session, run: int) -> None:
+    opened.page.evaluate(f"pickRun({run})")
+    until(opened.page, f"shown.run.k === {run}")
+    shown = opened.page.eval_on_selector_all("[data-key]", NUMBERS)
+    assert len(shown) > 60
+    for key, digits, text in shown:
+        value = reduce(lambda v, step: v[int(step)] if isinstance(v, list) else v[step], key.split("."), small().values)
+        number = re.match(r"-?[\d.]+|-", text)
+        assert number is not None, (key, text)
+        if value is None:
+            assert text.strip().startswith("-"), key
+        else:
+            assert float(number[0]) == pytest.approx(value, abs=0.5001 * 10.0 ** -int(digits)), key
+    keys = {key for key, _, _ in shown}
+    base = f"runs.{run}.conversion."
+    assert {base + "worst_tip_deviation_mm", base + "cycle_time_s", base + "band_s.0", f"runs.{run}.axes.0.used.0"} <= keys
+
+
+def test_a_click_shows_the_point_and_both_its_lines(opened: Session) -> None:
+    page = opened.page
+    page.evaluate("pickRun(0)")
+    page.uncheck("#machine")
+    box = page.locator("#view").bounding_box()
+    wanted = page.evaluate(PLACE)
+    page.locator("#view").scroll_into_view_if_needed()
+    page.locator("#view").click(position={"x": wanted[0], "y": wanted[1]})
+    assert box["width"] > 300
+    assert "line 14" in page.inner_text("#point")
+    page.click("#jump-cl")
+    page.wait_for_selector("#text .row.here")
+    assert LINES[13] in page.inner_text("#text .row.here")
+    page.click("#jump-nc")
+    until(page, "shown.texts.kind === 'nc0-0'")
+    line = page.inner_text("#text .row.here")
+    assert re.search(r"X[-\d.]+", line), line
+
+
+def test_a_line_of_a_text_leads_to_its_point_and_words_are_found(opened: Session) -> None:
+    page = opened.page
+    page.evaluate("openText('cl', 1, 0)")
+    page.fill("#search", "GOTO/6")
+    page.press("#search", "Enter")
+    until(page, "byId('found').textContent.startsWith('Line')")
+    assert LINES[10].startswith("GOTO/4") and page.inner_text("#found") == "Line 12."
+    page.press("#text", "Enter")
+    assert page.evaluate("shown.run.columns['CL line'][shown.point]") == 12
+    assert "line 12" in page.inner_text("#point")
+
+
+def test_the_slider_and_play_move_the_machine_and_the_cursor(opened: Session) -> None:
+    page = opened.page
+    end = page.evaluate("Number(byId('slider').max)")
+    assert end == pytest.approx(small().values["runs"][0]["conversion"]["cycle_time_s"], rel=0.02)
+    page.evaluate("byId('slider').value = byId('slider').max / 2; byId('slider').dispatchEvent(new Event('input'))")
+    half = page.evaluate("[shown.time, shown.lanes.cursor, shown.point]")
+    assert half[0] == pytest.approx(end / 2, rel=0.01) and half[1] == half[0] and half[2] > 0
+    page.click("#play")
+    until(page, f"shown.time > {half[0]}")
+    page.click("#play")
+    assert page.inner_text("#play") == "Play"
+
+
+def test_every_colouring_paints_and_says_what_the_colours_mean(opened: Session) -> None:
+    page = opened.page
+    names = page.eval_on_selector_all("#colour option", "all => all.map(e => e.value)")
+    assert set(names) == {"operation", "feed", "limit", "cause", "deviation", "tilt"}
+    for name in names:
+        page.select_option("#colour", name)
+        assert page.inner_text("#legend").strip()
+        assert page.evaluate(DARK), name
+
+
+def test_the_page_moves_the_axes_as_the_kinematics_does(opened: Session) -> None:
+    """The tool that the axes carry ends at the drawn tip, at every point."""
+    off = opened.page.evaluate(OFF)
+    assert off < 0.002 and opened.page.evaluate("toolLength(shown.run, 3)") == 130.25
+
+
+def test_keys_do_what_the_mouse_does(opened: Session) -> None:
+    page = opened.page
+    page.evaluate("setPoint(3)")
+    page.focus("#view")
+    before = page.evaluate("[...shown.view.turn, shown.view.span, shown.point]")
+    for key in ("ArrowRight", "ArrowUp", "+", "."):
+        page.keyboard.press(key)
+    after = page.evaluate("[...shown.view.turn, shown.view.span, shown.point]")
+    assert all(a != b for a, b in zip(before, after, strict=True)) and after[3] == before[3] + 1
+    bare = page.eval_on_selector_all("button, select, input", "all => all.filter(e => !(e.labels && e.labels.length) && "
+                                     "!e.getAttribute('aria-label') && !e.textContent.trim()).map(e => e.outerHTML)")
+    assert bare == []
+
+
+def test_words_stand_out_from_their_ground(opened: Session) -> None:
+    """Contrast of at least 4.5 (WCAG 2.2, 1.4.3) between text and the ground it stands on."""
+    poor = opened.page.evaluate(POOR)
+    assert poor == []
+
+
+@pytest.mark.parametrize("width", [360, 820])
+def test_small_screens_scroll_in_one_direction_alone(opened: Session, width: int) -> None:
+    opened.page.set_viewport_size({"width": width, "height": 740})
+    wide = opened.page.evaluate("document.documentElement.scrollWidth")
+    opened.page.set_viewport_size({"width": 1300, "height": 900})
+    assert wide <= width
+
+
+def test_it_prints_on_a4_with_the_picture(opened: Session, tmp_path: Path) -> None:
+    data = opened.page.pdf(format="A4", prefer_css_page_size=True)
+    boxes = re.findall(r"MediaBox \[([^\]]*)\]", data.decode("latin-1"))
+    sizes = {tuple(round(float(v)) for v in box.split()[2:]) for box in boxes}
+    assert sizes == {(595, 842)}
+    opened.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert opened.page.get_attribute("#printed", "src").startswith("data:image/png")
+    assert opened.said == [], "nothing was complained of to the end"
+
+
+def test_messages_of_what_was_not_converted_lead_to_the_cl_file(opened: Session) -> None:
+    page = opened.page
+    page.goto(refused().page.as_uri())
+    page.wait_for_selector("html[data-ready]", state="attached")
+    assert "NOT CONVERTED" in page.inner_text("#verdict") and not page.is_visible("#view")
+    page.click("#first button.jump >> nth=0")
+    page.wait_for_selector("#text .row.here")
+    assert "9000" in page.inner_text("#text .row.here") and opened.said == []

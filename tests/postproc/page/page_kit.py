@@ -1,0 +1,57 @@
+"""What the tests of the report share: a small five-axis path with a hostile name, reported once."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+
+from typer.testing import CliRunner
+
+from postproc.cli.app import app
+from tests.postproc.kit import SAMPLES
+
+HOSTILE = "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=2>"
+CUTS = [f"GOTO/{2 * k},{k % 3},{10 + k % 2},{math.sin(0.02 * k):.8f},0,{math.cos(0.02 * k):.8f}" for k in range(12)]
+LINES = ["PARTNO " + HOSTILE, "UNITS/MM", "MULTAX/ON", "LOADTL/4", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600", "RAPID",
+         "GOTO/0,0,50,0,0,1", *CUTS, "RAPID",
+         "GOTO/30,0,60,0,0,1", "FINI"]
+
+
+@dataclass(frozen=True)
+class Made:
+    """A report: exit code, what was printed, the page and its JSON by place."""
+
+    code: int
+    said: str
+    page: Path
+    values: dict[str, Any]
+
+
+def reported(*arguments: str, lines: tuple[str, ...] = tuple(LINES)) -> Made:
+    """`postproc report` of CL lines on a trunnion machine under LinuxCNC, with further arguments."""
+    folder = Path(mkdtemp())
+    cl, page, figures = folder / "part.cls", folder / "r.html", folder / "r.json"
+    cl.write_text("\n".join(lines) + "\n")
+    given = [] if "-m" in arguments else ["-m", "mikron-ucp710"]
+    given += [] if "-c" in arguments else ["-c", "linuxcnc"]
+    done = CliRunner().invoke(app, ["report", str(cl), *given, "--setup", str(SAMPLES / "tools.setup.toml"), "-o", str(page),
+                                    "--json", str(figures), *arguments])
+    values = json.loads(figures.read_text()) if figures.exists() else {}
+    return Made(done.exit_code, done.output, page, values)
+
+
+@cache
+def refused() -> Made:
+    """The same with a point that the machine does not reach."""
+    return reported(lines=tuple(line.replace("GOTO/30,0,60", "GOTO/30,0,9000") for line in LINES))
+
+
+@cache
+def small() -> Made:
+    """The small path under two controls."""
+    return reported("-c", "linuxcnc", "-c", "siemens-840d")

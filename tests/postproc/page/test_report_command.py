@@ -1,0 +1,107 @@
+"""The command `report` and `convert --report`: what is written, when, and that texts of files stay texts."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import zlib
+from base64 import b64decode
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from postproc.cli.app import app
+from postproc.page import drawings
+from tests.postproc.kit import SAMPLES
+from tests.postproc.page.page_kit import HOSTILE, LINES, refused, reported, small
+
+SETUP = str(SAMPLES / "tools.setup.toml")
+
+
+def test_each_control_is_a_run_with_what_its_proof_says_and_rests_on() -> None:
+    made = small()
+    assert made.code == 0 and made.values["ok"] and made.values["report_version"] == 1
+    assert [run["controller"] for run in made.values["runs"]] == ["linuxcnc", "siemens-840d"]
+    for run in made.values["runs"]:
+        assert run["proved"] and run["conversion"]["worst_tip_deviation_mm"] <= run["tolerance_mm"] == 0.01
+        assert run["statement"].startswith("proved: tip within")
+        assert {one["role"] for one in run["files"]} >= {"cl_file", "program", "setup", "machine", "controller"}
+        low, high = run["conversion"]["band_s"]
+        assert low <= run["conversion"]["cycle_time_s"] <= high
+
+
+def test_hashes_are_those_of_the_files_and_of_the_program_that_convert_writes(tmp_path: Path) -> None:
+    cl = tmp_path / "part.cls"
+    cl.write_text("\n".join(LINES) + "\n")
+    page = tmp_path / "r.html"
+    done = CliRunner().invoke(app, ["convert", str(cl), "-m", "mikron-ucp710", "-c", "linuxcnc", "--setup", SETUP, "-o",
+                                    str(tmp_path / "part.nc"), "--report", str(page)])
+    assert done.exit_code == 0, done.output
+    said = {(one["role"], one["file"]): one["sha256"] for one in small().values["runs"][0]["files"]}
+    for role, file in (("cl_file", cl), ("program", tmp_path / "part.nc")):
+        assert said[role, file.name] == hashlib.sha256(file.read_bytes()).hexdigest()
+    assert said["program", "part.nc"] in page.read_text()
+
+
+def test_the_page_asks_nothing_of_anybody_and_holds_texts_as_texts() -> None:
+    page = small().page.read_text()
+    assert page.count("<script") == page.count("</script>") and HOSTILE not in page
+    assert "\\u003c/script\\u003e" in page  # the name of the part, in the JSON
+    assert "default-src 'none'" in page
+    shown = re.sub(r"(?s)<title>.*?</title>|<script type=.*?</script>", "", page)  # texts and figures, whatever they say
+    assert not re.search(r"""(src|href)=["']?(?!#)\w|@import|url\(|importScripts|fetch\(|XMLHttpRequest""", shown)
+
+
+def test_texts_are_the_bytes_of_the_files_and_may_be_left_out(tmp_path: Path) -> None:
+    page = small().page.read_text()
+    kept = dict(re.findall(r'id="text-([\w-]+)" data-name="[^"]*">([^<]*)<', page))
+    assert set(kept) == {"cl", "nc0-0", "nc1-0"}
+    assert zlib.decompress(b64decode(kept["cl"])).decode().splitlines() == LINES
+    without = reported("--no-texts")
+    assert without.code == 0 and "text-cl" not in without.page.read_text()
+
+
+def test_what_cannot_be_converted_is_on_the_page_with_its_reasons() -> None:
+    made = refused()
+    run = made.values["runs"][0]
+    assert made.code == 1 and not made.values["ok"] and not run["converted"] and run["points"] is None
+    assert any(d["severity"] == "error" for d in run["conversion"]["diagnostics"])
+    assert made.page.exists() and "not converted" in made.said
+
+
+def test_figures_are_drawn_without_a_browser_with_units_on_their_axes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each sheet filled; that a sheet becomes PNG and SVG is of `toolpaths/drawing.py`."""
+    from matplotlib.figure import Figure
+
+    drawn = dict[str, list[str]]()
+
+    def filled(size: tuple[float, float], title: str, fill: Callable[[Figure], None], ending: str) -> bytes:
+        sheet = Figure(figsize=size)
+        fill(sheet)
+        drawn[title] = [place.get_xlabel() + "|" + place.get_ylabel() for place in sheet.axes]
+        return ending.encode()
+    monkeypatch.setattr(drawings, "image", filled)
+    made = drawings.drawings(small().values)
+    assert set(made) == set(drawings.names(2)) and made["path-2.svg"] == b".svg"
+    labels = [label for one in drawn.values() for label in one]
+    assert len(drawn) == 8 and all(re.search(r"\b(mm|deg|s|%)(\b|$|,)|%", label) for label in labels), labels
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (["-o", "r.txt"], "r.txt is no .html file"), (["-m", "a", "-m", "a"], "a is named twice"),
+    ([*(x for k in range(13) for x in ("-c", f"c{k}"))], "a report holds up to 12")])
+def test_wrong_use(arguments: list[str], said: str, tmp_path: Path) -> None:
+    given = ["report", "part.cls", *arguments]
+    for option, value in (("-m", "mill-3axis"), ("-c", "linuxcnc"), ("-o", str(tmp_path / "r.html"))):
+        given += [] if option in arguments else [option, value]
+    done = CliRunner().invoke(app, given)
+    assert done.exit_code == 2 and said in " ".join(done.output.replace("│", " ").split())
+
+
+def test_a_page_never_replaces_an_input(tmp_path: Path) -> None:
+    cl = tmp_path / "part.html"
+    cl.write_text("\n".join(LINES))
+    done = CliRunner().invoke(app, ["report", str(cl), "-m", "mill-3axis", "-c", "linuxcnc", "-o", str(cl)])
+    assert done.exit_code == 2 and cl.read_text().startswith("PARTNO")
