@@ -40,6 +40,16 @@ _LOGS = [
     ),
 ]
 
+_WHAT_IF = [
+    HintCase(
+        "time.what_if",
+        "time p.nc -m mill-3axis -c linuxcnc --what-if X.speed=1.3",
+        {"p.nc": PROGRAM},
+        "of the (velocity), acceleration",
+        (Edit(COMMAND, "X.speed", r"X.\1"),),
+    ),
+]
+
 
 def _box(x: float, y: float, z: float, low: float = 0.0) -> str:
     """A box as OFF, from the origin up."""
@@ -310,4 +320,4 @@ _NUMBERS = [
              {"part.cls": "UNITS/MM\n" + nx("EM12", 2, 12) + nx("EM6", 2, 6)}, "tools that need one: (EM6)",
              (Edit(COMMAND, "EM7", r"\1"),)),
 ]
-FILE = [*_NUMBERS, *_LOGS, *_MESHES, *_PROOFS, *_SHEETS]
+FILE = [*_NUMBERS, *_LOGS, *_WHAT_IF, *_MESHES, *_PROOFS, *_SHEETS]
