@@ -14,7 +14,7 @@ from postproc.cli.console import machine_of
 from postproc.cycle_time import report as figures
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.calibrate import CalibratedModel, calibrate
-from postproc.cycle_time.estimate import Estimate, estimate, measure_first
+from postproc.cycle_time.estimate import Estimate, estimate, measure_first, timed, total
 from postproc.cycle_time.fit_text import as_dict as fit_figures
 from postproc.cycle_time.fit_text import as_text as fit_text
 from postproc.cycle_time.fit_text import as_toml
@@ -32,6 +32,10 @@ from toolpaths.diagnostics import Diagnostic, read_value
 
 if TYPE_CHECKING:
     from toolpaths.choices import FigureEnding
+
+GAUGE_LENGTHS = (60.0, 240.0)
+"""mm between which gauge lengths lie that nobody states"""
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -64,6 +68,8 @@ class Timed:
     model: CycleTimeModel
     times: BlockTimes | None
     found: tuple[Diagnostic, ...]
+    otherwise: tuple[MotionBlocks, ...] = ()
+    """the same program with other gauge lengths, where the set-up does not state them"""
 
 
 TimeAnswer = tuple[dict[str, Any], str, dict[Path, str | bytes], list[Diagnostic]]
@@ -96,9 +102,7 @@ def answer(asked: Asked, progress: Progress) -> TimeAnswer:
         values, text = {"calibration": fit_figures(fit)}, fit_text(fit)
         if asked.output:
             outputs[Path(asked.output)] = as_toml(fit.model)
-    estimates = [
-        estimate(one.blocks, one.machine, one.model, times=one.times) for one in all_timed if one.blocks is not None
-    ]
+    estimates = [_estimated(one, one.blocks) for one in all_timed if one.blocks is not None]
     made = [tables(e, shares(e)) for e in estimates]
     if len(all_timed) == 1:
         table, words = _alone(asked, all_timed[0], estimates[0], made[0])
@@ -122,8 +126,12 @@ def _timed(file: Path, machine: Machine, change: WhatIf, setup: str, asked: Aske
     data = read_file(file)
     if not options.dialect and looks_like_gcode(data):
         shop = read_value(load_setup(options.setup or None, options.hooks))
-        blocks, found = from_gcode(data, machine, spec, shop, str(file), NeighbourFiles(file), override)
-        return Timed(file, machine, setup, change, blocks, planner, None, tuple(found))
+        near = NeighbourFiles(file)
+        blocks, found = from_gcode(data, machine, spec, shop, str(file), near, override)
+        lengths = GAUGE_LENGTHS if any(d.code == "time.length" for d in found) else ()
+        others = [from_gcode(data, machine, spec, shop, str(file), near, override, length)[0] for length in lengths]
+        return Timed(file, machine, setup, change, blocks, planner, None, tuple(found),
+                     tuple(one for one in others if one is not None))
     import toolpaths
     from postproc.pipeline.convert import convert
 
@@ -140,6 +148,17 @@ def _timed(file: Path, machine: Machine, change: WhatIf, setup: str, asked: Aske
 
         times, found = planned_times(result, blocks, planner, override)
     return Timed(file, machine, setup, change, blocks, planner, times, (*result.diagnostics, *found))
+
+
+def _estimated(one: Timed, blocks: MotionBlocks) -> Estimate:
+    """The estimate; its band holds the program with any usual gauge length where they are not known."""
+    e = estimate(blocks, one.machine, one.model, times=one.times)
+    if not one.otherwise:
+        return e
+    moved = [total(other, timed(other, e.model)) - e.seconds for other in one.otherwise]
+    low, high = min(0.0, *moved), max(0.0, *moved)
+    return replace(e, band=(max(e.band[0] + low, 0.0), e.band[1] + high),
+                   uncertainties=e.uncertainties | {"gauge lengths not known": (high - low) / 2.0})
 
 
 def _fitted(asked: Asked, all_timed: list[Timed]) -> tuple[CalibratedModel | None, list[Diagnostic]]:

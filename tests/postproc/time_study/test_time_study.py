@@ -129,3 +129,33 @@ def test_the_drawing_shows_speed_and_feed_along_the_path() -> None:
     assert (drawn.speed[np.isfinite(drawn.feed)] <= feeds * (1.0 + 1e-9)).all()
     first, again = (time_figure(e, shares(e), "part.ngc", ".svg") for _ in range(2))
     assert first == again and time_figure(e, shares(e), "part.ngc", ".png")[:4] == b"\x89PNG"
+
+
+TIP = """G21 G90 G17 G40 G49 G80 G94 G98 G54
+T1 M6
+G43.4 H1
+G0 X1. Y2. Z50.
+G1 X5. A10. F3000.
+G1 X9. A60.
+G1 X20. A10.
+G49
+M2
+"""
+
+
+def test_gauge_lengths_that_nobody_states_widen_the_band(tmp_path: Path) -> None:
+    """A program under the control's own kinematics: whatever the length is, its time lies in the band."""
+    (tmp_path / "tip.nc").write_text(TIP)
+    given = tmp_path / "tip.nc", "-m", "mikron-ucp710", "-c", "fanuc-30i"
+    result = call(*given, "--json", "-")
+    values = json.loads(result.stdout)
+    assert "time.length" in result.stderr
+    (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 230\n")
+    stated = call(*given, "--setup", tmp_path / "s.toml", "--json", "-")
+    known = json.loads(stated.stdout)
+    assert "time.length" not in stated.stderr
+    assert abs(known["cycle_time_s"] / values["cycle_time_s"] - 1.0) > 0.03
+    low, high = values["band_s"]
+    assert low < known["cycle_time_s"] < high
+    assert values["doubts_s"]["gauge lengths not known"] > 0.02 * values["cycle_time_s"]
+    assert "gauge lengths not known" not in known["doubts_s"]
