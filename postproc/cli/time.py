@@ -70,7 +70,7 @@ def time(files: TimedFiles,
          beyond: Beyond = False,
          max_blocks: MaxBlocks = None,
          json: Json = "") -> None:
-    """Estimate how long a program takes, with a band, and where the time goes; programs and machines side by side."""
+    """Estimate how long programs take, with a band, and where the time goes; several side by side."""
     logs, ending = calibrate or [], figure_ending(figure)
     _check(output, logs, len(files))
     only_with_errors(beyond, error_model)
