@@ -61,6 +61,7 @@ FLOORS = (
     ("postproc.pipeline", "the table of stages; convert, verify, choose_axes"),
     ("postproc.proof", "the proof as a file, what has changed since"),
     ("postproc.cycle_time", "how long a program takes, with a band"),
+    ("postproc.time_study", "times side by side, what if, tables, a figure"),
     ("postproc.placement", "where the part stands on the table"),
     ("postproc.alignment", "a part that is not where it was meant, measured"),
     ("postproc.report", "summary, trace, residual field"),

@@ -98,7 +98,7 @@ _SHARED = ("line", "rapid", "arc", "center", "normal", "sweep", "speed", "path",
 @dataclass(frozen=True)
 @arrays(start="E #axes.letters", end="E #axes.letters", line="E", rapid="E", arc="E", center="E 3", normal="E 3",
         sweep="E", speed="E", path="int8: E", tolerance="E", chain="E", operation="E", cl_line="E", move="E", given="E",
-        pieces="E", row="E")
+        pieces="E", row="E", tool="E")
 class MotionBlocks:
     """E blocks that move, in mm, rad and s.
 
@@ -120,6 +120,7 @@ class MotionBlocks:
             control's own kinematics), NaN elsewhere
         pieces (E,): of how many rows its block of the program consists; None: all of one
         row (E,): row of the executed motion that the block is, or is a piece of; None where none is known
+        tool (E,): number of the tool in the spindle, -1 where the program states none
     """
 
     axes: Axes
@@ -143,6 +144,7 @@ class MotionBlocks:
     given: Floats | None = None
     pieces: Ints | None = None
     row: Ints | None = None
+    tool: Ints | None = None
 
     def __post_init__(self) -> None:
         for name in _SHARED:

@@ -1,49 +1,64 @@
-"""The parameters of a control's model from a measured run, and how sure they are.
+"""The parameters of a control's model from measured runs, and how sure they are.
 
-Least squares on the times of sections of the run, over the logarithms of the parameters, with a wide normal
-prior about the model that the fit begins with, so that what the run does not show stays where it was and
-keeps its uncertainty (maximum a posteriori; the covariance is the inverse of J'J/s^2 + prior, J the
-derivatives of the sections' times; e.g. A. Tarantola, Inverse Problem Theory, 2005, section 3.2).
+Least squares on the times of sections of the runs, over the logarithms of the parameters, with a normal prior about the
+model
+that the fit begins with, so that what the runs do not show stays where it was and keeps its uncertainty (maximum a
+posteriori; the covariance is the inverse of J'J/s^2 + prior, J the derivatives of the sections' times; e.g. A.
+Tarantola, Inverse Problem Theory, 2005, section 3.2). What the model cannot say of a kind of motion is found by leaving the
+sections
+of that kind out (`left_out.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from postproc.cycle_time.blocks import MotionBlocks
+from postproc.cycle_time.blocks import Cause
 from postproc.cycle_time.estimate import timed
-from postproc.cycle_time.log import RunLog, matched
-from postproc.cycle_time.model import PARAMETERS, CalibrationRecord, CycleTimeModel
-from toolpaths.arrays import Floats, Ints
-from toolpaths.diagnostics import Diagnostic, warning
+from postproc.cycle_time.kinds import KINDS
+from postproc.cycle_time.left_out import structure
+from postproc.cycle_time.model import ASSUMED, PARAMETERS, CalibrationRecord, CycleTimeModel
+from postproc.cycle_time.runs import CLOCK, OTHERS, Run
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:
     from machines.machine import Machine
 
-PRIOR = {"corner_tolerance": 2.0, "block_time": 2.0, "rapid": 0.5, "override": 0.3, "stop_time": 2.0}
-"""standard deviation of each logarithm before the run is looked at"""
-FREE = {"lookahead": PARAMETERS, "ideal": ("corner_tolerance", "rapid", "override", "stop_time"),
-        "linuxcnc": ("rapid", "override")}
+PRIOR = {"corner_tolerance": 1.2, "block_time": 1.5, "rapid": 0.4, "override": 0.2, "stop_time": 1.5,
+         "acceleration_share": ASSUMED["acceleration"], "jerk_share": ASSUMED["jerk"], "spindle_time": 1.5}
+"""standard deviation of each logarithm before a run is looked at"""
+STATED = 0.05
+"""the same of the share of accelerations and jerks that the machine file states"""
+FREE = {"lookahead": PARAMETERS,
+        "ideal": tuple(name for name in PARAMETERS if name != "block_time"),
+        "linuxcnc": ("rapid", "override", "acceleration_share", "spindle_time")}
+CREDIBLE = 1.5
+"""prior deviations up to which a moved parameter is taken as that of the control"""
+MOST = 3.0
+"""prior deviations that a fit may move a parameter"""
 Modelled = Callable[[Floats], Floats]
 """from parameters, in prior deviations about the begin, to the times of the sections"""
-SECTIONS = 300
-"""stretches of the run whose times are compared, at most"""
-STARTS = {"block_time": 1e-4, "stop_time": 1e-3}
+STARTS = {"block_time": 1e-4, "stop_time": 1e-3, "spindle_time": 0.05}
 """where a fit begins with a value that is 0"""
-CLOCK = 1e-3
-"""s of uncertainty in any section: the clock of the log"""
+ENOUGH = 20
+"""sections that decide whether a control has jerk limits"""
 CLEAR = 0.7
 """share of the misfit that decides for a model without jerk"""
 NEAR, FAR = 0.02, 0.35
 """steps in prior deviations at which derivatives are taken"""
 SEEN = 0.5
 """share of its prior uncertainty below which a parameter counts as found"""
+MOVED = 0.02
+"""share of a run's ramps that an axis must hold for the run to show its acceleration"""
+WORSE = 0.005
+"""share of the time that the fitted model's total may be farther off than that of the model before"""
 
 
 @dataclass(frozen=True)
@@ -53,6 +68,7 @@ class CalibratedModel:
 
     Attributes:
         measured, modelled (K,): s of the sections; values: parameter to (value, standard deviation of its logarithm)
+        before: value of each parameter before the fit; total_before: s of all sections before
     """
 
     model: CycleTimeModel
@@ -60,70 +76,114 @@ class CalibratedModel:
     measured: Floats
     modelled: Floats
     values: dict[str, tuple[float, float]]
+    before: dict[str, float]
+    total_before: float
 
 
-def calibrate(blocks: MotionBlocks, log: RunLog, model: CycleTimeModel, file: str = "",
+@dataclass(frozen=True)
+@arrays(measured="K", other="K", clock="K")
+class Runs:
+    """All runs that a model is fitted to, their sections one after the other; clock (K,): s of uncertainty by the
+    readings."""
+
+    runs: tuple[Run, ...]
+    measured: Floats
+    other: Floats
+    clock: Floats
+
+    @staticmethod
+    def of(runs: Sequence[Run]) -> Runs:
+        """Sections of runs as one."""
+        return Runs(tuple(runs), np.concatenate([run.measured for run in runs]),
+                    np.concatenate([run.other for run in runs]),
+                    np.concatenate([np.full(len(run.measured), run.clock) for run in runs]))
+
+    def modelled(self, model: CycleTimeModel) -> Floats:
+        """(K,) s of the sections under a model."""
+        return np.concatenate([run.modelled(model) for run in self.runs])
+
+    def uncertainty(self, scale: float) -> Floats:
+        """(K,) s of each section: readings, times that are not fitted, and what sections scatter."""
+        scatter = scale * np.sqrt(np.maximum(self.measured, 0.0) * self.measured.mean())
+        return np.asarray(np.sqrt(self.clock**2 + (OTHERS * self.other) ** 2 + scatter**2))
+
+
+def calibrate(runs: Sequence[Run], model: CycleTimeModel, file: str = "",
               machine: Machine | None = None) -> tuple[CalibratedModel | None, list[Diagnostic]]:
-    """The model fitted to a log; None and why where the log does not fit the program.
+    """The model fitted to runs; None and why where it fits them worse than the model before.
 
     A model with jerk is also tried without, and left so where that is clearly better.
     """
-    samples, rows, found = matched(log, blocks, file)
-    if found:
-        return None, found
-    cuts = np.unique(np.linspace(0, len(rows) - 1, min(SECTIONS, len(rows) - 1) + 1).astype(int))
-    rows, measured = rows[cuts], np.diff(log.time[samples[cuts]])
-    before = np.diff(timed(blocks, model).begin[rows])
-    kinds = [True, False] if model.jerk and model.kind != "linuxcnc" else [model.jerk]
-    fits = [_fitted(blocks, rows, measured, before, model.model_copy(update={"jerk": jerk}), file, machine)
-            for jerk in kinds]
+    data = Runs.of(runs)
+    before = data.modelled(model)
+    both = model.jerk and model.kind != "linuxcnc" and len(data.measured) >= ENOUGH
+    kinds = [True, False] if both else [model.jerk]
+    fits = [_fitted(data, before, model.model_copy(update={"jerk": jerk}), file, machine) for jerk in kinds]
     off = [float(np.abs(fit.modelled - fit.measured).sum()) for fit in fits]
     fit = fits[-1] if off[-1] < CLEAR * off[0] else fits[0]
-    return fit, _warnings(fit, file)
+    found = _findings(fit, before, float(np.median(data.clock)), file)
+    return (None if has_errors(found) else fit), found
 
 
-def _fitted(blocks: MotionBlocks, rows: Ints, measured: Floats, before: Floats, model: CycleTimeModel, file: str,
-            machine: Machine | None) -> CalibratedModel:
+def _fitted(data: Runs, before: Floats, model: CycleTimeModel, file: str, machine: Machine | None) -> CalibratedModel:
     """The fit of the parameters that the kind of model has."""
     from scipy.optimize import least_squares
 
     begin = model.model_copy(update={k: max(getattr(model, k), v) for k, v in STARTS.items()})
-    free = [k for k, name in enumerate(PARAMETERS) if name in FREE[model.kind]]
-    start, prior = begin.values(), np.array([PRIOR[name] for name in PARAMETERS])
+    free, prior = _free(data, model), _prior(machine)
+    start, measured = begin.values(), data.measured
 
     def modelled(x: Floats) -> Floats:
         values = start.copy()
         values[free] += x * prior[free]
-        return np.diff(timed(blocks, begin.with_values(values)).begin[rows])
+        return data.modelled(begin.with_values(values))
     x = _start(modelled, measured, free)
-    scale = _scatter(measured - modelled(x), measured)
+    scale = _scatter(modelled(x), measured, len(free))
     for _ in range(3):
-        uncertainty = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
+        uncertainty = data.uncertainty(scale)
 
         def residual(x: Floats, uncertainty: Floats = uncertainty) -> Floats:
             return np.concatenate([(modelled(x) - measured) / uncertainty, x])
-        result = least_squares(residual, x, loss="soft_l1", diff_step=[1e-3] * len(x), max_nfev=60,
-                               f_scale=3.0)
+        result = least_squares(residual, np.clip(x, -0.99 * MOST, 0.99 * MOST), loss="soft_l1", diff_step=[1e-3] * len(x),
+                               max_nfev=60, f_scale=3.0, bounds=(-MOST, MOST))
         x = result.x
-        scale = max(_scatter(measured - modelled(x), measured), 1e-5)
+        scale = _scatter(modelled(x), measured, len(free))
     values = start.copy()
     values[free] += x * prior[free]
-    uncertainty = np.hypot(CLOCK, scale * np.sqrt(np.maximum(measured, 0.0) * measured.mean()))
-    covariance = _covariance(_slopes(modelled, x) / uncertainty[:, None], free, prior)
-    return _fit(model, begin.with_values(values), covariance, free, prior, measured, before, modelled(x),
-                file, machine)
+    weighted = _slopes(modelled, x) / data.uncertainty(scale)[:, None]
+    return _record(data, model, begin.with_values(values), weighted, free, prior, before, scale, file, machine)
 
 
-def _scatter(residual: Floats, measured: Floats) -> float:
-    """Standard deviation of a section's time as a share, for sections of the mean length, by the median."""
+def _free(data: Runs, model: CycleTimeModel) -> list[int]:
+    """Rows of PARAMETERS that are fitted: those of the kind of model; jerk where it counts, the spindle where a run starts
+    it."""
+    starts = any((run.blocks.pauses.cause == Cause.SPINDLE).any() for run in data.runs)
+    without = {name for name, fitted in (("jerk_share", model.jerk), ("spindle_time", starts)) if not fitted}
+    return [k for k, name in enumerate(PARAMETERS) if name in FREE[model.kind] and name not in without]
+
+
+def _prior(machine: Machine | None) -> Floats:
+    """(8,) standard deviations of the logarithms; accelerations and jerks that the machine file states vary little."""
+    result = dict(PRIOR)
+    for limit in ("acceleration", "jerk"):
+        if machine is not None and not any(name.endswith(f".{limit}") for name in machine.limits.assumed):
+            result[f"{limit}_share"] = STATED
+    return np.array([result[name] for name in PARAMETERS])
+
+
+def _scatter(modelled: Floats, measured: Floats, free: int) -> float:
+    """Standard deviation of a section's time as a share, for sections of the mean length: by the median, larger where few
+    sections leave little for it after the parameters."""
     weight = np.sqrt(np.maximum(measured, CLOCK) * measured.mean())
-    return float(1.4826 * np.median(np.abs(residual) / weight))
+    spare = len(measured) / max(len(measured) - free, 1)
+    middle = float(1.4826 * np.median(np.abs(measured - modelled) / weight))
+    return max(middle * float(np.sqrt(min(spare, len(measured)))), 1e-5)
 
 
 def _start(modelled: Modelled, measured: Floats, free: list[int]) -> Floats:
     """Where the fit begins: the best of a coarse grid over block time and rapids, which a fit cannot feel
     from where they hold nothing."""
-    grid = {"block_time": (0.0, 0.35, 0.55, 0.8, 1.05), "rapid": (0.0, -0.25, -0.6)}
+    grid = {"block_time": (0.0, 0.45, 0.75, 1.05, 1.4), "rapid": (0.0, -0.3, -0.75)}
     names = [PARAMETERS[k] for k in free]
     axes = [grid.get(name, (0.0,)) for name in names]
     options = [np.array(x) for x in product(*axes)]
@@ -142,31 +202,58 @@ def _slopes(modelled: Modelled, x: Floats) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def _covariance(weighted: Floats, free: list[int], prior: Floats) -> Floats:
-    """(5, 5) of the logarithms; parameters that do not take part have none.
+def _covariance(weighted: Floats, free: list[int], prior: Floats, far: Floats) -> Floats:
+    """(8, 8) of the logarithms; parameters that do not take part have none.
 
-    Neighbouring sections share a reading of the clock, so that only half of them count.
+    Neighbouring sections share a reading of the clock, so that only half of them count. `far` (F,): by how much a parameter
+    was moved
+    beyond what is credible of it: it stands for something else that the control does, and is another on other motions.
     """
     inner = np.linalg.inv(0.5 * weighted.T @ weighted + np.eye(len(free)))
     result = np.zeros((len(PARAMETERS), len(PARAMETERS)))
-    result[np.ix_(free, free)] = inner * np.outer(prior[free], prior[free])
+    result[np.ix_(free, free)] = inner * np.outer(prior[free], prior[free]) + np.diag(far**2)
     return result
 
 
-def _fit(model: CycleTimeModel, fitted: CycleTimeModel, covariance: Floats, free: list[int], prior: Floats,
-         measured: Floats, before: Floats, after: Floats, file: str, machine: Machine | None) -> CalibratedModel:
+def _record(data: Runs, model: CycleTimeModel, fitted: CycleTimeModel, weighted: Floats, free: list[int], prior: Floats,
+            before: Floats, scale: float, file: str, machine: Machine | None) -> CalibratedModel:
+    measured, after = data.measured, data.modelled(fitted)
+    far = np.maximum(np.abs((fitted.values() - model.values())[free]) / prior[free] - CREDIBLE, 0.0) * prior[free]
+    covariance = _covariance(weighted, free, prior, far)
     sigma = np.sqrt(np.diag(covariance))
     hidden = tuple(PARAMETERS[k] for k in free if sigma[k] > SEEN * prior[k])
-    relative = _relative(measured, after)
+    by_kind = np.concatenate([run.by_kind(timed(run.blocks, fitted)) for run in data.runs])
+    spent = by_kind.sum(axis=0)
     calibration = CalibrationRecord(
         log=file, samples=len(measured), machine=machine.name if machine is not None else "",
-        rms_before=_rms(before - measured), rms_after=_rms(after - measured), relative=relative,
-        covariance=tuple(tuple(float(v) for v in row) for row in covariance), not_identifiable=hidden)
-    others = tuple(name for name in model.assumed if name not in PARAMETERS)
-    result = fitted.model_copy(update={"calibration": calibration, "assumed": (*hidden, *others),
+        rms_before=_rms(before - measured), rms_after=_rms(after - measured), relative=_relative(measured, after),
+        covariance=tuple(tuple(float(v) for v in row) for row in covariance), parameters=PARAMETERS,
+        kinds={name: float(s / max(spent.sum(), CLOCK)) for name, s in zip(KINDS, spent, strict=True) if s > 0.0},
+        structure=structure(measured, after, by_kind, weighted, data.uncertainty(scale)),
+        axes=_accelerated(data, fitted), period=max(run.period for run in data.runs), not_identifiable=hidden)
+    others = tuple(name for name in model.assumed if name not in {PARAMETERS[k] for k in free})
+    assumed = tuple(name for name in hidden if not name.endswith("_share"))
+    result = fitted.model_copy(update={"calibration": calibration, "assumed": (*assumed, *others),
                                        "description": f"{model.description}, calibrated"})
+    result = result.model_copy(update={name: getattr(model, name) for k, name in enumerate(PARAMETERS) if k not in free})
+    names = [PARAMETERS[k] for k in free]
     values = {PARAMETERS[k]: (float(getattr(result, PARAMETERS[k])), float(sigma[k])) for k in free}
-    return CalibratedModel(result, calibration, measured, after, values)
+    return CalibratedModel(result, calibration, measured, after, values,
+                           {name: float(getattr(model, name)) for name in names}, float(before.sum()))
+
+
+def _accelerated(data: Runs, model: CycleTimeModel) -> tuple[str, ...]:
+    """Axes that hold a share of the ramps of the runs."""
+    held: dict[str, float] = {}
+    for run in data.runs:
+        times, axes = timed(run.blocks, model), run.blocks.axes
+        moved = np.abs(run.blocks.end - run.blocks.start) / np.maximum(axes.acceleration, 1e-12)
+        axis = moved.argmax(axis=1)
+        seconds = np.bincount(axis, weights=times.ramp + times.jerk, minlength=len(axes.letters))
+        for letter, value in zip(axes.letters, seconds.tolist(), strict=True):
+            held[letter] = held.get(letter, 0.0) + value
+    least = MOVED * max(sum(held.values()), CLOCK)
+    return tuple(letter for letter, value in held.items() if value > least)
 
 
 def _rms(values: Floats) -> float:
@@ -185,38 +272,19 @@ def _relative(measured: Floats, modelled: Floats) -> float:
     return float(np.hypot(0.005, np.sqrt(np.average(errors**2, weights=np.maximum(weight, CLOCK)))))
 
 
-def _warnings(fit: CalibratedModel, file: str) -> list[Diagnostic]:
-    relative = fit.calibration.relative
-    if relative <= 0.1:
-        return []
-    return [warning("log.fit", f"the model is {100 * relative:.0f} % off in parts of the run", file=file,
-                    hint="is it this program, this machine, without a feed hold?")]
-
-
-def as_toml(model: CycleTimeModel) -> str:
-    """The model as a file that `load_model` reads."""
-    lines = []
-    for name, value in model.model_dump(exclude={"calibration"}).items():
-        lines.append(f"{name} = {_toml(value)}")
-    if model.calibration is not None:
-        lines += ["", "[calibration]"]
-        lines += [f"{name} = {_toml(value)}" for name, value in model.calibration.model_dump().items()]
-    return "\n".join(lines) + "\n"
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if isinstance(value, (tuple, list)):
-        return "[" + ", ".join(_toml(v) for v in value) + "]"
-    return repr(value)
-
-
-def as_dict(fit: CalibratedModel) -> dict[str, object]:
-    """The figures of a calibration."""
-    c = fit.calibration
-    return {"parameters": {name: {"value": value, "relative_sigma": sigma} for name, (value, sigma) in fit.values.items()},
-            "sections": len(fit.measured), "rms_before_s": c.rms_before, "rms_after_s": c.rms_after,
-            "relative": c.relative, "not_identifiable": list(c.not_identifiable)}
+def _findings(fit: CalibratedModel, before: Floats, clock: float, file: str) -> list[Diagnostic]:
+    """An error where the fit is worse than what it began with, else what is to be known of it."""
+    record, measured = fit.calibration, fit.measured
+    off, was = (abs(float((values - measured).sum())) for values in (fit.modelled, before))
+    found: list[Diagnostic] = []
+    if record.rms_after > max(1.02 * record.rms_before, 2.0 * clock) or off > max(was, WORSE * measured.sum(), 2.0 * clock):
+        return [error("log.fit", f"the fitted model is farther off than the one before: sections {record.rms_after:.3g} s, "
+                      f"before {record.rms_before:.3g} s; all {off:.3g} s of {measured.sum():.4g} s, before {was:.3g} s",
+                      file=file, hint="is it this program, this machine, without a feed hold?")]
+    if record.period > 0.0:
+        found.append(info("log.polled", f"the log was polled, one sample every {record.period:.3g} s: a line is seen up to "
+                          f"that much late, which is allowed for; {record.samples} sections", file=file))
+    if record.relative > 0.1:
+        found.append(warning("log.fit", f"the model is {100 * record.relative:.0f} % off in parts of the run", file=file,
+                             hint="is it this program, this machine, without a feed hold?"))
+    return found

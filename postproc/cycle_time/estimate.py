@@ -11,6 +11,7 @@ from machines.choices import MotionOrder
 from machines.machine import Machine
 from postproc.cycle_time.blocks import Axes, Cause, MotionBlocks
 from postproc.cycle_time.bound import lower_bound
+from postproc.cycle_time.kinds import own_share
 from postproc.cycle_time.linuxcnc import Settings, linuxcnc
 from postproc.cycle_time.lookahead import lookahead
 from postproc.cycle_time.model import ASSUMED, PARAMETERS, CycleTimeModel
@@ -60,8 +61,18 @@ class Uncertain:
     seconds: float
 
 
+def as_used(blocks: MotionBlocks, model: CycleTimeModel) -> MotionBlocks:
+    """The blocks with the accelerations and jerks that the control uses of the machine's."""
+    if model.acceleration_share == 1.0 and model.jerk_share == 1.0:
+        return blocks
+    axes = replace(blocks.axes, acceleration=blocks.axes.acceleration * model.acceleration_share,
+                   jerk=blocks.axes.jerk * model.jerk_share)
+    return replace(blocks, axes=axes)
+
+
 def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
     """The blocks under a model."""
+    blocks = as_used(blocks, model)
     if model.spindle_time > 0.0:
         p = blocks.pauses
         runs_up = np.where(p.cause == Cause.SPINDLE, model.spindle_time, 0.0)
@@ -89,7 +100,7 @@ def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with
     model = model.of_machine(machine)
     times = times or timed(blocks, model)
     seconds = total(blocks, times)
-    bound = lower_bound(blocks, model)
+    bound = lower_bound(as_used(blocks, model), model)
     if not with_band:
         return Estimate(blocks, model, times, seconds, bound, (seconds, seconds), {}, {})
     down, up, uncertainties, assumed = _uncertainties(blocks, machine, model, seconds)
@@ -102,9 +113,10 @@ def _uncertainties(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel
                    seconds: float) -> tuple[float, float, dict[str, float], dict[str, float]]:
     """(s below, s above, standard deviation by origin, that of assumed values by name): every uncertain value is moved by
     one standard deviation."""
-    own = model.calibration.relative if model.calibration else model.own_share
+    here = timed(blocks, model)
+    own = own_share(blocks, here, model, seconds)
     low = high = (COVERAGE * own * seconds) ** 2
-    begin = total(blocks, timed(blocks, model))
+    begin = total(blocks, here)
     assumed, fitted = _assumed_changes(blocks, machine, model), _fitted_changes(blocks, model)
     deviation: dict[str, float] = {}
     for name, changed in (*assumed, *fitted):
@@ -128,11 +140,11 @@ def measure_first(e: Estimate, machine: Machine) -> Uncertain | None:
     known = e.assumed
     alone = {name: s for name, s in known.items() if name not in _LIMITS}
     begin = total(e.blocks, timed(e.blocks, e.model))
-    for limit in sorted(known.keys() & set(_LIMITS), key=lambda name: -known[name]):
+    for limit in sorted((one for one in _LIMITS if one in known), key=lambda name: -known[name]):
         if alone and max(alone.values()) >= known[limit]:
             break
         for axis, name in enumerate(machine.axis_names):
-            if f"{name}.{limit}" in machine.limits.assumed:
+            if f"{name}.{limit}" in machine.limits.assumed and not _shown(name, limit, e.model):
                 which = np.arange(len(machine.axis_names)) == axis
                 changed = [_scaled(e.blocks, limit, which, sign) for sign in (-1, 1)]
                 moved = sorted(total(b, timed(b, e.model)) - begin for b in changed)
@@ -160,8 +172,9 @@ def _assumed_changes(blocks: MotionBlocks, machine: Machine, model: CycleTimeMod
     """Assumed values: name, and the program and model with it lower and higher by one standard deviation."""
     result: list[tuple[str, list[Change]]] = []
     for limit in _LIMITS:
-        if (limit != "jerk" or (model.kind != "linuxcnc" and model.jerk)) and not model.calibration:
-            which = np.array([f"{name}.{limit}" in machine.limits.assumed for name in machine.axis_names])
+        if limit != "jerk" or (model.kind != "linuxcnc" and model.jerk):
+            which = np.array([f"{name}.{limit}" in machine.limits.assumed and not _shown(name, limit, model)
+                              for name in machine.axis_names])
             if which.any():
                 result.append((limit, [(_scaled(blocks, limit, which, sign), model) for sign in (-1, 1)]))
     for name, cause in _TIMING.items():
@@ -174,6 +187,14 @@ def _assumed_changes(blocks: MotionBlocks, machine: Machine, model: CycleTimeMod
                      for name in alone]
 
 
+def _shown(axis: str, limit: MotionOrder, model: CycleTimeModel) -> bool:
+    """True where the run that the model was fitted to shows the limit, so that the covariance of the fit holds it."""
+    record = model.calibration
+    if record is None:
+        return False
+    return limit == "velocity" or axis in record.axes
+
+
 def _fitted_changes(blocks: MotionBlocks, model: CycleTimeModel) -> list[tuple[str, list[Change]]]:
     """The same of parameters fitted to a log, along the principal axes of their covariance."""
     result: list[tuple[str, list[Change]]] = []
@@ -181,7 +202,7 @@ def _fitted_changes(blocks: MotionBlocks, model: CycleTimeModel) -> list[tuple[s
         return result
     values, vectors = np.linalg.eigh(np.array(model.calibration.covariance))
     for k, (size, direction) in enumerate(zip(np.sqrt(np.maximum(values, 0.0)), vectors.T, strict=True)):
-        moves = [dict(zip(PARAMETERS, sign * size * direction, strict=True)) for sign in (-1, 1)]
+        moves = [dict(zip(model.calibration.parameters, sign * size * direction, strict=True)) for sign in (-1, 1)]
         result.append((f"fit {k + 1}", [(blocks, with_values(model, move)) for move in moves]))
     return result
 

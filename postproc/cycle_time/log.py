@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.cycle_time.blocks import MotionBlocks
+from postproc.cycle_time.log_exports import is_export, lines_of_export
 from postproc.cycle_time.source import read_file
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -38,7 +39,8 @@ class RunLog:
 
 
 def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[RunLog | None, list[Diagnostic]]:
-    """A CSV file with the columns nc_line and time_s, and axis letters where it has positions.
+    """A CSV file with the columns nc_line and time_s, and axis letters where it has positions; or an export of MTConnect or
+    OPC UA.
 
     Raises:
         DiagnosticError: where the file cannot be read.
@@ -50,6 +52,8 @@ def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[RunLog | None,
         return None, [error("log.columns", f"is not a CSV file: {fault}", file=str(file),
                             hint="a log has the columns nc_line and time_s, a comma between them")]
     names = [name.strip() for name in rows[0]] if rows else []
+    if is_export(names):
+        return _exported(names, rows[1:], len(letters), str(file))
     allowed = ("nc_line", "time_s", *letters)
     if not {"nc_line", "time_s"} <= set(names) <= set(allowed) or len(set(names)) < len(names):
         return None, [error("log.columns", f"columns {', '.join(names) or 'none'}, allowed: nc_line, time_s and any of "
@@ -64,6 +68,14 @@ def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[RunLog | None,
     if found := _faults(column["nc_line"], column["time_s"], number, str(file)):
         return None, found
     return RunLog(column["nc_line"].astype(np.int64), column["time_s"], position, number), []
+
+
+def _exported(names: list[str], rows: list[list[str]], axes: int, file: str) -> tuple[RunLog | None, list[Diagnostic]]:
+    """The log of an export with one observation a line."""
+    line, time, number, found = lines_of_export(names, rows, file)
+    if found := found or _faults(line, time, number, file):
+        return None, found
+    return RunLog(line.astype(np.int64), time, np.full((len(line), axes), np.nan), number), []
 
 
 def _numbers(rows: list[list[str]], columns: int, file: str) -> tuple[Floats, list[Diagnostic]]:
@@ -103,6 +115,35 @@ def _faults(line: Floats, time: Floats, row: Ints, file: str) -> list[Diagnostic
         return [error("log.time", f"time_s goes from {time[0]:g} to {time[-1]:g}, allowed: more than 0 and at most "
                       f"{MOST_SECONDS:g} s", file=file, lines=row[[0, -1]].tolist(), hint="s, as the run passes")]
     return []
+
+
+POLLED, LEAST_PERIOD = 0.9, 0.004
+"""share of the steps of time that are whole multiples of a shortest one in a polled log; s of the shortest period"""
+
+
+def period(log: RunLog, lines: Ints) -> float:
+    """s at which the control was polled; 0.0 where the log has an entry for each change of the line.
+
+    A polled log has steps of time that are multiples of one period, and lines that come twice or not at all; lines (L,) of
+    the
+    program that move, rising.
+    """
+    step = np.diff(log.time)
+    step = step[step > 0.0]
+    if len(step) < LEAST:
+        return 0.0
+    first = float(np.quantile(step, 0.1))
+    count = np.maximum(np.round(step / first), 1.0)
+    short = count <= np.median(count) * 3.0
+    size = float(np.median(step[short] / count[short]))
+    count = np.maximum(np.round(step / size), 1.0)
+    whole = np.abs(step - count * size) < 0.15 * size
+    again = np.diff(log.line) == 0
+    seen = np.unique(log.line)
+    inside = lines[(lines >= seen[0]) & (lines <= seen[-1])]
+    missed = 1.0 - np.isin(inside, seen).mean() if len(inside) else 0.0
+    polled = whole.mean() > POLLED and size >= LEAST_PERIOD and (again.mean() > 0.05 or missed > 0.05)
+    return size if polled else 0.0
 
 
 def matched(log: RunLog, blocks: MotionBlocks, file: str) -> tuple[Ints, Ints, list[Diagnostic]]:

@@ -14,7 +14,8 @@ from machines.user_file import UserModel, load_toml
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic
 
-PARAMETERS = ("corner_tolerance", "block_time", "rapid", "override", "stop_time")
+PARAMETERS = ("corner_tolerance", "block_time", "rapid", "override", "stop_time", "acceleration_share", "jerk_share",
+              "spindle_time")
 """what a log can say, in the order of `CalibrationRecord.covariance`"""
 ASSUMED = {"corner_tolerance": 0.7, "block_time": 0.7, "rapid": 0.05, "override": 0.02, "stop_time": 0.7,
            "spindle_time": 0.7, "velocity": 0.15, "acceleration": 0.3, "jerk": 0.5, "tool_change": 0.3, "clamp": 0.3,
@@ -36,7 +37,18 @@ class CalibrationRecord(UserModel):
     relative: float = Field(ge=0.0)
     """standard deviation of the whole time over the model's that the sections leave, as a share"""
     covariance: tuple[tuple[float, ...], ...]
-    """of the logarithms of the five parameters"""
+    """of the logarithms of `parameters`"""
+    parameters: tuple[str, ...] = PARAMETERS[:5]
+    """rows and columns of the covariance"""
+    kinds: dict[str, float] = Field(default_factory=dict)
+    """kind of motion to its share of the run's time in motion"""
+    structure: dict[str, float] = Field(default_factory=dict)
+    """kind of motion to the standard deviation of its time over the model's, as a share: from sections of that kind when the
+    model is fitted without them; of kinds that the run does not hold from those that it holds"""
+    axes: tuple[str, ...] = ()
+    """whose accelerations the run shows; assumed limits of others count as they did before"""
+    period: float = Field(default=0.0, ge=0.0)
+    """s at which the log was polled; 0: it has every change of the line"""
     not_identifiable: tuple[str, ...] = ()
     """parameters that the run says nothing about; they keep their assumed uncertainty"""
 
@@ -62,6 +74,10 @@ class CycleTimeModel(UserModel):
     """share of the axes' velocity that rapids reach"""
     override: float = Field(default=1.0, gt=0.0, le=3.0)
     """of feeds"""
+    acceleration_share: float = Field(default=1.0, gt=0.0, le=10.0)
+    """share of the machine's accelerations that the control uses"""
+    jerk_share: float = Field(default=1.0, gt=0.0, le=100.0)
+    """share of the machine's jerks that the control uses"""
     stop_time: float = Field(default=0.005, ge=0.0, le=10.0)
     """s in position before motion goes on after a stop"""
     spindle_time: float = Field(default=0.0, ge=0.0, le=60.0)
@@ -84,11 +100,11 @@ class CycleTimeModel(UserModel):
         return self.model_copy(update={**known, "assumed": tuple(name for name in self.assumed if name not in known)})
 
     def values(self) -> Floats:
-        """(5,) logarithms of PARAMETERS."""
+        """(8,) logarithms of PARAMETERS."""
         return np.log(np.maximum([getattr(self, name) for name in PARAMETERS], 1e-6))
 
     def with_values(self, logarithms: Floats) -> CycleTimeModel:
-        """The model with other PARAMETERS (5,); the share of stated tolerances goes with the corner tolerance."""
+        """The model with other PARAMETERS (8,); the share of stated tolerances goes with the corner tolerance."""
         new = {name: float(np.exp(v)) for name, v in zip(PARAMETERS, logarithms, strict=True)}
         share = self.stated_share * new["corner_tolerance"] / self.corner_tolerance
         return self.model_copy(update={**new, "stated_share": share})

@@ -73,7 +73,8 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     blocks = MotionBlocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc, center, normal, sweep,
                           np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names,
                           pauses,
-                          origin.cl_line, origin.move, _tip_lengths(motion, control), row=np.arange(len(motion)))
+                           origin.cl_line, origin.move, _tip_lengths(motion, control), row=np.arange(len(motion)),
+                           tool=np.asarray(motion.tool[:len(motion)]))
     turned = np.where(np.isnan(motion.pitch), override, 1.0)
     blocks = replace(blocks, speed=_clamped(_speeds(motion, blocks, by_radius) * turned, blocks, machine))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 from postproc.cycle_time.estimate import Estimate, Uncertain
-from postproc.cycle_time.shares import TimeShares, most_expensive, operations, shares
+from postproc.cycle_time.shares import TimeShares, losses, most_expensive, operations, shares
 from toolpaths.table_text import table_text
 
 COVERS = ("95 % of runs on a machine as the files describe it: the model's own deviation, and parameters of the control and "
@@ -44,10 +45,14 @@ def _cutting(cause: dict[str, Any]) -> float:
     return float(sum(cause[f"{name}_s"] for name in ("feed", "limits", "corners", "stops")))
 
 
-def as_text(e: Estimate, name: str, override: float = 1.0, first: Uncertain | None = None) -> str:
-    """The same for people; `override` is the feed override that the blocks were made with."""
+def as_text(e: Estimate, name: str, override: float = 1.0, first: Uncertain | None = None,
+            tables: Sequence[str] = ()) -> str:
+    """The same for people; `override` is the feed override that the blocks were made with, `tables` lines of those by tool
+    and
+    operation."""
     d, s = as_dict(e), shares(e)
-    lines = [f"{name}: {clock(e.seconds)} ({e.seconds:.2f} s), 95 % between {clock(e.band[0])} and {clock(e.band[1])}; "
+    whole = clock(e.seconds) + (f" ({e.seconds:.2f} s)" if e.seconds >= 60.0 else "")
+    lines = [f"{name}: {whole}, 95 % between {clock(e.band[0])} and {clock(e.band[1])}; "
              f"lower bound {clock(e.lower_bound)}",
              f"model {e.model.kind}: {e.model.description}"]
     feed = "the programmed feed"
@@ -62,15 +67,29 @@ def as_text(e: Estimate, name: str, override: float = 1.0, first: Uncertain | No
     lines.append("time by activity: " + ", ".join(f"{key.removesuffix('_s').replace('_', ' ')} {value:.2f} s"
                                          for key, value in d["causes"].items() if value >= 0.005))
     lines += _limits(s, d["feed_s"])
-    if len(d["operations"]) > 1:
-        lines += table_text([(op["operation"] or "without a name", clock(op["time_s"])) for op in d["operations"]],
-                            align="lr", indent=2)
-    if d["most_expensive"]:
-        lines.append(f"largest losses against {feed}:")
-        for place in d["most_expensive"]:
-            cl = f", CL line {place['cl_line']}" if place["cl_line"] is not None else ""
-            lines.append(f"  NC line {place['nc_line']}{cl}: {place['lost_s']:.3f} s, {place['cause'].replace('_', ' ')}")
+    lines += tables
+    lost = [row for row in losses(e, s) if float(str(row["lost_s"])) >= 0.005]
+    if lost:
+        rows = [(str(row["cause"]).replace("_", " "), f"{row['lost_s']:.2f} s", f"{row['places']}",
+                 ", ".join(map(str, _numbers(row["nc_lines"])))) for row in lost]
+        lines += [f"losses against {feed}:",
+                  *table_text(rows, ("cause", "lost", "lines", "most at NC line"), align="lrr", indent=2)]
+        lines += _worst(d["most_expensive"])
     return "\n".join(lines)
+
+
+def _numbers(value: object) -> list[object]:
+    return list(value) if isinstance(value, list) else []
+
+
+def _worst(places: list[dict[str, Any]]) -> list[str]:
+    """The place with the largest loss."""
+    if not places:
+        return []
+    place = places[0]
+    cl = f", CL line {place['cl_line']}" if place["cl_line"] is not None else ""
+    cause = place["cause"].replace("_", " ")
+    return [f"largest single loss: NC line {place['nc_line']}{cl}, {place['lost_s']:.3f} s, {cause}"]
 
 
 def _limits(s: TimeShares, feed: float) -> list[str]:

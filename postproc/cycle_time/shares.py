@@ -103,3 +103,24 @@ def most_expensive(e: Estimate, s: TimeShares) -> list[dict[str, object]]:
             result.append({"nc_line": int(e.blocks.line[k]), "cl_line": cl if cl >= 0 else None, "lost_s": float(lost[k]),
                            "cause": cause})
     return result
+
+
+NAMED = 5
+"""lines that are named of a cause"""
+
+
+def losses(e: Estimate, s: TimeShares) -> list[dict[str, object]]:
+    """What goes beyond the feed of the program, by cause, the largest first: s, places, lines where most is lost."""
+    result: list[tuple[float, dict[str, object]]] = []
+    for cause in CAUSES[1:]:
+        lost = s.by_cause[cause]
+        rows = np.flatnonzero(lost > 0.0)
+        if not len(rows):
+            continue
+        line = e.blocks.line[rows]
+        number, index = np.unique(line, return_inverse=True)
+        of_line = summed(lost[rows], index, len(number))
+        worst = np.argsort(-of_line, kind="stable")[:NAMED]
+        result.append((float(lost.sum()), {"cause": cause, "lost_s": float(lost.sum()), "places": len(number),
+                       "nc_lines": sorted(int(number[k]) for k in worst), "largest_s": float(of_line[worst[0]])}))
+    return [row for _, row in sorted(result, key=lambda pair: -pair[0])]

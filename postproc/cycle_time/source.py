@@ -24,7 +24,7 @@ from postproc.reference.cutcom_of_tools import radii_of
 from postproc.reference.holes import Phase
 from postproc.setup.model import SetupFile, at_places, part_placement
 from toolpaths.arrays import Floats
-from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors, warning
 from toolpaths.input_files import read_input, unreadable
 
 
@@ -51,11 +51,12 @@ def from_conversion(result: PostResult, override: float = 1.0) -> MotionBlocks:
 
 def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup: SetupFile, file: str = "",
                others: Mapping[str, bytes] | None = None,
-               override: float = 1.0) -> tuple[MotionBlocks | None, list[Diagnostic]]:
+               override: float = 1.0, unknown_length: float = 0.0) -> tuple[MotionBlocks | None, list[Diagnostic]]:
     """The blocks of a program, from the machine's home; None and why where it cannot be executed.
 
     Tool lengths come from the set-up, by length register as by tool number; the work offset stands where the set-up puts
     the part. `others`: files of subprograms by name; `override` as of `blocks_of`.
+    `unknown_length`: mm that a length register holds of which the set-up says nothing.
     """
     controller = with_shop(controller, machine, setup)
     origins, found = _origins(setup, machine)
@@ -69,6 +70,15 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
     control = next(iter(controls.values()))
     lengths = {int(number): tool.length for number, tool in setup.tools.items()}
     code, motion, more = _executed(data, controller, controls, lengths, radii_of(setup), file, others)
+    if motion is not None and (unknown := unknown_lengths(motion, lengths)):
+        named = ", ".join(f"T{k}" for k in unknown[:6])
+        more.append(warning("time.length", f"gauge lengths are not stated: {named}; the control's own kinematics move the "
+                            f"axes by them, run with {unknown_length:g} mm", file=file, count=len(unknown),
+                            hint="state gauge_length in [tools.N] of a set-up, and give it with --setup"))
+        if unknown_length > 0.0:
+            lengths |= dict.fromkeys(unknown, unknown_length)
+            code, motion, again = _executed(data, controller, controls, lengths, radii_of(setup), file, others)
+            more = more if code is not None and motion is not None and not has_errors(again) else again
     found += more
     if code is None or motion is None or has_errors(found):
         return None, found
@@ -82,6 +92,12 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
         return None, [*found, error("gcode.no_motion", "the program moves nothing", file=file,
                                     hint="name a program that has moves: G0, G1 with axis words")]
     return blocks, found
+
+
+def unknown_lengths(motion: Motion, lengths: Mapping[int, float]) -> list[int]:
+    """Length registers that hold nothing the set-up states, where the control runs the kinematics."""
+    used = np.unique(motion.register[motion.frame > 0])
+    return [register for register in used.tolist() if register > 0 and not lengths.get(register, 0.0)]
 
 
 def _origins(setup: SetupFile, machine: Machine) -> tuple[list[tuple[str, Floats]], list[Diagnostic]]:

@@ -40,6 +40,27 @@ _LOGS = [
     ),
 ]
 
+TIP = (
+    "G21 G90 G17 G40 G49 G80 G94 G98 G54\nT1 M6\nS900 M3\nG43.4 H1\nG0 X1. Y2. Z50.\nG1 X5. A10. F500.\n"
+    "G1 X9. A20.\nG1 X20.\nG49\nM2\n"
+)
+_WHAT_IF = [
+    HintCase(
+        "time.what_if",
+        "time p.nc -m mill-3axis -c linuxcnc --what-if X.speed=1.3",
+        {"p.nc": PROGRAM},
+        "of the (velocity), acceleration",
+        (Edit(COMMAND, "X.speed", r"X.\1"),),
+    ),
+    HintCase(
+        "time.length",
+        "time p.nc -m mikron-ucp710 -c fanuc-30i",
+        {"p.nc": TIP, "s.toml": "[tools.1]\ngauge_length = 120\n"},
+        "give it with --setup",
+        (Edit(COMMAND, "", " --setup s.toml"),),
+    ),
+]
+
 
 def _box(x: float, y: float, z: float, low: float = 0.0) -> str:
     """A box as OFF, from the origin up."""
@@ -310,4 +331,4 @@ _NUMBERS = [
              {"part.cls": "UNITS/MM\n" + nx("EM12", 2, 12) + nx("EM6", 2, 6)}, "tools that need one: (EM6)",
              (Edit(COMMAND, "EM7", r"\1"),)),
 ]
-FILE = [*_NUMBERS, *_LOGS, *_MESHES, *_PROOFS, *_SHEETS]
+FILE = [*_NUMBERS, *_LOGS, *_WHAT_IF, *_MESHES, *_PROOFS, *_SHEETS]

@@ -11,7 +11,6 @@ import pytest
 from machines.machine import Machine
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.calibrate import calibrate
 from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.log import RunLog
 from postproc.cycle_time.model import load_model
@@ -19,6 +18,7 @@ from postproc.cycle_time.source import from_gcode
 from postproc.setup.model import SetupFile
 from tests.linuxcnc.simulator import Run
 from tests.linuxcnc.time_programs import END, HEAD, PROGRAMS, machine, random_lines
+from tests.postproc.time_kit import calibrated
 
 EACH, MEAN = 0.01, 0.003
 """shares of the time that an estimate may be off, each and on average"""
@@ -102,7 +102,7 @@ def test_a_generic_model_learns_linuxcnc_from_its_log(recorded, tmp_path: Path) 
     log = RunLog(taught.line[rows], taught.t[rows], np.full((len(rows), 3), np.nan), rows)
     model, _ = load_model("lookahead")
     assert model is not None
-    fit, found = calibrate(blocks(texts[0], on), log, model, "log.csv", on)
+    fit, found = calibrated(blocks(texts[0], on), log, model, "log.csv", on)
     assert fit is not None, found
     e = estimate(blocks(texts[1], on), on, fit.model)
     wide = estimate(blocks(texts[1], on), on, model)

@@ -12,9 +12,13 @@ import machines
 from machines.machine import Machine, Timing
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.blocks import MotionBlocks
+from postproc.cycle_time.calibrate import CalibratedModel, calibrate
+from postproc.cycle_time.log import RunLog
 from postproc.cycle_time.model import CycleTimeModel, load_model
+from postproc.cycle_time.runs import run_of_log
 from postproc.cycle_time.source import from_gcode
 from postproc.setup.model import SetupFile
+from toolpaths.diagnostics import Diagnostic
 
 HEAD = "G21 G90 G94 G17"
 
@@ -38,6 +42,13 @@ def blocks(text: str, on: Machine | None = None, controller: str = "linuxcnc") -
     made, found = from_gcode(f"{text}\nM2\n".encode(), on or machine(), spec, SetupFile())
     assert made is not None, [str(d) for d in found]
     return made
+
+
+def calibrated(b: MotionBlocks, log: RunLog, control: CycleTimeModel, file: str = "",
+               on: Machine | None = None) -> tuple[CalibratedModel | None, list[Diagnostic]]:
+    """The model fitted to the log of one program."""
+    run, found = run_of_log(b, log, file)
+    return (None, found) if run is None else calibrate([run], control, file, on)
 
 
 def random_program(seed: int, rotary: str = "", top: float = 300.0) -> str:

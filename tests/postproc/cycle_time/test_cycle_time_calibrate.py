@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.calibrate import CalibratedModel, as_toml, calibrate
+from postproc.cycle_time.calibrate import CalibratedModel
 from postproc.cycle_time.estimate import estimate, timed, total
+from postproc.cycle_time.fit_text import as_toml
 from postproc.cycle_time.log import RunLog, read_log
 from postproc.cycle_time.model import CycleTimeModel, load_model
-from tests.postproc.time_kit import blocks, machine, model
+from tests.postproc.time_kit import blocks, calibrated, machine, model
 from toolpaths.diagnostics import DiagnosticError
 
 CLOCK = 0.002
@@ -49,7 +50,7 @@ def log_of(b: MotionBlocks, truth: CycleTimeModel, rng: np.random.Generator) -> 
 
 
 def fit(truth: CycleTimeModel, rng: np.random.Generator) -> CalibratedModel:
-    made, found = calibrate(finishing(0), log_of(finishing(0), truth, rng), model("lookahead"),
+    made, found = calibrated(finishing(0), log_of(finishing(0), truth, rng), model("lookahead"),
                             "log.csv", machine())
     assert made is not None and not found
     return made
@@ -88,7 +89,7 @@ def test_what_a_run_does_not_show_is_said() -> None:
     b = blocks("G21 G90 G94 G17\nF900\n" + "\n".join(
         f"G1 X{20 * (i % 2)} Y{3 * i}\nG0 Z{300 + i % 2}" for i in range(1, 30)), controller="generic-iso")
     rng = np.random.default_rng(2)
-    made, _ = calibrate(b, log_of(b, model("lookahead"), rng), model("lookahead"), "log.csv")
+    made, _ = calibrated(b, log_of(b, model("lookahead"), rng), model("lookahead"), "log.csv")
     assert made is not None and made.model.calibration is not None
     assert "rapid" in made.model.calibration.not_identifiable
     assert "override" not in made.model.calibration.not_identifiable
@@ -144,7 +145,7 @@ def test_bad_logs_are_reported(tmp_path: Path, text: str, code: str, lines: tupl
 def test_a_log_of_another_program_is_refused() -> None:
     line = np.arange(9000, 9020)
     log = RunLog(line, np.arange(20.0), np.full((20, 3), np.nan), line)
-    made, found = calibrate(finishing(0), log, model("lookahead"), "log.csv")
+    made, found = calibrated(finishing(0), log, model("lookahead"), "log.csv")
     assert made is None and [d.code for d in found] == ["log.lines"]
 
 
@@ -152,7 +153,7 @@ def test_a_log_in_which_the_program_takes_no_time() -> None:
     b = finishing(0)
     line = np.append(np.unique(b.line)[:20], 10**6)
     log = RunLog(line, np.append(np.full(20, 3.0), 9.0), np.full((21, 3), np.nan), np.arange(2, 23))
-    made, found = calibrate(b, log, model("lookahead"), "log.csv")
+    made, found = calibrated(b, log, model("lookahead"), "log.csv")
     assert made is None and [d.code for d in found] == ["log.time"]
 
 

@@ -1,0 +1,56 @@
+"""Kinds of motion of a program, and how far a calibrated model may be off on each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from postproc.cycle_time.blocks import MotionBlocks
+from postproc.cycle_time.phases import BlockTimes, summed
+from postproc.cycle_time.shape import shape
+from toolpaths.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from postproc.cycle_time.model import CycleTimeModel
+
+KINDS = ("rapids", "lines at feed", "corners", "short lines", "shortest lines", "arcs", "turning axes")
+"""every block is of one of these: long lines at feed and, where corners and ramps hold them, below it; short and shortest
+lines"""
+SHORT, SHORTEST = 0.05, 0.008
+"""s at its feed below which a line is short (within the ramps of the control), and shortest (within its block time)"""
+SLOWER = 1.1
+"""times its time at the feed that a long line takes which is not at feed"""
+NOT_SEEN = {"rapids": 0.12, "lines at feed": 0.06, "corners": 0.12, "short lines": 0.3, "shortest lines": 0.6, "arcs": 0.12,
+            "turning axes": 0.4}
+"""standard deviation as a share of the time of a kind that no run has shown; by `bench_bands.py` what a model fitted to one
+kind of
+motion is off on another, on controls of another kind"""
+
+
+def kinds(blocks: MotionBlocks, times: BlockTimes) -> Ints:
+    """(E,) index into KINDS of each block, under a model's times."""
+    form = shape(blocks)
+    at_feed = form.length / np.maximum(blocks.speed, 1e-300)
+    kind = [blocks.rapid, form.turns, blocks.arc, at_feed < SHORTEST, at_feed < SHORT, times.seconds <= SLOWER * at_feed]
+    return np.select(kind, [0, 6, 5, 4, 3, 1], default=2).astype(np.int64)
+
+
+def time_by_kind(blocks: MotionBlocks, times: BlockTimes) -> Floats:
+    """(KINDS,) s in motion by kind; pauses are of none."""
+    return summed(times.seconds, kinds(blocks, times), len(KINDS))
+
+
+def own_share(blocks: MotionBlocks, times: BlockTimes, model: CycleTimeModel, seconds: float) -> float:
+    """Standard deviation of a program's time over the model's own, as a share of `seconds`.
+
+    Of a calibrated model: what its run scatters, and by kind of motion what the model may be off where its parameters fit,
+    each
+    with the time that the program spends in it; errors of the kinds are added as if they all had one sign.
+    """
+    record = model.calibration
+    if record is None:
+        return model.own_share
+    share = time_by_kind(blocks, times) / max(seconds, 1e-9)
+    by_kind = [record.structure.get(name, NOT_SEEN[name]) for name in KINDS]
+    return float(np.hypot(record.relative, share @ np.array(by_kind)))
