@@ -66,6 +66,7 @@ FLOORS = (
     ("postproc.report", "summary, trace, residual field"),
     ("postproc.setup_sheet", "a new set-up: facts, questions, a place that fits"),
     ("postproc.explain", "a page for each code of a message"),
+    ("postproc.python", "the calls of the package: time, orient, place, calibrate, analyse"),
     ("postproc.cli", "the command line"),
 )
 """(room, what it does): a room imports only rooms before it"""

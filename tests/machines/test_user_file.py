@@ -7,7 +7,8 @@ import pytest
 from pydantic import Field
 
 from machines.toml_lines import key_lines
-from machines.user_file import UserModel, ValueSource, load_toml, read_toml, schema, values_of
+from machines.user_file import UserModel, ValueSource, load_toml, read_toml, values_of
+from machines.user_model import schema
 
 
 class Axis(UserModel):
@@ -182,7 +183,7 @@ def test_base_cycle_unknown_base_and_wrong_type(tmp_path):
 
 
 def test_schema_knows_base_and_forbids_the_rest():
-    s = schema(File)
+    s = schema("file", File)
     assert "base" in s["properties"] and s["additionalProperties"] is False
 
 
