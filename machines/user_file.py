@@ -21,7 +21,6 @@ from pydantic_core import ErrorDetails
 
 from machines.toml_lines import KEPT, SHORT, KeyPath, Values, parsed
 from machines.user_model import SCHEMA_KEY, key_texts
-from machines.user_model import UserModel as UserModel
 from machines.value_words import POINT, advice, allowed, decimal_comma
 from toolpaths.cl.text.kinds_of_file import what_is
 from toolpaths.diagnostics import Diagnostic, error

@@ -17,7 +17,7 @@ HOLE = Cycle("DRILL", 5.0, 2.0, None, 3.0)
 
 def faults(**given: object) -> list[tuple[str, tuple[int, ...]]]:
     with pytest.raises(DiagnosticError) as found:
-        Toolpath.from_arrays(**{"tip": TIP, "feed": FEED} | given)  # type: ignore[arg-type]
+        Toolpath.from_arrays(**{"tip": TIP, "feed": FEED} | given)
     assert all(d.code == "arrays.value" and '; ' in d.message and d.file == "arrays" for d in found.value.diagnostics)
     return [(d.message.split()[0], d.lines) for d in found.value.diagnostics]
 
