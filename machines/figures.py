@@ -11,7 +11,8 @@ from pydantic import Field
 
 from machines.key_problem import KeyProblem
 from machines.toml_lines import KeyPath, Values
-from machines.user_file import UserFile, UserModel
+from machines.user_file import UserFile
+from machines.user_model import UserModel
 
 K = TypeVar("K", bound=str)
 ASSUMED, SOURCE = "assumed", "source"

@@ -10,7 +10,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from machines.value_words import AdvisedError
 
 HOOK_VALUES = ("tool_number", "tool_name", "operation", "work_offset")

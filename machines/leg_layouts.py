@@ -11,7 +11,7 @@ from pydantic import Field
 from machines.key_problem import KeyProblem
 from machines.models import Vector
 from machines.slider_models import Interval
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from toolpaths.units import DEG
 
 Drive = Literal["slide", "arm", "length"]

@@ -28,7 +28,7 @@ from machines.slider_models import (
     lineardeltakins,
     rail_problems,
 )
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from toolpaths.arrays import Floats
 
 Freedom = Literal["x", "y", "z", "a", "b", "c"]

@@ -21,7 +21,8 @@ from machines.kinematics.base import Kinematics
 from machines.machine import ClampCodes, ControlOptions, Limits, Machine, Timing, Turns
 from machines.models import ControlModel, KinematicsModel, MachineModel, register_beyond
 from machines.plausible import implausible
-from machines.user_file import UserFile, nearest_word, read_toml, schema, validate
+from machines.user_file import UserFile, nearest_word, read_toml, validate
+from machines.user_model import schema
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, Severity, error, has_errors, read_value
 from toolpaths.units import DEG, PER_MINUTE
 
@@ -145,7 +146,7 @@ def machine_schema() -> dict[str, Any]:
         except kinds.KindFault:
             continue
         found += [] if model is None else [machine_model(model)]
-    return schema(*found)
+    return schema("machine", *found)
 
 
 def assemble(file: UserFile, model: MachineModel) -> Machine:

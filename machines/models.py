@@ -15,7 +15,7 @@ from machines.hooks import HooksModel
 from machines.key_problem import KeyProblem
 from machines.kinematics.base import Kinematics
 from machines.machine import ControlKinematics
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

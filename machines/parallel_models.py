@@ -19,7 +19,7 @@ from machines.machine import ControlKinematics
 from machines.mobility import delta_faults, h4_faults, reach_faults
 from machines.models import NotNegative, Vector, blanks
 from machines.slider_models import SliderModel, lineardeltakins
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 
 
 class LinearDeltaModel(SliderModel):

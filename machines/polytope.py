@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import HalfspaceIntersection, QhullError
 
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats, Ints
@@ -62,6 +61,8 @@ class Polytope:
         Raises:
             ValueError: where the pose has no polytope, or it is flat or unbounded.
         """
+        from scipy.spatial import HalfspaceIntersection, QhullError
+
         normals, offsets = self.normals[at], self.offsets[at]
         if not np.isfinite(normals).all() or np.linalg.matrix_rank(normals) < 3:
             raise ValueError("no bounded polytope at this pose")

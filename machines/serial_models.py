@@ -16,7 +16,7 @@ from machines.kinematics.chain import ROTARY, Joint
 from machines.kinematics.serial import Serial
 from machines.machine import ControlKinematics
 from machines.models import KinematicsModel, Vector, blanks
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from toolpaths.arrays import Floats
 
 ORDER = "XYZUVWABC"

@@ -16,7 +16,7 @@ from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from machines.machine import ControlKinematics
 from machines.models import KinematicsModel, NotNegative, Positive, Vector
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 

@@ -14,25 +14,18 @@ from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path as FilePath
-from typing import Any, TypeVar, Union, get_args, get_origin
+from typing import Any, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from machines.toml_lines import KEPT, SHORT, KeyPath, Values, parsed
+from machines.user_model import SCHEMA_KEY, key_texts
 from machines.value_words import POINT, advice, allowed, decimal_comma
 from toolpaths.cl.text.kinds_of_file import what_is
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import advice as remedy
 from toolpaths.input_files import place, read_input, reason, shown
-
-
-class UserModel(BaseModel):
-    """Base of every model of a user's file: frozen, no unknown key, no conversion between types, no inf or nan."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False,
-                              use_attribute_docstrings=True)
-
 
 M = TypeVar("M", bound=BaseModel)
 _HOW = "write key = value, text in quotes, each [table] and each key on a line of its own"
@@ -127,21 +120,6 @@ def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]
         return None, [_diagnostic(file, model, fault) for fault in _faults(file.values, model, found)]
 
 
-def schema(*models: type[BaseModel]) -> Values:
-    """The JSON schema of a user's file that is any of the models, with the `base` key that `read_toml` takes out.
-
-    It holds for a file with its base merged in: a file that names a base may leave out what that gives.
-    """
-    any_of: Any = Union[models]  # noqa: UP007  # of as many as are given
-    result: Values = TypeAdapter(any_of).json_schema()
-    base = {"type": "string", "description": "built-in file (or .toml file next to this one) whose values hold where "
-                                             "this file gives none"}
-    several = [result["$defs"][choice["$ref"].split("/")[-1]] for choice in result.get("anyOf", [])]
-    for top in several or [result]:
-        top["properties"] = {"base": base} | top.get("properties", {})
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | result
-
-
 def nearest(word: str, known: Sequence[str]) -> str:
     """A hint: the known word nearest to `word`, else the list of all."""
     match = nearest_word(word, known)
@@ -177,7 +155,8 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
         why = "its lists or tables are nested too deeply" if isinstance(fault, RecursionError) else str(fault).split(";")[0]
         return None, [error("file.syntax", f"not valid TOML: {why}", file=str(path), hint=_HOW)]
     origins = {p: ValueSource(str(path), line) for p, line in lines.items()}
-    return _with_base(UserFile(name, str(path), deepcopy(values), origins), builtin, kind, (*above, key))
+    own = deepcopy({k: v for k, v in values.items() if k != SCHEMA_KEY or not isinstance(v, str)})
+    return _with_base(UserFile(name, str(path), own, origins), builtin, kind, (*above, key))
 
 
 def _model_of(model: type[M], text: str) -> M:
@@ -350,8 +329,8 @@ def _described(model: type[BaseModel], path: Sequence[str | int]) -> str:
     found: list[Any] = [model]
     text = ""
     for part in path:
-        fields = [m.model_fields[str(part)] for kind in found for m in _models(kind) if str(part) in m.model_fields]
-        text = next((" ".join(f.description.split()) for f in fields if f.description), text)
+        said = [key_texts(m).get(str(part), "") for kind in found for m in _models(kind)]
+        text = next((" ".join(one.split()) for one in said if one), text)
         found = [inner for kind in found for inner in _inside(kind, part)]
     return text
 

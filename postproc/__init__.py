@@ -10,14 +10,21 @@ if TYPE_CHECKING:
     from postproc.base.version import VERSION
     from postproc.pipeline.convert import convert, verify
     from postproc.pipeline.result import PostResult, VerifyResult
+    from postproc.python.calls import analyse, calibrate, orient, place, time
+    from toolpaths.diagnostics import DiagnosticError
+    from toolpaths.toolpath import Toolpath
 
-_HOME = {"VERSION": "base.version", "Options": "base.options", "PostResult": "pipeline.result",
-         "VerifyResult": "pipeline.result", "convert": "pipeline.convert", "verify": "pipeline.convert"}
-__all__ = ["VERSION", "Options", "PostResult", "VerifyResult", "convert", "verify"]
+_HOME = {"DiagnosticError": "toolpaths.diagnostics", "Options": "postproc.base.options",
+         "PostResult": "postproc.pipeline.result", "Toolpath": "toolpaths.toolpath", "VERSION": "postproc.base.version",
+         "VerifyResult": "postproc.pipeline.result", "convert": "postproc.pipeline.convert",
+         "verify": "postproc.pipeline.convert",
+         **dict.fromkeys(("analyse", "calibrate", "orient", "place", "time"), "postproc.python.calls")}
+__all__ = ["VERSION", "DiagnosticError", "Options", "PostResult", "Toolpath", "VerifyResult", "analyse", "calibrate",
+           "convert", "orient", "place", "time", "verify"]
 
 
 def __getattr__(name: str) -> Any:
     """The public calls, imported on first use so that the command line starts at once."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    return getattr(import_module(_HOME[name]), name)

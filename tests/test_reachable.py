@@ -22,6 +22,7 @@ PAGES = [p for p in sorted(ROOT.glob("*.md")) + sorted(p for top in ("toolpaths"
                                                        (ROOT / top).rglob("*.md")) if "```python" in p.read_text("utf-8")]
 LISTED = {
     "_Packer.persistent_id": "called by pickle", "_Unpacker.persistent_load": "called by pickle",
+    "Toolpath.from_arrays": "paths of other programs, for users of the package (docs/python.md)",
     "Toolpath.equals": "what a round trip means; for users of the package",
     "CorrectedCommands.tip_residual": "a result of `correct`, for users of the package",
     "CorrectedCommands.axis_residual": "likewise",

@@ -68,6 +68,7 @@ FLOORS = (
     ("postproc.setup_sheet", "a new set-up: facts, questions, a place that fits"),
     ("postproc.page", "the report: a page that opens offline, and the same as JSON"),
     ("postproc.explain", "a page for each code of a message"),
+    ("postproc.python", "the calls of the package: time, orient, place, calibrate, analyse"),
     ("postproc.cli", "the command line"),
 )
 """(room, what it does): a room imports only rooms before it"""

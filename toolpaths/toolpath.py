@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
 
 import numpy as np
+import numpy.typing as npt
 
-from toolpaths.arrays import Array, Floats, shared
+from toolpaths.arrays import Array, Floats, Ints, shared
 from toolpaths.choices import CycleKind, GivenDialect, GivenUnit, LengthUnit
 from toolpaths.diagnostics import Diagnostic
+from toolpaths.given_arrays import CLOSE, GivenArrays, given_rows, off_circle, passes, unit_rows
 from toolpaths.shapes import arrays
 
 
@@ -246,6 +249,61 @@ class Toolpath:
             if len(column) and int(column.max()) >= count:
                 raise ValueError(f"Toolpath.{name} holds {int(column.max())}, only {count} exist")
 
+    @classmethod
+    def from_arrays(cls, tip: npt.ArrayLike, axis: npt.ArrayLike = (0.0, 0.0, 1.0), feed: npt.ArrayLike = np.nan, *,
+                    rapid: npt.ArrayLike | None = None, feed_mode: npt.ArrayLike = FeedMode.PER_TIME,
+                    arc: npt.ArrayLike = -1, arcs: Arcs | None = None, cycle: npt.ArrayLike = -1,
+                    cycles: Sequence[Cycle] = (), tool: npt.ArrayLike = 0, tools: Sequence[Tool] = (Tool(1),),
+                    operation: npt.ArrayLike = 0, operations: Sequence[Operation] = (Operation(),),
+                    events: Sequence[Event] = (), spindle: float | None = None, normal: npt.ArrayLike | None = None,
+                    contact: npt.ArrayLike | None = None, name: str = "", file: str = "arrays") -> Toolpath:
+        """The path of arrays that a program has computed: one row per position, in the part frame.
+
+        Diagnostics of later stages name rows as lines, counted from 1. No CL file stands behind such a path: it is
+        compared by the read-back, not by the second witness, and its program is "checked, not proved".
+
+        Args:
+            tip: (N, 3) mm
+            axis: (N, 3) or (3,), from the tip to the spindle, of any length
+            feed: (N,) or one number; mm/s, or as `feed_mode` says; NaN for rapids, or where none is stated
+            rapid: (N,) True where the position is reached in rapid; default: where `feed` is NaN and no arc or
+                cycle is named
+            feed_mode: (N,) or one FeedMode
+            arc, arcs: (N,) index of the arc that ends in the row, -1 for straight motion; an arc begins at the row before
+            cycle, cycles: (N,) index of the cycle whose hole the row is, -1 for none
+            tool, tools: (N,) index into `tools`; default: T1 throughout
+            operation, operations: (N,) index into `operations`
+            events: records without motion; spindle: rev/min at the begin, negative anti-clockwise (SPINDL)
+            normal, contact: (N, 3) surface normals of any length, contact points, NaN where a row has none
+
+        Raises:
+            DiagnosticError: names each array that is wrong, with its rows.
+        """
+        g, tips = given_rows(tip, file)
+        arcs = Arcs.none() if arcs is None else arcs
+        arc_, cycle_ = g.whole("arc", arc, -1, len(arcs)), g.whole("cycle", cycle, -1, len(cycles))
+        tool_, operation_ = g.whole("tool", tool, 0, len(tools)), g.whole("operation", operation, 0, len(operations))
+        feeds, mode = g.floats("feed", feed, gaps=True), g.whole("feed_mode", feed_mode, 0, len(FeedMode))
+        hole = cycle_ >= 0
+        free = np.isnan(feeds) & (arc_ < 0) & ~hole if rapid is None else g.flags("rapid", rapid) & ~hole
+        if (bad := (feeds <= 0.0) & ~free).any():
+            g.fault("feed is not above 0", "give a feed above 0, or NaN where none is stated", bad)
+        if (bad := (arc_ >= 0) & (free | hole)).any():
+            g.fault("an arc is no rapid and no hole", "give arcs a feed, and rapid and cycle no arc", bad)
+        axes = unit_rows(g, "axis", axis)
+        more = [None if a is None else unit_rows(g, "normal", a, gaps=True) for a in (normal,)]
+        more += [None if a is None else g.floats("contact", a, 3, gaps=True) for a in (contact,)]
+        records = _records(g, events, tool_, tools, spindle)
+        g.require()
+        _check_arcs(g, tips, arc_, arcs)
+        kind = np.where(arc_ >= 0, Kind.ARC, np.where(free | hole, Kind.RAPID, Kind.FEED))
+        n32 = np.int32
+        return cls(tips, axes, np.where(free | hole, np.nan, feeds), mode.astype(np.int8), kind.astype(np.int8),
+                   np.where(hole, Role.HOLE, Role.POINT).astype(np.int8), arc_.astype(n32), cycle_.astype(n32),
+                   tool_.astype(n32), operation_.astype(n32), passes(free, operation_, tool_),
+                   np.arange(1, len(tips) + 1, dtype=np.int64), arcs, tuple(cycles), tuple(tools), tuple(operations),
+                   events=records, normal=more[0], contact=more[1], name=name, file=file)
+
     def __len__(self) -> int:
         return len(self.tip)
 
@@ -257,6 +315,39 @@ class Toolpath:
             if not _same(getattr(self, f.name), getattr(other, f.name)):
                 return False
         return True
+
+
+def _records(given: GivenArrays, events: Sequence[Event], tool: Ints, tools: Sequence[Tool],
+             spindle: float | None) -> tuple[Event, ...]:
+    """The events that were given, behind LOADTL where the tool changes and no event loads it, and SPINDL at the begin."""
+    index = [e.index for e in events]
+    if index != sorted(index) or any(not 0 <= k <= given.rows for k in index):
+        given.fault(f"events act before rows {index[:6]}", f"give them in order, each with an index of 0 to {given.rows}")
+    if spindle is not None and (not np.isfinite(spindle) or spindle == 0.0):
+        given.fault(f"spindle is {spindle:g}", "give rev/min, negative for anti-clockwise")
+    loaded = {e.index for e in events if e.word == "LOADTL"}
+    own = [Event(k, "LOADTL", (float(tools[tool[k]].number),), k + 1)
+           for k in (0, *(np.flatnonzero(np.diff(tool)) + 1).tolist()) if k not in loaded and len(tools)]
+    if spindle is not None:
+        own.insert(1 if own and own[0].index == 0 else 0,
+                   Event(0, "SPINDL", ("RPM", float(abs(spindle)), "CLW" if spindle > 0.0 else "CCLW"), 1))
+    return tuple(sorted([*own, *events], key=lambda e: e.index))
+
+
+def _check_arcs(given: GivenArrays, tip: Floats, arc: Ints, arcs: Arcs) -> None:
+    """Begin and end of each arc on its circle.
+
+    Raises:
+        DiagnosticError: names the rows that are off it.
+    """
+    rows = np.flatnonzero(arc >= 0)
+    k, wrong = arc[rows], np.zeros(len(tip), bool)
+    off = off_circle(tip[rows - 1], tip[rows], arcs.center[k], arcs.normal[k], arcs.radius[k], arcs.sweep[k])
+    wrong[rows] = (off > CLOSE) | (rows == 0)
+    if wrong.any():
+        given.fault(f"begin or end is more than {CLOSE:g} mm off its arc", "let the row before be the begin of the arc, "
+                    "sweep be in rad, positive, right-hand about normal", wrong)
+    given.require()
 
 
 def _same(a: object, b: object) -> bool:

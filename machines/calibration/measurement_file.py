@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import Field, field_validator
 
 from machines.models import NotNegative, Positive, Vector
-from machines.user_file import UserModel, schema
+from machines.user_model import UserModel, schema
 
 Sigma = Annotated[float, Field(ge=1e-6, le=1e6)]
 StepCount = Annotated[int, Field(ge=3, le=360)]
@@ -172,7 +172,7 @@ class MeasurementModel(UserModel):
 
 def measurement_schema() -> dict[str, Any]:
     """The JSON schema of a measurement file; `table` of each kind says which columns it has."""
-    result = schema(MeasurementModel)
+    result = schema("measurements", MeasurementModel)
     for kind, columns in COLUMNS.items():
         reference = result["properties"][kind]["anyOf"][0]["$ref"].split("/")[-1]
         found = [{"name": c.name, "unit": c.unit, "meaning": c.meaning} for c in columns]

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from machines.models import Vector
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 
 Jog = Literal["right up", "right down", "front up", "front down", "clockwise", "anti-clockwise", "tip left", "tip right",
               "tip back", "tip front"]

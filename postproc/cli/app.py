@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from postproc.base.options import Options
     from postproc.pipeline.result import PostResult
     from toolpaths.diagnostics import Diagnostic
+    from toolpaths.toolpath import Toolpath
 
 app = typer.Typer(name="postproc", cls=Group, no_args_is_help=True, add_completion=False, rich_markup_mode=None,
                   context_settings={"help_option_names": ["-h", "--help"]},
@@ -145,11 +146,9 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                        inputs := {"the CL file": str(file), "the set-up": setup, "the hooks": hooks,
                                   "the error model": error_model, **own_files(machine, controller)})
     from postproc.cycle_time.conversion import estimate_of
-    from postproc.pipeline.check_program import checked_file
     from postproc.pipeline.convert import convert as run
     from postproc.proof import command
     from postproc.report import summary
-    from postproc.setup_sheet.offers import offers
     from postproc.writing.program_files import program_files
 
     outputs: dict[Path, str | bytes] = {}
@@ -162,17 +161,33 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         result = replace(result, diagnostics=(*result.diagnostics, *why))
         time = estimate_of(result)  # all before a file is written
         values, text = summary.as_dict(result, str(output), time), summary.as_text(result, str(output), time)
-        more = offers(result, path, machine, controller)
+        more = [] if result.ok else _offers(result, path, machine, controller)
         outputs |= pages(page, path, result, known, output.name, time)
         if result.ok:
             texts, more = program_files(output, result.text, result.files or {})
             refuse_inputs(list(texts)[:-1], inputs)
             kept, unlike = command.kept(result, machine, controller, proof, known, output)
             more += unlike
-            check = checked_file(result, spec, check_program)
+            check = _checked(result, spec, check_program)
             outputs = {**outputs, **dict(zip(fields, noted, strict=True)), **kept, **check, **texts}
     found = [*result.diagnostics, *more]
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
+
+
+def _offers(result: PostResult, path: Toolpath, machine: str, controller: str) -> list[Diagnostic]:
+    """What is offered where a conversion is refused: what searches for it is imported there alone."""
+    from postproc.setup_sheet.offers import offers
+
+    return offers(result, path, machine, controller)
+
+
+def _checked(result: PostResult, controller: str, file: Path | None) -> dict[Path, str]:
+    """The program that checks the pivots, where it is asked for."""
+    if file is None:
+        return {}
+    from postproc.pipeline.check_program import checked_file
+
+    return checked_file(result, controller, file)
 
 
 @app.command(epilog="Example: postproc verify part.ngc part.cls -m mikron-ucp710 -c linuxcnc")

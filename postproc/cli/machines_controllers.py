@@ -172,10 +172,10 @@ def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Js
 @setup_app.command("schema")
 def setup_schema() -> None:
     """Print the JSON schema of a set-up file."""
-    from machines.user_file import schema
+    from machines.user_model import schema
     from postproc.setup.model import SetupFile
 
-    print_json(schema(SetupFile))
+    print_json(schema("setup", SetupFile))
 
 
 @controller_app.command("list")
@@ -202,7 +202,7 @@ def controller_show(name: Annotated[str, typer.Argument(help="name or TOML file"
 @controller_app.command("schema")
 def controller_schema() -> None:
     """Print the JSON schema of a controller file."""
-    from machines.user_file import schema
+    from machines.user_model import schema
     from postproc.controllers.model import ControllerFile
 
-    print_json(schema(ControllerFile))
+    print_json(schema("controller", ControllerFile))

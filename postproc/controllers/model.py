@@ -12,7 +12,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from machines.choices import Rapids, RolloverRule, Stop
-from machines.user_file import UserModel, load_toml
+from machines.user_file import load_toml
+from machines.user_model import UserModel
 from postproc.base.length_text import INCH, MM, LengthText
 from postproc.controllers.cycles import Cycles
 from postproc.controllers.output_modes import Modes

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from postproc.controllers.texts import placeholders
 
 LengthState = Literal["any", "off", "on"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from postproc.controllers.texts import placeholders
 
 VectorKind = Literal["table", "table_to_table", "tool_to_head", "head_to_head", "closing_table", "closing_head"]

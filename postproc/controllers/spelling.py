@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from machines.hooks import PASSIVE, PassiveWord
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from postproc.controllers.texts import (
     WORK_OFFSETS,
     AlignmentText,

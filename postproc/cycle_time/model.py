@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import Field
 
 from machines.machine import Machine
-from machines.user_file import UserModel, load_toml
+from machines.user_file import load_toml
+from machines.user_model import UserModel
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic
 

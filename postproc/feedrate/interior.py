@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats
@@ -200,6 +199,8 @@ def tie(low: Floats, right: Floats, tied: tuple[int, int]) -> slice:
 
 def solve_tied(low: Floats, right: Floats, tied: tuple[int, int]) -> Floats:
     """Solve the pentadiagonal equations, lower band (3, n) and right side (n,); zeros where they are not definite."""
+    from scipy.linalg import solveh_banded
+
     here = tie(low, right, tied)
     try:
         right[here] = solveh_banded(low[:, here], right[here], lower=True, check_finite=False)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from postproc.feedrate.kernels.splines import spline
 from toolpaths.arrays import Floats
@@ -70,6 +69,8 @@ class SplinePath:
     def __init__(self, knots: Floats, coefficients: Floats, degree: int = 5) -> None:
         if degree < 4:
             raise ValueError(f"degree {degree}: the third derivative must be continuous, which takes degree 4 or more")
+        from scipy.interpolate import BSpline
+
         self._orders = [BSpline(np.ascontiguousarray(knots, dtype=np.float64), np.asarray(coefficients, np.float64), degree)]
         for _ in range(3):
             self._orders.append(self._orders[-1].derivative())

@@ -17,7 +17,7 @@ from postproc.planning.planned import PlannedMotion
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
-from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.diagnostics import Diagnostic, has_errors, require
 from toolpaths.toolpath import ClSource, Toolpath
 
 if TYPE_CHECKING:
@@ -78,6 +78,15 @@ class PostResult:
         """True where nothing stands against writing the text."""
         return not has_errors(self.diagnostics)
 
+    def checked(self) -> PostResult:
+        """The same, where a program was written.
+
+        Raises:
+            DiagnosticError: carries all diagnostics.
+        """
+        require(self.diagnostics)
+        return self
+
     def with_found(self, found: list[Diagnostic]) -> PostResult:
         """With more diagnostics."""
         return replace(self, diagnostics=(*self.diagnostics, *found))
@@ -104,3 +113,12 @@ class VerifyResult:
     def ok(self) -> bool:
         """True where the program does what the CL file says."""
         return self.comparison is not None and not has_errors(self.diagnostics)
+
+    def checked(self) -> VerifyResult:
+        """The same, where the program does what the CL file says.
+
+        Raises:
+            DiagnosticError: carries all diagnostics.
+        """
+        require(self.diagnostics)
+        return self

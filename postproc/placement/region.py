@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import linprog
 
 from machines import reach as clearances
 from machines.kinematics.base import Kinematics
@@ -97,6 +96,8 @@ class Slabs:
                 break
             rows += new
             left = np.column_stack([-self.g[rows], self.joint[rows, None] == joints, np.zeros(len(rows))])
+            from scipy.optimize import linprog
+
             found = linprog(cost, A_ub=np.vstack([left, order]), b_ub=np.append(self.c[rows], np.zeros(count)),
                             bounds=[*zip(low, high, strict=True), *[(None, None)] * (count + 1)], method="highs")
             if found.x is None:

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 
 from machines.kinematics.base import Kinematics
 from postproc.feedrate.paths import Derivatives, SplinePath
@@ -24,6 +24,9 @@ from toolpaths.arrays import Array, Bools, Floats
 from toolpaths.rotations import angle_between
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.smooth import Smooth
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 DEGREE = 5
 SHARE = 0.05
@@ -57,6 +60,8 @@ class MachinePath:
     @staticmethod
     def through(s: Floats, values: Floats, led: Bools) -> MachinePath:
         """The path through sites."""
+        from scipy.interpolate import make_interp_spline
+
         return MachinePath(s, values, 0.0, led, make_interp_spline(s, values[:, :-6], k=DEGREE))
 
     @property
@@ -85,6 +90,8 @@ class MachinePath:
     @cached_property
     def tool_spline(self) -> BSpline:
         """of tip and axis (3 + 3), for limits at the tool; knots as of `fitted`"""
+        from scipy.interpolate import make_interp_spline
+
         return make_interp_spline(self.s, self.values[:, self.joints:], k=DEGREE)
 
     @cached_property

@@ -9,7 +9,6 @@ the tool axis would leave the tolerance by that (the rotary axis really has to s
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
@@ -37,6 +36,8 @@ def past_poles(s: Floats, q: Floats, tip: Floats, axis: Floats, near: Bools, kin
         return q, led
     rotary = np.array(kin.rotary)
     changed = q.copy()
+    from scipy.interpolate import make_interp_spline
+
     through = make_interp_spline(s[~inside], q[~inside][:, rotary], k=DEGREE)
     where = np.flatnonzero(inside)
     changed[np.ix_(where, rotary)] = through(s[where])

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from postproc.setup.place import PlaceBox
 from toolpaths.choices import LengthUnit
 

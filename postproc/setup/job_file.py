@@ -8,7 +8,8 @@ from typing import Annotated
 from pydantic import Field
 
 from machines.hooks import HooksModel
-from machines.user_file import UserModel, read_toml, validate
+from machines.user_file import read_toml, validate
+from machines.user_model import UserModel
 from toolpaths.choices import DialectName, LengthUnit
 from toolpaths.diagnostics import Diagnostic
 

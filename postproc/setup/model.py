@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
 from machines.hooks import HooksModel
-from machines.user_file import UserModel, read_toml, validate
+from machines.user_file import read_toml, validate
+from machines.user_model import UserModel
 from postproc.base.options import OutputMode
 from postproc.setup.bodies import BodiesModel, ToolBody
 from postproc.setup.files import seen_from_here

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from postproc.setup.ranges import pair
 
 LimitAngle = Annotated[float, Field(ge=-90.0, le=90.0)]

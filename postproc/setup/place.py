@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from postproc.setup.ranges import pair
 
 PlacePoint = Annotated[tuple[float, float, float], Field(description="x, y, z")]

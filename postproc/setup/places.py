@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 from postproc.setup.place import PlacePoint
 from toolpaths.diagnostics import Diagnostic, error
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 
 CoolantKind = Literal["off", "flood", "mist", "through", "air"]
 """through: through the tool"""

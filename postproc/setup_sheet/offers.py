@@ -12,13 +12,11 @@ from toolpaths.toolpath import Toolpath
 
 
 def offers(result: PostResult, toolpath: Toolpath, machine: str, controller: str) -> list[Diagnostic]:
-    """Notes behind the errors of a conversion; `machine` and `controller` as the command was given them.
+    """Notes behind the errors of a conversion that was refused; `machine` and `controller` as the command was given them.
 
     Args:
         toolpath: as it was read
     """
-    if result.ok:
-        return []
     codes = {d.code for d in result.diagnostics if d.severity is Severity.ERROR}
     missing = sorted(codes & OF_SETUP)
     if missing:

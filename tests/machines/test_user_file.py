@@ -7,7 +7,8 @@ import pytest
 from pydantic import Field
 
 from machines.toml_lines import key_lines
-from machines.user_file import UserModel, ValueSource, load_toml, read_toml, schema, values_of
+from machines.user_file import ValueSource, load_toml, read_toml, values_of
+from machines.user_model import UserModel, schema
 
 
 class Axis(UserModel):
@@ -182,7 +183,7 @@ def test_base_cycle_unknown_base_and_wrong_type(tmp_path):
 
 
 def test_schema_knows_base_and_forbids_the_rest():
-    s = schema(File)
+    s = schema("file", File)
     assert "base" in s["properties"] and s["additionalProperties"] is False
 
 
@@ -263,3 +264,13 @@ def _written(folder, text):
     path = folder / "parted.toml"
     path.write_text(text)
     return path
+
+
+def test_a_file_may_name_its_schema_for_editors(tmp_path: Path) -> None:
+    one = tmp_path / "one.toml"
+    one.write_text('#:schema file.json\n"$schema" = "file.json"\n')
+    found, _ = read_toml(one)
+    assert found is not None and found.values == {}
+    one.write_text('"$schema" = 3\n')
+    found, _ = read_toml(one)
+    assert found is not None and found.values == {"$schema": 3}, "no name: an unknown key, as others"

@@ -14,6 +14,7 @@ from toolpaths.cl.build import ModalValue, ToolpathBuilder
 from toolpaths.cl.heights import height_of, place
 from toolpaths.cl.unnumbered import loaded, named
 from toolpaths.diagnostics import Severity
+from toolpaths.given_arrays import passes
 from toolpaths.toolpath import Arcs, Cycle, FeedMode, Frame, Kind, Operation, Role, Tool, Toolpath
 
 NORMAL_ROUNDING = 1e-3
@@ -379,14 +380,3 @@ def _tools(b: ToolpathBuilder, n: int) -> tuple[Array, tuple[Tool, ...]]:
     for start, tool in zip(b.tool.starts, b.tool.values, strict=True):
         index.set(start, -1 if tool is None else order.setdefault(tool, len(order)))
     return spread(index, n, np.int32), named(tuple(order))
-
-
-def passes(free: Bools, operation: Array, tool: Array) -> Array:
-    """Number of the pass per row: a run of cutting rows and the `free` (rapid) rows before it.
-
-    A change of the operation or the tool between two cutting rows also begins a pass.
-    """
-    begins = np.zeros(len(free), bool)
-    change = (operation[1:] != operation[:-1]) | (tool[1:] != tool[:-1])
-    begins[1:] = ~free[:-1] & (free[1:] | change)
-    return np.cumsum(begins).astype(np.int32)

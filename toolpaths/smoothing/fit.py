@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solveh_banded
 
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shapes import arrays
@@ -205,6 +204,8 @@ def _solved(knots: KnotVectors, normal: Normal, fixed: tuple[Floats, Floats]) ->
         bands[d, last - d] = 0.0
     bands[0, begin], bands[0, last] = 1.0, 1.0
     right[begin], right[last] = head, tail
+    from scipy.linalg import solveh_banded
+
     return np.asarray(solveh_banded(bands, right, lower=True, overwrite_ab=True, overwrite_b=True, check_finite=False))
 
 

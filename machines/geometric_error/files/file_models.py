@@ -15,7 +15,7 @@ from machines.geometric_error.tables.choices import MapDirections, TableRule
 from machines.geometric_error.tables.names import parse
 from machines.models import Positive, Vector
 from machines.slider_models import Interval
-from machines.user_file import UserModel
+from machines.user_model import UserModel
 
 MatrixRows = tuple[Vector, ...]
 

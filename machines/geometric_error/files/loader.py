@@ -25,7 +25,8 @@ from machines.geometric_error.tables.names import SPINDLE, ErrorName, parse
 from machines.geometric_error.tables.table_curves import Fault, table_curve
 from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
-from machines.user_file import UserFile, nearest, read_toml, schema, validate
+from machines.user_file import UserFile, nearest, read_toml, validate
+from machines.user_model import schema
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, Severity, has_errors, read_value, warning
 from toolpaths.units import DEG
@@ -57,7 +58,7 @@ def load_checked(source: str | Path, machine: Machine) -> tuple[ErrorModel | Non
 
 def error_model_schema() -> dict[str, object]:
     """The JSON schema of an error model file."""
-    return schema(ErrorFileModel)
+    return schema("error-model", ErrorFileModel)
 
 
 class _Loader:

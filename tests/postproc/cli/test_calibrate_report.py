@@ -23,6 +23,7 @@ from machines.geometric_error.actual.rods import RodErrors, rod_frame, rod_names
 from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load
 from machines.geometric_error.tables.csv_table import read_csv, write_csv
+from machines.user_model import key_texts
 from postproc.cli.app import app
 
 ROOT = Path(__file__).parents[3]
@@ -82,7 +83,7 @@ def test_readme_and_schema_say_what_every_column_is() -> None:
     assert approach_column("X") == "X way" and "`X way`, ..." in README  # the name in users' tables
     assert {"name": "X way, ...", "unit": "", "meaning": DIRECTION} in \
         schema["$defs"]["LaserModel"]["properties"]["table"]["columns"]
-    assert all(field.description for field in MeasurementModel.model_fields.values())
+    assert set(key_texts(MeasurementModel)) == set(MeasurementModel.model_fields)
 
 
 # ---- the account -------------------------------------------------------------------------------------------

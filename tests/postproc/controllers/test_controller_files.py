@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from machines.user_file import schema
+from machines.user_model import schema
 from postproc.cli.app import app
 from postproc.cli.catalogue import controller_values
 from postproc.compile.program import Program
@@ -76,7 +76,7 @@ def test_work_offsets_are_given_for_every_code_of_a_setup(tmp_path: Path) -> Non
 
 
 def test_the_schema_explains_every_key() -> None:
-    text = schema(ControllerFile)
+    text = schema("controller", ControllerFile)
     tables = {"format", "comment", "program", "codes", "tools", "subprograms", "arcs", "cycles", "feed", "kinematics",
               "modes", "cutter_compensation", "start", "stops", "rollover", "links", "pivots", "alignment"}
     silent = {f"{name}.{key}" for name, model in {**text["$defs"], "": text}.items()
