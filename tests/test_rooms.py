@@ -60,6 +60,7 @@ FLOORS = (
     ("postproc.orientation.figures", "the choice as pictures"),
     ("postproc.pipeline", "the table of stages; convert, verify, choose_axes"),
     ("postproc.proof", "the proof as a file, what has changed since"),
+    ("postproc.clock", "a control executed from cycle to cycle: axis motion by time"),
     ("postproc.cycle_time", "how long a program takes, with a band"),
     ("postproc.placement", "where the part stands on the table"),
     ("postproc.alignment", "a part that is not where it was meant, measured"),

@@ -39,7 +39,7 @@ UNKNOWN: dict[str, Any] = {"cycle_time_s": None, "lower_bound_s": None, "band_s"
 def time(file: Annotated[Path, typer.Argument(metavar="FILE", help="CL file, or G-code file of the controller")],
          machine: MachineName,
          controller: ControllerName = "linuxcnc",
-         model: Annotated[str, typer.Option("--model", metavar="{ideal,lookahead,linuxcnc,FILE}",
+         model: Annotated[str, typer.Option("--model", metavar="{ideal,lookahead,control,linuxcnc,FILE}",
                                             help="model of the control, or a TOML file; default: the controller's")] = "",
          calibrate: Annotated[str, typer.Option("--calibrate", metavar="LOG.csv", help="fit the model to a measured run of "
                                                 "FILE: columns nc_line, time_s")] = "",
@@ -145,7 +145,7 @@ def _calibrated(blocks: MotionBlocks, machine: Machine, planner: CycleTimeModel,
     read, found = read_log(log, machine.axis_names)
     if read is None:
         return None, {}, found
-    fit, found = calibrate(blocks, read, planner, log, machine)
+    fit, found = calibrate(blocks, read, planner.quick(), log, machine)
     if fit is None:
         return None, {}, found
     return fit.model, {"calibration": as_dict(fit)}, found
