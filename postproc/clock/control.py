@@ -82,7 +82,7 @@ def execute(commanded: CommandedPath, settings: ControlSettings) -> ControlMotio
     speed = _allowed(commanded, path, settings)
     slow, most = narrow(path, limits, float(speed[np.isfinite(speed)].max(initial=0.0)))
     table = np.concatenate([path.s[:, None], path.dq, path.d2q, path.d3q, slow[:, None], most[:, None]], axis=1)
-    t, s, rows = [np.zeros(1)], [np.zeros(1)], [np.zeros((1, 2))]
+    t, s, rows = list[Floats]([np.zeros(1)]), list[Floats]([np.zeros(1)]), list[Floats]([np.zeros((1, 2))])
     now = 0.0
     for begin, end in zip(path.stops[:-1].tolist(), path.stops[1:].tolist(), strict=True):
         low, high = np.searchsorted(path.s, (begin, end))

@@ -190,4 +190,4 @@ def places(s: Floats, width: Floats, fixed: Floats) -> Floats:
     inside = s[~close, None] + width[~close, None] * PLACES
     every = np.concatenate([s[close], np.clip(inside.ravel(), fixed[0], fixed[-1]), fixed])
     every = np.unique(every)
-    return every[np.append(np.diff(every) > 1e-9, True)]
+    return np.asarray(every[np.append(np.diff(every) > 1e-9, True)])

@@ -85,7 +85,7 @@ def pieces(blocks: MotionBlocks, form: Shape) -> tuple[Floats, Floats, Ints]:
 def _on_the_clock(blocks: MotionBlocks, form: Shape, moved: ControlMotion, owner: Ints, stops: Bools, target: Floats,
                   stop_time: float) -> BlockTimes:
     """Times of the blocks with their rests."""
-    seconds = np.bincount(owner, weights=np.diff(moved.ends), minlength=len(blocks))
+    seconds = summed(np.diff(moved.ends), owner, len(blocks))
     p = blocks.pauses
     inside = p.block >= 0
     rest = summed(p.seconds[inside], p.block[inside], len(blocks)) + np.where(stops, stop_time, 0.0)
