@@ -88,7 +88,7 @@ def execute(commanded: CommandedPath, settings: ControlSettings) -> ControlMotio
         low, high = np.searchsorted(path.s, (begin, end))
         first, last = np.searchsorted(path.ends, (begin, end))
         dt, made = _stretch(table[low:high + 1], path.ends[first:last + 1], speed[first:last], limits, begin, end, settings)
-        t.append(now + dt * np.arange(1, len(made) + 1))
+        t.append(np.asarray(now + dt * np.arange(1, len(made) + 1), dtype=np.float64))
         now = float(t[-1][-1])
         reached = made[-1, 0] - begin
         s.append(begin + (made[:, 0] - begin) * ((end - begin) / reached))
