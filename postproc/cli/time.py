@@ -47,7 +47,7 @@ Tables = Annotated[str, typer.Option("--csv", metavar="TABLES.csv", help="the ta
 def time(files: TimedFiles,
          machine: MachineName,
          controller: ControllerName = "linuxcnc",
-         model: Annotated[str, typer.Option("--model", metavar="{ideal,lookahead,linuxcnc,FILE}",
+         model: Annotated[str, typer.Option("--model", metavar="{ideal,lookahead,control,linuxcnc,FILE}",
                                             help="model of the control, or a TOML file; default: the controller's")] = "",
          calibrate: Logs = None,
          output: Annotated[str, typer.Option("-o", "--output", metavar="MODEL.toml", help="file for the fitted model")] = "",

@@ -20,7 +20,7 @@ def estimate_of(result: PostResult) -> Estimate | None:
     """The estimate under the model of the controller; None where nothing is written."""
     if not result.ok:
         return None
-    model = read_value(load_model(model_name(result.controller_name, result.controller.writer)))
+    model = read_value(load_model(model_name(result.controller_name, result.controller.writer))).quick()
     rows = len(result.path) if result.path is not None else 0
     give_back(rows)
     blocks = from_conversion(result)

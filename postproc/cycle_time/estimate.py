@@ -11,6 +11,7 @@ from machines.choices import MotionOrder
 from machines.machine import Machine
 from postproc.cycle_time.blocks import Axes, Cause, MotionBlocks
 from postproc.cycle_time.bound import lower_bound
+from postproc.cycle_time.control import control
 from postproc.cycle_time.kinds import own_share
 from postproc.cycle_time.linuxcnc import Settings, linuxcnc
 from postproc.cycle_time.lookahead import lookahead
@@ -79,7 +80,7 @@ def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
         blocks = replace(blocks, pauses=replace(p, seconds=p.seconds + runs_up))
     if model.kind == "linuxcnc":
         return linuxcnc(blocks, Settings(cycle=model.servo_cycle, override=model.override, rapid=model.rapid))
-    return lookahead(blocks, model)
+    return control(blocks, model) if model.kind == "control" else lookahead(blocks, model)
 
 
 def total(blocks: MotionBlocks, times: BlockTimes) -> float:
@@ -103,7 +104,7 @@ def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with
     bound = lower_bound(as_used(blocks, model), model)
     if not with_band:
         return Estimate(blocks, model, times, seconds, bound, (seconds, seconds), {}, {})
-    down, up, uncertainties, assumed = _uncertainties(blocks, machine, model, seconds)
+    down, up, uncertainties, assumed = _uncertainties(blocks, machine, model.quick(), seconds)
     low = seconds - down if machine.limits.assumed else max(seconds - down, min(bound, seconds))
     return Estimate(blocks, model, times, seconds, bound, (max(low, 0.0), seconds + up), uncertainties,
                     assumed)
@@ -137,9 +138,9 @@ def measure_first(e: Estimate, machine: Machine) -> Uncertain | None:
     All axes slower take no less than one of them, so limits are moved axis by axis only while all of them together move the
     time by more than the worst value so far.
     """
-    known = e.assumed
+    known, model = e.assumed, e.model.quick()
     alone = {name: s for name, s in known.items() if name not in _LIMITS}
-    begin = total(e.blocks, timed(e.blocks, e.model))
+    begin = total(e.blocks, timed(e.blocks, model))
     for limit in sorted((one for one in _LIMITS if one in known), key=lambda name: -known[name]):
         if alone and max(alone.values()) >= known[limit]:
             break
@@ -147,7 +148,7 @@ def measure_first(e: Estimate, machine: Machine) -> Uncertain | None:
             if f"{name}.{limit}" in machine.limits.assumed and not _shown(name, limit, e.model):
                 which = np.arange(len(machine.axis_names)) == axis
                 changed = [_scaled(e.blocks, limit, which, sign) for sign in (-1, 1)]
-                moved = sorted(total(b, timed(b, e.model)) - begin for b in changed)
+                moved = sorted(total(b, timed(b, model)) - begin for b in changed)
                 alone[f"{name}.{limit}"] = (moved[-1] - moved[0]) / 2.0
     worst = max(alone, key=lambda name: alone[name], default="")
     return Uncertain(worst, _assumed_value(worst, machine, e.model), alone[worst]) if worst and alone[worst] > 0.0 else None

@@ -58,9 +58,9 @@ class CycleTimeModel(UserModel):
     """How a control plans."""
 
     description: str = ""
-    kind: Literal["ideal", "lookahead", "linuxcnc"] = "lookahead"
+    kind: Literal["ideal", "lookahead", "control", "linuxcnc"] = "lookahead"
     """ideal: as fast as the limits allow inside the corner tolerance; lookahead: a control that sees a number of blocks;
-    linuxcnc: LinuxCNC's planner"""
+    control: the reference control, executed from cycle to cycle; linuxcnc: LinuxCNC's planner"""
     corner_tolerance: float = Field(default=0.01, gt=0.0, le=10.0)
     """mm that corners may be rounded off where the program does not say"""
     stated_share: float = Field(default=1.0, gt=0.0, le=1000.0)
@@ -82,7 +82,7 @@ class CycleTimeModel(UserModel):
     stop_time: float = Field(default=0.005, ge=0.0, le=10.0)
     """s in position before motion goes on after a stop"""
     spindle_time: float = Field(default=0.0, ge=0.0, le=60.0)
-    """s that the spindle takes to come up to speed at each M3 or M4"""
+    """s at rest at each M3 or M4: what the spindle takes to come up to speed where the control waits for it"""
     servo_cycle: float = Field(default=0.001, gt=0.0, le=0.1)
     """s, of LinuxCNC"""
     own_share: float = Field(default=0.03, ge=0.0, le=1.0)
@@ -96,9 +96,13 @@ class CycleTimeModel(UserModel):
         stays. Only of a control with look-ahead."""
         stated = {"lookahead": machine.look_ahead, "block_time": None if self.calibration else machine.block_time}
         known = {name: value for name, value in stated.items() if value is not None}
-        if self.kind != "lookahead" or not known:
+        if self.kind not in ("lookahead", "control") or not known:
             return self
         return self.model_copy(update={**known, "assumed": tuple(name for name in self.assumed if name not in known)})
+
+    def quick(self) -> CycleTimeModel:
+        """The model whose times are formulas: "lookahead" with the same parameters where this one executes a control."""
+        return self.model_copy(update={"kind": "lookahead"}) if self.kind == "control" else self
 
     def values(self) -> Floats:
         """(8,) logarithms of PARAMETERS."""
@@ -123,7 +127,7 @@ def load_model(source: str | Path) -> tuple[CycleTimeModel | None, list[Diagnost
 
 
 def model_name(controller: str, writer: str) -> str:
-    """The built-in model of a controller: its own where there is one, LinuxCNC's for its dialects, else "lookahead"."""
+    """The built-in model of a controller: its own where there is one, that of its dialect, else "lookahead"."""
     known = builtin_files()
     stem = Path(controller).stem
     return stem if stem in known else writer if writer in known else "lookahead"

@@ -1,0 +1,193 @@
+"""The path that a control makes of commanded points: fitted where they stand on a curve, corners rounded off.
+
+Derivatives by path length are those of the polyline smoothed by a kernel of finite width: at a vertex the direction changes
+by du over the width w as the quintic S(x) = 10 x^3 - 15 x^4 + 6 x^5, so that the third derivative is continuous; widths
+overlap and add up. The deviation of a corner is 5/64 |du| w (integral of S from 0 to 1/2), that of a curve of curvature k
+is k w^2/56 (variance of Beta(3, 3) is 1/28): the widths are chosen by the mean over w, which deviates more in both
+cases (|du| w/8, k w^2/24).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_banded
+
+from postproc.clock.kernels import add_turns
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.compiled import chosen
+from toolpaths.shapes import arrays
+
+SMOOTH_TURN, SMOOTH_SAG = 1.0, 40.0
+"""largest change of direction of neighbouring blocks on one curve, rad, and the sag of its chord in tolerances"""
+EVEN, SLIGHT = 1.5, 0.02
+"""on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad"""
+PIECE_TURN, MOST_PIECES = 0.02, 24
+"""rad that a fitted curve turns from piece to piece, and pieces of a block at most"""
+WIDTHS = 0.01 * 1.3 ** np.arange(30)
+"""mm (rad of rotary blocks): widths that are tried, 0.01 to 20"""
+MEAN_SHARE = 1.6
+"""by which the mean over a width deviates more than the kernel, at least"""
+SLOPE = 0.5
+"""by which the width may change with the path"""
+PLACES = np.array([-0.5, -0.3, -0.14, 0.0, 0.14, 0.3, 0.5])
+"""of a width where derivatives are taken"""
+BEFORE = 1e-7
+"""mm or rad before a rest where the direction is still that of the path that leads there"""
+COMPILE_FROM = 2_000
+
+
+@dataclass(frozen=True)
+@arrays(points="V A", length="N", speed="N", tolerance="V", stop="V", weight="A")
+class CommandedPath:
+    """What a control is given, N blocks between V = N + 1 points.
+
+    Attributes:
+        points (V, A): machine coordinates, mm and rad
+        length (N,): path of each block that the feed refers to, > 0; speed (N,): largest along it
+        tolerance (V,): mm that the path may leave each point, 0 for none; stop (V,): the axes rest there
+        weight (A,): mm that a unit of each axis counts in deviations
+    """
+
+    points: Floats
+    length: Floats
+    speed: Floats
+    tolerance: Floats
+    stop: Bools
+    weight: Floats
+
+
+@dataclass(frozen=True)
+@arrays(s="M", q="M A", dq="M A", d2q="M A", d3q="M A", ends="V", stops="K")
+class BlendedPath:
+    """A path by its length: position and derivatives at M places; ends (V,): of the blocks; stops (K,): rests, both ends."""
+
+    s: Floats
+    q: Floats
+    dq: Floats
+    d2q: Floats
+    d3q: Floats
+    ends: Floats
+    stops: Floats
+
+
+def blended(path: CommandedPath) -> BlendedPath:
+    """The path that the control runs."""
+    points, length, tolerance, owner = fitted(path)
+    ends = np.concatenate([[0.0], np.cumsum(length)])
+    last = np.append(np.flatnonzero(np.diff(owner)), len(owner) - 1)
+    blocks = np.concatenate([[0.0], ends[last + 1]])
+    stop = path.stop.copy()
+    stop[[0, -1]] = True
+    stops = blocks[stop]
+    width = widths(points * path.weight, ends, tolerance, stops)
+    u = np.diff(points, axis=0) / length[:, None]
+    s = places(ends[1:-1], width, np.unique(np.concatenate([blocks, stops, stops[1:] - BEFORE])))
+    turns = np.where(np.isin(ends[1:-1], stops)[:, None], 0.0, np.diff(u, axis=0))
+    k = np.clip(np.searchsorted(ends, s, side="right") - 1, 0, len(u) - 1)
+    q, dq = points[k] + (s - ends[k])[:, None] * u[k], u[k]
+    d2q, d3q = np.zeros_like(dq), np.zeros_like(dq)
+    add = chosen(add_turns, len(s), COMPILE_FROM)
+    add(s, q, dq, d2q, d3q, ends[1:-1], turns, width)
+    return BlendedPath(s, q, dq, d2q, d3q, blocks, stops)
+
+
+def fitted(path: CommandedPath) -> tuple[Floats, Floats, Floats, Ints]:
+    """(points (P + 1, A), length (P,), tolerance (P + 1,), block of each piece (P,)): blocks on one curve as pieces of
+    a cubic spline through their ends."""
+    flat = path.points * path.weight
+    step = np.diff(flat, axis=0)
+    chord = np.maximum(np.linalg.norm(step, axis=1), 1e-12)
+    u = step / chord[:, None]
+    smooth, turn = _curved(u, chord, path)
+    first, last = _tangents(u, chord, smooth)
+    bend = np.maximum(np.concatenate([[0.0], np.where(smooth, turn, 0.0)]), np.append(np.where(smooth, turn, 0.0), 0.0))
+    count = np.clip(np.ceil(bend / PIECE_TURN), 1, MOST_PIECES).astype(np.int64)
+    owner = np.repeat(np.arange(len(u)), count)
+    part = (np.arange(len(owner)) - (np.cumsum(count) - count)[owner] + 1.0) / count[owner]
+    x = part[:, None]
+    h = chord[owner, None]
+    inner = (flat[owner] * (1 + 2 * x) * (1 - x) ** 2 + flat[owner + 1] * x**2 * (3 - 2 * x)
+             + h * first[owner] * x * (1 - x) ** 2 + h * last[owner] * x**2 * (x - 1))
+    inner[part >= 1.0 - 1e-12] = flat[1:]
+    wide = np.concatenate([flat[:1], inner])
+    piece = np.maximum(np.linalg.norm(np.diff(wide, axis=0), axis=1), 1e-12)
+    length = path.length[owner] * piece / chord[owner]
+    tolerance = np.minimum(path.tolerance[owner], path.tolerance[owner + 1])
+    tolerance = np.where(part >= 1.0 - 1e-12, path.tolerance[owner + 1], tolerance)
+    return wide / path.weight, length, np.concatenate([path.tolerance[:1], tolerance]), owner
+
+
+def _curved(u: Floats, chord: Floats, path: CommandedPath) -> tuple[Bools, Floats]:
+    """Of inner points (N - 1,): whether both blocks are of one curve, change of direction."""
+    turn = np.linalg.norm(np.diff(u, axis=0), axis=1)
+    sag = turn * np.maximum(chord[:-1], chord[1:]) / 8.0
+    around = np.concatenate([[0.0], turn[:-1]]) + np.append(turn[1:], 0.0) if len(turn) else turn
+    even = turn <= np.maximum(EVEN * around, SLIGHT)
+    smooth = (turn <= SMOOTH_TURN) & (sag <= SMOOTH_SAG * path.tolerance[1:-1]) & even & ~path.stop[1:-1]
+    return smooth, turn
+
+
+def _tangents(u: Floats, chord: Floats, smooth: Bools) -> tuple[Floats, Floats]:
+    """(N, A) derivatives at begin and end of each block: of cubic splines by chord length through smooth points, without
+    curvature where they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV)."""
+    n = len(u)
+    bands, right = np.zeros((4, 2 * n)), np.zeros((2 * n, u.shape[1]))
+    left, joined = np.concatenate([[False], smooth]), np.append(smooth, False)
+    begin, end = 2 * np.arange(n), 2 * np.arange(n) + 1
+    bands[1, begin], bands[0, end], right[begin] = 2.0, np.where(left, 0.0, 1.0), 3.0 * u
+    bands[1, end], right[end] = np.where(joined, 1.0, 2.0), np.where(joined[:, None], 0.0, 3.0 * u)
+    bands[2, begin] = np.where(joined, 0.0, 1.0)
+    k = np.flatnonzero(smooth)
+    bands[0, begin[k + 1]] = -1.0
+    before, behind = chord[k] / (chord[k] + chord[k + 1]), chord[k + 1] / (chord[k] + chord[k + 1])
+    bands[3, begin[k]], bands[0, end[k + 1]] = behind, before
+    right[begin[k + 1]] = 3.0 * (behind[:, None] * u[k] + before[:, None] * u[k + 1])
+    solved = solve_banded((2, 1), bands, right)
+    return solved[0::2], solved[1::2]
+
+
+def widths(flat: Floats, ends: Floats, tolerance: Floats, stops: Floats) -> Floats:
+    """(P - 1,) width over which each inner point is smoothed: the widest whose mean deviates by at most the tolerance,
+    and all narrower ones too; it reaches over no rest."""
+    s = ends[1:-1]
+    if not len(s):
+        return s
+    middle = (flat[1:] + flat[:-1]) / 2.0 * np.diff(ends)[:, None]
+    whole = np.concatenate([np.zeros((1, flat.shape[1])), np.cumsum(middle, axis=0)])
+    before = s - stops[np.searchsorted(stops, s, side="right") - 1]
+    behind = stops[np.minimum(np.searchsorted(stops, s, side="right"), len(stops) - 1)] - s
+    room = 2.0 * np.minimum(before, behind)
+    result, alive = np.zeros(len(s)), np.flatnonzero((tolerance[1:-1] > 0.0) & (room > 0.0))
+    for width in WIDTHS:
+        w = np.minimum(width, room[alive])
+        mean = (_integral(flat, whole, ends, s[alive] + w / 2) - _integral(flat, whole, ends, s[alive] - w / 2)) / w[:, None]
+        good = np.linalg.norm(mean - flat[alive + 1], axis=1) <= MEAN_SHARE * tolerance[alive + 1]
+        result[alive[good]] = w[good]
+        alive = alive[good & (width < room[alive])]
+        if not len(alive):
+            break
+    result = np.minimum(np.minimum.accumulate(result - SLOPE * s) + SLOPE * s,
+                        np.minimum.accumulate((result + SLOPE * s)[::-1])[::-1] - SLOPE * s)
+    return np.asarray(np.maximum(result, np.minimum(WIDTHS[0], np.maximum(room, 1e-9))))
+
+
+def _integral(flat: Floats, whole: Floats, ends: Floats, at: Floats) -> Floats:
+    """(K, A) integral of the polyline from 0 to places `at` (K,)."""
+    k = np.clip(np.searchsorted(ends, at, side="right") - 1, 0, len(ends) - 2)
+    x = (at - ends[k])[:, None]
+    slope = (flat[k + 1] - flat[k]) / (ends[k + 1] - ends[k])[:, None]
+    return np.asarray(whole[k] + x * (flat[k] + slope * x / 2.0))
+
+
+def places(s: Floats, width: Floats, fixed: Floats) -> Floats:
+    """(M,) places of derivatives: several over each width, only the points themselves where they stand close together."""
+    if not len(s):
+        return fixed
+    gap = np.diff(s, prepend=-np.inf, append=np.inf)
+    close = np.maximum(gap[:-1], gap[1:]) < width / 6.0
+    inside = s[~close, None] + width[~close, None] * PLACES
+    every = np.concatenate([s[close], np.clip(inside.ravel(), fixed[0], fixed[-1]), fixed])
+    every = np.unique(every)
+    return np.asarray(every[np.append(np.diff(every) > 1e-9, True)])

@@ -1,0 +1,104 @@
+"""Blocks under the reference control (`postproc.clock`): its path from the blocks, its times back to them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.clock.control import ControlMotion, ControlSettings, execute
+from postproc.clock.path import CommandedPath
+from postproc.cycle_time.blocks import CornerMode, MotionBlocks
+from postproc.cycle_time.lookahead import TANGENT, directions, limits
+from postproc.cycle_time.model import CycleTimeModel
+from postproc.cycle_time.phases import BlockTimes, summed
+from postproc.cycle_time.shape import Shape, shape
+from toolpaths.arrays import Bools, Floats, Ints
+
+ARM = 50.0
+"""mm from a rotary axis at which its deviations count"""
+ARC_PIECE = 0.1
+"""rad of an arc that one piece stands for; the control fits a curve through them"""
+BACKWARD = -0.5
+"""cosine of the change of direction in X, Y, Z below which the axes rest"""
+SHORTEST = 1e-9
+"""mm or rad that a block counts at least"""
+AT_SPEED = 0.999
+"""of the speed asked for that counts as constant speed"""
+
+
+def control(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
+    """How long the reference control takes over each block."""
+    form = shape(blocks)
+    stops, target = rests(blocks, form), limits(blocks, form, model)[0]
+    moved, owner = motion(blocks, model, form, stops, target)
+    return _on_the_clock(blocks, form, moved, owner, stops, target, model.stop_time)
+
+
+def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bools,
+           target: Floats) -> tuple[ControlMotion, Ints]:
+    """The executed motion, and the block of each piece that was commanded; rests without their time."""
+    points, length, owner = pieces(blocks, form)
+    last = np.append(np.diff(owner) > 0, True)
+    stated = blocks.tolerance
+    free = np.isnan(stated) | np.isinf(stated)
+    tolerance = np.where(free, model.corner_tolerance, stated * model.stated_share)
+    tolerance = np.where(blocks.path == CornerMode.BLEND, tolerance, 0.0)
+    inner = np.where(blocks.arc, model.corner_tolerance, tolerance)[owner]
+    axes = blocks.axes
+    path = CommandedPath(points, length, target[owner], np.concatenate([[0.0], np.where(last, tolerance[owner], inner)]),
+                         np.concatenate([[True], stops[owner] & last]), np.where(axes.rotary, ARM, 1.0))
+    jerk = axes.jerk if model.jerk else np.full(len(axes.letters), np.inf)
+    return execute(path, ControlSettings(axes.velocity, axes.acceleration, jerk, buffer=model.lookahead,
+                                         block_time=model.block_time)), owner
+
+
+def rests(blocks: MotionBlocks, form: Shape) -> Bools:
+    """(E,) where the axes rest at the end: by command, exact stop, corner of an exact path, between rapid and feed."""
+    d = directions(blocks, form)
+    change = np.abs(d.first[1:] - d.last[:-1]).max(axis=1, initial=0.0)
+    exact = (blocks.path[:-1] == CornerMode.EXACT) & (change > TANGENT)
+    forward = (form.last[:-1] * form.first[1:]).sum(axis=1)
+    exact |= forward < BACKWARD
+    stop = blocks.forced[:-1] | (blocks.path[:-1] == CornerMode.STOP) | exact | (blocks.rapid[1:] != blocks.rapid[:-1])
+    return np.append(stop, True)
+
+
+def pieces(blocks: MotionBlocks, form: Shape) -> tuple[Floats, Floats, Ints]:
+    """(points (P + 1, A), length (P,), block (P,)): arcs as pieces of at most ARC_PIECE."""
+    count = np.where(blocks.arc, np.maximum(np.ceil(np.abs(blocks.sweep) / ARC_PIECE), 1), 1).astype(np.int64)
+    owner = np.repeat(np.arange(len(blocks)), count)
+    part = (np.arange(len(owner)) - (np.cumsum(count) - count)[owner] + 1.0) / count[owner]
+    start, step = blocks.start[owner], (blocks.end - blocks.start)[owner]
+    points = start + part[:, None] * step
+    bent = np.flatnonzero((part < 1.0) & blocks.arc[owner])
+    if len(bent):
+        row, columns = owner[bent], blocks.axes.xyz
+        normal, angle = blocks.normal[row], (blocks.sweep[row] * part[bent])[:, None]
+        spoke = blocks.start[row][:, columns] - blocks.center[row]
+        along = (((blocks.end - blocks.start)[row][:, columns] * normal).sum(axis=1) * part[bent])[:, None] * normal
+        level = (spoke * normal).sum(axis=1)[:, None] * normal
+        turned = np.cos(angle) * (spoke - level) + np.sin(angle) * np.cross(normal, spoke)
+        points[np.ix_(bent, columns)] = blocks.center[row] + level + turned + along
+    length = np.maximum(form.length, SHORTEST)[owner] / count[owner]
+    return np.concatenate([blocks.start[:1], points]), length, owner
+
+
+def _on_the_clock(blocks: MotionBlocks, form: Shape, moved: ControlMotion, owner: Ints, stops: Bools, target: Floats,
+                  stop_time: float) -> BlockTimes:
+    """Times of the blocks with their rests."""
+    seconds = summed(np.diff(moved.ends), owner, len(blocks))
+    p = blocks.pauses
+    inside = p.block >= 0
+    rest = summed(p.seconds[inside], p.block[inside], len(blocks)) + np.where(stops, stop_time, 0.0)
+    begin = np.concatenate([[0.0], np.cumsum(seconds + rest)[:-1]])
+    step = np.diff(moved.t)
+    which = owner[np.clip(np.searchsorted(moved.ends, moved.t[1:] - step / 2.0, side="right") - 1, 0, len(owner) - 1)]
+    peak = np.zeros(len(blocks))
+    np.maximum.at(peak, which, np.maximum(moved.v[1:], moved.v[:-1]))
+    peak = np.maximum(peak, form.length / np.maximum(seconds, 1e-300))
+    constant = np.minimum(moved.v[1:], moved.v[:-1]) >= AT_SPEED * target[which]
+    steady = np.minimum(summed(np.where(constant, step, 0.0), which, len(blocks)), seconds)
+    lost = np.maximum(seconds - form.length / np.maximum(peak, 1e-300), 0.0)
+    around = stops | np.concatenate([[True], stops[:-1]])
+    return BlockTimes(begin, begin + seconds + np.where(stops, stop_time, 0.0), seconds - steady, steady,
+                      np.zeros(len(blocks)), peak, np.where(around, lost, 0.0) + np.where(stops, stop_time, 0.0),
+                      np.where(around, 0.0, lost), p.seconds.copy())
