@@ -35,7 +35,7 @@ Logs = Annotated[list[str] | None, typer.Option(
 Changes = Annotated[list[str] | None, typer.Option(
     "--what-if", metavar="VALUE=FACTOR", help="side by side: the time with X.acceleration=1.3, tool_change=0.5, ...; "
     "together with commas")]
-Machines = Annotated[list[str] | None, typer.Option(
+OtherMachines = Annotated[list[str] | None, typer.Option(
     "--with-machine", metavar="MACHINE", help="side by side: on this machine too")]
 Setups = Annotated[list[str] | None, typer.Option(
     "--with-setup", metavar="S.toml", help="side by side: with this set-up too")]
@@ -55,7 +55,7 @@ def time(files: TimedFiles,
                                                  "feeds at PERCENT of what is programmed, rapids and taps as they are; "
                                                  "with --calibrate, at which the run was measured")] = 100.0,
          what_if: Changes = None,
-         with_machine: Machines = None,
+         with_machine: OtherMachines = None,
          setup: Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools")] = "",
          with_setup: Setups = None,
          figure: Drawing = None,

@@ -21,7 +21,7 @@ from postproc.cycle_time.fit_text import as_toml
 from postproc.cycle_time.log import read_log
 from postproc.cycle_time.model import CycleTimeModel, load_model, model_name
 from postproc.cycle_time.phases import BlockTimes
-from postproc.cycle_time.runs import Run, run_of_log, run_of_total, seconds_of
+from postproc.cycle_time.runs import MeasuredRun, run_of_log, run_of_total, seconds_of
 from postproc.cycle_time.shares import shares
 from postproc.cycle_time.source import from_conversion, from_gcode, read_file
 from postproc.time_study import side_by_side
@@ -164,7 +164,7 @@ def _estimated(one: Timed, blocks: MotionBlocks) -> Estimate:
 def _fitted(asked: Asked, all_timed: list[Timed]) -> tuple[CalibratedModel | None, list[Diagnostic]]:
     """The model fitted to the runs of all files as they are, on the first machine with the first set-up."""
     step = len(all_timed) // len(asked.files)
-    runs, found = list[Run](), list[Diagnostic]()
+    runs, found = list[MeasuredRun](), list[Diagnostic]()
     for one, log in zip(all_timed[::step], asked.logs, strict=True):
         if one.blocks is not None:
             run, more = _run(one.blocks, one.machine, log)
@@ -176,7 +176,7 @@ def _fitted(asked: Asked, all_timed: list[Timed]) -> tuple[CalibratedModel | Non
     return fit, [*found, *more]
 
 
-def _run(blocks: MotionBlocks, machine: Machine, log: str) -> tuple[Run | None, list[Diagnostic]]:
+def _run(blocks: MotionBlocks, machine: Machine, log: str) -> tuple[MeasuredRun | None, list[Diagnostic]]:
     """The run of a log, or of the time of the whole run."""
     seconds = None if Path(log).exists() else seconds_of(log)
     if seconds is not None:

@@ -23,7 +23,7 @@ from postproc.cycle_time.estimate import timed
 from postproc.cycle_time.kinds import KINDS
 from postproc.cycle_time.left_out import structure
 from postproc.cycle_time.model import ASSUMED, PARAMETERS, CalibrationRecord, CycleTimeModel
-from postproc.cycle_time.runs import CLOCK, OTHERS, Run
+from postproc.cycle_time.runs import CLOCK, OTHERS, MeasuredRun
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.shapes import arrays
@@ -86,13 +86,13 @@ class Runs:
     """All runs that a model is fitted to, their sections one after the other; clock (K,): s of uncertainty by the
     readings."""
 
-    runs: tuple[Run, ...]
+    runs: tuple[MeasuredRun, ...]
     measured: Floats
     other: Floats
     clock: Floats
 
     @staticmethod
-    def of(runs: Sequence[Run]) -> Runs:
+    def of(runs: Sequence[MeasuredRun]) -> Runs:
         """Sections of runs as one."""
         return Runs(tuple(runs), np.concatenate([run.measured for run in runs]),
                     np.concatenate([run.other for run in runs]),
@@ -108,7 +108,7 @@ class Runs:
         return np.asarray(np.sqrt(self.clock**2 + (OTHERS * self.other) ** 2 + scatter**2))
 
 
-def calibrate(runs: Sequence[Run], model: CycleTimeModel, file: str = "",
+def calibrate(runs: Sequence[MeasuredRun], model: CycleTimeModel, file: str = "",
               machine: Machine | None = None) -> tuple[CalibratedModel | None, list[Diagnostic]]:
     """The model fitted to runs; None and why where it fits them worse than the model before.
 

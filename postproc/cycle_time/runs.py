@@ -29,7 +29,7 @@ fitted"""
 
 @dataclass(frozen=True)
 @arrays(row="R", after="R", measured="K", other="K")
-class Run:
+class MeasuredRun:
     """A measured run of a program.
 
     Attributes:
@@ -73,7 +73,7 @@ class Run:
         return flat.reshape(len(self.measured), len(KINDS))
 
 
-def run_of_log(blocks: MotionBlocks, log: RunLog, file: str = "") -> tuple[Run | None, list[Diagnostic]]:
+def run_of_log(blocks: MotionBlocks, log: RunLog, file: str = "") -> tuple[MeasuredRun | None, list[Diagnostic]]:
     """The run of a log; None and why where the log does not fit the program."""
     samples, rows, found = matched(log, blocks, file)
     if found:
@@ -90,14 +90,14 @@ def run_of_log(blocks: MotionBlocks, log: RunLog, file: str = "") -> tuple[Run |
     row = rows[cuts]
     change = np.append(np.flatnonzero(np.diff(blocks.line) != 0) + 1, len(blocks))
     after = change[np.searchsorted(change, row, side="right")]
-    return Run(blocks, row, after, np.diff(time[cuts]), _other(blocks, row), polled), []
+    return MeasuredRun(blocks, row, after, np.diff(time[cuts]), _other(blocks, row), polled), []
 
 
-def run_of_total(blocks: MotionBlocks, seconds: float) -> Run:
+def run_of_total(blocks: MotionBlocks, seconds: float) -> MeasuredRun:
     """The run of a program of which only the time from begin to end is known."""
     none = np.zeros(0, dtype=np.int64)
     other = _of_machine(blocks)
-    return Run(blocks, none, none, np.array([seconds]), np.array([other.sum()]))
+    return MeasuredRun(blocks, none, none, np.array([seconds]), np.array([other.sum()]))
 
 
 def _of_machine(blocks: MotionBlocks) -> Floats:

@@ -265,10 +265,9 @@ class BlockMotions:
 
     def tiled(self, times: int) -> BlockMotions:
         """The blocks `times` times one after the other, (times K) of them."""
-        ends = (np.tile(a, (times, 1)) for a in (self.before, self.end))
-        coordinates = (np.tile(a, (times, 1)) for a in (self.first, self.last))
-        return BlockMotions(self.motion, self.control, np.tile(self.rows, times), *ends, np.tile(self.frame, times),
-                            *coordinates)
+        before, end, first, last = (np.tile(a, (times, 1)) for a in (self.before, self.end, self.first, self.last))
+        return BlockMotions(self.motion, self.control, np.tile(self.rows, times), before, end, np.tile(self.frame, times),
+                            first, last)
 
     def at(self, t: float | Floats) -> Floats:
         """Machine coordinates (K, J) at fraction t, one or (K,)."""
