@@ -62,6 +62,7 @@ FLOORS = (
     ("postproc.proof", "the proof as a file, what has changed since"),
     ("postproc.clock", "a control executed from cycle to cycle: axis motion by time"),
     ("postproc.cycle_time", "how long a program takes, with a band"),
+    ("postproc.time_fit", "the model of a control fitted to measured runs"),
     ("postproc.time_study", "times side by side, what if, tables, a figure"),
     ("postproc.placement", "where the part stands on the table"),
     ("postproc.alignment", "a part that is not where it was meant, measured"),

@@ -20,7 +20,7 @@ READERS = {
 FILES = {
     "toolpaths.interrupted_runs": "names of temporary files", "toolpaths.shapes": "tables of shapes",
     "machines.toml_lines": "lines of TOML files", "machines.value_words": "values in TOML files",
-    "postproc.cycle_time.log_exports": "logs that others export",
+    "postproc.time_fit.log_exports": "logs that others export",
     "machines.sheet.pivot_text": "pivot numbers as controls put them out",
     "machines.sheet.quantity": "figures of data sheets with their units",
     "machines.hooks": "blocks of the shop in machine files and set-ups",

@@ -43,7 +43,7 @@ PLACES = {
     ("machines/calibration/run.py", "way"): "that column",
     ("postproc/explain/codes.toml", "X way"): "that column", ("postproc/explain/codes.toml", "x way"): "that column",
     ("machines/geometric_error/tables/readings.py", "way"): "group of a regular expression",
-    ("postproc/cycle_time/log.py", "position (S, A): axis positions, mm and degrees"): "columns of a log, no output mode",
+    ("postproc/time_fit/log.py", "position (S, A): axis positions, mm and degrees"): "columns of a log, no output mode",
     ("samples/calibration/make_measurements.py", "X way"): "that column",
     ("samples/surfaces.py", "One way, along +y"): "passes that are all cut in one direction",
     ("samples/make_joints.py", '("BESIDE", 0.01, 0.0)'): "name of an operation in a sample",

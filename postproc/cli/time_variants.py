@@ -13,17 +13,17 @@ from postproc.base.progress import Progress
 from postproc.cli.console import machine_of
 from postproc.cycle_time import report as figures
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.calibrate import CalibratedModel, calibrate
 from postproc.cycle_time.estimate import Estimate, estimate, measure_first, timed, total
-from postproc.cycle_time.fit_text import as_dict as fit_figures
-from postproc.cycle_time.fit_text import as_text as fit_text
-from postproc.cycle_time.fit_text import as_toml
-from postproc.cycle_time.log import read_log
 from postproc.cycle_time.model import CycleTimeModel, load_model, model_name
 from postproc.cycle_time.phases import BlockTimes
-from postproc.cycle_time.runs import MeasuredRun, run_of_log, run_of_total, seconds_of
 from postproc.cycle_time.shares import shares
 from postproc.cycle_time.source import from_conversion, from_gcode, read_file
+from postproc.time_fit.calibrate import CalibratedModel, calibrate
+from postproc.time_fit.fit_text import as_dict as fit_figures
+from postproc.time_fit.fit_text import as_text as fit_text
+from postproc.time_fit.fit_text import as_toml
+from postproc.time_fit.log import read_log
+from postproc.time_fit.runs import MeasuredRun, run_of_log, run_of_total, seconds_of
 from postproc.time_study import side_by_side
 from postproc.time_study.tables import TimeTables, as_csv, tables
 from postproc.time_study.tables import as_text as tables_text

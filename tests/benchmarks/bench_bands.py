@@ -16,11 +16,11 @@ from functools import cache
 import numpy as np
 
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.calibrate import calibrate
 from postproc.cycle_time.estimate import estimate, timed, total
-from postproc.cycle_time.log import RunLog
 from postproc.cycle_time.model import CycleTimeModel
-from postproc.cycle_time.runs import run_of_log
+from postproc.time_fit.calibrate import calibrate
+from postproc.time_fit.log import RunLog
+from postproc.time_fit.runs import run_of_log
 from tests.postproc.time_kit import blocks, machine, model
 
 MACHINE = "mikron-ucp710"

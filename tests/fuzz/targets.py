@@ -117,8 +117,8 @@ def _loaded(path: Path) -> Any:
 def targets() -> dict[str, Callable[[bytes], None]]:
     """name -> what takes bytes."""
     from postproc.collision.mesh import load_mesh
-    from postproc.cycle_time.log import read_log
     from postproc.setup.model import load_setup
+    from postproc.time_fit.log import read_log
 
     files: dict[str, tuple[str, Callable[[Path], Any]]] = {
         "setup": (".toml", load_setup), "machine": (".toml", _loaded), "controller": (".toml", load_controller),

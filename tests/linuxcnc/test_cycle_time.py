@@ -12,10 +12,10 @@ from machines.machine import Machine
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.estimate import Estimate, estimate
-from postproc.cycle_time.log import RunLog
 from postproc.cycle_time.model import load_model
 from postproc.cycle_time.source import from_gcode
 from postproc.setup.model import SetupFile
+from postproc.time_fit.log import RunLog
 from tests.linuxcnc.simulator import Run
 from tests.linuxcnc.time_programs import END, HEAD, PROGRAMS, machine, random_lines
 from tests.postproc.time_kit import calibrated

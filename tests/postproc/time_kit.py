@@ -12,12 +12,12 @@ import machines
 from machines.machine import Machine, Timing
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.calibrate import CalibratedModel, calibrate
-from postproc.cycle_time.log import RunLog
 from postproc.cycle_time.model import CycleTimeModel, load_model
-from postproc.cycle_time.runs import run_of_log
 from postproc.cycle_time.source import from_gcode
 from postproc.setup.model import SetupFile
+from postproc.time_fit.calibrate import CalibratedModel, calibrate
+from postproc.time_fit.log import RunLog
+from postproc.time_fit.runs import run_of_log
 from toolpaths.diagnostics import Diagnostic
 
 HEAD = "G21 G90 G94 G17"

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.log_exports import is_export, lines_of_export
 from postproc.cycle_time.source import read_file
+from postproc.time_fit.log_exports import is_export, lines_of_export
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.shapes import arrays

@@ -9,9 +9,9 @@ import numpy as np
 from postproc.cycle_time.blocks import Cause, MotionBlocks
 from postproc.cycle_time.estimate import timed, total
 from postproc.cycle_time.kinds import KINDS, kinds
-from postproc.cycle_time.log import RunLog, matched, period
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes, summed
+from postproc.time_fit.log import RunLog, matched, period
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from postproc.cycle_time.calibrate import CalibratedModel
 from postproc.cycle_time.model import CycleTimeModel
+from postproc.time_fit.calibrate import CalibratedModel
 from toolpaths.table_text import table_text
 
 UNITS = {"corner_tolerance": "mm", "block_time": "s", "stop_time": "s", "spindle_time": "s"}

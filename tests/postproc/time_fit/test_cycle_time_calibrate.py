@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.calibrate import CalibratedModel
 from postproc.cycle_time.estimate import estimate, timed, total
-from postproc.cycle_time.fit_text import as_toml
-from postproc.cycle_time.log import RunLog, read_log
 from postproc.cycle_time.model import CycleTimeModel, load_model
+from postproc.time_fit.calibrate import CalibratedModel
+from postproc.time_fit.fit_text import as_toml
+from postproc.time_fit.log import RunLog, read_log
 from tests.postproc.time_kit import blocks, calibrated, machine, model
 from toolpaths.diagnostics import DiagnosticError
 

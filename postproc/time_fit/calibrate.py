@@ -21,9 +21,9 @@ import numpy as np
 from postproc.cycle_time.blocks import Cause
 from postproc.cycle_time.estimate import timed
 from postproc.cycle_time.kinds import KINDS
-from postproc.cycle_time.left_out import structure
 from postproc.cycle_time.model import ASSUMED, PARAMETERS, CalibrationRecord, CycleTimeModel
-from postproc.cycle_time.runs import CLOCK, OTHERS, MeasuredRun
+from postproc.time_fit.left_out import structure
+from postproc.time_fit.runs import CLOCK, OTHERS, MeasuredRun
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.shapes import arrays

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.calibrate import CalibratedModel, calibrate
 from postproc.cycle_time.estimate import estimate, timed, total
-from postproc.cycle_time.fit_text import as_text
 from postproc.cycle_time.kinds import NOT_SEEN, own_share
-from postproc.cycle_time.log import RunLog, period, read_log
 from postproc.cycle_time.model import CycleTimeModel
-from postproc.cycle_time.runs import run_of_log, run_of_total
+from postproc.time_fit.calibrate import CalibratedModel, calibrate
+from postproc.time_fit.fit_text import as_text
+from postproc.time_fit.log import RunLog, period, read_log
+from postproc.time_fit.runs import run_of_log, run_of_total
 from tests.postproc.time_kit import blocks, machine, model
 
 TRUTH = {"corner_tolerance": 0.006, "stated_share": 0.6, "override": 0.96, "rapid": 0.8, "acceleration_share": 0.8}
