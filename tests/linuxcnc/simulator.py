@@ -44,7 +44,7 @@ _HAL_KEYS = (0x48414C32, 0x90280A48, 0x48484C34, 0x48534130, 0x64)
 
 
 @dataclass(frozen=True)
-class MeasuredRun:
+class Run:
     """One row per servo cycle of 1 ms, from the start of the program to its end.
 
     Attributes:
@@ -95,8 +95,8 @@ def missing() -> str:
 
 
 def simulate(machine: Machine, program: str | Path, tools: Mapping[int, ToolEntry | tuple[float, float]] | None = None,
-             warp: int | Fraction = 10, time_limit: float = 300.0) -> MeasuredRun:
-    """MeasuredRun a G-code file on LinuxCNC configured as `machine`, from its home; M0 and M1 go on by themselves.
+             warp: int | Fraction = 10, time_limit: float = 300.0) -> Run:
+    """Run a G-code file on LinuxCNC configured as `machine`, from its home; M0 and M1 go on by themselves.
 
     The machine's own kinematics module runs where `control_kinematics` names one, else joints are the program's axes.
 
@@ -108,7 +108,7 @@ def simulate(machine: Machine, program: str | Path, tools: Mapping[int, ToolEntr
         time_limit: s of the host.
 
     Raises:
-        RuntimeError: where LinuxCNC did not come up or lost samples; what it refuses in the program is in `MeasuredRun.errors`.
+        RuntimeError: where LinuxCNC did not come up or lost samples; what it refuses in the program is in `Run.errors`.
     """
     folder = Path(tempfile.mkdtemp(prefix="postproc-sim-"))
     try:
@@ -123,12 +123,12 @@ def simulate(machine: Machine, program: str | Path, tools: Mapping[int, ToolEntr
 
 
 def recorded(machine: Machine, program: str | Path, tools: Mapping[int, ToolEntry | tuple[float, float]] | None = None,
-             warp: int = 10) -> MeasuredRun:
+             warp: int = 10) -> Run:
     """`simulate` for its time: a recording that a busy host may have made longer is made again, each time at half the warp.
 
     What the host costs only adds, so that the shortest counts; two that agree are enough.
     """
-    runs: list[MeasuredRun] = []
+    runs: list[Run] = []
     for attempt in range(RECORDINGS):
         runs.append(simulate(machine, program, tools, Fraction(warp, 2**attempt)))
         if runs[-1].errors or not runs[-1].uncertain:
@@ -166,8 +166,8 @@ def standstill(machine: Machine, poses: Floats, tool_length: float = 0.0, warp: 
     raise RuntimeError(f"no rest at {np.sum(~found)} of {len(poses)} poses; {'; '.join(run.errors)}")
 
 
-def _stop_at(machine: Machine, poses: Floats, tool_length: float, warp: int) -> MeasuredRun:
-    """MeasuredRun a program that goes to each pose and pauses there, twice: see ATTEMPTS."""
+def _stop_at(machine: Machine, poses: Floats, tool_length: float, warp: int) -> Run:
+    """Run a program that goes to each pose and pauses there, twice: see ATTEMPTS."""
     axes = config.letters(machine)
     moves = ("G0 " + " ".join(f"{a}{v:.9f}" for a, v in zip(axes, row, strict=True)) + "\nM0\nM0" for row in poses)
     with tempfile.TemporaryDirectory(prefix="postproc-rest-") as name:
@@ -176,7 +176,7 @@ def _stop_at(machine: Machine, poses: Floats, tool_length: float, warp: int) -> 
         return simulate(machine, program, {1: ToolEntry(z=tool_length)}, warp)
 
 
-def _rests(run: MeasuredRun) -> Array:
+def _rests(run: Run) -> Array:
     """Rows (M,) of the end of each standstill of at least REST cycles."""
     still = np.concatenate([[False], np.all(np.abs(np.diff(run.joints, axis=0)) < STILL, axis=1), [False]])
     edges = np.flatnonzero(np.diff(still.astype(np.int8)))
@@ -255,7 +255,7 @@ def _shared_objects() -> set[tuple[str, int, int]]:
             for key, number, *_ in map(str.split, Path(f"/proc/sysvipc/{kind}").read_text().splitlines()[1:])}
 
 
-def _result(folder: Path, machine: Machine, warp: int | Fraction) -> MeasuredRun:
+def _result(folder: Path, machine: Machine, warp: int | Fraction) -> Run:
     result, axes = json.loads((folder / "result.json").read_text()), config.letters(machine)
     joints = len(machine.axis_names)
     rows = np.fromfile(folder / "samples.f64").reshape(-1, 1 + joints + len(axes) + 2)
@@ -264,6 +264,6 @@ def _result(folder: Path, machine: Machine, warp: int | Fraction) -> MeasuredRun
     if len(rows) <= DELAY and not result["errors"]:
         raise RuntimeError("no samples")
     late, early = rows[DELAY:], rows[:len(rows) - DELAY] if len(rows) > DELAY else rows[:0]
-    return MeasuredRun(t=(late[:, 0] - late[:1, 0]) * config.PERIOD, joints=late[:, 1:1 + joints],
+    return Run(t=(late[:, 0] - late[:1, 0]) * config.PERIOD, joints=late[:, 1:1 + joints],
                pose=early[:, 1 + joints:1 + joints + len(axes)], line=early[:, -2].astype(np.int64), axes=axes,
                errors=tuple(result["errors"]), starved=result["starved"], waited=result["waited"] * float(warp))

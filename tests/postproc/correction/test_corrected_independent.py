@@ -73,7 +73,7 @@ def name(case: Case) -> str:
 
 
 @dataclass(frozen=True)
-class MeasuredRun:
+class Run:
     """A conversion, its own machine with errors, and at which of the program's ends each CL point is reached.
 
     Attributes:
@@ -91,7 +91,7 @@ class MeasuredRun:
     axis: Floats
 
 
-def run_of(result: PostResult, own: Machine, errors: Errors, controller: str) -> MeasuredRun:
+def run_of(result: PostResult, own: Machine, errors: Errors, controller: str) -> Run:
     assert result.ok and result.job is not None, [str(d) for d in result.diagnostics]
     lengths = {int(k): v.gauge_length for k, v in result.setup.tools.items()}
     ends = [end for end in read(result.text, controller, own, lengths) if end.tool > 0.0 and end.cuts]
@@ -115,12 +115,12 @@ def run_of(result: PostResult, own: Machine, errors: Errors, controller: str) ->
     posed(np.setdiff1d(few[away <= away[:, :1] + 4.0 * moved], reached))  # farther ones cannot be the nearest
     off = np.linalg.norm(real[few] * np.repeat([1.0, ARM], 3) - wanted[:, None], axis=2)
     at = few[np.arange(len(few)), off.argmin(axis=1)]
-    return MeasuredRun(result, own, ends, rows, at, np.linalg.norm(real[at, :3] - moves.tip[rows], axis=1),
+    return Run(result, own, ends, rows, at, np.linalg.norm(real[at, :3] - moves.tip[rows], axis=1),
                np.linalg.norm(real[at, 3:] - moves.axis[rows], axis=1))
 
 
 @cache
-def converted(case: Case, corrected: bool = True) -> MeasuredRun:
+def converted(case: Case, corrected: bool = True) -> Run:
     sample, machine, controller, mode, seed = case
     own = Machine(machine)
     setup = "h4a" if machine.startswith("h4a") else "delta" if machine == "uranesx" else "tools"

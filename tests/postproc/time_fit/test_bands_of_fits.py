@@ -143,7 +143,7 @@ def test_twelve_lines_with_a_quick_spindle_are_the_spindle_and_no_large_corner()
 
 
 def test_a_fit_that_is_worse_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from postproc.cycle_time import calibrate as module
+    from postproc.time_fit import calibrate as module
 
     b = program()
     run, _ = run_of_log(b, log_of(b, model("lookahead")))
