@@ -26,14 +26,16 @@ def given_defaults(command: Any, arguments: list[str], context: typer.Context) -
     if given is None:
         return
     of_cl = ONLY_OF_CL in names
-    file = given.get("file")
+    file = given.get("file") or given.get("files")
     folder = Path(str(file)).parent if of_cl and file and file != "-" else Path()
     values, where = _values(folder, str(given.get("json") or ""))
     taken = {key: value for key, value in values.items()
              if key in names and key not in given and (of_cl or key in ("machine", "controller"))}
     SAYS.job_units = str(where) if "units" in taken else ""
     if taken:
-        context.default_map = {command.name: taken}
+        several = {one.name for one in command.params if getattr(one, "multiple", False)}
+        context.default_map = {command.name: {key: [value] if key in several and not isinstance(value, list) else value
+                                              for key, value in taken.items()}}
         line = f"{where}: {', '.join(f'{key} {_shown(value)}' for key, value in taken.items())}"
         if "quiet" in given:
             SAYS.job_line = line  # it stands before warnings and errors

@@ -11,7 +11,6 @@ from machines.choices import MotionOrder
 from machines.machine import Machine
 from postproc.cycle_time.blocks import Axes, Cause, MotionBlocks
 from postproc.cycle_time.bound import lower_bound
-from postproc.cycle_time.control import control
 from postproc.cycle_time.kinds import own_share
 from postproc.cycle_time.linuxcnc import Settings, linuxcnc
 from postproc.cycle_time.lookahead import lookahead
@@ -80,7 +79,11 @@ def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
         blocks = replace(blocks, pauses=replace(p, seconds=p.seconds + runs_up))
     if model.kind == "linuxcnc":
         return linuxcnc(blocks, Settings(cycle=model.servo_cycle, override=model.override, rapid=model.rapid))
-    return control(blocks, model) if model.kind == "control" else lookahead(blocks, model)
+    if model.kind == "control":
+        from postproc.cycle_time.control import control  # SciPy, which other models do without
+
+        return control(blocks, model)
+    return lookahead(blocks, model)
 
 
 def total(blocks: MotionBlocks, times: BlockTimes) -> float:

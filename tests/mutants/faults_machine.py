@@ -83,7 +83,7 @@ FAULTS = (
     Fault("points of another place of the curve", "linearising", "_Front._record", "self.u.append(u1[taken])",
           "self.u.append(0.9 * u1[taken])"),
     Fault("axis too early on its great circle", "linearising", "Curves.axis_at", "u[where])", "0.97 * u[where])"),
-    Fault("safe margin 0", "links", "safe_space", "setup.clearance.margin, centres)", "0.0, centres)"),
+    Fault("safe margin 0", "links", "safe_space", "setup.clearance.margin, centres,", "0.0, centres,"),
     Fault("safe planes by the ends of arcs", "links", "_cut",
           "np.concatenate([tips, _outermost(moves.curves(rows))])", "tips",
           ("helix linuxcnc", "helix fanuc", "tall linuxcnc", "whole circle"),

@@ -42,6 +42,8 @@ def test_the_command_takes_what_is_left_out_and_names_the_file(part: Path, tmp_p
     assert "(CONTROLLER HAAS-NGC)" in text and "(TOLERANCE 0.02 MM" in text and "GAUGE LENGTH 100" in text
     assert run("verify", out, part).exit_code == 0
     assert run("trace", part, "--line", "7").exit_code == 0 and run("time", part).exit_code == 0
+    got = run("report", part, "-o", tmp_path / "r.html")
+    assert got.exit_code == 0 and b"mill-3axis" in (tmp_path / "r.html").read_bytes()
     assert "mill-3axis" in run("setup", "new", part, "-o", tmp_path / "n.toml", "--yes").stderr
 
 
@@ -103,7 +105,7 @@ def test_every_key_is_an_option_and_every_command_with_a_machine_and_a_cl_file_t
     found = commands(typer.main.get_command(app))
     assert set(JobFile.model_fields) <= found["convert"]
     on_cl_files = sorted(name for name, names in found.items() if {"machine", "dialect"} <= names)
-    assert on_cl_files == ["convert", "orient", "place", "setup align", "setup new", "time", "trace", "verify"]
+    assert on_cl_files == ["convert", "orient", "place", "report", "setup align", "setup new", "time", "trace", "verify"]
     for name in on_cl_files:
         got = run(*name.split(), *({"verify": ["x.nc"], "setup align": ["x.csv"]}.get(name, [])), part, "--no-such-option")
         assert re.search(r"postproc\.toml: .*machine mill-3axis", got.stderr), name

@@ -179,7 +179,7 @@ def test_programs_that_cannot_be_followed(body: str, code: str) -> None:
     ("#1=#500", "gcode.variable"), ("#3000=1", "gcode.alarm"), ("G43.5 H1", "gcode.unknown_code"),
     ("G76 X0. Z-1. R1. Q.1", "gcode.unknown_code"), ("G87 X0.", "gcode.unknown_code"), ("#1=1/0", "gcode.expression"),
     ("G65 P9810", "gcode.subprogram"), ("#1=#3012", "gcode.variable"), ("IF[#1EQ#0]GOTO5", "gcode.jump"),
-    ("M198 P1", "gcode.unknown_code"), ("G1 G53 X0. F9", "gcode.machine_position"), ("G187 P3", "gcode.unknown_code"),
+    ("M198 P1", "gcode.subprogram"), ("G1 G53 X0. F9", "gcode.machine_position"), ("G187 P3", "gcode.unknown_code"),
     ("B5.", "gcode.unknown_word"), ("G0 X1. X2.", "gcode.repeated"), ("G17 G18", "gcode.repeated")])
 def test_what_is_not_modelled_is_an_error_with_its_line(block: str, code: str) -> None:
     assert faults(FANUC, program(f"G0 X0. Y0. Z0.\n{block}\n")).get(code) == [6]

@@ -6,6 +6,8 @@ import ast
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
+IN_MESSAGE = {"arrays.value"}
+"""what is said of arrays in Python: no command leads there, and the remedy ends the message (`test_given_arrays.py`)"""
 
 
 def calls(path: Path) -> list[tuple[int, str]]:
@@ -26,7 +28,7 @@ def calls(path: Path) -> list[tuple[int, str]]:
 def test_no_error_without_a_hint() -> None:
     bare = {f"{path.relative_to(ROOT)}:{line}": code for path in sorted((ROOT / "toolpaths").rglob("*.py"))
             for line, code in calls(path)}
-    assert bare == {}
+    assert {place: code for place, code in bare.items() if code not in IN_MESSAGE} == {}
 
 
 def test_an_error_without_a_hint_is_noticed(tmp_path: Path) -> None:
