@@ -24,6 +24,7 @@ from typing import get_args
 from zlib import crc32
 
 from machines.models import KinematicsModel
+from toolpaths.input_files import place
 
 GROUP, FILES = "postproc.kinematics", "POSTPROC_KINDS"
 BUILT_IN = {
@@ -109,7 +110,7 @@ def _in_files() -> dict[str, type[KinematicsModel]]:
     Raises:
         KindFault: where a file cannot be run or registers nothing, or two of them define one kind.
     """
-    named = dict.fromkeys(str(Path(part).resolve()) for part in os.environ.get(FILES, "").split(os.pathsep) if part)
+    named = dict.fromkeys(str(place(part)) for part in os.environ.get(FILES, "").split(os.pathsep) if part)
     found, where = dict[str, type[KinematicsModel]](), dict[str, str]()
     for file in named:
         for kind, model in _of_file(file).items():
@@ -135,7 +136,7 @@ def _of_file(file: str) -> dict[str, type[KinematicsModel]]:
 
 
 def _run(file: Path) -> ModuleType:
-    name = f"postproc_kinds_{file.stem}_{crc32(str(file.resolve()).encode()):08x}"
+    name = f"postproc_kinds_{file.stem}_{crc32(str(place(file)).encode()):08x}"
     spec = spec_from_file_location(name, file)
     if spec is None or spec.loader is None:
         raise ImportError("not a Python file")

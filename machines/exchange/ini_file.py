@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from toolpaths.diagnostics import Diagnostic, warning
-from toolpaths.input_files import read_input, reason
+from toolpaths.input_files import is_regular, read_input, reason
 
 _INCLUDE = re.compile(r"#INCLUDE\s+(\S+)")
 _FROM_INI = re.compile(r"\[(\w+)\]\(?([\w-]+)\)?$")
@@ -120,7 +120,7 @@ class HalFiles:
     @staticmethod
     def _readable(entry: IniEntry) -> bool:
         name = entry.value.split()[0] if entry.value else ""
-        return name.endswith(".hal") and not name.startswith("LIB:") and (Path(entry.file).parent / name).is_file()
+        return name.endswith(".hal") and not name.startswith("LIB:") and is_regular(Path(entry.file).parent / name)
 
     def _all(self) -> Iterator[HalWord]:
         for entry in self.ini.all("HAL", "HALFILE"):

@@ -29,15 +29,17 @@ def machine_new(sheet: Annotated[Path, typer.Argument(metavar="SHEET.toml", help
                 force: Annotated[bool, typer.Option("--force", help="replace a file that there is already")] = False,
                 json: Json = "") -> None:
     """Write a machine file from a data sheet, a pivot table and jogs; wrong units and signs are found."""
+    from toolpaths.input_files import there_is
+
     refuse_overwriting({"-o": str(output), "--drawing": drawing, "--json": json}, {"the sheet": str(sheet)})
     for option, path in (("-o", output), ("--drawing", Path(drawing) if drawing else None)):
-        if path is not None and path.exists() and not force:
+        if path is not None and there_is(path) and not force:
             raise typer.BadParameter(f"{path} exists; --force replaces it", param_hint=option)
     from machines.sheet.drawing import drawing as picture
     from machines.sheet.make import new_machine
 
     with shown_errors(json):
-        asked = not sheet.exists() and _asked(sheet)
+        asked = not there_is(sheet) and _asked(sheet)
         made = new_machine(sheet, output.stem)
     outputs: dict[Path, str | bytes] = {}
     if made.machine is not None:

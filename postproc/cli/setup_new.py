@@ -55,9 +55,10 @@ def setup_new(file: ClFile, machine: MachineName,
               units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None, json: Json = "") -> None:
     """Write the set-up of a CL file: what the files state, what is asked for, a place that fits; proved."""
     from postproc.base.options import Options
+    from toolpaths.input_files import there_is
 
     refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), **own_files(machine, controller)})
-    if output.exists() and not force:
+    if there_is(output) and not force:
         raise typer.BadParameter(f"{output} exists; --force replaces it", param_hint="-o")
     given = _given(gauge_length or [], spindle or [], feed, coolant, tool_number or [])
     _known_register(work_offset_code)

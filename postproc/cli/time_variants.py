@@ -29,6 +29,7 @@ from postproc.time_study.tables import TimeTables, as_csv, tables
 from postproc.time_study.tables import as_text as tables_text
 from postproc.time_study.what_if import AS_IS, WhatIf, machine_with, model_with, parsed
 from toolpaths.diagnostics import Diagnostic, read_value
+from toolpaths.input_files import there_is
 
 if TYPE_CHECKING:
     from toolpaths.choices import FigureEnding
@@ -178,7 +179,7 @@ def _fitted(asked: Asked, all_timed: list[Timed]) -> tuple[CalibratedModel | Non
 
 def _run(blocks: MotionBlocks, machine: Machine, log: str) -> tuple[MeasuredRun | None, list[Diagnostic]]:
     """The run of a log, or of the time of the whole run."""
-    seconds = None if Path(log).exists() else seconds_of(log)
+    seconds = None if there_is(log) else seconds_of(log)
     if seconds is not None:
         return run_of_total(blocks, seconds), []
     read, found = read_log(log, machine.axis_names)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, warning
-from toolpaths.input_files import is_regular, read_input, unreadable
+from toolpaths.input_files import is_regular, place, read_input, unreadable
 from toolpaths.interrupted_runs import interrupted
 
 
@@ -37,7 +37,7 @@ class NeighbourFiles(Mapping[str, bytes]):
 
 def unfinished(program: Path) -> list[Diagnostic]:
     """That a killed run was replacing files where a program stands: they may be of two programs."""
-    if interrupted(program.resolve().parent) is None:
+    if interrupted(place(program).parent) is None:
         return []
     return [warning("file.unfinished", "a run that was killed had begun to replace files in this folder: subprograms next "
                     "to the program may be new where it is old", file=str(program),

@@ -30,7 +30,7 @@ from postproc.witness.machine import merged
 from postproc.witness.second_reading import testify
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.input_files import read_input
+from toolpaths.input_files import is_regular, read_input
 from toolpaths.toolpath import ClSource
 
 
@@ -39,7 +39,7 @@ def machine_tables(machine: Machine) -> list[dict[str, Any]]:
     a caller has changed in memory stand before it."""
     known = builtin()
     path = Path(machine.file) if machine.file else known.get(machine.name)
-    if path is None or not path.is_file():
+    if path is None or not is_regular(path):
         return []
     tables = [values_of(file) for file in base_chain(path, known)]
     return tables if machine.limits is machine.stated else [{"axes": _limits_table(machine)}, *tables]

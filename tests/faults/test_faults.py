@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import random
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,8 +20,10 @@ pytestmark = pytest.mark.skipif(not hasattr(__import__("os"), "fork"), reason="a
 def shop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     """`machine new`, which writes three files, in a folder that every user may enter."""
     folder = tmp_path_factory.mktemp("faults")
-    for each in (folder, *folder.parents[:2]):
-        each.chmod(each.stat().st_mode | 0o055)
+    base = tmp_path_factory.getbasetemp()
+    for each in (folder, base, *base.parents):
+        if each.stat().st_uid == os.geteuid() and each != Path(tempfile.gettempdir()) and len(each.parts) > 2:
+            each.chmod(each.stat().st_mode | 0o055)
     yield bench(commands(folder)["machine new"], folder / "bench")
 
 
