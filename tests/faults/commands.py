@@ -84,16 +84,25 @@ def load(words: tuple[str, ...], folder: Path) -> None:
 
 
 def started(words: tuple[str, ...], folder: Path, said: Path, before: Callable[[], None] = lambda: None) -> int:
-    """Process of a command that runs in `folder` and prints into the file `said`; `before` runs in it first."""
+    """Process of a command that runs in `folder` and prints into the file `said`; `before` runs in it first.
+
+    It stands in its folder when this returns.
+    """
     sys.stdout.flush()
     sys.stderr.flush()
+    stands, there = os.pipe()
     child = os.fork()
     if child:
+        os.close(there)
+        os.read(stands, 1)
+        os.close(stands)
         return child
     code = 99
     try:
+        os.close(stands)
         os.chdir(folder)
         handle = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
+        os.close(there)
         os.dup2(handle, 1)
         os.dup2(handle, 2)
         for number, name in ((1, "stdout"), (2, "stderr")):
