@@ -148,15 +148,23 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
         return None, [problem] if problem else []
     name = source if source in builtin else path.stem
     try:
-        values, lines = parsed(text)
+        values, _ = parsed(text)
+        origins = (_kept_origins if len(text) < SHORT else _origins)(text, str(path))
     except tomllib.TOMLDecodeError as fault:
         return None, [_syntax(fault, str(path), text, kind)]
     except (ValueError, RecursionError) as fault:  # of Python's own: digits of a number, depth of lists
         why = "its lists or tables are nested too deeply" if isinstance(fault, RecursionError) else str(fault).split(";")[0]
         return None, [error("file.syntax", f"not valid TOML: {why}", file=str(path), hint=_HOW)]
-    origins = {p: ValueSource(str(path), line) for p, line in lines.items()}
     own = deepcopy({k: v for k, v in values.items() if k != SCHEMA_KEY or not isinstance(v, str)})
     return _with_base(UserFile(name, str(path), own, origins), builtin, kind, (*above, key))
+
+
+def _origins(text: str, file: str) -> dict[KeyPath, ValueSource]:
+    """Of every value of a TOML text; whoever changes them takes a copy."""
+    return {path: ValueSource(file, line) for path, line in parsed(text)[1].items()}
+
+
+_kept_origins = lru_cache(maxsize=KEPT)(_origins)
 
 
 def _model_of(model: type[M], text: str) -> M:

@@ -1,9 +1,10 @@
-"""A serial chain's poses in one loop over points: the compiled twin of `Serial`'s columns, with the same bits."""
+"""A serial chain's poses, and its slides at a tip, in loops over points: compiled twins of `Serial`'s columns, same bits."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from toolpaths.arrays import Floats, Ints
 from toolpaths.compiled import compiled, loop, wanted
 from toolpaths.shapes import arrays
 
-_ROWS = ("float64", 2)
+_ROWS, _INDEX = ("float64", 2), ("int64", 1)
 COMPILE_FROM = 20_000
 """points that are worth compiling for; fewer take the loop where any is compiled anyway"""
 
@@ -42,16 +43,37 @@ class ChainLoop:
         return cls(np.array(turn), np.array(column), np.array([joint.along for joint in chain]),
                    np.array([joint.place for joint in chain]), np.array(turning, dtype=np.int64))
 
-    def poses(self, q: Floats, carried: Floats) -> Floats:
-        """(1 + C, N, 3), see `chain_poses`; sines as numpy has them, whose bits the columns have too."""
+    @cached_property
+    def sliding(self) -> tuple[int, int]:
+        """The first slide of the chain, and one past the last."""
+        at = np.flatnonzero(self.turn < 0)
+        return int(at[0]), int(at[-1]) + 1
+
+    @cached_property
+    def slides_together(self) -> bool:
+        """No rotary joint stands between the slides."""
+        first, end = self.sliding
+        return bool((self.turn[first:end] < 0).all())
+
+    def _turned(self, q: Floats) -> tuple[Floats, Floats]:
+        """Cosine and sine (R, N) of the rotary joints; as numpy has them, whose bits the columns have too."""
         cos, sin = np.empty((2, len(self.turning), len(q)))
         for k, j in enumerate(self.turning.tolist()):
             np.cos(q[:, j], out=cos[k])
             np.sin(q[:, j], out=sin[k])
-        return compiled(chain_poses)(q, cos, sin, self.turn, self.column, self.along, self.place, carried)
+        return cos, sin
+
+    def poses(self, q: Floats, carried: Floats) -> Floats:
+        """(1 + C, N, 3), see `chain_poses`."""
+        return compiled(chain_poses)(q, *self._turned(q), self.turn, self.column, self.along, self.place, carried)
+
+    def at_tip(self, tip: Floats, q: Floats, at_zero: Floats, from_slides: Floats) -> Floats:
+        """(N, J), see `chain_at_tip`; only where no rotary joint stands between the slides."""
+        chain = self.turn, self.column, self.along, self.place
+        return compiled(chain_at_tip)(tip, q, *self._turned(q), *chain, *self.sliding, at_zero, from_slides)
 
 
-@loop(takes=(_ROWS, _ROWS, _ROWS, ("int64", 1), ("int64", 1), _ROWS, _ROWS, _ROWS))
+@loop(takes=(_ROWS, _ROWS, _ROWS, _INDEX, _INDEX, _ROWS, _ROWS, _ROWS))
 def chain_poses(q: Floats, cos: Floats, sin: Floats, turn: Ints, column: Ints, along: Floats, place: Floats,
                 carried: Floats) -> Floats:
     """(1 + C, N, 3): a point and directions at the tool's end, `carried` (1 + C, 3), moved by C joints in turn.
@@ -81,6 +103,46 @@ def chain_poses(q: Floats, cos: Floats, sin: Floats, turn: Ints, column: Ints, a
             for i in range(3):
                 result[m, n, i] = v[i]
     return result
+
+
+@loop(takes=(_ROWS, _ROWS, _ROWS, _ROWS, _INDEX, _INDEX, _ROWS, _ROWS, ("int64", 0), ("int64", 0), ("float64", 1), _ROWS))
+def chain_at_tip(tip: Floats, q: Floats, cos: Floats, sin: Floats, turn: Ints, column: Ints, along: Floats, place: Floats,
+                 first: int, end: int, at_zero: Floats, from_slides: Floats) -> Floats:
+    """(N, J): q with the slides, joints `first` to `end` of the chain, as they bring the tip (N, 3) there.
+
+    Args:
+        q, cos, sin, turn, column, along, place: as in `chain_poses`
+        at_zero: (3,) the tip where all joints stand at 0
+        from_slides: (3, 3) slides per displacement of the tip
+    """
+    result = np.empty(q.shape)
+    gap, start = np.empty(3), np.empty(3)
+    for n in range(len(q)):
+        for i in range(3):
+            gap[i], start[i] = tip[n, i], at_zero[i]
+        for c in range(first):
+            turn_point(gap, along[c], place[c], cos[turn[c], n], -sin[turn[c], n])
+        for c in range(len(turn) - 1, end - 1, -1):
+            turn_point(start, along[c], place[c], cos[turn[c], n], sin[turn[c], n])
+        for j in range(q.shape[1]):
+            result[n, j] = q[n, j]
+        for k in range(end - first):
+            slide = 0.0
+            for i in range(3):
+                if from_slides[k, i] != 0.0:
+                    slide = slide + from_slides[k, i] * (gap[i] - start[i])
+            result[n, column[first + k]] = slide
+    return result
+
+
+@loop
+def turn_point(v: Floats, d: Floats, place: Floats, cos: float, sin: float) -> None:
+    """Turn the point v (3,) about the line through `place` (3,) along the unit d (3,)."""
+    for i in range(3):
+        v[i] = v[i] - place[i]
+    turn_vector(v, d, cos, sin)
+    for i in range(3):
+        v[i] = v[i] + place[i]
 
 
 @loop

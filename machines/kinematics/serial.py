@@ -84,11 +84,8 @@ class Serial(Kinematics):
     @property
     def slides_square(self) -> bool:  # type: ignore[override]  # nothing assigns it
         """See the base class."""
-        kinds = [joint.rotary for joint in self.chain]
-        first = kinds.index(False) if False in kinds else 0
-        together = not any(kinds[first:first + len(self._slides)])
-        directions = np.stack([joint.direction for joint in self._slides])
-        return together and bool(np.abs(directions @ directions.T - np.eye(len(directions))).max() < SQUARE)
+        a = np.stack([joint.direction for joint in self._slides])
+        return self._loop.slides_together and bool(np.abs(a @ a.T - np.eye(len(a))).max() < SQUARE)
 
     @cached_property
     def _slides(self) -> list[Joint]:
@@ -288,8 +285,12 @@ class Serial(Kinematics):
         at = [self.axis_names.index(joint.name) for joint in self._slides]
         if sorted(at) != sorted(solved.tolist()):
             return super().at_tip(tip, q, solved)
-        result, to = np.array(q), columns.of_rows(np.broadcast_to(tip, (len(q), 3)))
-        result[:, at] = np.stack(self._slides_to(to, self._turning(q)), axis=1)
+        to = np.broadcast_to(tip, (len(q), 3))
+        if self._loop.slides_together and pays(len(q)):
+            return self._loop.at_tip(to, q, self._ends[0], self._from_slides)
+        result = np.array(q)
+        for j, value in zip(at, self._slides_to(columns.of_rows(to), self._turning(q)), strict=True):
+            result[:, j] = value
         return result
 
     def _angles(self, axis: Columns, from_pole: Floats, wanted: Floats) -> Iterator[tuple[Floats, ...]]:
@@ -315,15 +316,14 @@ class Serial(Kinematics):
 
     def _slides_to(self, tip: Columns, turning: Turning) -> list[Floats]:
         """Linear joints (N,) in chain order that bring the tip there, the rotary ones standing at `turning`."""
-        slides = self._slides
-        first, last = self.chain.index(slides[0]), self.chain.index(slides[-1])
-        if any(joint.rotary for joint in self.chain[first:last]):
+        if not self._loop.slides_together:
             return self._slides_apart(tip, turning)
+        first, end = self._loop.sliding
         for joint in self.chain[:first]:
             cos, sin = turning[joint.name]
             place = joint.place
             tip = columns.plus(columns.turned(joint.along, cos, -sin, columns.minus(tip, place)), place)
-        at_zero, = self._sweep(self.chain[last + 1:], None, turning, [self._tip_at_zero()])
+        at_zero, = self._sweep(self.chain[end:], None, turning, [self._tip_at_zero()])
         gap = columns.minus(tip, at_zero)
         return [columns.dot(columns.of_one(row), gap) for row in self._from_slides]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -246,17 +246,15 @@ def turning_run(lines: list[int], file: str) -> Diagnostic:
                  count=len(lines), hint="use auto or tcp for this operation")
 
 
+@lru_cache(maxsize=8)
 def table_axes(control: Control) -> Ints:
     """Joint numbers of the rotary axes that carry the part: those that turn the slides as the table sees them."""
-    kin = control.machine.kinematics
-    if not control.has_tip_modes:
-        return np.zeros(0, dtype=np.int64)
-    q = np.zeros((2, kin.joints))
-    found = []
-    for j in control.rotary.tolist():
-        q[1] = 0.0
-        q[1, j] = 0.7
+    kin, found = control.machine.kinematics, np.zeros(0, dtype=np.int64)
+    if control.has_tip_modes:
+        q = np.zeros((1 + len(control.rotary), kin.joints))
+        q[np.arange(1, len(q)), control.rotary] = 0.7
         slides = kin.slide_directions(q, control.xyz)
-        if not np.allclose(slides[0], slides[1], atol=1e-9):
-            found.append(j)
-    return np.array(found, dtype=np.int64)
+        turned = [not np.allclose(slides[0], other, atol=1e-9) for other in slides[1:]]
+        found = control.rotary[np.array(turned, dtype=bool)]
+    found.setflags(write=False)
+    return found

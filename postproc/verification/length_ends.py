@@ -68,10 +68,10 @@ class Ends:
 
     def add(self, tool: Ints, sign: int, mm: Floats, what: str) -> None:
         """Lengths (N,) of tools (N,), as indices; the shorter ones stay."""
-        for t in np.unique(tool).tolist():
-            least = float(mm[tool == t].min())
-            if least < self.mm[t, sign]:
-                self.mm[t, sign], self.what[t][sign] = max(least, 0.0), what
+        least = np.full(len(self.numbers), np.inf)
+        np.minimum.at(least, tool, mm)
+        for t in np.flatnonzero(least < self.mm[:, sign]).tolist():
+            self.mm[t, sign], self.what[t][sign] = max(least.item(t), 0.0), what
 
     def follow(self, tool: Ints, speed: Floats, room: Room, what: str) -> None:
         """Places (N,) with a speed (N,) mm or rad per mm, of a clearance: as far as is left, again and again."""

@@ -8,7 +8,7 @@ lengths found, and the bound of its deviation (`deviation_bound`) must keep the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -22,7 +22,7 @@ from postproc.readback.comparison.compare import Comparison, bound_of_blocks, of
 from postproc.readback.comparison.length_margins import MUCH, LengthMargin, length_matters
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
-from postproc.readback.execution.poses import BlockPoses, begins
+from postproc.readback.execution.poses import FEW, BlockPoses, begins
 from postproc.readback.text.canonical import Canonical
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
@@ -77,6 +77,11 @@ class _Places:
     def of(cls, here: tuple[Floats, Floats], there: tuple[Floats, Floats]) -> _Places:
         """From poses with gauge lengths and with tools longer by `STEP`."""
         return cls(*here, *(np.nan_to_num((b - a) / STEP) for a, b in zip(here, there, strict=True)))
+
+    @classmethod
+    def joined(cls, parts: Sequence[_Places]) -> _Places:
+        """Of several fractions one after the other."""
+        return cls(*(np.concatenate(a) for a in zip(*((p.tip, p.axis, p.d_tip, p.d_axis) for p in parts), strict=True)))
 
     def at(self, k: Ints, x: Floats) -> tuple[Floats, Floats]:
         """(tip, axis) of some with tools longer by x (K,) mm."""
@@ -208,14 +213,16 @@ class _Look:
 
     def _links(self, rows: Ints, keeps: bool) -> None:
         near, moves = self.job.options.tolerance + self.executed.corrected_between(self.motion, rows), self.moves
-        tool, owner = self._tool(rows), self.c.owner[rows]
-        for t in self._times(rows, keeps):
-            places = self._poses(rows, t, keeps)
+        tool, owner, times = self._tool(rows), self.c.owner[rows], self._times(rows, keeps)
+        together = max(1, FEW // len(rows))
+        for first in range(0, len(times), together):
+            places = _Places.joined([self._poses(rows, t, keeps) for t in times[first:first + together]])
+            row = np.tile(np.arange(len(rows)), len(places.tip) // len(rows))
 
-            def left(k: Ints, x: Floats, places: _Places = places) -> Floats:
-                return _room(self.job, moves, owner[k], *places.at(k, x), near[k])
+            def left(k: Ints, x: Floats, places: _Places = places, row: Ints = row) -> Floats:
+                return _room(self.job, moves, owner[row[k]], *places.at(k, x), near[row[k]])
 
-            self.ends.follow(tool, lengths(places.d_tip), left, "clearance")
+            self.ends.follow(tool[row], lengths(places.d_tip), left, "clearance")
 
     def points(self) -> None:
         """Points of the CL file, which blocks must come to within the tolerance."""
@@ -239,16 +246,19 @@ class _Look:
         limits, names = self.job.machine.limits, self.job.machine.axis_names
         for first in range(0, len(self.motion), CHUNK):
             rows = np.arange(first, min(first + CHUNK, len(self.motion)))
-            tool = self._tool(rows)
-            for t in self._times(rows, bool(self._keeps_joints(rows).all())):
-                q, other = self.executed.joints(self.motion, rows, t), self.longer.joints(self.again, rows, t)
-                slope = (other - q) / STEP
-                for j in np.flatnonzero((np.abs(slope) > LEAST).any(axis=0)).tolist():
-                    for sign, direction in enumerate(SIGNS):
-                        goes = direction * slope[:, j]
-                        k = np.flatnonzero(np.abs(goes) > LEAST)
-                        room = np.where(goes[k] > 0.0, limits.upper[j] - q[k, j], q[k, j] - limits.lower[j])
-                        self.ends.add(tool[k], sign, (room + TRAVEL_SLACK) / np.abs(goes[k]), f"travel {names[j]}")
+            rows = rows[~self._keeps_joints(rows)]
+            times = self._times(rows, False) if len(rows) else []
+            if not times:
+                continue
+            q = np.concatenate([self.executed.joints(self.motion, rows, t) for t in times])
+            slope = (np.concatenate([self.longer.joints(self.again, rows, t) for t in times]) - q) / STEP
+            tool, goes_on = np.tile(self._tool(rows), len(times)), np.abs(slope) > LEAST
+            for j in np.flatnonzero(goes_on.any(axis=0)).tolist():
+                k = np.flatnonzero(goes_on[:, j])
+                up, down = limits.upper[j] - q[k, j] + TRAVEL_SLACK, q[k, j] - limits.lower[j] + TRAVEL_SLACK
+                for sign, direction in enumerate(SIGNS):
+                    goes = direction * slope[k, j]
+                    self.ends.add(tool[k], sign, np.where(goes > 0.0, up, down) / np.abs(goes), f"travel {names[j]}")
 
     def bounds_of_reach(self) -> None:
         """Bounds of a parallel machine's workspace and joints, where those go with the length."""

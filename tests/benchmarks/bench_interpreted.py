@@ -30,10 +30,12 @@ from postproc.collision.solid import solid
 from postproc.feedrate import interior_packed, paths, tightening
 from postproc.feedrate.interior import NumpySteps
 from postproc.feedrate.windows import solve_problem
+from postproc.readback.execution import frames_loop
 from tests.machines.error_models import serial_errors
 from tests.machines.geometric_error.test_geometric_error_rods import kinematics, platform, rod_errors, rod_frame
 from tests.postproc.collision.test_collision_search import HERE, random_case
 from tests.postproc.feedrate_kit import MIKRON, random_path, uniform
+from toolpaths.arrays import Floats
 from toolpaths.smoothing import sweep
 from toolpaths.smoothing.bspline import KnotVectors
 from toolpaths.smoothing.sweep import Data, Normal
@@ -65,6 +67,16 @@ def compared(name: str, module: ModuleType, plain: Callable[[], object], loop: C
     print(f"{name}: {1e3 * first:.3f} ms, interpreted {1e3 * second:.1f} ms, {second / first:.0f} times")
 
 
+def framed(tip: Floats) -> None:
+    """A line for points (N, 3) in frames."""
+    frames = np.zeros(len(tip), dtype=np.int64), np.eye(3)[None], np.zeros((1, 3)), tip
+    with patch.object(chain_loop, "wanted", lambda *_: False):
+        columns = seconds(lambda: frames_loop.on_table(*frames))
+    interpreted = seconds(lambda: frames_loop.points_on_table(*frames))
+    print(f"frames_loop.py, {len(tip)} points: {1e3 * columns:.3f} ms, interpreted {1e3 * interpreted:.1f} ms, "
+          f"{interpreted / columns:.0f} times")
+
+
 def main() -> None:
     """Print the table."""
     rng = np.random.default_rng(3)
@@ -92,6 +104,9 @@ def main() -> None:
              lambda: frame.solve(slides, where, turned, errors))
     serial, q = machines.load("mikron-ucp710").kinematics, rng.normal(size=(300, 5))
     compared("chain_loop.py, 300 poses", chain_loop, lambda: serial.forward(q), lambda: serial.forward(q))
+    tip, slides = rng.normal(size=(300, 3)), np.arange(3)
+    compared("chain_loop.py, 300 tips", chain_loop, *2 * [lambda: serial.at_tip(tip, q, slides)])
+    framed(tip)
     actual = ActualSerial(serial, serial_errors(serial))
     chain = ActualChainLoop.of(actual.lines)
     with patch.object(chain_loop, "wanted", lambda *_: False):

@@ -271,8 +271,8 @@ def _circle_jets(motion: Motion, executed: BlockPoses, rows: Ints, pieces: Piece
     n = len(rows)
     words = Curves(start, stop, axis0, axis0, np.ones(n, dtype=bool), centre, normal, sweep)
     points = [words.tip_at(pieces.a), words.tip_at(pieces.b), centre, centre + normal]
-    seen = [executed.at_coordinates(motion, rows, begin, point) for point in points]
-    first, last, middle, up = seen
+    seen = executed.at_coordinates(motion, np.tile(rows, 4), np.tile(begin, (4, 1)), np.concatenate(points))
+    first, last, middle, up = seen.reshape(4, n, 3)
     n_table = up - middle
     reach = np.maximum(lengths(start - centre), 1.0)
     kept = np.abs(lengths(n_table) - 1.0) < 1e-9

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.frames import tool_x
 from postproc.control.control import Control, InterpolationMode
 from postproc.control.modes import table_axes
+from postproc.readback.execution.frames_loop import in_frames, on_table
 from postproc.readback.text.canonical import WordMeaning
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
@@ -63,7 +65,7 @@ class FrameTable:
     origin: Floats
     """(F, 3)"""
 
-    @property
+    @cached_property
     def plain(self) -> bool:
         """True where the words of all are machine positions."""
         return all(frame.kinematics is None or frame.control is None for frame in self.frames)
@@ -83,8 +85,9 @@ class FrameTable:
         result = np.array(position)
         for control, kin, k in self._parts(number):
             tip, _ = kin.forward(position[k] / control.unit)
-            at = number[k]
-            result[np.ix_(k, control.xyz)] = np.einsum("nj,nji->ni", tip - self.origin[at], self.rotation[at])
+            here = result[k]
+            here[:, control.xyz] = in_frames(number[k], self.rotation, self.origin, tip)
+            result[k] = here
         return result
 
     def position(self, number: Ints, coordinates: Floats) -> Floats:
@@ -93,13 +96,13 @@ class FrameTable:
             return coordinates
         result = np.array(coordinates)
         for control, kin, k in self._parts(number):
-            at = number[k]
-            tip = np.einsum("nij,nj->ni", self.rotation[at], coordinates[np.ix_(k, control.xyz)]) + self.origin[at]
-            q = kin.at_tip(tip, coordinates[k] / control.unit, control.slides)
-            result[np.ix_(k, control.slides)] = q[:, control.slides]
+            here = result[k]
+            tip = on_table(number[k], self.rotation, self.origin, here[:, control.xyz])
+            here[:, control.slides] = kin.at_tip(tip, here / control.unit, control.slides)[:, control.slides]
+            result[k] = here
         return result
 
-    def _parts(self, number: Ints) -> Iterator[tuple[Control, Kinematics, Ints]]:
+    def _parts(self, number: Ints) -> Iterator[tuple[Control, Kinematics, Ints | slice]]:
         """Rows of one control and tool length at a time, not too many; none where the words are machine positions."""
         owners = self.owner[number]
         for owner in np.flatnonzero(np.bincount(owners)).tolist():
@@ -107,6 +110,9 @@ class FrameTable:
             if control is None or kin is None:
                 continue
             rows = np.flatnonzero(owners == owner)
+            if len(rows) == len(number) <= _CHUNK:
+                yield control, kin, slice(None)
+                continue
             for at in range(0, len(rows), _CHUNK):
                 yield control, kin, rows[at:at + _CHUNK]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -269,12 +270,17 @@ class BlockMotions:
         return BlockMotions(self.motion, self.control, np.tile(self.rows, times), before, end, np.tile(self.frame, times),
                             first, last)
 
+    @cached_property
+    def bent(self) -> Ints:
+        """Numbers of the blocks that are dog-legs."""
+        return np.flatnonzero(_bent(self.motion, self.control, self.rows))
+
     def at(self, t: float | Floats) -> Floats:
         """Machine coordinates (K, J) at fraction t, one or (K,)."""
         share = np.broadcast_to(np.asarray(t), len(self.rows))
         along = _along(self.motion, self.control.xyz, self.rows, self.first, self.last, share)
         result: Floats = self.motion.table.position(self.frame, along)
-        k = np.flatnonzero(_bent(self.motion, self.control, self.rows))
+        k = self.bent
         if len(k):
             speed = self.control.machine.limits.velocity * self.control.unit
             result[k] = _dog_leg(self.before[k], self.end[k], share[k], speed)

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from machines.kinematics import chain_loop
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.frames import ExecutionFrame, FrameTable
+from postproc.readback.execution.frames_loop import in_frames, on_table
 from postproc.readback.execution.poses import SAMPLES, BlockMotions, BlockPoses, begins, coordinates
 from tests.postproc.reader_kit import FANUC, control, good
 from toolpaths.arrays import Floats, Ints
@@ -60,3 +62,18 @@ def test_a_place_between_two_blocks_is_computed_once(motion: Motion, monkeypatch
     changes = int(np.count_nonzero(np.diff(motion.frame)))
     BlockPoses(HELD, lambda _: HELD.machine.kinematics, {}).look_ahead(motion, ROWS["all"], SAMPLES)
     assert asked == [COUNT + 1 + changes]
+
+
+@pytest.mark.numeric
+def test_points_in_frames_have_the_bits_of_the_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(4)
+    rotation = np.linalg.qr(rng.normal(size=(4, 3, 3)))[0]
+    origin, number, point = rng.normal(size=(4, 3)) * 100.0, rng.integers(0, 4, 300), rng.normal(size=(300, 3)) * 50.0
+    found = []
+    for chosen in (False, True):
+        monkeypatch.setattr(chain_loop, "wanted", lambda *_, chosen=chosen: chosen)
+        found.append([change(number, rotation, origin, point) for change in (on_table, in_frames)])
+    np.testing.assert_array_equal(*found)
+    np.testing.assert_allclose(in_frames(number, rotation, origin, found[1][0]), point, rtol=0, atol=1e-11)
+    f = number[0]
+    np.testing.assert_allclose(found[1][0][0], rotation[f] @ point[0] + origin[f], rtol=0, atol=1e-11)
