@@ -12,22 +12,24 @@ function svg(tag, attributes, ...children) {
 // A waterfall: each cause begins where the one before ended.
 function waterfall(k) {
   const base = `runs.${k}.conversion.time.causes`, causes = Object.entries(valueAt(base)).filter((one) => one[1] > 0.0005);
-  const total = causes.reduce((s, one) => s + one[1], 0) || 1, high = 24, wide = 640, left = 150;
-  const drawn = svg("svg", {viewBox: `0 0 ${wide + left + 90} ${high * (causes.length + 1) + 6}`, role: "img", width: "100%",
-    "aria-label": "Waterfall of the time by cause", style: "max-width: 900px"});
+  const total = causes.reduce((s, one) => s + one[1], 0) || 1, high = 24, wide = 640, left = 220;
+  const drawn = svg("svg", {viewBox: `0 0 ${wide + left + 4} ${high * (causes.length + 1) + 6}`, role: "img", width: "100%",
+    "aria-label": "Waterfall of the time by cause", style: "max-width: 900px; min-width: 500px"});
   let at = 0;
   causes.forEach(([name, seconds], row) => {
     const key = name.replace(/_s$/, ""), x = left + wide * at / total, w = Math.max(wide * seconds / total, 1);
-    drawn.append(svg("text", {x: left - 8, y: row * high + 17, "text-anchor": "end"}, CAUSE_TEXT[key] || key),
+    drawn.append(svg("text", {x: 4, y: row * high + 17}, CAUSE_TEXT[key] || key),
       svg("rect", {x, y: row * high + 4, width: w, height: high - 8, fill: `rgb(${CATEGORY[row % CATEGORY.length].join(",")})`}),
-      svg("text", {x: left + wide + 6, y: row * high + 17, "data-key": `${base}.${name}`, "data-digits": 2}, number(seconds, 2) + " s"));
+      svg("text", {x: left - 10, y: row * high + 17, "text-anchor": "end", "data-key": `${base}.${name}`, "data-digits": 2}, number(seconds, 2) + " s"));
     at += seconds;
   });
-  drawn.append(svg("text", {x: left - 8, y: causes.length * high + 17, "text-anchor": "end", "font-weight": 700}, "all"),
+  drawn.append(svg("text", {x: 4, y: causes.length * high + 17, "font-weight": 700}, "all"),
     svg("rect", {x: left, y: causes.length * high + 4, width: wide, height: high - 8, fill: "#50575f"}),
-    svg("text", {x: left + wide + 6, y: causes.length * high + 17, "font-weight": 700}, number(total, 2) + " s"));
-  return drawn;
+    svg("text", {x: left - 10, y: causes.length * high + 17, "text-anchor": "end", "font-weight": 700}, number(total, 2) + " s"));
+  return make("div", {class: "scroll"}, drawn);
 }
+
+const plainNumber = (v) => String(Number(v.toPrecision(4)));
 
 class Lanes {
   constructor(canvas, picked) {
@@ -87,27 +89,39 @@ class Lanes {
       const y0 = k * high + 4, tall = high - 8, y = (v) => y0 + tall * (1 - (v - low) / (top - low || 1));
       g.strokeStyle = "#c4cad1"; g.lineWidth = 1; g.strokeRect(this.left, y0, wide, tall);
       g.fillStyle = "#1b1f24"; g.textAlign = "left"; g.fillText(`${name}, ${unit}`, 4, y0 + tall / 2);
-      g.textAlign = "right"; g.fillStyle = "#50575f"; g.fillText(top.toPrecision(4), this.left - 4, y0 + 6);
-      g.fillText(low.toPrecision(4), this.left - 4, y0 + tall - 5);
+      g.textAlign = "right"; g.fillStyle = "#50575f"; g.fillText(plainNumber(top), this.left - 4, y0 + 6);
+      g.fillText(plainNumber(low), this.left - 4, y0 + tall - 5);
+      g.save(); g.beginPath(); g.rect(this.left, y0 - 1, wide, tall + 2); g.clip();
       [...curves].reverse().forEach((value, n) => this.curve(g, value, first, last, wide, y, curves.length === 2 && n === 0 ? "#d55e00" : "#0072b2"));
+      g.restore();
     });
     g.fillStyle = "#1b1f24"; g.textAlign = "center";
-    for (let t = 0; t <= 5; t++) g.fillText(clockText(this.from + (this.to - this.from) * t / 5), Math.min(this.left + wide * t / 5, w - 34), h - 8);
+    const ticks = Math.min(5, Math.max(1, Math.floor(wide / 80)));
+    for (let t = 0; t <= ticks; t++) g.fillText(clockText(this.from + (this.to - this.from) * t / ticks), Math.min(this.left + wide * t / ticks, w - 34), h - 8);
   }
 
   // Least and greatest value of each column of pixels.
   curve(g, value, first, last, wide, y, colour) {
     g.strokeStyle = colour; g.lineWidth = 1.3; g.beginPath();
     const scale = wide / (this.to - this.from || 1);
-    let column = -1, low = 0, high = 0, pen = false;
-    const flush = () => { if (column >= 0) { const x = this.left + column; if (pen) g.lineTo(x, y(low)); else g.moveTo(x, y(low)); g.lineTo(x, y(high)); pen = true; } };
+    let column = 0, low = 0, high = 0, pen = false;
+    const flush = () => { const x = this.left + column; if (pen) g.lineTo(x, y(low)); else g.moveTo(x, y(low)); g.lineTo(x, y(high)); pen = true; };
+    let empty = true;
+    const add = (seconds, v) => {
+      if (v !== v) { if (!empty) flush(); empty = true; pen = false; return; }
+      const x = Math.round((seconds - this.from) * scale);
+      if (x === column && !empty) { if (v < low) low = v; if (v > high) high = v; return; }
+      if (!empty) flush();
+      column = x; low = high = v; empty = false;
+    };
+    const {time, columns: {rest}} = this.run, stays = this.kind === "position";
+    if (first === 0) add(0, value(0)); // it stands where it begins until it moves
     for (let i = first; i <= last; i++) {
-      const v = value(i), x = Math.round((this.run.time[i] - this.from) * scale);
-      if (v !== v) { flush(); column = -1; pen = false; continue; }
-      if (x < 0 || x > wide) continue;
-      if (x === column) { if (v < low) low = v; if (v > high) high = v; } else { flush(); column = x; low = high = v; }
+      if (stays && i > 0 && rest[i] > 0) add(time[i - 1] + rest[i] / 1000, value(i - 1));
+      add(time[i], value(i));
     }
-    flush(); g.stroke();
+    if (!empty) flush();
+    g.stroke();
   }
 }
 

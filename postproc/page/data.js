@@ -2,6 +2,11 @@
 const report = JSON.parse(document.getElementById("report").textContent);
 const byId = (id) => document.getElementById(id);
 
+// A text of a file as it can be read: what turns the direction of writing, and control characters, show as a mark.
+const HIDDEN = /[\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g;
+const visible = (text) => text.replace(HIDDEN, "\ufffd");
+const short = (text, most) => (text.length > most ? text.slice(0, most) + "\u2026" : text);
+
 // An element; texts are put in as texts, never as markup.
 function make(tag, attributes, ...children) {
   const made = document.createElement(tag);
@@ -10,7 +15,7 @@ function make(tag, attributes, ...children) {
     else if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
     else made.setAttribute(name, value);
   }
-  for (const child of children) if (child !== null && child !== undefined) made.append(child);
+  for (const child of children) if (child !== null && child !== undefined) made.append(typeof child === "string" ? visible(child) : child);
   return made;
 }
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from typing import Any
+from unicodedata import category
 
 from postproc.base.json_values import plain, rounded
 from postproc.base.version import VERSION
@@ -18,11 +19,15 @@ from toolpaths.toolpath import Toolpath
 
 SCHEMA_VERSION = 1
 """of the report; it rises where a key changes its meaning or goes"""
-SCRIPTS = ("data.js", "view.js", "scene.js", "machine.js", "texts.js", "charts.js", "tables.js", "page.js")
+SCRIPTS = ("data.js", "view.js", "scene.js", "machine.js", "labels.js", "texts.js", "charts.js", "tables.js", "page.js")
 """in the order in which they run"""
 POLICY = ("default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; "
           "form-action 'none'")
 """the page may load nothing from anywhere"""
+
+
+TITLE = 120
+"""letters of the title of the window at most"""
 
 
 def report_dict(toolpath: Toolpath, runs: Sequence[Run]) -> dict[str, Any]:
@@ -46,7 +51,7 @@ def document(report: dict[str, Any], texts: Sequence[tuple[str, str, bytes]]) ->
         "<!doctype html>", '<html lang="en"><head><meta charset="utf-8">',
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{escape(report['part'])} - report</title>", f"<style>{style}</style></head>", body,
+        f"<title>{escape(_printable(report['part'])[:TITLE])} - report</title>", f"<style>{style}</style></head>", body,
         f'<script type="application/json" id="report">{embedded(light)}</script>', *parts,
         "<script>\n\"use strict\";", *scripts, "</script>", "</body></html>", ""])
 
@@ -56,6 +61,11 @@ def embedded(value: object) -> str:
     text = json.dumps(rounded(value), allow_nan=False, default=plain, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026").replace(
         "\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def _printable(text: str) -> str:
+    """Without what turns the direction of writing, and without control characters (Unicode categories Cc and Cf)."""
+    return "".join(" " if category(letter) in ("Cc", "Cf") else letter for letter in text)
 
 
 def _apart(report: dict[str, Any]) -> tuple[list[tuple[str, str]], dict[str, Any]]:

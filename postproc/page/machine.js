@@ -1,5 +1,5 @@
 // The machine as lines: axes of a chain by their motions one after the other, legs between their joints, the tool.
-const AXIS_COLOURS = {X: [213, 94, 0], Y: [0, 128, 96], Z: [0, 114, 178], A: [140, 60, 130], B: [140, 60, 130], C: [90, 70, 160]};
+const AXIS_COLOUR = [120, 125, 130]; // none of the colours of the path
 const TOOL_COLOUR = [40, 40, 40];
 
 const dot3 = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -50,14 +50,17 @@ function across(axis) {
   return u.map((x) => x / size);
 }
 
-// Lines of the machine at one place in time; `size` is that of what is seen, mm.
-function chainLines(skeleton, position, size, lines) {
+// Lines of the machine at one place in time, and the letters of its axes; `size` is that of what is seen, mm. A linear axis
+// has its letter on the side to which the tool moves against the part where its position rises, next to `middle` of what is seen.
+function chainLines(skeleton, position, size, lines, named, middle) {
   const frames = framesOf(skeleton, position);
   let joint = null;
   skeleton.axes.forEach((axis, k) => {
-    const frame = frames[k], colour = AXIS_COLOURS[axis.letter] || [90, 90, 90];
+    const frame = frames[k], colour = AXIS_COLOUR;
     const at = axis.turns ? moved(frame, axis.point) : moved(frames[k + 1], [0, 0, 0]);
     const along = turned(frame, axis.direction);
+    const far = axis.turns ? 0.45 * size : 0.62 * size + dot3(along, middle.map((v, i) => v - at[i]));
+    named.push([axis.letter + (axis.turns ? "" : "+"), at.map((v, i) => v + far * along[i])]);
     if (axis.turns) {
       const radius = 0.3 * size, u = across(axis.direction), behind = frames[k + 1];
       lines.push([...at.map((v, i) => v - 0.4 * size * along[i]), ...at.map((v, i) => v + 0.4 * size * along[i]), ...colour]);

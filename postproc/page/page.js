@@ -4,7 +4,8 @@ const shown = {run: null, time: 0, point: 0, playing: 0, fade: false, texts: nul
 // All that is said in words and numbers.
 function words(k, info) {
   verdict(k, byId("verdict"));
-  const found = info.conversion.diagnostics.filter((d) => d.severity !== "info");
+  const sorted = [...info.conversion.diagnostics].sort((a, b) => WEIGHT[a.severity] - WEIGHT[b.severity]);
+  const found = sorted.filter((d) => d.severity !== "info");
   byId("first").replaceChildren(...(found.length ? [messageItems(found, jumpTo)] : [make("p", {class: "note"}, "No warnings.")]));
   byId("compare").replaceChildren(...[compareTable(pickRun)].filter(Boolean));
   byId("head").replaceChildren(...headParts(k));
@@ -14,8 +15,10 @@ function words(k, info) {
   byId("sheet-body").replaceChildren(...sheetParts(k));
   byId("orientation-body").replaceChildren(...orientationParts(k));
   byId("errors-body").replaceChildren(...errorParts(k, openText));
-  byId("messages-body").replaceChildren(info.conversion.diagnostics.length ? messageItems(info.conversion.diagnostics, jumpTo) : "None.");
+  byId("messages-body").replaceChildren(sorted.length ? messageItems(sorted, jumpTo) : "None.");
 }
+
+const WEIGHT = {error: 0, warning: 1, info: 2};
 
 async function pickRun(k) {
   stop();
@@ -28,7 +31,7 @@ async function pickRun(k) {
 function pathParts(run) {
   byId("time").hidden = document.querySelector(".stage").hidden = byId("point").hidden = !run.count;
   textChoices(run);
-  if (!run.count) return; // its messages still lead to the CL file
+  if (!run.count) { openFirst(0); return; } // its messages still lead to the CL file
   const colour = byId("colour"), wanted = colour.value;
   colour.replaceChildren(...colouringsOf(run).map((name) => make("option", {value: name}, COLOURINGS[name].title)));
   if (colouringsOf(run).includes(wanted)) colour.value = wanted;
@@ -37,17 +40,17 @@ function pathParts(run) {
   recolour(); fit();
   byId("machine").disabled = byId("bed").disabled = !run.info.skeleton && !run.legs;
   byId("bed").disabled = !run.info.skeleton;
-  byId("view-note").textContent = "Drag to turn, with Shift to move, wheel to zoom, click a point. " + (run.info.skeleton || run.legs ? "Machine: axes as lines and circles, not its covers." : "The machine is not drawn: its parts are not known as lines.");
+  byId("view-note").textContent = "Drag to turn, with Shift to move, wheel to zoom, click a point. " + (run.info.skeleton || run.legs ? "Machine: axes as grey lines and circles, not its covers; x, y, z are those of the part." : "The machine is not drawn: its parts are not known as lines.");
   shown.lanes.set(run);
   setPoint(Math.max(run.columns.kind.findIndex((kind, i) => i > 0 && kind !== 0), 0));
+  openFirst(run.columns["CL line"][shown.point]);
 }
 
 function recolour() {
   const {colours, legend} = coloured(shown.run, byId("colour").value, byId("rapids").checked);
-  shown.view.setColours(colours); showLegend([...legend, ...axisLegend()]); draw();
+  shown.view.setColours(colours); if (shown.run.solids.length) legend.push({colour: SOLID_COLOUR, text: "part, table, fixtures"});
+  showLegend(legend); draw();
 }
-
-const axisLegend = () => (!byId("machine").checked || !shown.run.info.skeleton ? [] : shown.run.info.skeleton.axes.map((axis) => ({colour: AXIS_COLOURS[axis.letter] || [90, 90, 90], text: "axis " + axis.letter})));
 
 const cutCorners = (run) => {
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity], names = ["part x", "part y", "part z"];
@@ -57,7 +60,7 @@ const cutCorners = (run) => {
 
 function fit() {
   const [low, high] = cutCorners(shown.run), size = Math.hypot(...low.map((v, k) => high[k] - v)) || 10;
-  const room = byId("machine").checked && (shown.run.info.skeleton || shown.run.legs) ? 0.45 * size : 0.08 * size;
+  const room = byId("machine").checked && (shown.run.info.skeleton || shown.run.legs) ? 0.14 * size : 0.05 * size;
   shown.view.fit(low.map((v) => v - room), high.map((v) => v + room));
   if (byId("bed").checked && shown.run.info.skeleton) shown.view.middle = moved(back(bedAt()), shown.view.middle);
   draw();
@@ -75,31 +78,34 @@ function fitWhole() {
 
 const bedAt = () => { const now = between(shown.run, shown.time); return bedOf(shown.run.info.skeleton, now.at); };
 
+const OPENED_AT_ONCE = 200000; // characters of a packed text up to which it is shown without being asked for
+const SOLID_COLOUR = [170, 140, 95];
 let asked = false;
 function draw() { if (!asked) { asked = true; requestAnimationFrame(drawNow); } }
 
 function drawNow() {
   asked = false;
-  const run = shown.run, view = shown.view, lines = [];
+  const run = shown.run, view = shown.view, lines = [], named = [];
   if (!run || !run.count) return;
   const now = between(run, shown.time), size = view.span / 1.05, withMachine = byId("machine").checked;
   const tip = ["part x", "part y", "part z"].map(now.at);
   let axis = run.columns["axis i"] ? ["axis i", "axis j", "axis k"].map(now.at) : null;
   view.model = null;
   if (run.info.skeleton) {
-    const part = 0.55 * size;
-    const frames = withMachine ? chainLines(run.info.skeleton, now.at, part, lines) : framesOf(run.info.skeleton, now.at);
-    axis = turned(frames[frames.length - 1], run.info.skeleton.tool_axis);
     if (byId("bed").checked) view.model = back(bedOf(run.info.skeleton, now.at));
+    const part = 0.55 * size, middle = view.model ? moved(back(view.model), view.middle) : view.middle;
+    const frames = withMachine ? chainLines(run.info.skeleton, now.at, part, lines, named, middle) : framesOf(run.info.skeleton, now.at);
+    axis = turned(frames[frames.length - 1], run.info.skeleton.tool_axis);
   }
   if (withMachine && run.legs) legLines(run, now.i + now.share, lines);
-  for (const solid of run.solids) for (let k = 0; k < solid["edge 0"].length; k++) lines.push([0, 1, 2, 3, 4, 5].map((j) => solid["edge " + j][k]).concat([120, 120, 120]));
+  for (const solid of run.solids) for (let k = 0; k < solid["edge 0"].length; k++) lines.push([0, 1, 2, 3, 4, 5].map((j) => solid["edge " + j][k]).concat(SOLID_COLOUR));
   if (axis) toolLines(tip, axis, toolLength(run, now.next), 0.012 * size, lines);
   const p = ["part x", "part y", "part z"].map((n) => run.columns[n][shown.point]), r = 0.015 * size;
   for (let k = 0; k < 3; k++) lines.push([...p.map((v, i) => v - (i === k ? r : 0)), ...p.map((v, i) => v + (i === k ? r : 0)), 156, 28, 18]);
   shown.lines = lines;
   view.done = shown.fade ? now.i + 1 : 1e9; // what is still to come is pale while time runs
   view.draw(lines);
+  drawLabels(view, byId("labels"), named);
 }
 
 // Gauge length of the tool that runs at a point, mm; where none is stated something that can be seen.
@@ -144,7 +150,15 @@ function play() {
 function textChoices(run) {
   const kinds = [...document.querySelectorAll("script[id^=text-]")].map((e) => [e.id.slice(5), e.dataset.name]).filter(([kind]) => kind === "cl" || kind.startsWith(`nc${run.k}-`));
   byId("texts").hidden = !kinds.length;
+  if (shown.texts.kind && !kinds.some(([kind]) => kind === shown.texts.kind)) shown.texts.close(); // that of another program
   byId("text-file").replaceChildren(...kinds.map(([kind, name]) => make("option", {value: kind}, (kind === "cl" ? "CL file " : "program ") + name)));
+}
+
+// The CL file at a line without being asked for, where that costs nothing.
+function openFirst(line) {
+  const packed = byId("text-cl");
+  if (packed && packed.textContent.length < OPENED_AT_ONCE && !shown.texts.kind) openText("cl", line, 0);
+  else if (shown.texts.kind) byId("text-file").value = shown.texts.kind;
 }
 
 async function openText(kind, line, file) {
@@ -240,12 +254,16 @@ function listen() {
   const turns = {top: [0, 0], front: [0, Math.PI / 2], iso: [-0.7, 0.95]};
   document.querySelectorAll("[data-view]").forEach((b) => b.addEventListener("click", () => { shown.view.turn = [...turns[b.dataset.view]]; draw(); }));
   window.addEventListener("resize", () => { draw(); shown.lanes.drawn = null; shown.lanes.draw(); });
-  window.addEventListener("beforeprint", () => { if (shown.run.count) { drawNow(); byId("printed").src = shown.view.canvas.toDataURL("image/png"); } });
+  window.addEventListener("beforeprint", () => {
+    if (!shown.run.count) return;
+    drawNow();
+    byId("printed").replaceChildren(make("img", {src: pictureOf(shown.view, byId("labels")), alt: "Picture of the path on the machine"}), byId("legend").cloneNode(true));
+    byId("printed").lastChild.removeAttribute("id");
+  });
 }
 
 async function begin() {
-  
-  byId("title").textContent = report.part;
+  byId("title").textContent = short(visible(report.part), 300);
   byId("subtitle").textContent = `${report.cl_file}, ${report.runs.map(lineOf).join("; ")}`;
   byId("foot").textContent = `postproc ${report.postproc}, report version ${report.report_version}. This page loads nothing from anywhere.`;
   byId("run").replaceChildren(...report.runs.map((run, k) => make("option", {value: k}, lineOf(run))));

@@ -22,6 +22,7 @@ from postproc.report import summary
 from postproc.report.residuals import residuals
 from postproc.verification.proof_text import statement
 from toolpaths.arrays import Floats, finite
+from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
 
@@ -140,10 +141,11 @@ def _feeds(result: PostResult) -> dict[str, Any] | None:
 
 
 def _collisions(result: PostResult) -> dict[str, Any]:
-    """Whether tools were compared with part, table and fixtures, and how many errors that found."""
-    found = [d for d in result.diagnostics if d.code.startswith("collision.")]
+    """Whether tools were compared with part, table and fixtures, how many errors that found, and how many warnings of what
+    could not be compared."""
+    found = [d.severity for d in result.diagnostics if d.code.startswith("collision.")]
     return {"checked": result.setup.bodies is not None and result.comparison is not None,
-            "messages": len(found)}
+            "errors": found.count(Severity.ERROR), "warnings": found.count(Severity.WARNING)}
 
 
 def _offset(result: PostResult) -> dict[str, Any] | None:

@@ -30,7 +30,7 @@ function tilts(run) {
 }
 
 const COLOURINGS = {
-  operation: {title: "operation", named: (run, v) => run.info.conversion.time.operations[v] ? run.info.conversion.time.operations[v].operation : "operation " + (v + 1)},
+  operation: {title: "operation", named: (run, v) => { const op = run.info.conversion.time.operations[v]; return op && op.operation ? short(op.operation, 60) : "operation " + (v + 1); }},
   feed: {title: "feed reached", column: "feed reached", unit: "mm/min", cutsOnly: true},
   limit: {title: "limiting axis", named: (run, v) => limitName(run.info, v)},
   cause: {title: "cause of the time", named: (run, v) => run.info.causes[v].replace("_", " ")},
@@ -76,8 +76,13 @@ function coloured(run, name, showRapids) {
   return {colours: out, legend};
 }
 
+const MOST_NAMED = 16;
+
 function showLegend(legend) {
-  byId("legend").replaceChildren(...legend.map((one) => {
+  const named = legend.slice(0, MOST_NAMED), more = legend.length - named.length;
+  if (more) named.push({text: `and ${more} more: their colours repeat`});
+  byId("legend").replaceChildren(...named.map((one) => {
+    if (!one.colour && one.text !== undefined) return make("span", {}, one.text);
     if (one.text !== undefined) return make("span", {}, swatch(`rgb(${one.colour.join(",")})`), one.text);
     const stops = VIRIDIS.map((c) => `rgb(${c.join(",")})`).join(",");
     const bar = make("i", {class: "scale"});
@@ -110,6 +115,8 @@ function meter(share, label) {
     "aria-valuenow": (100 * share).toFixed(0), "aria-label": label}, inner);
 }
 
+const feedText = (asked, reached) => (asked === asked ? number(asked, 0) + " mm/min programmed" : "none of the CL file") + (reached === reached ? ", " + number(reached, 0) + " mm/min reached in the mean" : "");
+
 // What is known of a point, next to the picture.
 function showPoint(run, i, jump) {
   const c = run.columns, info = run.info, used = usage(run, i);
@@ -120,8 +127,8 @@ function showPoint(run, i, jump) {
   const rows = [["Program", go("nc", c["NC line"][i])], ["CL file", go("cl", c["CL line"][i])],
     ["Operation", COLOURINGS.operation.named(run, c.operation[i])], ["Tool", "T" + c.tool[i]], ["Motion", kind], ["Time", clockText(run.time[i])],
     ["Part x, y, z", ["part x", "part y", "part z"].map((n) => number(c[n][i], 3)).join(", ") + " mm"],
-    ["Feed", number(c["feed programmed"][i], 0) + " programmed, " + number(c["feed reached"][i], 0) + " mm/min reached in the mean"],
-    ["Time goes to", cause + "; " + why], ["Tilt", number(Math.acos(Math.min(1, toolAxis(run, i)[2])) * 180 / Math.PI, 2) + " deg"],
+    ["Feed", feedText(c["feed programmed"][i], c["feed reached"][i])],
+    ["Time goes to", cause + "; " + why], ["Tilt", number(Math.acos(Math.max(-1, Math.min(1, toolAxis(run, i)[2]))) * 180 / Math.PI, 2) + " deg"],
     ["Deviation", c.deviation[i] === c.deviation[i] ? number(c.deviation[i], 2) + " um at the end of the block" : "not on a move of the CL file"]];
   const axes = info.axes.map((axis, j) => [axis.letter, number(c[axis.letter][i], 3) + " " + axis.unit,
     ...ORDERS.map((order, k) => meter(used[k][j], `${axis.letter} ${order}, percent of its limit`))]);

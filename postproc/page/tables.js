@@ -5,7 +5,7 @@ function verdict(k, box) {
   const run = report.runs[k], found = run.conversion.diagnostics, count = (s) => found.filter((d) => d.severity === s).length;
   box.className = !run.converted ? "bad" : !run.proved || count("warning") ? "warn" : "good";
   const word = !run.converted ? "NOT CONVERTED" : run.proved ? "PROVED" : "CHECKED, NOT PROVED";
-  box.replaceChildren(make("b", {}, word), " ", run.statement || "No program was written: the errors below say why.");
+  box.replaceChildren(make("b", {}, word), " ", (run.statement || "").replace(/^proved: /, "") || "No program was written: the errors below say why.");
   if (run.converted) {
     box.append(make("div", {}, "Allowed: ", figure(`runs.${k}.tolerance_mm`, 4, "mm"), ", ", figure(`runs.${k}.axis_tolerance_deg`, 4, "degrees"),
       "; bound: ", figure(`runs.${k}.conversion.worst_tip_deviation_mm`, 6, "mm"), ", ", figure(`runs.${k}.conversion.worst_axis_deviation_deg`, 6, "degrees")));
@@ -21,7 +21,7 @@ function messageItems(list, jump) {
 function timeCell(k) {
   const base = `runs.${k}.conversion`, run = report.runs[k].conversion;
   if (run.cycle_time_s === null) return "-";
-  return make("span", {}, clockText(run.cycle_time_s) + " (", figure(base + ".cycle_time_s", 2, "s"), ")");
+  return run.cycle_time_s < 60 ? figure(base + ".cycle_time_s", 2, "s") : make("span", {}, clockText(run.cycle_time_s) + " (", figure(base + ".cycle_time_s", 2, "s"), ")");
 }
 
 function bandCell(k) {
@@ -41,18 +41,32 @@ function compareTable(pick) {
     table(["Machine, control", "State", "Bound", "Time", "95 % of runs", "Lower bound", "Blocks", "Travel used", "Warnings"], rows, [2, 3, 4, 5, 6, 8]));
 }
 
+function collisionText(found) {
+  if (!found.checked) return "not checked: the set-up has no [bodies]";
+  if (found.errors) return `${found.errors} found, see messages`;
+  return "none with part, table and fixtures of the set-up" + (found.warnings ? "; not all was checked, see the warnings" : "");
+}
+
+const spindleText = (rpm) => rpm.map((v) => number(Math.abs(v), 0) + (v < 0 ? " CCLW" : " CLW")).join(", ") || "off";
+
+function spindleRange(tools) {
+  if (tools.length < 4) return tools.map((t) => `T${t.number}: ${spindleText(t.spindle_rpm)}`).join("; ") || "-";
+  const every = tools.flatMap((t) => t.spindle_rpm.map(Math.abs));
+  return `${tools.length} tools, ` + (every.length ? `${number(Math.min(...every), 0)} to ${number(Math.max(...every), 0)} rpm` : "spindle off");
+}
+
 function headParts(k) {
   const run = report.runs[k], base = `runs.${k}`, c = run.conversion, witness = c.witness;
   const axes = run.axes.map((axis, j) => [axis.letter, axis.used ? make("span", {}, figure(`${base}.axes.${j}.used.0`, 3, ""), " to ", figure(`${base}.axes.${j}.used.1`, 3, axis.unit)) : "-",
-    axis.travel.map((v) => (v === null ? "no end" : v)).join(" to "), axis.used_percent === null ? "-" : figure(`${base}.axes.${j}.used_percent`, 1, "%"),
+    axis.travel.every((v) => v === null) ? "no ends" : axis.travel.map((v) => (v === null ? "no end" : v)).join(" to "), axis.used_percent === null ? "-" : figure(`${base}.axes.${j}.used_percent`, 1, "%"),
     axis.margin === null ? "-" : figure(`${base}.axes.${j}.margin`, 3, axis.unit)]);
-  const feeds = run.feeds || {}, collisions = run.collisions;
+  const feeds = run.feeds || {};
   const facts = [["Time", timeCell(k)], ["95 % of runs", c.cycle_time_s === null ? "-" : bandCell(k)], ["Lower bound", figure(base + ".conversion.lower_bound_s", 2, "s")],
     ["Time model", c.time ? c.time.model : "-"], ["Blocks", figure(base + ".conversion.blocks_out", 0, "")], ["CL points", figure(base + ".conversion.points_in", 0, "")],
     ["Feeds of cuts", run.feeds ? make("span", {}, figure(base + ".feeds.least_mm_per_min", 0, ""), " to ", figure(base + ".feeds.greatest_mm_per_min", 0, "mm/min")) : "-"],
     ["Blocks slowed for an axis", run.feeds ? figure(base + ".feeds.reduced_blocks", 0, "") : "-"],
-    ["Spindle", c.tools.map((t) => `T${t.number}: ${t.spindle_rpm.map((v) => Math.abs(v) + (v < 0 ? " CCLW" : " CLW")).join(", ") || "off"}`).join("; ") || "-"],
-    ["Collisions", collisions.checked ? (collisions.messages ? `${collisions.messages} found, see messages` : "none with part, table and fixtures of the set-up") : "not checked: the set-up has no [bodies]"],
+    ["Spindle", spindleRange(c.tools)],
+    ["Collisions", collisionText(run.collisions)],
     ["Rewinds", figure(base + ".conversion.rewinds", 0, "")], ["Singular directions passed", figure(base + ".conversion.singular_events", 0, "")]];
   const proof = witness ? make("div", {}, make("h3", {}, "What the proof covers"), make("p", {}, "Compared a second time, by other code: " + (witness.compared.join(", ") || "nothing") + "."),
     make("p", {}, witness.not_compared.length ? "Not compared: " + witness.not_compared.join("; ") + "." : "Nothing was left out."),
@@ -66,22 +80,35 @@ function operationTable(k) {
   const time = report.runs[k].conversion.time;
   if (!time) return null;
   const base = `runs.${k}.conversion.time.operations`;
-  return make("div", {}, make("h3", {}, "Operations"), table(["Operation", "Time", "Cutting", "Rapids", "Tool changes"], time.operations.map((op, n) => [op.operation || "without a name",
+  return make("div", {}, make("h3", {}, "Operations"), table(["Operation", "Time", "Cutting", "Rapids", "Tool changes"], time.operations.map((op, n) => [short(op.operation || "without a name", 80),
     figure(`${base}.${n}.time_s`, 2, "s"), figure(`${base}.${n}.cutting_s`, 2, "s"), figure(`${base}.${n}.rapids_s`, 2, "s"), figure(`${base}.${n}.tool_change_s`, 2, "s")]), [1, 2, 3, 4]));
 }
 
 function sheetParts(k) {
-  const run = report.runs[k], base = `runs.${k}`, position = (values, unit) => (values ? Object.entries(values).map(([a, v]) => a + " " + number(v, 3)).join("  ") : "-");
-  const tools = run.tools.map((t, n) => ["T" + t.number, t.name || "-", t.gauge_length_mm === null ? "not stated" : figure(`${base}.tools.${n}.gauge_length_mm`, 4, "mm"),
+  const run = report.runs[k], base = `runs.${k}`, position = (values) => (values ? make("span", {}, ...Object.entries(values).flatMap(([a, v]) => [make("span", {class: "whole"}, a + " " + number(v, 3)), " "])) : "-");
+  const tools = run.tools.map((t, n) => ["T" + t.number, short(t.name || "-", 60), spindleText(t.spindle_rpm), t.gauge_length_mm === null ? "not stated" : figure(`${base}.tools.${n}.gauge_length_mm`, 4, "mm"),
     t.length_register === null ? "-" : "H" + t.length_register, make("span", {}, figure(`${base}.tools.${n}.time_s`, 1, "s"), " (" + number(t.time_s / 60, 1) + " min)"),
-    number(t.cutting_mm / 1000, 3) + " m", position(t.first_axes)]);
-  const offset = run.work_offset;
-  return [make("p", {}, `${report.part} on ${lineOf(run)}; program ${run.files.filter((f) => f.role === "program").map((f) => f.file).join(", ") || "not written"}`),
-    make("h3", {}, "Tools in the order of use"), table(["Tool", "Name", "Gauge length", "Register", "Time", "At feed", "First position (machine coordinates, mm and degrees)"], tools, [2, 4, 5]),
-    offset ? make("div", {}, make("h3", {}, "Work offset"), make("p", {}, `${offset.register}: ${position(offset.values)}`)) : null,
+    figure(`${base}.tools.${n}.cutting_mm`, 0, "mm"), position(t.first_axes)]);
+  const offset = run.work_offset, part = short(report.part, 120);
+  if (!run.converted) return [make("p", {}, `${part} on ${lineOf(run)}: no program was written, so there is nothing to set up.`)];
+  return [make("p", {}, `${part} on ${lineOf(run)}; program ${run.files.filter((f) => f.role === "program").map((f) => f.file).join(", ")}`),
+    make("h3", {}, "Tools in the order of use"), table(["Tool", "Name", "Spindle, rpm", "Gauge length", "Register", "Time", "At feed", "First position (machine coordinates, mm and degrees)"], tools, [3, 5, 6]), make("figure", {id: "printed"}),
+    offset ? make("div", {}, make("h3", {}, "Work offset"), make("p", {}, offset.register + ": ", position(offset.values))) : null,
     run.conversion.places.length ? table(["Place", "Work offset", "Offset"], run.conversion.places.map((p) => [p.place, p.work_offset, position(p.offset)]), []) : null,
     make("h3", {}, "What the header of the program says: offsets, lengths, pivots, what is relied on"), make("div", {class: "header-lines"}, run.header.join("\n") || "-"),
     operationTable(k)].filter(Boolean);
+}
+
+// Reasons in words that differ by their numbers alone stand once, with how many candidates they hold for and the first.
+function grouped(rejected) {
+  const kinds = new Map();
+  for (const one of rejected) {
+    const key = one.reason.replace(/-?\d[\d.]*/g, "#").replace(/\b(about|at least) /, "");
+    if (!kinds.has(key)) kinds.set(key, []);
+    kinds.get(key).push(one);
+  }
+  const angles = (one) => Object.entries(one.orientation_deg || {}).map(([a, v]) => `${a} ${number(v, 2)}`).join(" ");
+  return [...kinds.values()].sort((a, b) => b.length - a.length).map((all) => make("div", {}, (all.length > 1 ? `${all.length} candidates, the first ` : "") + `${angles(all[0])}: ${all[0].reason}`));
 }
 
 function orientationParts(k) {
@@ -91,7 +118,7 @@ function orientationParts(k) {
   return [make("p", {}, "Each pass is machined with a fixed tool axis (3+2). The table gives the chosen rotary positions, the time with them and with the axes of the CL file, and why other directions lost."),
     table(["Pass", "Rotary position, deg", "Time", "With the CL file's axes", "Held by", "Rejected candidates"], found.passes.map((p, n) => [String(p.pass), angles(p.orientation_deg),
       figure(`${base}.passes.${n}.time_s`, 3, "s"), figure(`${base}.passes.${n}.reference_time_s`, 3, "s"), p.limiting_axis || "-",
-      (p.rejected || []).map((r) => (typeof r === "string" ? r : [r.count, r.reason || r.why].filter((v) => v !== undefined).join(" "))).join("; ") || "-"]), [2, 3]),
+      p.rejected && p.rejected.length ? make("div", {}, ...grouped(p.rejected)) : "-"]), [2, 3]),
     table(["Plan", "Time"], Object.keys(found.plans).filter((name) => found.plans[name]).map((name) => [name.replaceAll("_", " "), figure(`${base}.plans.${name}.time_s`, 3, "s")]), [1])];
 }
 

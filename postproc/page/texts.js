@@ -23,12 +23,14 @@ class Texts {
       const bytes = await inflated(byId("text-" + kind).textContent);
       this.known.set(kind, new TextDecoder("utf-8").decode(bytes).split(/\r\n|\r|\n/));
     }
-    this.kind = kind; this.lines = this.known.get(kind); this.here = -1;
+    this.kind = kind; this.lines = this.known.get(kind); this.here = -1; this.box.scrollTop = 0;
     this.tall = Math.min(this.lines.length * ROW, TALLEST);
     this.room.style.height = this.tall + "px";
     this.draw();
     return true;
   }
+
+  close() { this.kind = null; this.lines = null; this.here = -1; this.room.replaceChildren(); }
 
   // First line in sight: very long texts scroll in shares of their length.
   first() {

@@ -7,21 +7,26 @@ from typing import Any
 import numpy as np
 
 from postproc.cycle_time.estimate import Estimate
+from postproc.cycle_time.shape import shape
+from postproc.cycle_time.shares import shares
 from postproc.pipeline.result import PostResult
+from postproc.readback.comparison.compare import Comparison
 from postproc.report.summary import tools_of
+from postproc.time_study.tables import by_tool
+from toolpaths.arrays import Floats
 from toolpaths.rotations import lengths
 
 
 def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
-    """`summary.tools_of` with length register, s (rapids and the rests behind its blocks among them), mm at feed, the
-    greatest feed reached (mm/min) and the first position (axes in mm and degrees, part in mm) of each tool."""
+    """`summary.tools_of` with length register, s as `time` counts them (its change among them), mm that its tip travels at
+    feed against the part, arcs by their length, and its first position (axes in mm and degrees, part in mm)."""
     c, job, b = result.comparison, result.job, e.blocks
     if c is None or job is None or b.row is None:
         return []
     motion, row = c.executed[1], np.asarray(b.row)
     number = motion.tool[row]
-    span = np.diff(np.concatenate([e.timed.begin, e.timed.end[-1:]]))
-    travel = lengths(np.diff(c.tip, axis=0, prepend=c.tip[:1]))
+    seconds = {line["tool"]: line["time_s"] for line in by_tool(e, shares(e))}
+    travel = _travel(c, e)
     cuts = motion.code > 0
     back, unit, found = job.placement.inverse(), job.control.unit, list[dict[str, Any]]()
     for tool in tools_of(result):
@@ -36,7 +41,16 @@ def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
         here = (motion.tool == tool["number"]) & cuts
         found.append(tool | {
             "length_register": next((int(r) for r in registers.tolist() if r >= 0), None),
-            "time_s": float(span[blocks].sum()), "cutting_mm": float(travel[here].sum()),
+            "time_s": seconds[tool["number"]], "cutting_mm": float(travel[here].sum()),
             "first_axes": dict(zip(result.machine.axis_names, q.tolist(), strict=True)),
             "first_part_mm": back.points(c.tip[first])[0].tolist()})
     return found
+
+
+def _travel(c: Comparison, e: Estimate) -> Floats:
+    """(M,) mm that the tip travels in each row of the executed motion: straight, of arcs the length of the arc."""
+    travel: Floats = lengths(np.diff(c.tip, axis=0, prepend=c.tip[:1]))
+    row, arc = np.asarray(e.blocks.row)[e.blocks.arc], shape(e.blocks).length[e.blocks.arc]
+    travel[row] = 0.0
+    np.add.at(travel, row, arc)
+    return travel

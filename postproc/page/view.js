@@ -1,10 +1,10 @@
 // Lines in WebGL2: the path as one strip with a colour for each piece, other lines on top; parallel projection, z up.
 const LINE_VERTEX = `#version 300 es
-in vec3 place; in vec4 colour; uniform mat4 matrix; uniform float done; uniform float stride; out vec4 shade;
+in vec3 place; in vec4 colour; uniform mat4 matrix; uniform float done; uniform float stride; flat out vec4 shade;
 void main() { gl_Position = matrix * vec4(place, 1.0); shade = colour;
   if (float(gl_VertexID) * stride > done) shade.a *= 0.22; }`;
 const LINE_PIXEL = `#version 300 es
-precision mediump float; in vec4 shade; out vec4 pixel; void main() { if (shade.a < 0.01) discard; pixel = shade; }`;
+precision mediump float; flat in vec4 shade; out vec4 pixel; void main() { if (shade.a < 0.01) discard; pixel = shade; }`;
 const COARSE_FROM = 50000; // points from which only every n-th is drawn while the picture moves
 const SMOOTH_TO = 200000; // points up to which edges are smoothed: without a graphics card that costs most of the time
 
@@ -75,6 +75,12 @@ class View {
       out[12 + row] = shift + turned.reduce((s, x, k) => s + x * this.centre[k], 0) - v.reduce((s, x, k) => s + x * this.middle[k], 0);
     }
     return out;
+  }
+
+  // Pixels of the page at which a place of the part is drawn.
+  project(p) {
+    const m = this.matrix(), c = p.map((v, k) => v - this.centre[k]), f = (k) => m[k] * c[0] + m[4 + k] * c[1] + m[8 + k] * c[2] + m[12 + k];
+    return [(f(0) + 1) * this.canvas.clientWidth / 2, (1 - f(1)) * this.canvas.clientHeight / 2];
   }
 
   resize() {

@@ -43,6 +43,26 @@ POOR = """() => { const parts = (c) => (c.match(/[\\d.]+/g) || []).map(Number);
     const a = light(parts(e instanceof SVGElement ? style.fill : style.color));
     return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), e.outerHTML.slice(0, 80)];
   }).filter((one) => one[0] < 4.5); }"""
+LONG = """() => { const run = report.runs[0], tool = run.tools[0], op = run.conversion.time.operations[0];
+  const old = [report.part, tool.name, op.operation];
+  report.part = tool.name = op.operation = "X".repeat(10000); words(0, run); recolour();
+  const found = document.documentElement.scrollWidth;
+  [report.part, tool.name, op.operation] = old; words(0, run); recolour();
+  return found; }"""
+"""width of the page where names have ten thousand letters"""
+MANY = """() => { showLegend(Array.from({length: 200}, (_, k) => ({colour: [0, 0, 0], text: "op " + k})));
+  const found = byId("legend").textContent; recolour(); return found; }"""
+TRIAD = """(bed) => { byId("bed").checked = bed; fit(); drawNow();
+  const v = shown.view, o = v.project([0, 0, 0]), scale = v.span / Math.min(v.canvas.clientWidth, v.canvas.clientHeight);
+  const off = (e, k) => v.project(e).map((p, j) => Math.abs((p - o[j]) * scale - partDirections(v)[k][j]));
+  return Math.max(...[[1, 0, 0], [0, 1, 0], [0, 0, 1]].flatMap(off)); }"""
+"""how far the axes in the corner are from those of the path, of 1"""
+LANE = """() => { const at = [], put = (x, y) => at.push([x, y]);
+  const g = {beginPath() {}, stroke() {}, moveTo: put, lineTo: put};
+  const run = {time: [2, 8], columns: {rest: [2000, 4000]}};
+  const lanes = Object.assign(Object.create(Lanes.prototype), {left: 10, from: 0, to: 10, kind: "position", run});
+  lanes.curve(g, (i) => [3, 7][i], 0, 1, 100, (v) => v, ""); return at; }"""
+"""corners of a lane: it stands until 2 s, rests 4 s more, moves from 3 to 7 until 8 s"""
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 
@@ -89,6 +109,21 @@ def test_a_hostile_name_is_shown_as_it_stands_and_does_nothing(opened: Session) 
     assert opened.page.evaluate("window.hacked") is None and opened.page.locator("main img[src=x]").count() == 0
 
 
+def test_texts_of_ten_thousand_letters_and_turned_ones_do_no_harm(opened: Session) -> None:
+    """The page is as wide as its window, and a sign that turns the direction of writing stands as a mark."""
+    page = opened.page
+    assert page.evaluate("make('b', {}, 'a\u202egpj\u0000\u2066.exe').textContent") == "a\ufffdgpj\ufffd\ufffd.exe"
+    page.set_viewport_size({"width": 360, "height": 740})
+    wide = page.evaluate(LONG)
+    page.set_viewport_size({"width": 1300, "height": 900})
+    assert wide <= 360
+
+
+def test_many_operations_do_not_fill_the_page_with_their_legend(opened: Session) -> None:
+    said = opened.page.evaluate(MANY)
+    assert "op 15" in said and "op 16" not in said and "and 184 more" in said
+
+
 @pytest.mark.parametrize("run", [0, 1])
 def test_every_number_on_the_page_is_that_of_the_json(opened: Session, run: int) -> None:
     opened.page.evaluate(f"pickRun({run})")
@@ -106,6 +141,34 @@ def test_every_number_on_the_page_is_that_of_the_json(opened: Session, run: int)
     keys = {key for key, _, _ in shown}
     base = f"runs.{run}.conversion."
     assert {base + "worst_tip_deviation_mm", base + "cycle_time_s", base + "band_s.0", f"runs.{run}.axes.0.used.0"} <= keys
+
+
+def test_the_text_is_open_at_the_point_and_never_that_of_another_program(opened: Session) -> None:
+    page = opened.page
+    page.evaluate("(async () => { shown.texts.close(); await pickRun(0); })()")
+    until(page, "shown.texts.kind === 'cl' && shown.texts.here > 0")
+    assert page.evaluate("shown.texts.here === shown.run.columns['CL line'][shown.point]")
+    page.evaluate("openText('nc0-0', 5, 0)")
+    until(page, "shown.texts.kind === 'nc0-0'")
+    page.evaluate("pickRun(1)")
+    until(page, "shown.run.k === 1 && shown.texts.kind === 'cl'")
+    assert page.evaluate("byId('text-file').value") == "cl"
+
+
+def test_the_axes_in_the_corner_are_those_of_the_path(opened: Session) -> None:
+    """x, y, z of the part, the bed standing still or not, point as the pixels of places along them do."""
+    page = opened.page
+    page.evaluate("pickRun(0)")
+    until(page, "shown.run.k === 0")
+    for bed in (False, True):
+        off = page.evaluate(TRIAD, bed)
+        assert off < 1e-3, bed
+    page.evaluate("byId('bed').checked = false; fit()")
+
+
+def test_an_axis_stands_still_on_its_lane_before_it_moves_and_while_the_machine_rests(opened: Session) -> None:
+    drawn = opened.page.evaluate(LANE)
+    assert [tuple(p) for p in drawn[::2]] == [(10, 3), (30, 3), (70, 3), (90, 7)]
 
 
 def test_a_click_shows_the_point_and_both_its_lines(opened: Session) -> None:
@@ -202,7 +265,7 @@ def test_it_prints_on_a4_with_the_picture(opened: Session, tmp_path: Path) -> No
     sizes = {tuple(round(float(v)) for v in box.split()[2:]) for box in boxes}
     assert sizes == {(595, 842)}
     opened.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
-    assert opened.page.get_attribute("#printed", "src").startswith("data:image/png")
+    assert opened.page.get_attribute("#printed img", "src").startswith("data:image/png")
     assert opened.said == [], "nothing was complained of to the end"
 
 

@@ -14,12 +14,15 @@ from postproc.cycle_time.conversion import estimate_of
 from postproc.cycle_time.estimate import Estimate
 from postproc.page.columns import unpacked
 from postproc.page.points import columns
+from postproc.page.run import Run, run_dict
 from postproc.page.skeleton import chain, legs
+from postproc.page.tools import tool_rows
 from postproc.page.what_if import FACTORS, ORDERS, scaled, what_if
 from postproc.pipeline.result import PostResult
 from tests.postproc.kit import convert, good, machine, setup_of, toolpath
 from tests.postproc.page.page_kit import small
 from toolpaths.arrays import Floats
+from toolpaths.diagnostics import error, info, warning
 
 
 @cache
@@ -146,3 +149,20 @@ def test_a_machine_of_axes_has_a_chain_and_no_legs() -> None:
     result, _ = arcs()
     assert result.job is not None and chain(result.machine, result.job) is not None
     assert legs(result.job, np.zeros((2, 3))) is None
+
+
+def test_tools_have_the_length_of_their_arcs_and_all_times_add_up() -> None:
+    """The half circle is 10 pi long, not its chord of 20; what tools take is the whole time, changes among it."""
+    result, made = arcs()
+    rows, found = tool_rows(result, made), {one.name: one.values for one in columns(result, made)}
+    steps = np.linalg.norm(np.diff(np.stack([found[f"part {name}"] for name in "xyz"], axis=1), axis=0), axis=1)
+    kind = found["kind"][1:]
+    assert rows[0]["cutting_mm"] == pytest.approx(steps[kind == 1].sum() + 10.0 * math.pi, abs=1e-3)
+    assert sum(row["time_s"] for row in rows) == pytest.approx(made.seconds, abs=1e-6)
+
+
+def test_only_errors_are_collisions_and_notes_of_clear_paths_are_none() -> None:
+    result = replace(arcs()[0], diagnostics=(info("collision.clear", ""), warning("collision.bound", ""),
+                                             error("collision.touch", ""), error("reach.axis", "")))
+    found = run_dict(Run(result, None, {}, "part.nc"))["collisions"]
+    assert (found["errors"], found["warnings"]) == (1, 1)
