@@ -121,7 +121,7 @@ def test_subprograms_of_one_archive_and_of_other_files() -> None:
 
 
 @pytest.mark.parametrize(("block", "code"), [
-    ("TRANS V5", "gcode.unknown_word"), ("ROT Z30", "gcode.frame_turned"), ("G0 C=DC(5)", "gcode.rollover"), ("R1=R2",
+    ("TRANS V5", "gcode.unknown_word"), ("ROTS X30 Y5", "gcode.frame_turned"), ("G0 C=DC(5)", "gcode.rollover"), ("R1=R2",
     "gcode.variable"),
     ("IF 5==5 GOTOF A", "gcode.jump"), ("G0 X=R1", "gcode.variable"), ("CIP X1 Y1 I1=2", "gcode.syntax"), ("G33 Z1 K1",
     "gcode.unknown_code"),
