@@ -5,12 +5,14 @@ from __future__ import annotations
 from tests.mutants import faults_controls as controls
 from tests.mutants import faults_machine as machine
 from tests.mutants import faults_places as places
+from tests.mutants import faults_programs as programs
 from tests.mutants import faults_reading as reading
 from tests.mutants.battery import CASES, SIX
 from tests.mutants.plant import Fault
 
-FAULTS: tuple[Fault, ...] = (*reading.FAULTS, *machine.FAULTS, *controls.FAULTS, *places.FAULTS)
-BESIDE = ("lengths at the machine", "measured part", "check program")
+FAULTS: tuple[Fault, ...] = (*reading.FAULTS, *machine.FAULTS, *controls.FAULTS, *places.FAULTS,
+                             *programs.FAULTS)
+BESIDE = ("lengths at the machine", "measured part", "check program", programs.ROOM)
 """rooms whose faults change no conversion: tests alone are asked"""
 BATTERY: dict[str, tuple[str, ...]] = {
     "reader": ("flat linuxcnc", "flat siemens", "contact", "inch", "creo", "five linuxcnc"),
@@ -78,6 +80,7 @@ TESTS: dict[str, tuple[str, ...]] = {
     "lengths at the machine": ("postproc/verification/test_length_margins.py",),
     "measured part": ("postproc/alignment/test_align.py",),
     "check program": ("postproc/pipeline/test_check_program.py",),
+    programs.ROOM: ("postproc/readback/test_frames_and_patterns.py", "postproc/readback/test_frames_by_matrices.py"),
     "proof": ("postproc/readback/test_readback.py", "postproc/readback/test_program_mutation.py",
               "postproc/readback/test_pecks_dwells_ends.py"),
 }

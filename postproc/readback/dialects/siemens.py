@@ -93,6 +93,7 @@ class SiemensReader(Reader):
         """Blocks of plain words at once; those with names, calls and = one by one."""
         text = _COMMENT.sub(lambda m: m[1] or b"", lines_of(data)).upper()
         self.programs = [(text.count(b"\n", 0, m.start()) + 1, m[1].decode()) for m in _PROGRAM.finditer(text)]
+        self.mains = [m[1].decode() for m in _PROGRAM.finditer(text) if m[2] == b"MPF"]
         text, found = block_delete(_PROGRAM.sub(b"", text), file)
         text, special = _apart(text)
         words, more = read_words(text, file)
@@ -115,11 +116,14 @@ class SiemensReader(Reader):
         return super().check(plain.take(plain.letter != ord(STATEMENT)), file)
 
     def structure(self, text: ProgramText, file: str) -> tuple[Structure, list[Diagnostic]]:
-        """Programs begin at %_N_ lines; a name or an L number that is one's calls it, P times."""
+        """Programs begin at %_N_ lines, the main one is what stands before them, else the first MPF, else the first; a
+        name or an L number that is one's calls it, P times."""
         words, lines = text.words, text.words.lines
         starts = [*self.programs, (lines + 1, "")]
         spans = {name: (a, starts[k + 1][0] - 1) for k, (a, name) in enumerate(starts[:-1])}
-        main = next(iter(spans.values()), (1, lines)) if len(spans) > 1 else (1, lines)
+        main = (1, starts[0][0] - 1)
+        if self.programs and not (words.line < starts[0][0]).any():
+            main = spans[next(iter([*self.mains, self.programs[0][1]]))]
         back = set(codes(words, "M", (17,))[0].tolist())
         where, index = words.pick(STATEMENT)
         named = [(int(b), text.statements[int(k)]) for b, k in zip(where, index, strict=True)]

@@ -32,7 +32,8 @@ _NEEDED = {
     "siemens": re.compile(
         rb"\b(?:DEF|IF|GOTO[FBCS]?|FOR|WHILE|REPEATB?|LOOP|CASE|EXTERN|A?TRANS|A?ROTS?|A?SCALE|A?MIRROR|HOLES[12]|CYCLE801|EXTCALL|SETAL|G53|G153|G20|G21)\b"
         rb"|\bR\d+[ \t]*=|=[ \t]*[-+]*[ \t]*(?!(?:IC|AC|DC|ACP|ACN)[ \t]*\([ \t]*[-+.\d]+[ \t]*\))[A-Z_$(\[]"
-        rb"|=[ \t]*[-+]?[\d.]+[ \t]*[-+*/]|\bT[ \t]*=[ \t]*\"|\bPROC\b[^\n]*\("),
+        rb"|=[ \t]*[-+]?[\d.]+[ \t]*[-+*/]|\bT[ \t]*=[ \t]*\"|\bPROC\b[^\n]*(?:\(|\bSAVE\b)"
+        rb"|\bMCALL[ \t]+(?!CYCLE8)[A-Z_]"),
     "klartext": re.compile(rb"DECLARE STRING|FN[ \t]*\d+[ \t]*:"
                            rb"|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}
 _CONTINUED = re.compile(rb"~[ \t]*\n")
@@ -40,7 +41,7 @@ _COMMENT, _STRING = re.compile(rb";[^\n]*"), re.compile(rb'(?<!T=)"[^"\n]*"')
 _SIGNS = re.compile(rb"=[ \t]*[-+]*[ \t]*(?:[A-Z_$(\[]|[\d.]+[ \t]*[-+*/])")
 _PARAMETERS = re.compile(rb"R\d+[ \t]*=")
 _WORDS = (b"DEF", b"IF", b"GOTO", b"FOR", b"WHILE", b"REPEAT", b"LOOP", b"CASE", b"EXT", b"TRANS", b"ROT", b"SCALE",
-          b"MIRROR", b"HOLES", b"CYCLE801", b"SETAL", b"G53", b"G153", b"G20", b"G21", b"PROC", b'"')
+          b"MIRROR", b"HOLES", b"CYCLE801", b"SETAL", b"G53", b"G153", b"G20", b"G21", b"PROC", b"MCALL", b'"')
 """one of these, signs or parameters stand where `_NEEDED` finds anything in a program of SINUMERIK: absent is soon known"""
 
 

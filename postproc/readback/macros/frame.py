@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 FrameRow = tuple[float, float, float]
 FrameTurn = tuple[FrameRow, FrameRow, FrameRow]
@@ -32,6 +33,13 @@ class CoordinateFrame:
     def turned(self) -> bool:
         """True where it does more than shift."""
         return self.turn != UNTURNED
+
+    @property
+    def square(self) -> bool:
+        """True where its axes are square to one another, as those of one rotation, then scales and mirrors, always are."""
+        columns = [_row(row[j] for row in self.turn) for j in range(3)]
+        return all(abs(sum(a * b for a, b in zip(u, v, strict=True))) <= 1e-9 * math.hypot(*u) * math.hypot(*v)
+                   for u, v in combinations(columns, 2))
 
     def before(self, inner: CoordinateFrame) -> CoordinateFrame:
         """The frame in which `inner` is stated in the coordinates of this one."""

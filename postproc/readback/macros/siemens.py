@@ -8,8 +8,9 @@ from pathlib import PurePath
 
 from postproc.readback.macros.expressions import Cursor, MacroFault
 from postproc.readback.macros.held import Held
-from postproc.readback.macros.siemens_expressions import SiemensValue, equal, expression, number, skip, take
+from postproc.readback.macros.siemens_expressions import SiemensValue, equal, expression, number, skip, split_values, take
 from postproc.readback.macros.siemens_rows import Listing, SiemensRow, listing
+from postproc.readback.macros.siemens_saved import SavedModes
 from postproc.readback.macros.siemens_variables import KINDS, DeclaredVariable, SiemensNames
 from postproc.readback.macros.siemens_words import SiemensWords
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
@@ -22,6 +23,7 @@ _TARGET = re.compile(r"[A-Z_][A-Z0-9_]*|\d+")
 _PARAMETER = re.compile(r"(VAR )?[ \t]*(REAL|INT|BOOL|CHAR|AXIS|STRING)[ \t]*(?:\[\d+\])?[ \t]*([A-Z_][A-Z0-9_]*)"
                         r"[ \t]*(?:=[ \t]*([^,]+))?")
 _PROC = re.compile(r"PROC[ \t]+[A-Z_][A-Z0-9_]*[ \t]*(?:\(([^()]*)\))?")
+_SAVE = re.compile(r"(?<![A-Z0-9_])SAVE(?![A-Z0-9_])")
 _CASE = re.compile(r"[ \t]*DEFAULT(?![A-Z0-9_])")
 _COUNT = re.compile(r"(?<![A-Z0-9_])P[ \t]*=?[ \t]*(?=[\dR(])")
 
@@ -30,7 +32,8 @@ _COUNT = re.compile(r"(?<![A-Z0-9_])P[ \t]*=?[ \t]*(?=[\dR(])")
 class SiemensLevel:
     """A program, or a part of one that is repeated, that runs: rows first..last, the next, its variables, how often again.
 
-    `back`: variables of the caller that take over values of its own at the end; `part`: ends at its last row.
+    `back`: variables of the caller that take over values of its own at the end; `part`: ends at its last row; `saved`: what
+    SAVE gives the caller back.
     """
 
     source: SourceFile
@@ -43,6 +46,7 @@ class SiemensLevel:
     back: dict[str, tuple[str, tuple[SiemensValue, ...]]] = field(default_factory=dict)
     ends: dict[int, float] = field(default_factory=dict)
     modal: bool = False
+    saved: SavedModes | None = None
 
 
 class SiemensMacros:
@@ -77,7 +81,7 @@ class SiemensMacros:
         """From the first row to M30, or the end of the main program."""
         first = self.sources.read[0]
         made = self.listed(first)
-        start, last = next(iter(made.programs.values()), (0, len(made.rows) - 1))
+        start, last = made.main
         self._push(SiemensLevel(first, start, last, start, {}))
         while self.levels and not self.ended:
             level = self.levels[-1]
@@ -279,8 +283,11 @@ class SiemensMacros:
             raise MacroFault("gcode.subprogram", f"there is no subprogram {name}",
                              f"put it next to the program, as {name}.SPF")
         local, back = self._parameters(span, given)
+        head = next((row.body for row in self.listed(span[0]).rows[span[1]:span[2] + 1] if row.head == "PROC"), "")
+        saved = self.words.saved() if _SAVE.search(head) else None
         if times > 0:
-            self._push(SiemensLevel(*span, span[1], local, times, back=back, modal=modal or self.levels[-1].modal))
+            self._push(SiemensLevel(*span, span[1], local, times, back=back, modal=modal or self.levels[-1].modal,
+                                    saved=saved))
 
     def _parameters(self, span: tuple[SourceFile, int, int], given: str,
                     ) -> tuple[dict[str, DeclaredVariable], dict[str, tuple[str, tuple[SiemensValue, ...]]]]:
@@ -288,7 +295,7 @@ class SiemensMacros:
         rows = self.listed(span[0]).rows
         head = next((m for k in range(span[1], span[2] + 1) if (m := _PROC.match(rows[k].body))), None)
         stated = _PARAMETER.finditer(head[1]) if head and head[1] else iter(())
-        values = self.words.split(given)
+        values = split_values(given)
         local: dict[str, DeclaredVariable] = {}
         back: dict[str, tuple[str, tuple[SiemensValue, ...]]] = {}
         count = 0
@@ -311,6 +318,8 @@ class SiemensMacros:
             self.levels.pop()
         level = self.levels[-1]
         level.times -= 1
+        if level.saved is not None:
+            self.words.give_back(level.saved, self.line)
         if level.times > 0:
             level.at = level.first
             return

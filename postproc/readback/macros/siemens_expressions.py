@@ -236,3 +236,29 @@ def _function(name: str, given: list[SiemensValueLater], c: Cursor) -> SiemensVa
         except (TypeError, ValueError) as why:
             raise fault from why
     return made
+
+
+def split_values(given: str) -> list[str]:
+    """The values of a call, by the commas between them."""
+    parts, depth, last, inside = list[str](), 0, 0, False
+    for k, sign in enumerate(given):
+        inside ^= sign == '"'
+        depth += 0 if inside else (sign in "([") - (sign in ")]")
+        if sign == "," and not depth and not inside:
+            parts.append(given[last:k])
+            last = k + 1
+    return [*parts, given[last:]] if given.strip() else []
+
+
+def axis_values(c: Cursor, names: Names) -> dict[str, float]:
+    """What a frame states: values by axis, or RPL, up to the end of its row."""
+    given = dict[str, float]()
+    while True:
+        skip(c)
+        if c.done:
+            return given
+        key = c.match(re.compile(r"[A-Z]+"))
+        if not key or key in given:
+            raise c.fault(f"{key} stands twice" if key else "not a block of words")
+        take(c, "=")
+        given[key] = number(expression(c, names))

@@ -34,11 +34,26 @@ class SiemensRow:
 
 @dataclass
 class Listing:
-    """A file: its rows; programs by name with their first and last row; the partner of each row of a loop or IF."""
+    """A file: its rows; programs by name with their first and last row; the partner of each row of a loop or IF.
+
+    `main`: first and last row of the program that runs first: rows before any %_N_ row, else the first MPF, else the first.
+    """
 
     rows: list[SiemensRow]
+    main: tuple[int, int] = (0, -1)
     programs: dict[str, tuple[int, int]] = field(default_factory=dict)
     partner: dict[int, int] = field(default_factory=dict)
+
+
+@dataclass
+class RowDone:
+    """What a row has done: moved an axis, ended the program, returned; the call that follows; what MCALL names."""
+
+    moved: bool = False
+    ended: bool = False
+    back: bool = False
+    call: tuple[str, str, int] | None = None
+    modal: tuple[str, str] | None = None
 
 
 def siemens_rows(data: bytes, file: str) -> tuple[list[str], list[Diagnostic]]:
@@ -66,9 +81,15 @@ def row_of(text: str) -> SiemensRow:
 def listing(source: SourceFile) -> Listing:
     """A file's rows, and what belongs together in them."""
     made = Listing([row_of(text) for text in source.rows])
-    starts = [(k, m[1]) for k, text in enumerate(source.rows) if (m := _BEGINS.match(text.strip()))]
-    for n, (k, name) in enumerate(starts):
-        made.programs[name] = (k + 1, (starts[n + 1][0] if n + 1 < len(starts) else len(source.rows)) - 1)
+    starts = [(k, m[1], m[2]) for k, text in enumerate(source.rows) if (m := _BEGINS.match(text.strip()))]
+    ends = [k for k, _, _ in starts[1:]] + [len(source.rows)]
+    for (k, name, _), end in zip(starts, ends, strict=False):
+        made.programs[name] = (k + 1, end - 1)
+    before = made.rows[:starts[0][0]] if starts else made.rows
+    if any(row.body and not row.body.startswith("%") for row in before) or not starts:
+        made.main = (0, len(before) - 1)
+    else:
+        made.main = made.programs[next((name for _, name, kind in starts if kind == "MPF"), starts[0][1])]
     open_: list[tuple[str, int]] = []
     for k, row in enumerate(made.rows):
         if row.head in _CLOSES:

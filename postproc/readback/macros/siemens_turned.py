@@ -11,7 +11,7 @@ import math
 import re
 
 from postproc.readback.macros.expressions import MacroFault, written
-from postproc.readback.macros.frame import AXES, CoordinateFrame
+from postproc.readback.macros.frame import AXES, IN_PLANE, CoordinateFrame
 from postproc.readback.macros.track import Track
 
 CENTRES = "IJK"
@@ -90,9 +90,10 @@ class TurnedBlocks:
         if self.on and (self.oriented or any(w.startswith("CYCLE800(") for w in out)):
             raise MacroFault("gcode.frame_turned", "a frame that turns, scales or mirrors next to TRAORI or before CYCLE800 "
                              "is not executed", "write ROT alone before it, to cancel the frame")
-        self._judge(size, out, bool(ends))
+        goes = bool(ends or centres)
+        self._judge(size, out, goes)
         made = [self._changed(w, size) for w in out]
-        if (ends or not self.on) and self.motion is not None and not any(
+        if (goes or not self.on) and self.motion is not None and not any(
                 (m := _CODE.fullmatch(w)) and int(m[1]) in _MOTION for w in out):
             code = self._swapped(self.motion, size)
             made = [*([f"G{code}"] if code != self.written else []), *made]
@@ -101,7 +102,11 @@ class TurnedBlocks:
             self.written = None
         start = {a: self.track.at[a] for a in AXES if a in self.track.at}
         moved = self._ends(ends)
-        return [*made, *moved, *self._centres(centres, start, bool(ends)), *self._radius(radius, size)]
+        return [*made, *moved, *self._centres(centres, start), *self._radius(radius, size)]
+
+    def drills(self, frame: CoordinateFrame) -> bool:
+        """True where holes of the plane in force keep direction and depth in a frame."""
+        return frame.keeps(IN_PLANE[self.track.plane][2])
 
     def _swapped(self, code: int, size: float) -> int:
         return _OTHER.get(code, code) if size < 0.0 else code
@@ -118,7 +123,7 @@ class TurnedBlocks:
             raise MacroFault("gcode.frame_turned", "a circle, or G41 and G42, in a frame that turns the plane, or scales "
                              "its axes unequally", _HINT)
         drills = any(re.match(r"CYCLE8\d", w) for w in out)
-        if drills and not (self.frame.keeps(2) and not math.isnan(size)):
+        if drills and not self.drills(self.frame):
             raise MacroFault("gcode.frame_turned", "a drilling cycle in a frame that turns or scales the tool's axis", _HINT)
 
     def _ends(self, ends: dict[str, float]) -> list[str]:
@@ -140,7 +145,7 @@ class TurnedBlocks:
             made.append(f"{axis}=AC({written(value / self.track.unit)})")
         return made
 
-    def _centres(self, centres: dict[str, tuple[float, bool]], start: dict[str, float | None], moves: bool) -> list[str]:
+    def _centres(self, centres: dict[str, tuple[float, bool]], start: dict[str, float | None]) -> list[str]:
         """I, J, K from the begin of the block."""
         if not centres or self.motion not in (2, 3):
             return []

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from postproc.readback.macros.expressions import Cursor, MacroFault, written
-from postproc.readback.macros.frame import AXES, rotated, scaled, shifted
+from postproc.readback.macros.frame import AXES, IN_PLANE, CoordinateFrame, rotated, scaled, shifted
 from postproc.readback.macros.held import Held
-from postproc.readback.macros.siemens_expressions import NAME, SiemensValue, expression, indices, number, skip, take
+from postproc.readback.macros.siemens_expressions import (
+    NAME,
+    SiemensValue,
+    axis_values,
+    expression,
+    indices,
+    number,
+    skip,
+    split_values,
+    take,
+)
 from postproc.readback.macros.siemens_patterns import PATTERNS, positions
+from postproc.readback.macros.siemens_rows import RowDone
+from postproc.readback.macros.siemens_saved import SavedModes, codes_back, take_code
 from postproc.readback.macros.siemens_turned import CENTRES, TurnedBlocks
 from postproc.readback.macros.siemens_variables import SiemensNames
 from postproc.readback.macros.word_blocks import Blocks, coded
@@ -26,17 +37,6 @@ _WHOLE = frozenset("GMTDHLPN")
 _NEVER = frozenset({"MCALL", "CALL", "EXTCALL"})
 
 
-@dataclass
-class RowDone:
-    """What a row has done: moved an axis, ended the program, returned; the call that follows; what MCALL names."""
-
-    moved: bool = False
-    ended: bool = False
-    back: bool = False
-    call: tuple[str, str, int] | None = None
-    modal: tuple[str, str] | None = None
-
-
 class SiemensWords:
     """Words of rows; `runnable` says which names are those of subprograms."""
 
@@ -48,6 +48,8 @@ class SiemensWords:
         self.turned = TurnedBlocks(self.track)
         self.patterns: dict[str, int] = {}
         self.drilled_level: float | None = None
+        self.modal_subprogram = ""
+        self.codes: dict[str, int] = {}
         self.unknown_tools: dict[str, int] = {}
         self.line = 0
 
@@ -74,11 +76,12 @@ class SiemensWords:
             if "MCALL" in out:
                 out.remove("MCALL")
                 done.modal = calls[-1]
+                self.modal_subprogram = calls[-1][0]
             else:
                 done.call = (*calls[-1], times)
         elif out == ["MCALL"]:
             done.modal = ("", "")
-            self.drilled_level = None
+            self.drilled_level, self.modal_subprogram = None, ""
         elif "MCALL" in out:
             self.drilled_level = self._level()
         out = self._framed(out, machine)
@@ -105,6 +108,7 @@ class SiemensWords:
         for m in re.finditer(r"(?<![A-Z0-9_])G[ \t]*0*(\d+)(?![A-Z0-9_.])", body):
             code = int(m[1])
             self.turned.codes(code)
+            take_code(self.codes, code)
             if code in (70, 71, 700, 710, 20, 21):
                 self.track.unit = 25.4 if code in (70, 700, 20) else 1.0
             elif code in (90, 91):
@@ -131,6 +135,8 @@ class SiemensWords:
         if key is None:
             raise c.fault("not a block of words")
         c.at = key.end()
+        if _FRAMES.fullmatch(key[1]):
+            raise c.fault(f"{key[1]} next to other words: a frame stands in a block of its own")
         index: tuple[SiemensValue, ...] = tuple(indices(c, self.names)) if take(c, "[") else ()
         if not c.text.startswith("==", c.at) and take(c, "="):
             self._assigned(key[1], index, c, out, machine, done)
@@ -174,6 +180,9 @@ class SiemensWords:
         if not turned.on or machine:
             return False
         if key in AXES and key in self.held.axes:
+            if how not in (None, "AC", "IC"):
+                raise MacroFault("gcode.frame_turned", f"{key}={how}(...) in a frame that turns, scales or mirrors",
+                                 "AC() or IC(): DC, ACP and ACN are for rotary axes, CAC, CIC and CDC coded positions")
             done.moved = True
             turned.end(key, value * track.unit, track.absolute if how is None else how == "AC")
         elif key in CENTRES:
@@ -258,17 +267,6 @@ class SiemensWords:
         self.unknown_tools.setdefault(name, self.line)
         return 30_000 + list(self.unknown_tools).index(name)
 
-    def split(self, given: str) -> list[str]:
-        """The values of a call, by the commas between them."""
-        parts, depth, last, inside = list[str](), 0, 0, False
-        for k, sign in enumerate(given):
-            inside ^= sign == '"'
-            depth += 0 if inside else (sign in "([") - (sign in ")]")
-            if sign == "," and not depth and not inside:
-                parts.append(given[last:k])
-                last = k + 1
-        return [*parts, given[last:]] if given.strip() else []
-
     def _function(self, name: str, c: Cursor, out: list[str], calls: list[tuple[str, str]]) -> None:
         """NAME(...): a subprogram, or a cycle with its values written out."""
         start, depth, inside = c.at, 1, False
@@ -290,7 +288,7 @@ class SiemensWords:
     def _values(self, name: str, given: str) -> list[str]:
         """Values of a cycle, levels in the coordinates of the set-up's work offset."""
         made = []
-        for k, part in enumerate(self.split(given)):
+        for k, part in enumerate(split_values(given)):
             part = part.strip()
             bare = NAME.fullmatch(part)
             if not part or (bare and not self.names.known(part)):
@@ -304,7 +302,7 @@ class SiemensWords:
             if isinstance(value, str):
                 made.append(f'"{value}"')
                 continue
-            shift = self._level() / self.track.scale("Z") if k in _LEVELS.get(name, ()) else 0.0
+            shift = self._level() / self.track.unit if k in _LEVELS.get(name, ()) else 0.0
             if name == "CYCLE800" and any(self.track.shift(a) for a in self.held.axes):
                 raise MacroFault("gcode.mode", "CYCLE800 in coordinates that TRANS has shifted is not executed",
                                  "write TRANS alone before it, and state the origin in CYCLE800")
@@ -313,16 +311,7 @@ class SiemensWords:
 
     def _frame(self, head: str, c: Cursor) -> None:
         """TRANS, ROT, SCALE, MIRROR start from the work offset, ATRANS, AROT, ASCALE, AMIRROR go on."""
-        given = dict[str, float]()
-        while True:
-            skip(c)
-            if c.done:
-                break
-            key = c.match(re.compile(r"[A-Z]+"))
-            if not key:
-                raise c.fault("not a block of words")
-            take(c, "=")
-            given[key] = number(expression(c, self.names))
+        given = axis_values(c, self.names)
         kind = head.removeprefix("A") if head != "A" else head
         if kind == "ROTS" and given:
             raise MacroFault("gcode.frame_turned", f"{head} with solid angles is not executed", "ROT with X, Y, Z or RPL")
@@ -348,27 +337,52 @@ class SiemensWords:
             if axis not in AXES:
                 self.track.local[axis] += mm[axis]
                 self.track.shifted = True
-        self.turned.take(frame if fresh else self.turned.frame.before(frame))
-        if self.drilled_level is not None and self._level() != self.drilled_level:
-            raise MacroFault("gcode.frame_turned", "a frame moves the tool's axis while MCALL holds a drilling cycle",
+        self._in_force(frame if fresh else self.turned.frame.before(frame))
+
+    def _in_force(self, frame: CoordinateFrame) -> None:
+        """Another frame; a drilling cycle under MCALL keeps its axis and level."""
+        if not frame.square:
+            raise MacroFault("gcode.frame_turned", "a rotation behind SCALE of unequal factors is not executed: the axes of "
+                             "the frame are no longer square to one another", "rotate first, then scale")
+        self.turned.take(frame)
+        moves = self._level() != self.drilled_level or not self.turned.drills(self.turned.frame)
+        if self.drilled_level is not None and moves:
+            raise MacroFault("gcode.frame_turned", "a frame moves or turns the tool's axis while MCALL holds a cycle",
                              "write MCALL alone before it, and call the cycle again behind it")
+
+    def saved(self) -> SavedModes:
+        """What SAVE keeps."""
+        return SavedModes(dict(self.codes), self.turned.frame, dict(self.track.local))
+
+    def give_back(self, saved: SavedModes, line: int) -> None:
+        """The caller's frame and codes in force again."""
+        self.track.local.clear()
+        self.track.local.update(saved.local)
+        self._in_force(saved.frame)
+        if codes := codes_back(saved, self.codes):
+            self.row("", Cursor(codes), line)
 
     def _level(self) -> float:
         """mm by which levels of cycles lie higher in the work offset."""
-        return self.turned.frame.shift[2] if self.turned.on else self.track.shift("Z")
+        normal = IN_PLANE[self.track.plane][2]
+        return self.turned.frame.shift[normal] if self.turned.on else self.track.shift(AXES[normal])
 
     def _pattern(self, name: str, given: str, out: list[str]) -> None:
         """A block for each place of a pattern; the code of motion holds on behind it."""
-        values = [self._value(part) for part in self.split(given)]
+        if self.modal_subprogram:
+            raise MacroFault("gcode.cycle", f"{name} while MCALL names the program {self.modal_subprogram} is not executed",
+                             "state the places one by one, in blocks under MCALL")
+        values = [self._value(part) for part in split_values(given)]
+        first, second, _ = (AXES[k] for k in IN_PLANE[self.track.plane])
         try:
-            here = self.track.position("X") / self.track.unit, self.track.position("Y") / self.track.unit
+            here = self.track.position(first) / self.track.unit, self.track.position(second) / self.track.unit
         except MacroFault:
             here = None
         self.patterns.setdefault(name, self.line)
         motion = self.turned.motion
         for x, y in positions(name, values, here):
             self.blocks.count(self.line)
-            self.row("", Cursor(f"G0 X=AC({written(x)}) Y=AC({written(y)})"), self.line)
+            self.row("", Cursor(f"G0 {first}=AC({written(x)}) {second}=AC({written(y)})"), self.line)
         if motion is not None:
             out.append(f"G{motion}")
             self.turned.motion = motion

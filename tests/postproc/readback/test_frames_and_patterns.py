@@ -10,7 +10,7 @@ import pytest
 from postproc.readback.dialects.readers import reader_for
 from tests.postproc.kit import machine
 from tests.postproc.readback.test_macros import HEAD, LINUXCNC, SINUMERIK, track
-from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, control, controller, executed, faults
+from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, control, controller, executed, faults, good, words
 
 CYCLE = "G0 Z10\nF100 S100 M3\nMCALL CYCLE81(5,0,2,-3)\n"
 
@@ -70,10 +70,18 @@ def test_motion_and_side_are_those_of_the_program_behind_a_mirror() -> None:
 
 @pytest.mark.parametrize(("body", "line"), [
     ("SCALE X2\nG1 F9 X5\nG3 X0 Y5 I-5 J0\n", 5), ("ROT X30\nG1 F9 X5\nG3 X0 Y5 I-5 J0\n", 5), ("ROTS X5 Y6\n", 3),
-    ("SCALE X0\n", 3), ("ROT X90\nMCALL CYCLE81(5,0,2,-3)\n", 4), ("MCALL CYCLE81(5,0,2,-3)\nTRANS Z5\n", 4),
+    ("SCALE X0\n", 3), ("ROT X90\nG1 F9 X5\nG2 I-5\n", 5), ("SCALE X2\nAROT Z45\n", 4), ("ROT Z30\nX=DC(5)\n", 4),
+    ("MCALL CYCLE81(5,0,2,-3)\nROT X90\n", 4), ("MCALL CYCLE81(5,0,2,-3)\nMIRROR Z0\n", 4),
+    ("MCALL CYCLE81(5,0,2,-3)\nSCALE Z2\n", 4), ("G18\nMIRROR Y0\nCYCLE81(5,0,2,-3)\n", 5),
+    ("ROT X90\nMCALL CYCLE81(5,0,2,-3)\n", 4), ("MCALL CYCLE81(5,0,2,-3)\nTRANS Z5\n", 4),
     ("G41 X5\nMIRROR X0\n", 4), ("ROT Z90\nTRAORI\n", 4), ("ROT Z90\nCYCLE800(0,\"\",0,57,0,0,0,0,0,0,0,0,0)\n", 4)])
 def test_what_no_plain_block_says_is_refused(body: str, line: int) -> None:
     assert faults(SIEMENS, SINUMERIK + body + "M30\n") == {"gcode.frame_turned": [line]}
+
+
+@pytest.mark.parametrize("row", ["G90 TRANS X10", "TRANS X1 X2", "ROT Z30 X"])
+def test_a_frame_stands_alone_in_its_block(row: str) -> None:
+    assert faults(SIEMENS, SINUMERIK + row + "\nM30\n") == {"gcode.expression": [3]}
 
 
 def test_a_frame_asks_for_positions_that_it_needs() -> None:
@@ -93,6 +101,55 @@ def test_a_frame_asks_for_positions_that_it_needs() -> None:
     ("R1=2\nTRANS X5\nHOLES1(R1, 0, 0, 0, 1, R1)\nTRANS", [[7, 0], [8, 0]])])
 def test_patterns_drill_at_their_places(call: str, places: list[list[float]]) -> None:
     assert holes(call + "\n") == places
+
+
+@pytest.mark.parametrize(("body", "places"), [
+    ("G18\nMCALL CYCLE81(5,0,2,-3)\nHOLES1(1, 2, 0, 0, 10, 2)\n", [[2, -3, 1], [2, -3, 11]]),
+    ("G18\nTRANS Y1 Z5\nMCALL CYCLE81(5,0,2,-3)\nX1\n", [[1, -2, 0]]),
+    ("G19\nATRANS X4\nMCALL CYCLE81(5,0,2,-3)\nHOLES2(1, 2, 5, 90, 0, 1)\n", [[1, 1, 7]])])
+def test_holes_of_other_planes_lie_in_those_planes(body: str, places: list[list[float]]) -> None:
+    motion = good(SIEMENS, SINUMERIK + body + "MCALL\nM30\n")
+    assert words(motion)[0] == [0, 0, 0] and [words(motion)[k] for k in np.flatnonzero(motion.code == 1)] == places
+
+
+SUBPROGRAM = "%_N_DEEP_SPF\nPROC DEEP\nG0 Z-3\nZ0\nM17\n"
+
+
+@pytest.mark.parametrize("before", ["", "R1=1\n"])
+def test_mcall_calls_a_subprogram_behind_each_block_that_moves(before: str) -> None:
+    text = SINUMERIK + before + "MCALL DEEP\nX1\nX2\nMCALL\nX3\nM30\n" + SUBPROGRAM
+    assert words(good(SIEMENS, text))[1:] == [[1, 0, 0], [1, 0, -3], [1, 0, 0], [2, 0, 0], [2, 0, -3], [2, 0, 0], [3, 0, 0]]
+
+
+@pytest.mark.parametrize("call", ["HOLES1(0,0,0,5,10,2)", "HOLES2(0,0,10,0,0,3)", "CYCLE801(0,0,0,1,1,2,2)"])
+def test_patterns_under_mcall_of_a_subprogram_are_refused(call: str) -> None:
+    body = f"MCALL DEEP\n{call}\nMCALL\nM30\n"
+    assert faults(SIEMENS, SINUMERIK + body + SUBPROGRAM) == {"gcode.cycle": [4]}
+    assert not faults(SIEMENS, SINUMERIK + body.replace("\nHOLES", "\nMCALL\nHOLES").replace("CYCLE801", "MCALL\nCYCLE801")
+                      + SUBPROGRAM)
+
+
+@pytest.mark.parametrize("before", ["", "R1=1\n"])
+@pytest.mark.parametrize("archive", ["{main}%_N_DEEP_SPF\nX7\nM17\n%_N_LAST_SPF\nX8\nM17\n", "{main}%_N_DEEP_SPF\nX7\nM17\n",
+                                     "; all\n%_N_DEEP_SPF\nX7\nM17\n%_N_PART_MPF\n{main}"])
+def test_the_program_that_runs_first_of_an_archive(archive: str, before: str) -> None:
+    """What stands before all %_N_ rows, else the first main program, wherever it stands."""
+    text = archive.format(main=SINUMERIK + before + "DEEP\nX1\nM30\n")
+    assert words(good(SIEMENS, text)) == [[0, 0, 0], [7, 0, 0], [1, 0, 0]]
+
+
+@pytest.mark.parametrize(("inside", "ends"), [
+    ("G91 X1", [[1, 0, 0], [2, 0, 0]]), ("TRANS X5\nX1", [[6, 0, 0], [2, 0, 0]]),
+    ("MIRROR X0\nG18 G1 F100 X1", [[-1, 0, 0], [2, 0, 0]]), ("G700\nX1", [[25.4, 0, 0], [2, 0, 0]])])
+def test_save_gives_the_caller_its_codes_and_frame_back(inside: str, ends: list[list[float]]) -> None:
+    text = SINUMERIK + "DEEP\nX2\nM30\n%_N_DEEP_SPF\nPROC DEEP SAVE DISPLOF\n" + inside + "\nM17\n"
+    motion = good(SIEMENS, text)
+    assert words(motion)[1:] == ends and motion.code[-1] == 0
+
+
+def test_save_asks_for_codes_that_nothing_states() -> None:
+    text = SINUMERIK + "DEEP\nX2\nM30\n%_N_DEEP_SPF\nPROC DEEP SAVE\nG60 X1\nM17\n"
+    assert faults(SIEMENS, text) == {"gcode.mode": [9]}
 
 
 def test_patterns_leave_the_code_of_motion() -> None:
