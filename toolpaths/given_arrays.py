@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TypeVar
+
 import numpy as np
 import numpy.typing as npt
 
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 
+Listed = TypeVar("Listed")
 CLOSE = 0.01
 """mm that the begin and the end of an arc may be off its circle"""
 
@@ -29,8 +33,8 @@ class GivenArrays:
         """(N,) or (N, width) finite numbers, from one value or row for all of them; with `gaps` NaN stands for none."""
         shape = (self.rows, width) if width else (self.rows,)
         try:
-            a = np.array(np.broadcast_to(np.asarray(values, np.float64), shape))
-        except (TypeError, ValueError):
+            a = np.array(np.broadcast_to(_numbers(values), shape))
+        except (TypeError, ValueError, OverflowError):
             self.fault(f"{name} is no array of numbers of shape {shape}: {_shown(values)}",
                        f"give {name} as {shape}, or one {'row' if width else 'number'} for all rows of tip")
             return np.full(shape, np.nan)
@@ -58,7 +62,15 @@ class GivenArrays:
         if a.dtype != np.bool_:
             self.fault(f"{name} is of type {a.dtype}", f"give {name} as True or False for each row")
             return np.zeros(self.rows, bool)
-        return np.asarray(self.floats(name, a) != 0.0)
+        return np.asarray(self.floats(name, a.astype(np.float64)) != 0.0)
+
+    def listed(self, name: str, values: object, kind: type[Listed]) -> tuple[Listed, ...]:
+        """The values of a list, each of `kind`."""
+        given = tuple(values) if isinstance(values, Sequence) else (values,)
+        if not isinstance(values, Sequence) or not all(isinstance(one, kind) for one in given):
+            types = ", ".join(sorted({type(one).__name__ for one in given}))
+            self.fault(f"{name} is no list of {kind.__name__}: found {types}", f"give a list of {kind.__name__}")
+        return tuple(one for one in given if isinstance(one, kind))
 
     def require(self) -> None:
         """Raise what was found.
@@ -68,6 +80,20 @@ class GivenArrays:
         """
         if self.found:
             raise DiagnosticError(self.found)
+
+
+def _numbers(values: npt.ArrayLike) -> Floats:
+    """Numbers as float64, NaN where an array is masked.
+
+    Raises:
+        TypeError, ValueError, OverflowError: complex numbers, flags, texts, dates, rows of different lengths.
+    """
+    a = np.asanyarray(values)
+    if a.dtype.kind not in "fiuO":
+        raise TypeError(f"no numbers: {a.dtype}")
+    if isinstance(a, np.ma.MaskedArray):
+        return np.where(np.ma.getmaskarray(a), np.nan, np.ma.getdata(a).astype(np.float64))
+    return np.asarray(a, np.float64)
 
 
 def _shown(values: npt.ArrayLike) -> str:
@@ -85,8 +111,8 @@ def given_rows(tip: npt.ArrayLike, file: str) -> tuple[GivenArrays, Floats]:
         DiagnosticError: where the tips are no such array.
     """
     try:
-        a = np.asarray(tip, np.float64)
-    except (TypeError, ValueError):
+        a = _numbers(tip)
+    except (TypeError, ValueError, OverflowError):
         a = np.zeros(0)
     given = GivenArrays(len(a) if a.ndim else 0, file)
     if a.ndim != 2 or a.shape[1] != 3 or not len(a):

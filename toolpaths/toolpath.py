@@ -280,7 +280,9 @@ class Toolpath:
             DiagnosticError: names each array that is wrong, with its rows.
         """
         g, tips = given_rows(tip, file)
-        arcs = Arcs.none() if arcs is None else arcs
+        arcs = Arcs.none() if arcs is None else next(iter(g.listed("arcs", [arcs], Arcs)), Arcs.none())
+        cycles, tools = g.listed("cycles", cycles, Cycle), g.listed("tools", tools, Tool)
+        operations, events = g.listed("operations", operations, Operation), g.listed("events", events, Event)
         arc_, cycle_ = g.whole("arc", arc, -1, len(arcs)), g.whole("cycle", cycle, -1, len(cycles))
         tool_, operation_ = g.whole("tool", tool, 0, len(tools)), g.whole("operation", operation, 0, len(operations))
         feeds, mode = g.floats("feed", feed, gaps=True), g.whole("feed_mode", feed_mode, 0, len(FeedMode))
@@ -323,8 +325,9 @@ def _records(given: GivenArrays, events: Sequence[Event], tool: Ints, tools: Seq
     index = [e.index for e in events]
     if index != sorted(index) or any(not 0 <= k <= given.rows for k in index):
         given.fault(f"events act before rows {index[:6]}", f"give them in order, each with an index of 0 to {given.rows}")
-    if spindle is not None and (not np.isfinite(spindle) or spindle == 0.0):
-        given.fault(f"spindle is {spindle:g}", "give rev/min, negative for anti-clockwise")
+    if spindle is not None and (not isinstance(spindle, (int, float, np.number)) or not np.isfinite(spindle) or not spindle):
+        given.fault(f"spindle is {spindle!r}", "give rev/min, negative for anti-clockwise")
+        spindle = None
     loaded = {e.index for e in events if e.word == "LOADTL"}
     own = [Event(k, "LOADTL", (float(tools[tool[k]].number),), k + 1)
            for k in (0, *(np.flatnonzero(np.diff(tool)) + 1).tolist()) if k not in loaded and len(tools)]

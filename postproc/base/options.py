@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
+from postproc.base.given import faults_of
 from postproc.base.header_words import chosen_axes, feed_line, hooks_line, setup_line
 from toolpaths.choices import GivenDialect, GivenUnit
+from toolpaths.diagnostics import DiagnosticError
 
 FeedModeChoice = Literal["auto", "per-minute", "inverse-time"]
 OutputMode = Literal["auto", "axes", "tcp", "tilted"]
 FeedSource = Literal["programmed", "planned"]
 Orientation = Literal["keep", "per-pass", "whole-part", "auto"]
+_WORDS = {"feed_mode": get_args(FeedModeChoice), "output": get_args(OutputMode), "feed": get_args(FeedSource),
+          "orient": get_args(Orientation), "units": get_args(GivenUnit), "dialect": get_args(GivenDialect)}
 
 
 @dataclass(frozen=True)
 class Options:
-    """Options of convert, verify and trace; mm and degrees as on the command line."""
+    """Options of convert, verify and trace; mm and degrees as on the command line.
+
+    Raises:
+        DiagnosticError: names each value that is no number, or none of the words that there are.
+    """
 
     tolerance: float = 0.01
     axis_tolerance: float = 0.05
@@ -50,6 +58,11 @@ class Options:
     """file whose [hooks] are blocks of the shop, under those of the set-up"""
     name: str = ""
     """of the program and its subprograms' files; default: that of the CL file"""
+
+    def __post_init__(self) -> None:
+        found = faults_of({f.name: (getattr(self, f.name), f.default) for f in fields(self)}, _WORDS)
+        if found:
+            raise DiagnosticError(found)
 
     def header(self) -> list[str]:
         """The options as comment lines of an output file; files by their names, wherever they stand."""

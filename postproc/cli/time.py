@@ -86,7 +86,7 @@ def time(files: TimedFiles,
     options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model, hooks=hooks,
                       error_beyond=beyond)
     asked = Asked(tuple(files), (machine, *(with_machine or [])), controller, model, (setup, *(with_setup or [])),
-                  ("", *(what_if or [])), tuple(logs), output, override, options, csv, figure, ending)
+                  tuple(what_if or ()), tuple(logs), output, override, options, csv, figure, ending)
     with shown_errors(json), progress_bar() as progress:
         values, text, outputs, found = answer(asked, progress)
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)

@@ -84,14 +84,14 @@ def answer(asked: Asked, progress: Progress) -> TimeAnswer:
         DiagnosticError: where a file, machine, set-up or model cannot be read.
     """
     known = [machine_of(name) for name in asked.machines]
-    changes = [parsed(text, known[0]) if text else AS_IS for text in asked.what_if]
+    changes = [AS_IS, *(parsed(text, *known) for text in asked.what_if)]
     all_timed = [
         _timed(file, machine_with(m, change), change, setup, asked, progress)
         for file, m, setup, change in product(asked.files, known, asked.setups, changes)
     ]
     found = [d for one in all_timed for d in one.found]
     if any(one.blocks is None for one in all_timed):
-        return {}, "", {}, found
+        return {}, "", {}, list(dict.fromkeys(found))
     values: dict[str, Any] = {}
     text, outputs = "", dict[Path, str | bytes]()
     if asked.logs:
@@ -104,13 +104,14 @@ def answer(asked: Asked, progress: Progress) -> TimeAnswer:
         if asked.output:
             outputs[Path(asked.output)] = as_toml(fit.model)
     estimates = [_estimated(one, one.blocks) for one in all_timed if one.blocks is not None]
-    made = [tables(e, shares(e)) for e in estimates]
+    made, variants = [tables(e, shares(e)) for e in estimates], _variants(all_timed, estimates)
     if len(all_timed) == 1:
         table, words = _alone(asked, all_timed[0], estimates[0], made[0])
     else:
-        table, words = _several(all_timed, estimates, made)
-    outputs |= _files(asked, [one.name for one in _variants(all_timed, estimates)], estimates, made)
-    return table | values, words + (f"\n{text}" if text else ""), outputs, found
+        table, words = _several(variants, made)
+    found += side_by_side.without_effect(variants)
+    outputs |= _files(asked, [one.name for one in variants], estimates, made)
+    return table | values, words + (f"\n{text}" if text else ""), outputs, list(dict.fromkeys(found))
 
 
 def _timed(file: Path, machine: Machine, change: WhatIf, setup: str, asked: Asked, progress: Progress) -> Timed:
@@ -200,9 +201,8 @@ def _alone(asked: Asked, one: Timed, e: Estimate, made: TimeTables) -> tuple[dic
     return values, figures.as_text(e, one.file.name, asked.override / 100.0, first, tables_text(made))
 
 
-def _several(all_timed: list[Timed], estimates: list[Estimate], made: list[TimeTables]) -> tuple[dict[str, Any], str]:
+def _several(variants: list[side_by_side.Variant], made: list[TimeTables]) -> tuple[dict[str, Any], str]:
     """Estimates side by side, with their tables."""
-    variants = _variants(all_timed, estimates)
     rows = [
         {**row, "tools": t.tools, "operations": t.operations, "losses": t.losses}
         for row, t in zip(side_by_side.as_dict(variants), made, strict=True)
@@ -211,8 +211,11 @@ def _several(all_timed: list[Timed], estimates: list[Estimate], made: list[TimeT
 
 
 def _variants(all_timed: list[Timed], estimates: list[Estimate]) -> list[side_by_side.Variant]:
+    files = side_by_side.short([one.file for one in all_timed])
+    setups = side_by_side.short([Path(one.setup) for one in all_timed])
     names = side_by_side.names(
-        [(one.file.name, one.machine.name, Path(one.setup).name, one.what_if.text) for one in all_timed]
+        [(file, one.machine.name, setup, one.what_if.text)
+         for file, setup, one in zip(files, setups, all_timed, strict=True)]
     )
     return [
         side_by_side.Variant(name, str(one.file), one.machine.name, one.setup, one.what_if.text, e)

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_banded
 
 from postproc.clock.kernels import add_turns
 from toolpaths.arrays import Bools, Floats, Ints
@@ -132,6 +131,8 @@ def _curved(u: Floats, chord: Floats, path: CommandedPath) -> tuple[Bools, Float
 def _tangents(u: Floats, chord: Floats, smooth: Bools) -> tuple[Floats, Floats]:
     """(N, A) derivatives at begin and end of each block: of cubic splines by chord length through smooth points, without
     curvature where they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV)."""
+    from scipy.linalg import solve_banded
+
     n = len(u)
     bands, right = np.zeros((4, 2 * n)), np.zeros((2 * n, u.shape[1]))
     left, joined = np.concatenate([[False], smooth]), np.append(smooth, False)

@@ -6,9 +6,11 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as FilePath
+from types import UnionType
 
 from machines.loader import load as load_machine
 from machines.machine import Machine
+from postproc.base.given import wrong
 from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.controllers.model import ControllerFile, load_controller
@@ -52,8 +54,9 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
             the conversion
 
     Raises:
-        DiagnosticError: where machine, controller or set-up cannot be loaded.
+        DiagnosticError: where path or options are none, or machine, controller or set-up cannot be loaded.
     """
+    require_call(path, options)
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     start = _begun(path, machine, controller, spec, setup, options, _reading(path, diagnostics))
     start, done = _oriented(start, progress)
@@ -105,10 +108,29 @@ def choose_axes(path: Toolpath, machine: Machine, controller: str | FilePath, op
     them), proved by the program for a controller; arguments and errors as of `convert`."""
     from postproc.pipeline.oriented import oriented
 
+    require_call(path, options)
     spec, machine, setup, options = _loaded(controller, machine, None, options)
     start = _begun(path, machine, controller, spec, setup, options, _reading(path, diagnostics))
     start = start.with_found(one_part(start.setup.places, "the choice of tool axes", options.setup))
     return oriented(start, _stages, progress)[0] if start.ok else start
+
+
+def require_call(path: object, options: object = None, others: type | UnionType = Toolpath) -> None:
+    """Refuse what is no Toolpath nor of `others`, and options that are none.
+
+    Raises:
+        DiagnosticError: says what was found, and what to give.
+    """
+    found = []
+    if not isinstance(path, (Toolpath, others)):
+        read = "path, diagnostics = toolpaths.read(FILE)"
+        first = isinstance(path, tuple) and bool(path) and isinstance(path[0], Toolpath)
+        found.append(wrong(f"path is of type {type(path).__name__}", f"give its first value: {read}" if first else
+                           f"give a Toolpath: {read}, or Toolpath.from_arrays"))
+    if not (options is None or isinstance(options, Options)):
+        found.append(wrong(f"options is of type {type(options).__name__}", "give postproc.Options(tolerance=0.02, ...)"))
+    if found:
+        raise DiagnosticError(found)
 
 
 def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diagnostic, ...]:
@@ -138,6 +160,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         DiagnosticError: where machine, controller, set-up or tool table cannot be loaded, or the G-code file
             not be opened.
     """
+    require_call(path, options)
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     try:
         data = read_input(gcode, standard_input=True)

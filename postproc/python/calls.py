@@ -12,21 +12,26 @@ from typing import Any
 from machines.calibration.outcome import CalibrationOutcome
 from machines.loader import load
 from machines.machine import Machine
+from postproc.base.given import is_number, wrong
 from postproc.base.options import Options
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.model import load_model, model_name
 from postproc.cycle_time.source import from_conversion, from_gcode, read_file
 from postproc.orientation.plans.choice import OrientationChoice
-from postproc.pipeline.convert import choose_axes, convert
+from postproc.pipeline.convert import choose_axes, convert, require_call
 from postproc.placement.place import PlacementChoice
 from postproc.placement.place import place as place_part
 from postproc.setup.model import SetupFile, alone, load_setup
 from postproc.verification.neighbour_files import NeighbourFiles
-from toolpaths.diagnostics import DiagnosticError, read_value, require
+from toolpaths.cl.text.kinds_of_file import looks_like_apt
+from toolpaths.diagnostics import DiagnosticError, error, read_value, require
 from toolpaths.toolpath import Toolpath
 
 FileName = str | Path
+LEAST_OVERRIDE, MOST_OVERRIDE = 0.01, 3.0
+HEAD = 20_000
+"""bytes by which a file is recognised"""
 
 
 def time(source: Toolpath | FileName, machine: Machine | FileName, controller: FileName = "linuxcnc",
@@ -37,13 +42,12 @@ def time(source: Toolpath | FileName, machine: Machine | FileName, controller: F
     Args:
         source: a Toolpath, or the file of a program
         model: of the control: "ideal", "lookahead", "linuxcnc" or a TOML file; default: the controller's
-        override: of programmed feeds, 1.0 as programmed
+        override: of programmed feeds, 0.01 to 3, 1.0 as programmed
 
     Raises:
-        DiagnosticError: carries all that was found; ValueError: an override that is not above 0.
+        DiagnosticError: carries all that was found.
     """
-    if not override > 0.0:
-        raise ValueError(f"override is {override:g}; give it as a part of the programmed feed, above 0, 1.0 as programmed")
+    _require_time(source, options, override)
     m = _machine(machine)
     spec = read_value(load_controller(controller))
     planner = read_value(load_model(model or model_name(str(controller), spec.writer))).of_machine(m)
@@ -59,7 +63,11 @@ def time(source: Toolpath | FileName, machine: Machine | FileName, controller: F
     else:
         shop = _setup(setup, options)
         others = NeighbourFiles(Path(source))
-        blocks = read_value(from_gcode(read_file(source), m, spec, shop, str(source), others, override))
+        data = read_file(source)
+        if looks_like_apt(data[:HEAD]):
+            raise DiagnosticError([error("file.program", "this is a CL file, not a program of a control", file=str(source),
+                                         hint="give the path of it: path, diagnostics = toolpaths.read(FILE)")])
+        blocks = read_value(from_gcode(data, m, spec, shop, str(source), others, override))
     return estimate(blocks, m, planner, times=times)
 
 
@@ -86,6 +94,7 @@ def place(path: Toolpath, machine: Machine | FileName, setup: SetupFile | FileNa
     Raises:
         DiagnosticError: carries all that was found.
     """
+    require_call(path, options)
     shop = _setup(setup, options)
     require(path.faults)
     return read_value(place_part(path, _machine(machine), shop, options, controller))
@@ -114,6 +123,18 @@ def analyse(machine: Machine | FileName, singular_above: float | None = None) ->
     from machines.analysis.report import analyse as run
 
     return run(_machine(machine), singular_above)
+
+
+def _require_time(source: object, options: object, override: object) -> None:
+    """Refuse what is neither a path nor a file, options that are none, an override that no control has.
+
+    Raises:
+        DiagnosticError: says what was found, and what to give.
+    """
+    require_call(source, options, FileName)
+    if not is_number(override, LEAST_OVERRIDE, MOST_OVERRIDE):
+        raise DiagnosticError([wrong(f"override is {override!r}", "give it as a part of the programmed feed, "
+                                     f"{LEAST_OVERRIDE:g} to {MOST_OVERRIDE:g}, 1.0 as programmed")])
 
 
 def _machine(machine: Machine | FileName) -> Machine:

@@ -57,6 +57,8 @@ SEEN = 0.5
 """share of its prior uncertainty below which a parameter counts as found"""
 MOVED = 0.02
 """share of a run's ramps that an axis must hold for the run to show its acceleration"""
+UNLIKE = 0.5
+"""share by which the fitted model may be off in parts of a run: beyond it, the run is of something else"""
 WORSE = 0.005
 """share of the time that the fitted model's total may be farther off than that of the model before"""
 
@@ -281,6 +283,10 @@ def _findings(fit: CalibratedModel, before: Floats, clock: float, file: str) -> 
         return [error("log.fit", f"the fitted model is farther off than the one before: sections {record.rms_after:.3g} s, "
                       f"before {record.rms_before:.3g} s; all {off:.3g} s of {measured.sum():.4g} s, before {was:.3g} s",
                       file=file, hint="is it this program, this machine, without a feed hold?")]
+    if record.relative > UNLIKE:
+        return [error("log.fit", f"no values of the model explain the run: {fit.modelled.sum():.4g} s fitted, "
+                      f"{measured.sum():.4g} s measured, {100 * record.relative:.0f} % off in parts of it", file=file,
+                      hint="is it this program, this machine, without a feed hold?")]
     if record.period > 0.0:
         found.append(info("log.polled", f"the log was polled, one sample every {record.period:.3g} s: a line is seen up to "
                           f"that much late, which is allowed for; {record.samples} sections", file=file))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 from dataclasses import dataclass
@@ -11,13 +12,14 @@ import numpy as np
 
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.source import read_file
-from postproc.time_fit.log_exports import is_export, lines_of_export
+from postproc.time_fit.log_exports import is_export, lines_of_export, number_of
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.shapes import arrays
 
 LEAST = 8
 """lines of the log that a fit needs"""
+UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 MOST_LINES, MOST_SECONDS = 1e9, 1e7
 """what no program and no run has more of"""
 
@@ -45,9 +47,11 @@ def read_log(file: str | Path, letters: tuple[str, ...]) -> tuple[RunLog | None,
     Raises:
         DiagnosticError: where the file cannot be read.
     """
-    text = read_file(file, "a log of a measured run: columns nc_line and time_s").decode("utf-8-sig", "replace")
+    data = read_file(file, "a log of a measured run: columns nc_line and time_s; or give the time of the whole run alone, "
+                           "as 812.4 or 0:13:32")
+    text = data.decode("utf-16" if data[:2] in UTF_16 else "utf-8-sig", "replace")
     try:
-        rows = list(csv.reader(io.StringIO(text)))
+        rows = [[] if len(row) == 1 and not row[0].strip() else row for row in csv.reader(io.StringIO(text, newline=None))]
     except csv.Error as fault:
         return None, [error("log.columns", f"is not a CSV file: {fault}", file=str(file),
                             hint="a log has the columns nc_line and time_s, a comma between them")]
@@ -85,7 +89,7 @@ def _numbers(rows: list[list[str]], columns: int, file: str) -> tuple[Floats, li
         if not row:
             continue
         try:
-            numbers = [float(cell) for cell in row]
+            numbers = [number_of(cell) for cell in row]
         except ValueError:
             numbers = []
         if len(numbers) != columns or not np.isfinite(numbers).all():

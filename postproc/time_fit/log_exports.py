@@ -12,7 +12,7 @@ such exports; no standard fixes a form as CSV.
 from __future__ import annotations
 
 import re
-from datetime import datetime
+from datetime import UTC, datetime
 
 import numpy as np
 
@@ -38,7 +38,7 @@ LINES = frozenset(
     }
 )
 """names of the line number, lower case, letters alone"""
-NOTHING = ("", "UNAVAILABLE", "null", "None")
+NOTHING = ("", "unavailable", "null", "none")
 SAMPLES = "one sample a line, decimal points, no units"
 SHOWN = 8
 """names that a message lists"""
@@ -68,10 +68,10 @@ def lines_of_export(names: list[str], rows: list[list[str]], file: str) -> tuple
         return _none(_no_item(sorted(items), sorted({row[column] for row in rows if row}), file))
     values, bad = [], []
     for k, row in enumerate(rows, 2):
-        if not row or row[column] not in items or row[value].strip() in NOTHING or _is_bad(row, state):
+        if not row or row[column] not in items or row[value].strip().lower() in NOTHING or _is_bad(row, state):
             continue
         try:
-            values.append((float(row[value]), _seconds(row[time].strip()), k))
+            values.append((number_of(row[value]), _seconds(row[time].strip()), k))
         except ValueError:
             bad.append(k)
     if bad:
@@ -108,9 +108,21 @@ def _plain(name: str) -> str:
     return re.sub(r"[^a-z]", "", name.lower())
 
 
+def number_of(text: str) -> float:
+    """A number as files spell it.
+
+    Raises:
+        ValueError: also for the digits of other scripts and for 1_000, which Python alone would read.
+    """
+    if "_" in text or not text.isascii():
+        raise ValueError(f"no number: {text}")
+    return float(text)
+
+
 def _seconds(text: str) -> float:
-    """s of a number, or of a date and time."""
+    """s of a number, or of a date and time; UTC where the date names no zone, so that no change of the clock is met."""
     try:
-        return float(text)
+        return number_of(text)
     except ValueError:
-        return datetime.fromisoformat(text).timestamp()
+        at = datetime.fromisoformat(text)
+        return (at if at.tzinfo else at.replace(tzinfo=UTC)).timestamp()

@@ -12,6 +12,7 @@ from postproc.cycle_time.kinds import KINDS, kinds
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes, summed
 from postproc.time_fit.log import RunLog, matched, period
+from postproc.time_fit.log_exports import number_of
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays
@@ -115,7 +116,7 @@ def seconds_of(text: str) -> float | None:
     """s of 812.4, 13:32 or 0:13:32; None of anything else, and of no time at all."""
     parts = text.split(":")
     try:
-        values = [float(part) for part in parts]
+        values = [number_of(part) for part in parts]
     except ValueError:
         return None
     if len(values) > 3 or not all(0.0 <= value < 1e7 for value in values) or any(value >= 60.0 for value in values[1:]):

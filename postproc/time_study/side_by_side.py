@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from postproc.cycle_time.estimate import Estimate
 from postproc.cycle_time.report import clock
 from postproc.cycle_time.shares import CAUSES, shares
 from postproc.time_study.tables import LEAST
+from toolpaths.diagnostics import Diagnostic, info
 from toolpaths.table_text import table_text
 
 
@@ -70,9 +73,31 @@ def as_text(variants: Sequence[Variant]) -> str:
 
 
 def names(parts: Sequence[tuple[str, ...]]) -> list[str]:
-    """A short name for each variant: only those of its parts that differ."""
+    """A short name for each variant: only those of its parts that differ; a second one of the same name is numbered."""
     differ = [k for k in range(len(parts[0])) if len({part[k] for part in parts}) > 1]
-    return [
-        ", ".join(part[k] or ("as it is" if k == len(part) - 1 else "no set-up") for k in differ) or part[0]
-        for part in parts
-    ]
+    result: list[str] = []
+    count = Counter[str]()
+    for part in parts:
+        words = [part[k] or ("as it is" if k == len(part) - 1 else "no set-up") for k in differ]
+        name = ", ".join(words) or part[0]
+        count[name] += 1
+        result.append(name if count[name] == 1 else f"{name} ({count[name]})")
+    return result
+
+
+def short(files: Sequence[Path]) -> list[str]:
+    """The name of each file, with its folders where another of them has the same name."""
+    places = {file.name: {one for one in files if one.name == file.name} for file in files}
+    return [file.name if len(places[file.name]) == 1 else str(file) for file in files]
+
+
+def without_effect(variants: Sequence[Variant]) -> list[Diagnostic]:
+    """What-ifs that change neither time nor band: no block or no part of the control's model depends on them."""
+    as_is = {(v.file, v.machine, v.setup): v.estimate for v in variants if not v.what_if}
+    found = []
+    for v in variants:
+        e, first = v.estimate, as_is[v.file, v.machine, v.setup]
+        if v.what_if and (e.seconds, e.lower_bound, e.band) == (first.seconds, first.lower_bound, first.band):
+            found.append(info("time.no_effect", f"--what-if {v.what_if} changes nothing on {v.machine} with the model "
+                              f"{e.model.kind}: nothing in the program depends on it", file=v.file))
+    return found

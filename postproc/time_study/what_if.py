@@ -31,13 +31,13 @@ class WhatIf:
 AS_IS = WhatIf("", ())
 
 
-def parsed(text: str, machine: Machine) -> WhatIf:
-    """The factors of "X.acceleration=1.3,tool_change=0.5".
+def parsed(text: str, *machines: Machine) -> WhatIf:
+    """The factors of "X.acceleration=1.3,tool_change=0.5"; axes are those of any of the machines.
 
     Raises:
         DiagnosticError: names the values that there are.
     """
-    known = {f"{axis}.{limit}" for axis in machine.axis_names for limit in LIMITS} | {*LIMITS, *TIMING, *MODEL}
+    known = {f"{axis}.{limit}" for m in machines for axis in m.axis_names for limit in LIMITS} | {*LIMITS, *TIMING, *MODEL}
     factors = []
     for part in text.split(","):
         name, sign, number = (word.strip() for word in part.partition("="))
@@ -46,7 +46,7 @@ def parsed(text: str, machine: Machine) -> WhatIf:
         except ValueError:
             factor = math.nan
         if name not in known:
-            raise _wrong(f"{name!r} is no value of {machine.name}")
+            raise _wrong(f"{name!r} is no value of {', '.join(m.name for m in machines)}")
         if not sign or not 1.0 / MOST <= factor <= MOST:
             raise _wrong(f"{part.strip()!r}: a factor from {1 / MOST:g} to {MOST:g} stands behind =")
         factors.append((name, factor))
@@ -55,7 +55,7 @@ def parsed(text: str, machine: Machine) -> WhatIf:
 
 def _wrong(what: str) -> DiagnosticError:
     hint = ("give a factor, as X.acceleration=1.3, of the velocity, acceleration, jerk of an axis or of all, or of "
-            f"{', '.join((*TIMING, *MODEL))}; several with commas")
+            f"{', '.join((*TIMING, *MODEL))}; several with commas, a point in decimals")
     return DiagnosticError([error("time.what_if", f"--what-if: {what}", hint=hint)])
 
 

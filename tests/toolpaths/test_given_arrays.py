@@ -65,6 +65,11 @@ def test_rapid_says_where_no_feed_is_a_rapid() -> None:
     ({"arc": [-1, -1, 0, -1]}, [("arc", (3,))]), ({"arc": [-1, -1, -1, 0], "arcs": HALF}, [("begin", (4,))]),
     ({"feed_mode": 3}, [("feed_mode", (1, 2, 3, 4))]), ({"spindle": 0.0}, [("spindle", ())]),
     ({"events": [Event(9, "COOLNT")]}, [("events", ())]), ({"contact": [0, 0, np.inf]}, [("contact", (1, 2, 3, 4))]),
+    ({"tip": np.ones((4, 3), complex)}, [("tip", ())]), ({"tip": np.ones((4, 3), bool)}, [("tip", ())]),
+    ({"tip": [["1", "2", "3"]]}, [("tip", ())]), ({"tip": [[0, 0, 10**400]]}, [("tip", ())]),
+    ({"tip": np.ma.masked_equal(TIP, 20.0), "feed": 1}, [("tip", (3, 4))]), ({"feed": True}, [("feed", ())]),
+    ({"spindle": "fast"}, [("spindle", ())]), ({"events": "COOLNT"}, [("events", ())]), ({"arcs": 3}, [("arcs", ())]),
+    ({"tools": Tool(1)}, [("tools", ())]), ({"cycles": [3]}, [("cycles", ())]),
     ({"normal": (0, 0, 0), "spindle": np.nan}, [("normal", (1, 2, 3, 4)), ("spindle", ())]),
 ])
 def test_faults_are_named_with_their_rows(given: dict[str, object], expected: list[tuple[str, tuple[int, ...]]]) -> None:

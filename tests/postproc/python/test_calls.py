@@ -54,8 +54,6 @@ def test_what_a_call_cannot_do_it_raises_with_all_diagnostics(tmp_path: Path) ->
         postproc.place(path, "mill-3axis", SetupFile())
     with pytest.raises(DiagnosticError):
         postproc.calibrate(tmp_path / "none.toml")
-    with pytest.raises(ValueError, match="above 0"):
-        postproc.time(path, "mill-3axis", override=np.nan)
     far = passes((1.0, 0.0), 1, 9000.0)
     with pytest.raises(DiagnosticError, match="travel"):
         postproc.time(far, "mill-3axis", setup=setup_of())
@@ -63,6 +61,49 @@ def test_what_a_call_cannot_do_it_raises_with_all_diagnostics(tmp_path: Path) ->
         postproc.convert(far, "mill-3axis", setup=setup_of()).checked()
     with pytest.raises(DiagnosticError):
         postproc.orient(far, "mill-3axis")
+
+
+WRONG_CALLS = {
+    "a file": (lambda path: postproc.convert("part.cls", "mill-3axis"), "path is of type str; give a Toolpath"),
+    "what read gives": (lambda path: postproc.orient((path, []), "mill-3axis"), "path is of type tuple; give its first"),
+    "an array": (lambda path: postproc.time(path.tip, "mill-3axis"), "path is of type ndarray; give a Toolpath"),
+    "no part": (lambda path: postproc.place(None, "mill-3axis", "s.toml"), "path is of type NoneType; give a Toolpath"),
+    "verify a file": (lambda path: postproc.verify("p.ngc", "p.cls", "mill-3axis"), "path is of type str"),
+    "options": (lambda path: postproc.convert(path, "mill-3axis", options={}), "options is of type dict; give"),
+    "options of a program": (lambda path: postproc.time("p.ngc", "mill-3axis", options={}), "options is of type dict"),
+    "percent": (lambda path: postproc.time(path, "mill-3axis", override=50), "override is 50; give it as a part of"),
+    "nan": (lambda path: postproc.time(path, "mill-3axis", override=np.nan), "override is nan; give it as a part of"),
+    "a text": (lambda path: postproc.time(path, "mill-3axis", override="1"), "override is '1'; give it as a part of"),
+    "no number": (lambda path: postproc.Options(tolerance=np.nan), "tolerance is nan; give a number"),
+    "a number as text": (lambda path: postproc.Options(axis_tolerance="1"), "axis_tolerance is '1'; give a number"),
+    "a word": (lambda path: postproc.Options(output="rtcp"), "output is 'rtcp'; give one of 'auto', 'axes'"),
+    "a list": (lambda path: postproc.Options(units=["mm"]), "units is .'mm'.; give one of"),
+    "a flag": (lambda path: postproc.Options(smooth="no"), "smooth is 'no'; give True or False"),
+    "words": (lambda path: postproc.Options(allow_unknown="ABC"), "allow_unknown is 'ABC'; give a tuple of texts"),
+    "a number as file": (lambda path: postproc.Options(setup=5), "setup is 5; give a text"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_CALLS)
+def test_a_wrong_call_says_what_to_give(name: str) -> None:
+    call, message = WRONG_CALLS[name]
+    with pytest.raises(DiagnosticError, match=message) as found:
+        call(passes((1.0, 0.0), 1))
+    assert {d.code for d in found.value.diagnostics} == {"call.value"}
+
+
+def test_all_wrong_options_are_named_at_once() -> None:
+    with pytest.raises(DiagnosticError) as found:
+        postproc.Options(tolerance=np.nan, units="furlong", feed="fast")
+    assert [d.message.split()[0] for d in found.value.diagnostics] == ["tolerance", "units", "feed"]
+    assert postproc.Options(tolerance=np.float32(0.02), setup=Path("s.toml"), max_tilt=30).tolerance > 0.0
+
+
+def test_a_cl_file_is_no_program_whose_time_is_asked(tmp_path: Path) -> None:
+    (tmp_path / "part.cls").write_text("PARTNO/A\nUNITS/MM\nLOADTL/1\nGOTO/0,0,50\nFINI\n")
+    with pytest.raises(DiagnosticError, match="this is a CL file") as found:
+        postproc.time(tmp_path / "part.cls", "mill-3axis")
+    assert [d.code for d in found.value.diagnostics] == ["file.program"] and found.value.diagnostics[0].hint
 
 
 def test_a_path_that_was_not_read_whole_is_placed_by_nobody() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -13,7 +15,7 @@ from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.estimate import estimate, timed, total
 from postproc.cycle_time.kinds import NOT_SEEN, own_share
 from postproc.cycle_time.model import CycleTimeModel
-from postproc.time_fit.calibrate import CalibratedModel, calibrate
+from postproc.time_fit.calibrate import CalibratedModel, _findings, calibrate
 from postproc.time_fit.fit_text import as_text
 from postproc.time_fit.log import RunLog, period, read_log
 from postproc.time_fit.runs import run_of_log, run_of_total
@@ -142,16 +144,21 @@ def test_twelve_lines_with_a_quick_spindle_are_the_spindle_and_no_large_corner()
     assert 0.002 < made.values["corner_tolerance"][0] < 0.05
 
 
-def test_a_fit_that_is_worse_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from postproc.time_fit import calibrate as module
+@pytest.mark.parametrize(("sections", "total", "refused"), [
+    (1.0, 1.0, False), (1.1, 1.0, True), (1.0, 1.1, True), (0.5, 0.9, False)])
+def test_a_fit_that_is_worse_is_refused(sections: float, total: float, refused: bool) -> None:
+    """The fit of the zigzag again, `sections` (rms) and `total` times as far off as the model before."""
+    made = of_zigzag()
+    record = made.calibration.model_copy(update={"rms_before": 0.1, "rms_after": 0.1 * sections, "relative": 0.02})
+    worse = replace(made, calibration=record, modelled=made.measured * (1.0 + 0.02 * total))
+    found = _findings(worse, made.measured * 1.02, 0.001, "log.csv")
+    assert [d.code for d in found] == ["log.fit"] * refused and all("farther off" in d.message for d in found)
 
-    b = program()
-    run, _ = run_of_log(b, log_of(b, model("lookahead")))
-    assert run is not None
-    monkeypatch.setattr(module, "_start", lambda modelled, measured, free: np.full(len(free), 0.9))
-    monkeypatch.setattr("scipy.optimize.least_squares", lambda residual, x, **given: type("Result", (), {"x": x}))
-    made, found = calibrate([run], model("lookahead"), "log.csv", machine())
-    assert made is None and [d.code for d in found] == ["log.fit"] and "farther off" in found[0].message
+
+def test_a_run_that_no_values_explain_is_refused() -> None:
+    made, found = calibrate([run_of_total(arcs(), 100.0 * total(arcs(), timed(arcs(), truth())))], model("lookahead"))
+    assert made is None and [d.code for d in found] == ["log.fit"] and "no values of the model" in found[0].message
+    assert found[0].hint and "s measured" in found[0].message
 
 
 def test_assumed_accelerations_count_until_the_run_shows_them() -> None:
@@ -188,6 +195,24 @@ def test_exports_are_read(tmp_path: Path, name: str) -> None:
     log, found = read_log(tmp_path / "log.csv", ("X", "Y"))
     assert log is not None and not found
     assert log.line.tolist() == list(range(3, 15)) and log.time.tolist() == pytest.approx([float(k) for k in range(12)])
+
+
+@pytest.fixture
+def berlin(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Where the clock is put forward in the night to 2026-03-29."""
+    monkeypatch.setenv("TZ", "Europe/Berlin")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()
+
+
+@pytest.mark.usefixtures("berlin")
+def test_dates_without_a_zone_are_utc_and_nothing_is_spelled_in_any_case(tmp_path: Path) -> None:
+    rows = "".join(f"2026-03-29T0{1 + k // 4}:{15 * (k % 4):02d}:00{'Z' if k % 2 else ''},line,{k + 3}\n" for k in range(12))
+    (tmp_path / "log.csv").write_text("timestamp,dataItemId,value\n" + rows + "2026-03-29T05:00:00Z,line, unavailable\n")
+    log, found = read_log(tmp_path / "log.csv", ("X", "Y"))
+    assert log is not None and not found and np.diff(log.time).tolist() == [900.0] * 11
 
 
 @pytest.mark.parametrize(("change", "code"), [

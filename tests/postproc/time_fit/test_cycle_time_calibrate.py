@@ -14,6 +14,7 @@ from postproc.cycle_time.model import CycleTimeModel, load_model
 from postproc.time_fit.calibrate import CalibratedModel
 from postproc.time_fit.fit_text import as_toml
 from postproc.time_fit.log import RunLog, read_log
+from postproc.time_fit.runs import seconds_of
 from tests.postproc.time_kit import blocks, calibrated, machine, model
 from toolpaths.diagnostics import DiagnosticError
 
@@ -21,15 +22,18 @@ CLOCK = 0.002
 """s, standard deviation of the time stamps"""
 
 
+LINES = 160
+
+
 @cache
 def finishing(seed: int) -> MotionBlocks:
     """Waves cut in short lines, with long and short rapids between the passes."""
     rng = np.random.default_rng(seed)
-    x = np.cumsum(rng.uniform(0.05, 1.2, 500)) - 150.0
-    y = 8.0 * np.sin(x / 9.0) + np.cumsum(rng.normal(0.0, 0.15, 500))
+    x = np.cumsum(rng.uniform(0.05, 1.2, LINES)) - 150.0
+    y = 8.0 * np.sin(x / 9.0) + np.cumsum(rng.normal(0.0, 0.15, LINES))
     text = ["G21 G90 G94 G17", f"G0 X{x[0]:.3f} Y{y[0]:.3f} Z300", "F6000"]
-    for i in range(500):
-        if i % 60 == 59:
+    for i in range(LINES):
+        if i % 30 == 29:
             text += ["G0 Z320", f"G0 X{x[i] - 250 * rng.random():.3f} Y{y[i] + rng.normal(0, 90):.3f}",
                      f"G0 X{x[i]:.3f} Y{y[i]:.3f}", "G0 Z300"]
         text.append(f"G1 X{x[i]:.4f} Y{y[i]:.4f} Z{300 - 2 * np.sin(x[i] / 4):.4f}")
@@ -57,17 +61,17 @@ def fit(truth: CycleTimeModel, rng: np.random.Generator) -> CalibratedModel:
 
 
 @cache
-def with_jerk() -> CalibratedModel:
-    rng = np.random.default_rng(4)
-    return fit(hidden(rng), rng)
+def with_jerk(seed: int = 4) -> tuple[CycleTimeModel, CalibratedModel]:
+    """A control with jerk limits, and the model that is fitted to its log."""
+    rng = np.random.default_rng(seed)
+    truth = hidden(rng)
+    return truth, fit(truth, rng)
 
 
 def test_hidden_parameters_are_found_and_bands_hold_on_other_programs() -> None:
-    rng = np.random.default_rng(8)
     inside, off, narrower = [], [], []
-    for _ in range(3):
-        truth = hidden(rng)
-        made = fit(truth, rng)
+    for k in (4, 8):
+        truth, made = with_jerk(k)
         off.append([abs(np.log(made.values[name][0] / getattr(truth, name))) / made.values[name][1]
                     for name in ("corner_tolerance", "rapid", "override", "stop_time")])
         assert made.values["corner_tolerance"][0] == pytest.approx(truth.corner_tolerance, rel=0.1)
@@ -99,11 +103,11 @@ def test_a_control_without_jerk_is_recognised() -> None:
     rng = np.random.default_rng(3)
     truth = hidden(rng).model_copy(update={"jerk": False})
     assert not fit(truth, rng).model.jerk
-    assert with_jerk().model.jerk
+    assert with_jerk()[1].model.jerk
 
 
 def test_the_model_is_a_file(tmp_path: Path) -> None:
-    made = with_jerk().model
+    made = with_jerk()[1].model
     (tmp_path / "shop.toml").write_text(as_toml(made))
     loaded, found = load_model(tmp_path / "shop.toml")
     assert not found and loaded == made
@@ -165,6 +169,29 @@ def test_columns_in_any_order_and_a_byte_order_mark(tmp_path: Path) -> None:
     assert log.line[2] == 3 and log.time[2] == 3.5 and log.position[2, 0] == 27.0
 
 
+@pytest.mark.parametrize("data", [
+    ("nc_line,time_s\n" + GOOD).encode("utf-16"), ("nc_line,time_s\n" + GOOD).replace("\n", "\r").encode(),
+    ("nc_line,time_s\n" + GOOD + "  \n\n").encode()])
+def test_logs_of_other_editors_are_read(tmp_path: Path, data: bytes) -> None:
+    (tmp_path / "log.csv").write_bytes(data)
+    log, found = read_log(tmp_path / "log.csv", ("X", "Y"))
+    assert log is not None and not found and log.line.tolist() == list(range(1, 12))
+
+
+def test_numbers_that_python_alone_would_read_are_none(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("nc_line,time_s\n" + GOOD + "12,1_2\n13,１３\n", encoding="utf-8")
+    log, found = read_log(tmp_path / "log.csv", ("X", "Y"))
+    assert log is None and found[0].code == "log.numbers" and found[0].lines == (13, 14)
+
+
+@pytest.mark.parametrize(("text", "seconds"), [
+    ("812.4", 812.4), ("0:13:32", 812.0), ("13:32", 812.0), (" 21 ", 21.0), ("1:00:00.5", 3600.5), ("13 min", None),
+    ("21,5", None), ("0", None), ("-3", None), ("nan", None), ("00:61", None), ("1:2:3:4", None), (":21", None), ("", None),
+    ("1_0", None), ("２１", None), ("1e400", None)])
+def test_the_time_of_a_whole_run(text: str, seconds: float | None) -> None:
+    assert seconds_of(text) == seconds
+
+
 def test_a_log_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(DiagnosticError, match=r"time\.open"):
+    with pytest.raises(DiagnosticError, match=r"time\.open.*0:13:32"):
         read_log(tmp_path / "none.csv", ("X",))

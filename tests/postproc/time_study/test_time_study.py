@@ -15,6 +15,7 @@ from postproc.cli.app import app
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.estimate import Estimate, estimate, timed, total
 from postproc.cycle_time.shares import shares
+from postproc.time_study.side_by_side import names, short
 from postproc.time_study.tables import by_tool
 from postproc.time_study.time_figure import along_path, time_figure
 from postproc.time_study.what_if import machine_with, model_with, parsed
@@ -85,6 +86,27 @@ def test_a_wrong_what_if_is_reported(text: str) -> None:
     with pytest.raises(DiagnosticError) as fault:
         parsed(text, machine())
     assert [d.code for d in fault.value.diagnostics] == ["time.what_if"]
+
+
+def test_every_variant_has_a_name_of_its_own() -> None:
+    assert names([("a", ""), ("a", "")]) == ["a", "a (2)"]
+    assert names([("a", ""), ("a", "jerk=2"), ("a", "")]) == ["as it is", "jerk=2", "as it is (2)"]
+    assert short([Path("x/a.nc"), Path("y/a.nc"), Path("x/b.nc"), Path("x/b.nc")]) == ["x/a.nc", "y/a.nc", "b.nc", "b.nc"]
+
+
+def test_an_axis_of_any_of_the_machines_may_be_asked_for() -> None:
+    asked = parsed("A.velocity=2", machine(), machine("mikron-ucp710"))
+    assert machine_with(machine(), asked).limits.velocity.tolist() == machine().limits.velocity.tolist()
+    changed = machine_with(machine("mikron-ucp710"), asked).limits.velocity / machine("mikron-ucp710").limits.velocity
+    assert changed.tolist() == [1.0, 1.0, 1.0, 2.0, 1.0]
+
+
+def test_a_what_if_without_effect_is_named_and_messages_come_once(program: Path) -> None:
+    result = call(program, program, "-m", "mill-3axis", "--what-if", "X.jerk=0.5", "--what-if", "tool_change=0.5",
+                  "--json", "-")
+    found = json.loads(result.stdout)["diagnostics"]
+    assert [(d["code"], d["message"].split()[1]) for d in found] == [("time.no_effect", "X.jerk=0.5")]
+    assert call(program, "-m", "mill-3axis", "--what-if", "").exit_code == 1
 
 
 def test_side_by_side_and_files(program: Path, tmp_path: Path) -> None:
