@@ -60,7 +60,7 @@ FLOORS = (
     ("postproc.orientation.figures", "the choice as pictures"),
     ("postproc.pipeline", "the table of stages; convert, verify, choose_axes"),
     ("postproc.proof", "the proof as a file, what has changed since"),
-    ("postproc.clock", "a control executed from cycle to cycle: axis motion by time"),
+    ("postproc.clock", "a control's motion: its path from commanded points, axis motion by time"),
     ("postproc.cycle_time", "how long a program takes, with a band"),
     ("postproc.time_fit", "the model of a control fitted to measured runs"),
     ("postproc.time_study", "times side by side, what if, tables, a figure"),

@@ -9,11 +9,13 @@ cases (|du| w/8, k w^2/24).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from postproc.clock.kernels import add_turns
+from postproc.feedrate.paths import Derivatives
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
 from toolpaths.shapes import arrays
@@ -32,8 +34,12 @@ SLOPE = 0.5
 """by which the width may change with the path"""
 PLACES = np.array([-0.5, -0.3, -0.14, 0.0, 0.14, 0.3, 0.5])
 """of a width where derivatives are taken"""
-BEFORE = 1e-7
-"""mm or rad before a rest where the direction is still that of the path that leads there"""
+BEFORE, APART = 1e-7, 1e-6
+"""mm before a rest where the direction is still that of the path that leads there; least distance of places and points"""
+SMOOTH_BUMP = (140.0, -420.0, 420.0, -140.0)
+"""140 x^3 (1 - x)^3, whose integral is 1 and whose derivatives up to the second vanish at 0 and 1"""
+TAKES_BACK = 0.3
+"""mm of an interval that takes back what the ones before went astray"""
 COMPILE_FROM = 2_000
 
 
@@ -44,7 +50,7 @@ class CommandedPath:
 
     Attributes:
         points (V, A): machine coordinates, mm and rad
-        length (N,): path of each block that the feed refers to, > 0; speed (N,): largest along it
+        length (N,): path of each block that the feed refers to, > 0 where the axes move; speed (N,): largest along it
         tolerance (V,): mm that the path may leave each point, 0 for none; stop (V,): the axes rest there
         weight (A,): mm that a unit of each axis counts in deviations
     """
@@ -60,7 +66,12 @@ class CommandedPath:
 @dataclass(frozen=True)
 @arrays(s="M", q="M A", dq="M A", d2q="M A", d3q="M A", ends="V", stops="K")
 class BlendedPath:
-    """A path by its length: position and derivatives at M places; ends (V,): of the blocks; stops (K,): rests, both ends."""
+    """A path by its length in mm, axes weighted; a path of the planner (`ParametricPath`).
+
+    Attributes:
+        s (M,), q, dq, d2q, d3q (M, A): places, position and derivatives there
+        ends (V,): s of the commanded points; stops (K,): s of rests, both ends included
+    """
 
     s: Floats
     q: Floats
@@ -70,19 +81,82 @@ class BlendedPath:
     ends: Floats
     stops: Floats
 
+    @property
+    def start(self) -> float:
+        """0."""
+        return float(self.s[0])
+
+    @property
+    def end(self) -> float:
+        """Length."""
+        return float(self.s[-1])
+
+    @property
+    def breaks(self) -> Floats:
+        """Places between which derivatives are polynomials."""
+        return self.s
+
+    @cached_property
+    def _pieces(self) -> tuple[Floats, Floats]:
+        """(coefficients (7, M - 1, A) of dq by the share of each interval, q (M, A) where they lead): between places that
+        the smoothing makes no polynomial q goes astray by some 1e-7 mm, which long intervals take back."""
+        h = np.diff(self.s)[:, None]
+        still = np.isin(self.s[1:], self.stops)[:, None] & (h < APART)
+        d, b0, c0 = self.dq[:-1], self.d2q[:-1] * h, self.d3q[:-1] * h * h / 2
+        f, b = self.dq[1:] - d - b0 - c0, self.d2q[1:] * h - b0 - 2 * c0
+        c = self.d3q[1:] * h * h / 2 - c0
+        bent = [b0, c0, 10 * f - 4 * b + c, -15 * f + 7 * b - 2 * c, 6 * f - 3 * b + c, np.zeros_like(d)]
+        made = np.stack([d, *(np.where(still, 0.0, one) for one in bent)])
+        step = h * (made / np.arange(1.0, 8.0)[:, None, None]).sum(axis=0)
+        astray = np.cumsum(np.diff(self.q, axis=0) - step, axis=0)
+        long = np.flatnonzero(h[:, 0] >= TAKES_BACK)
+        back = np.diff(astray[long], axis=0, prepend=0.0)
+        made[3:, long] += back / h[long] * np.array(SMOOTH_BUMP)[:, None, None]
+        step[long] += back
+        return made, np.concatenate([self.q[:1], self.q[:1] + np.cumsum(step, axis=0)])
+
+    def derivatives(self, s: Floats) -> Derivatives:
+        """At s (N,): polynomials that have the positions and derivatives of the places."""
+        c, q = self._pieces
+        k = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
+        h = (self.s[k + 1] - self.s[k])[:, None]
+        x = (s - self.s[k])[:, None] / h
+        at = c[:, k]
+        whole, first, second, third = (np.zeros_like(x * at[0]) for _ in range(4))
+        for n in range(6, -1, -1):
+            third = third * x + 2.0 * second
+            second = second * x + first
+            first = first * x + at[n]
+            whole = whole * x + at[n] / (n + 1.0)
+        return Derivatives(q[k] + h * x * whole, first, second / h, third / (h * h))
+
 
 def blended(path: CommandedPath) -> BlendedPath:
     """The path that the control runs."""
+    moves = np.linalg.norm(np.diff(path.points, axis=0) * path.weight, axis=1) > APART
+    group = np.concatenate([[0], np.cumsum(moves)])
+    if not moves.any():
+        flat = np.zeros((1, path.points.shape[1]))
+        return BlendedPath(np.zeros(1), path.points[:1], flat, flat, flat, np.zeros(len(group)), np.zeros(1))
+    first = np.flatnonzero(np.concatenate([[True], moves]))
+    stop = np.logical_or.reduceat(path.stop, first)
+    stop[[0, -1]] = True
+    path = CommandedPath(path.points[first], path.length[moves], path.speed[moves],
+                         np.minimum.reduceat(path.tolerance, first), stop, path.weight)
+    made = _blended(path)
+    return replace(made, ends=made.ends[group])
+
+
+def _blended(path: CommandedPath) -> BlendedPath:
+    """The same where each block moves."""
     points, length, tolerance, owner = fitted(path)
     ends = np.concatenate([[0.0], np.cumsum(length)])
     last = np.append(np.flatnonzero(np.diff(owner)), len(owner) - 1)
     blocks = np.concatenate([[0.0], ends[last + 1]])
-    stop = path.stop.copy()
-    stop[[0, -1]] = True
-    stops = blocks[stop]
+    stops = blocks[path.stop]
     width = widths(points * path.weight, ends, tolerance, stops)
     u = np.diff(points, axis=0) / length[:, None]
-    s = places(ends[1:-1], width, np.unique(np.concatenate([blocks, stops, stops[1:] - BEFORE])))
+    s = places(ends[1:-1], width, stops)
     turns = np.where(np.isin(ends[1:-1], stops)[:, None], 0.0, np.diff(u, axis=0))
     k = np.clip(np.searchsorted(ends, s, side="right") - 1, 0, len(u) - 1)
     q, dq = points[k] + (s - ends[k])[:, None] * u[k], u[k]
@@ -93,8 +167,8 @@ def blended(path: CommandedPath) -> BlendedPath:
 
 
 def fitted(path: CommandedPath) -> tuple[Floats, Floats, Floats, Ints]:
-    """(points (P + 1, A), length (P,), tolerance (P + 1,), block of each piece (P,)): blocks on one curve as pieces of
-    a cubic spline through their ends."""
+    """(points (P + 1, A), length (P,) in mm, tolerance (P + 1,), block of each piece (P,)): blocks on one curve as pieces
+    of a cubic spline through their ends."""
     flat = path.points * path.weight
     step = np.diff(flat, axis=0)
     chord = np.maximum(np.linalg.norm(step, axis=1), 1e-12)
@@ -111,8 +185,7 @@ def fitted(path: CommandedPath) -> tuple[Floats, Floats, Floats, Ints]:
              + h * first[owner] * x * (1 - x) ** 2 + h * last[owner] * x**2 * (x - 1))
     inner[part >= 1.0 - 1e-12] = flat[1:]
     wide = np.concatenate([flat[:1], inner])
-    piece = np.maximum(np.linalg.norm(np.diff(wide, axis=0), axis=1), 1e-12)
-    length = path.length[owner] * piece / chord[owner]
+    length = np.maximum(np.linalg.norm(np.diff(wide, axis=0), axis=1), 1e-12)
     tolerance = np.minimum(path.tolerance[owner], path.tolerance[owner + 1])
     tolerance = np.where(part >= 1.0 - 1e-12, path.tolerance[owner + 1], tolerance)
     return wide / path.weight, length, np.concatenate([path.tolerance[:1], tolerance]), owner
@@ -182,13 +255,17 @@ def _integral(flat: Floats, whole: Floats, ends: Floats, at: Floats) -> Floats:
     return np.asarray(whole[k] + x * (flat[k] + slope * x / 2.0))
 
 
-def places(s: Floats, width: Floats, fixed: Floats) -> Floats:
-    """(M,) places of derivatives: several over each width, only the points themselves where they stand close together."""
-    if not len(s):
-        return fixed
+def places(s: Floats, width: Floats, stops: Floats) -> Floats:
+    """(M,) places of derivatives: several over each width, only the points themselves where they stand close together; the
+    stops, and where the path leads to them."""
     gap = np.diff(s, prepend=-np.inf, append=np.inf)
     close = np.maximum(gap[:-1], gap[1:]) < width / 6.0
     inside = s[~close, None] + width[~close, None] * PLACES
-    every = np.concatenate([s[close], np.clip(inside.ravel(), fixed[0], fixed[-1]), fixed])
-    every = np.unique(every)
-    return np.asarray(every[np.append(np.diff(every) > 1e-9, True)])
+    every = np.unique(np.concatenate([s[close], inside.ravel(), (stops[1:] + stops[:-1]) / 2.0]))
+    every = every[np.diff(np.floor(every / APART), prepend=-1.0) > 0.0]
+    behind = np.searchsorted(stops, every, side="right")
+    free = (behind > 0) & (behind < len(stops))
+    every, behind = every[free], behind[free]
+    every = every[np.minimum(every - stops[behind - 1], stops[behind] - every) > 2.0 * APART]
+    every = every[np.diff(every, prepend=-np.inf) > APART]
+    return np.asarray(np.unique(np.concatenate([every, stops, stops[1:-1] - BEFORE])))

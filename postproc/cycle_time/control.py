@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from postproc.clock.control import ControlMotion, ControlSettings, execute
 from postproc.clock.path import CommandedPath
 from postproc.cycle_time.blocks import CornerMode, MotionBlocks
-from postproc.cycle_time.lookahead import TANGENT, directions, limits
+from postproc.cycle_time.lookahead import TANGENT, directions, limits, lookahead
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes, summed
 from postproc.cycle_time.shape import Shape, shape
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.diagnostics import REPORT, info, warning
 
 ARM = 50.0
 """mm from a rotary axis at which its deviations count"""
@@ -21,16 +24,34 @@ BACKWARD = -0.5
 """cosine of the change of direction in X, Y, Z below which the axes rest"""
 SHORTEST = 1e-9
 """mm or rad that a block counts at least"""
+MOST_BLOCKS, MOST_STOPS = 300_000, 5_000
+"""blocks and rests up to which the control is executed"""
+STRICT_UP_TO = 5_000
+"""blocks up to which every sample of the motion is measured"""
 AT_SPEED = 0.999
 """of the speed asked for that counts as constant speed"""
 
 
 def control(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
-    """How long the reference control takes over each block."""
+    """How long the control takes over each block; `found` says where the times are those of `lookahead`: beyond
+    MOST_BLOCKS or MOST_STOPS, and where no motion within the limits was found."""
     form = shape(blocks)
     stops, target = rests(blocks, form), limits(blocks, form, model)[0]
-    moved, owner = motion(blocks, model, form, stops, target)
-    return _on_the_clock(blocks, form, moved, owner, stops, target, model.stop_time)
+    if len(blocks) > MOST_BLOCKS or np.count_nonzero(stops) > MOST_STOPS:
+        return replace(lookahead(blocks, model), found=(info(
+            "time.control", f"{len(blocks)} blocks with {np.count_nonzero(stops)} stops: the control is executed up to "
+            f"{MOST_BLOCKS} blocks and {MOST_STOPS} stops; the times are those of the model lookahead"),))
+    try:
+        moved, owner = motion(blocks, model, form, stops, target)
+    except (ValueError, ArithmeticError) as fault:
+        return replace(lookahead(blocks, model), found=(warning(
+            "time.plan", f"the motion of the control cannot be planned, times are those of the model lookahead: {fault}",
+            hint=f"{REPORT}; --model lookahead needs no plan"),))
+    times = _on_the_clock(blocks, form, moved, owner, stops, target, model.stop_time)
+    return times if moved.solved else replace(times, found=(warning(
+        "time.unsolved", "the least time of some stretches between these lines was not found; the time is longer than "
+        "necessary, within all limits", lines=blocks.line[[0, -1]].tolist(),
+        hint=f"{REPORT}; --model lookahead needs no plan"),))
 
 
 def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bools,
@@ -48,7 +69,7 @@ def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bool
                          np.concatenate([[True], stops[owner] & last]), np.where(axes.rotary, ARM, 1.0))
     jerk = axes.jerk if model.jerk else np.full(len(axes.letters), np.inf)
     return execute(path, ControlSettings(axes.velocity, axes.acceleration, jerk, buffer=model.lookahead,
-                                         block_time=model.block_time)), owner
+                                         block_time=model.block_time, strict=len(blocks) <= STRICT_UP_TO)), owner
 
 
 def rests(blocks: MotionBlocks, form: Shape) -> Bools:
@@ -85,17 +106,19 @@ def pieces(blocks: MotionBlocks, form: Shape) -> tuple[Floats, Floats, Ints]:
 def _on_the_clock(blocks: MotionBlocks, form: Shape, moved: ControlMotion, owner: Ints, stops: Bools, target: Floats,
                   stop_time: float) -> BlockTimes:
     """Times of the blocks with their rests."""
-    seconds = summed(np.diff(moved.ends), owner, len(blocks))
+    seconds = summed(np.diff(moved.times()), owner, len(blocks))
     p = blocks.pauses
     inside = p.block >= 0
     rest = summed(p.seconds[inside], p.block[inside], len(blocks)) + np.where(stops, stop_time, 0.0)
     begin = np.concatenate([[0.0], np.cumsum(seconds + rest)[:-1]])
-    step = np.diff(moved.t)
-    which = owner[np.clip(np.searchsorted(moved.ends, moved.t[1:] - step / 2.0, side="right") - 1, 0, len(owner) - 1)]
+    step, travel = np.diff(moved.t), np.diff(moved.s)
+    piece = np.clip(np.searchsorted(moved.ends, moved.s[:-1] + travel / 2.0, side="right") - 1, 0, len(owner) - 1)
+    scale = (form.length[owner] / np.maximum(np.bincount(owner)[owner], 1)) / np.maximum(np.diff(moved.ends), SHORTEST)
+    which, v = owner[piece], np.stack([moved.v[1:], moved.v[:-1]]) * scale[piece]
     peak = np.zeros(len(blocks))
-    np.maximum.at(peak, which, np.maximum(moved.v[1:], moved.v[:-1]))
+    np.maximum.at(peak, which, v.max(axis=0, initial=0.0))
     peak = np.maximum(peak, form.length / np.maximum(seconds, 1e-300))
-    constant = np.minimum(moved.v[1:], moved.v[:-1]) >= AT_SPEED * target[which]
+    constant = v.min(axis=0, initial=np.inf) >= AT_SPEED * target[which]
     steady = np.minimum(summed(np.where(constant, step, 0.0), which, len(blocks)), seconds)
     lost = np.maximum(seconds - form.length / np.maximum(peak, 1e-300), 0.0)
     around = stops | np.concatenate([[True], stops[:-1]])

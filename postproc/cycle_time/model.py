@@ -60,7 +60,7 @@ class CycleTimeModel(UserModel):
     description: str = ""
     kind: Literal["ideal", "lookahead", "control", "linuxcnc"] = "lookahead"
     """ideal: as fast as the limits allow inside the corner tolerance; lookahead: a control that sees a number of blocks;
-    control: the reference control, executed from cycle to cycle; linuxcnc: LinuxCNC's planner"""
+    control: its path and the planner's motion on it; linuxcnc: LinuxCNC's planner"""
     corner_tolerance: float = Field(default=0.01, gt=0.0, le=10.0)
     """mm that corners may be rounded off where the program does not say"""
     stated_share: float = Field(default=1.0, gt=0.0, le=1000.0)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats
+from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays
 
 
@@ -65,7 +66,7 @@ class BlockTimes:
         peak (E,): largest speed, mm/s or rad/s
         lost_stop, lost_corner (E,): s that ramps to and from stops and corners cost over going on at the peak
         pause (P,): s that each pause takes
-        asked (E,): speed of the feed word as far as the axes reach it
+        found: what the model has to say of these times
     """
 
     begin: Floats
@@ -77,6 +78,7 @@ class BlockTimes:
     lost_stop: Floats
     lost_corner: Floats
     pause: Floats
+    found: tuple[Diagnostic, ...] = ()
 
     @property
     def seconds(self) -> Floats:

@@ -56,7 +56,7 @@ def optimum() -> float:
 
 def main() -> None:
     for chord in (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0):
-        t = float(execute(commanded(points(chord)), LIMITS).t[-1])
+        t = float(execute(commanded(points(chord)), LIMITS).seconds)
         print(f"chord {chord:4} mm: measured {MEASURED} s, control {t:.3f} s ({100 * (t / MEASURED - 1):+.1f} %)")
     print(f"optimum of the planner {optimum():.3f} s")
 
