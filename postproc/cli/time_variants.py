@@ -104,8 +104,7 @@ def answer(asked: Asked, progress: Progress) -> TimeAnswer:
         if asked.output:
             outputs[Path(asked.output)] = as_toml(fit.model)
     estimates = [_estimated(one, one.blocks) for one in all_timed if one.blocks is not None]
-    found += [replace(d, file=str(one.file)) for one, e in zip([t for t in all_timed if t.blocks is not None], estimates, strict=True)
-              for d in e.timed.found]
+    found += [replace(d, file=str(one.file)) for one, e in zip(all_timed, estimates, strict=True) for d in e.timed.found]
     made, variants = [tables(e, shares(e)) for e in estimates], _variants(all_timed, estimates)
     if len(all_timed) == 1:
         table, words = _alone(asked, all_timed[0], estimates[0], made[0])
