@@ -9,14 +9,14 @@ import numpy as np
 
 from machines.choices import MotionOrder
 from machines.machine import Machine
-from postproc.cycle_time.blocks import Axes, Cause, MotionBlocks
+from postproc.cycle_time.blocks import Cause, MotionBlocks
 from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.kinds import own_share
 from postproc.cycle_time.linuxcnc import Settings, linuxcnc
 from postproc.cycle_time.lookahead import lookahead
 from postproc.cycle_time.model import ASSUMED, PARAMETERS, CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats
 from toolpaths.units import DEG
 
 COVERAGE = 1.96
@@ -150,7 +150,7 @@ def measure_first(e: Estimate, machine: Machine) -> Uncertain | None:
         for axis, name in enumerate(machine.axis_names):
             if f"{name}.{limit}" in machine.limits.assumed and not _shown(name, limit, e.model):
                 which = np.arange(len(machine.axis_names)) == axis
-                changed = [_scaled(e.blocks, limit, which, sign) for sign in (-1, 1)]
+                changed = [scaled(e.blocks, limit, which, np.exp(sign * ASSUMED[limit])) for sign in (-1, 1)]
                 moved = sorted(total(b, timed(b, model)) - begin for b in changed)
                 alone[f"{name}.{limit}"] = (moved[-1] - moved[0]) / 2.0
     worst = max(alone, key=lambda name: alone[name], default="")
@@ -180,7 +180,8 @@ def _assumed_changes(blocks: MotionBlocks, machine: Machine, model: CycleTimeMod
             which = np.array([f"{name}.{limit}" in machine.limits.assumed and not _shown(name, limit, model)
                               for name in machine.axis_names])
             if which.any():
-                result.append((limit, [(_scaled(blocks, limit, which, sign), model) for sign in (-1, 1)]))
+                result.append((limit, [(scaled(blocks, limit, which, np.exp(sign * ASSUMED[limit])), model)
+                                       for sign in (-1, 1)]))
     for name, cause in _TIMING.items():
         here = (blocks.pauses.cause == cause) & (blocks.pauses.seconds > 0.0)
         if name in machine.timing.assumed and here.any():
@@ -218,12 +219,10 @@ def with_values(model: CycleTimeModel, logarithms: dict[str, float]) -> CycleTim
     return moved.model_copy(update=others)
 
 
-def _scaled(blocks: MotionBlocks, limit: str, which: Floats, sign: int) -> MotionBlocks:
-    axes = blocks.axes
-    factor = np.where(which, np.exp(sign * ASSUMED[limit]), 1.0)
-    scaled = {name: getattr(axes, name) for name in _LIMITS} | {limit: getattr(axes, limit) * factor}
-    return replace(blocks, axes=Axes(axes.letters, axes.rotary, scaled["velocity"], scaled["acceleration"],
-                                     scaled["jerk"], axes.xyz))
+def scaled(blocks: MotionBlocks, limit: MotionOrder, which: Bools, factor: float) -> MotionBlocks:
+    """The blocks on a machine whose axes `which` (A,) have that limit times the factor."""
+    changed = getattr(blocks.axes, limit) * np.where(which, factor, 1.0)
+    return replace(blocks, axes=replace(blocks.axes, **{limit: changed}))
 
 
 def _longer(blocks: MotionBlocks, which: Floats, seconds: float) -> MotionBlocks:

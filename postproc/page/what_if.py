@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from machines.choices import MotionOrder
-from postproc.cycle_time.blocks import Axes, MotionBlocks
-from postproc.cycle_time.estimate import Estimate, timed, total
+from postproc.cycle_time.estimate import Estimate, scaled, timed, total
 from postproc.cycle_time.shares import shares
 
 FACTORS = (0.5, 0.75, 1.0, 1.5, 2.0)
@@ -20,7 +18,7 @@ LEAST = 0.002
 """share of the time that a limit must hold to be looked at"""
 BLOCKS = 50_000
 """blocks up to which times are counted again"""
-ORDERS: tuple[MotionOrder, ...] = ("velocity", "acceleration", "jerk")
+ORDERS: tuple[MotionOrder, ...] = get_args(MotionOrder)
 
 
 def what_if(e: Estimate) -> dict[str, Any]:
@@ -37,14 +35,5 @@ def what_if(e: Estimate) -> dict[str, Any]:
 def _seconds(e: Estimate, letter: str, order: MotionOrder, factor: float) -> float:
     if factor == 1.0:
         return e.seconds
-    blocks = scaled(e.blocks, letter, order, factor)
+    blocks = scaled(e.blocks, order, np.array([name == letter for name in e.blocks.axes.letters]), factor)
     return float(total(blocks, timed(blocks, e.model)))
-
-
-def scaled(blocks: MotionBlocks, letter: str, order: MotionOrder, factor: float) -> MotionBlocks:
-    """The blocks on a machine whose axis has that limit times the factor."""
-    axes = blocks.axes
-    one = np.where(np.array([name == letter for name in axes.letters]), factor, 1.0)
-    values = {name: getattr(axes, name) * (one if name == order else 1.0) for name in ORDERS}
-    return replace(blocks, axes=Axes(axes.letters, axes.rotary, values["velocity"], values["acceleration"],
-                                     values["jerk"], axes.xyz))

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from postproc.cycle_time.conversion import estimate_of
-from postproc.cycle_time.estimate import Estimate
+from postproc.cycle_time.estimate import Estimate, scaled
 from postproc.page.columns import unpacked
 from postproc.page.points import columns
 from postproc.page.run import Run, run_dict
 from postproc.page.skeleton import chain, legs
 from postproc.page.tools import tool_rows
-from postproc.page.what_if import FACTORS, ORDERS, scaled, what_if
+from postproc.page.what_if import FACTORS, ORDERS, what_if
 from postproc.pipeline.result import PostResult
 from tests.postproc.kit import convert, good, machine, setup_of, toolpath
 from tests.postproc.page.page_kit import small
@@ -140,7 +140,7 @@ def test_what_if_times_are_those_of_a_machine_with_that_limit() -> None:
     for one in found["limits"]:
         assert one["seconds"][FACTORS.index(1.0)] == made.seconds
         assert one["seconds"][0] > made.seconds - 1e-9
-    blocks = scaled(made.blocks, "X", "velocity", 0.5)
+    blocks = scaled(made.blocks, "velocity", np.array([name == "X" for name in made.blocks.axes.letters]), 0.5)
     assert blocks.axes.velocity[0] == 0.5 * made.blocks.axes.velocity[0]
     assert all((getattr(blocks.axes, name)[1:] == getattr(made.blocks.axes, name)[1:]).all() for name in ORDERS)
 
