@@ -71,6 +71,7 @@ FLOORS = (
     ("postproc.page", "the report: a page that opens offline, and the same as JSON"),
     ("postproc.explain", "a page for each code of a message"),
     ("postproc.python", "the calls of the package: time, orient, place, calibrate, analyse"),
+    ("postproc.batch", "many runs of commands: jobs, workers, what is done already"),
     ("postproc.cli", "the command line"),
 )
 """(room, what it does): a room imports only rooms before it"""

@@ -28,6 +28,7 @@ FILES = {
     "machines.calibration.folded_names": "names of parameters",
     "machines.geometric_error.exchange.imports": "tables of others",
     "postproc.pipeline.hooks": "blocks of controller files",
+    "postproc.batch.tasks": "names of files that are made up",
     "postproc.reference.records": "blocks of INSERT records",
     "postproc.base.header_words": "headers of programs: written and read in one place",
     "postproc.readback.comparison.hooks": "blocks of the shop in programs",

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import sys
+from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.base.options import FeedModeChoice, FeedSource, OutputMode
+from postproc.cli.batch import EXAMPLE as BATCHES
+from postproc.cli.batch import batch
 from postproc.cli.calibrate import calibrate
 from postproc.cli.console import (
     Json,
@@ -60,6 +66,7 @@ from toolpaths.choices import FieldEnding, GivenDialect, GivenUnit
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
+    from postproc.batch.run import Ran
     from postproc.pipeline.result import PostResult
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
@@ -77,6 +84,7 @@ app.command(epilog="Example: postproc time part.cls -m mikron-ucp710 -c linuxcnc
 app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog=PLACES)(place)
 app.command("report", epilog=REPORTS)(report_command)
+app.command(epilog=BATCHES)(batch)
 
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "
@@ -114,9 +122,10 @@ def _version(wanted: bool) -> None:
 
 
 @app.callback()
-def options_of_all(version: Annotated[bool, typer.Option("--version", is_eager=True, callback=_version,
-                                                         help="show the version")] = False) -> None:
+def options_of_all(context: typer.Context, version: Annotated[bool, typer.Option(
+        "--version", is_eager=True, callback=_version, help="show the version")] = False) -> None:
     """Options before the command."""
+    context.obj = run_command  # for commands that call others
 
 
 @app.command(epilog="Example: postproc convert part.cls -m mikron-ucp710 -c linuxcnc -o part.ngc")
@@ -290,6 +299,20 @@ def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", 
                            allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
     found = figures(result)
     report(tuple(result.diagnostics), json, found, text_of(result))
+
+
+def run_command(arguments: Sequence[str]) -> Ran:
+    """A command line called within a process that goes on, under the guard: what a worker of a batch does."""
+    from postproc.batch.run import Ran
+
+    said, own = io.StringIO(), sys.argv
+    sys.argv = ["postproc", *arguments]
+    try:
+        with redirect_stderr(said), redirect_stdout(io.StringIO()):
+            code = guarded(lambda: app(list(arguments), prog_name="postproc"))
+    finally:
+        sys.argv = own
+    return Ran(code, tuple(line for line in said.getvalue().splitlines() if line.strip()))
 
 
 def main() -> None:

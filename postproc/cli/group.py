@@ -36,7 +36,7 @@ def width() -> int:
 
 
 ORDER = ("convert", "verify", "inspect", "trace", "time", "report", "orient", "place", "calibrate", "errors", "machine",
-         "controller", "setup")
+         "controller", "setup", "batch")
 """commands as the help lists them, the first ones first; others follow"""
 
 

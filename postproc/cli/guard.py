@@ -187,7 +187,9 @@ def _silence(stream: TextIO) -> None:
 
 
 def _interrupted() -> int:
-    _say("interrupted; nothing was written")
+    from postproc.cli.says import SAYS
+
+    _say(SAYS.interrupted or "interrupted; nothing was written")
     return INTERRUPTED
 
 

@@ -14,6 +14,7 @@ class Says:
         verbose: each stage is named as it begins
         strict: warnings are errors
         job_line: what --quiet holds back until there is a warning or an error: the values that a job file gives
+        interrupted: what is said where the command is interrupted, "" where nothing was written
         job_units: the job file whose units the command takes, "" where it has its own or none
     """
 
@@ -22,6 +23,7 @@ class Says:
     strict: bool = False
     job_units: str = ""
     job_line: str = ""
+    interrupted: str = ""
 
 
 SAYS = Says()

@@ -112,6 +112,8 @@ class ProgramBlocks(UserModel):
     """{name} is the program's name, {number} its number in four digits, {units} the word of its units"""
     number: int = Field(default=1, ge=1, le=9999)
     """of the program, where the controller has numbers"""
+    suffix: Annotated[str, Field(pattern=r"^\.[A-Za-z0-9]+$")] = ".nc"
+    """usual ending of the name of a program's file: what `batch` names programs by"""
     stock: tuple[Annotated[str, placeholders("x0", "y0", "z0", "x1", "y1", "z1")], ...] = ()
     """blocks behind `begin` that state the stock for the control's graphics, where the set-up has one
     ([rewind.stock]): its least and greatest X, Y, Z, at all places, mm in the first work offset, rotary axes at 0"""

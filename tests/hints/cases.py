@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tests.hints.align_cases import ALIGN
+from tests.hints.batch_cases import BATCH
 from tests.hints.cl_cases import CL
 from tests.hints.cl_word_cases import CL_WORDS
 from tests.hints.convert_cases import CONVERT
@@ -19,4 +20,4 @@ from tests.hints.tool_cases import TOOLS
 from tests.hints.verify_cases import VERIFY
 
 CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE, *ALIGN, *PLACE, *VERIFY, *EXCHANGE,
-         *OWN_ROOMS, *MACROS]
+         *OWN_ROOMS, *MACROS, *BATCH]
