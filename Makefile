@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile -rfEs
 SOURCES := toolpaths machines postproc
 NUMERIC = $(shell grep -rl --include='test_*.py' 'mark\.numeric' tests)
 
-.PHONY: demo test quick numeric hard damage changes slow mutants programs faults fuzz lint lock clean
+.PHONY: docs demo test quick numeric hard damage changes slow mutants programs faults fuzz lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -70,6 +70,10 @@ numeric: $(STAMP)
 	@for kind in $$($(BIN)/python -m tests.processors); do echo "processor: $$kind"; \
 		NUMBA_CPU_NAME=$$kind NUMBA_CPU_FEATURES= NUMBA_CACHE_DIR="$(CURDIR)/.pytest_cache/numba-$$kind" \
 		$(BIN)/pytest -m numeric $(NUMERIC) || exit 1; done
+
+# The documentation as a site that opens offline: out/docs/index.html. Warnings are errors.
+docs: $(STAMP)
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -184,9 +184,9 @@ class ClSource:
         cycle="int32: N", tool="int32: N", operation="int32: N", pass_="int32: N", line="int64: N", normal="N 3",
         contact="N 3", spin="N")
 class Toolpath:
-    """The path of the cutter in the part frame (the absolute frame of the CL file), one row per commanded position.
+    """The path of the cutter in the part frame (the absolute frame of the CL file), N commanded positions, a row each.
 
-    Attributes (N rows):
+    Attributes:
         tip (N, 3): mm, the tool tip
         axis (N, 3): unit, from the tip to the spindle
         feed (N,): see `feed_mode`; NaN where the file had stated none, and for rapids

@@ -1,0 +1,91 @@
+"""Commands and Python blocks of the documentation do what the page says; commands of READMEs are such as there are."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from typer.main import get_command
+
+from postproc.cli.app import app
+from postproc.cli.batch import wrong_use
+from postproc.setup.model import load_setup
+from tests.docs.page import ROOT, blocks
+from tests.docs.page import faults as faults_of
+
+PAGES = sorted(p for p in (ROOT / "docs").rglob("*.md") if "generated" not in p.parts and p.name != "python.md")
+READMES = sorted(p for p in (*ROOT.glob("*.md"), *(p for top in ("toolpaths", "machines", "postproc", "samples", "tests")
+                 for p in (ROOT / top).rglob("*.md")), *PAGES) if p.name != "CHANGELOG.md")
+HOW_TOS = 20
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[str(p.relative_to(ROOT / "docs")) for p in PAGES])
+def test_a_page_does_what_it_says(page: Path, tmp_path: Path) -> None:
+    assert faults_of(page, tmp_path) == []
+
+
+def test_a_page_that_is_wrong_is_noticed(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("```console\n$ postproc inspect samples/pocket.cls\n...7 points...\n```\n", encoding="utf-8")
+    assert len(faults_of(page, tmp_path)) == 1
+    page.write_text("```console\n$ postproc inspect samples/pocket.cls\n...96 points...\n```\n", encoding="utf-8")
+    assert faults_of(page, tmp_path) == []
+    page.write_text("```python\n>>> 1 + 1\n3\n```\n", encoding="utf-8")
+    assert len(faults_of(page, tmp_path)) == 1
+
+
+def commands(text: str) -> list[list[str]]:
+    """Commands of the shell blocks of a page, as words; what is cut short with ... is left out."""
+    found = []
+    for block in blocks(text):
+        if block.kind in ("sh", "bash", "console", "text"):
+            for line in block.text.replace("\\\n", " ").splitlines():
+                words = shlex.split(line.removeprefix("$ "), comments=True)
+                if words[:1] == ["postproc"] and "..." not in words:
+                    found.append(words[1:])
+    return found
+
+
+def wrong(words: list[str]) -> str:
+    """What a command line has that there is not; "" where it is one."""
+    group = get_command(app)
+    while hasattr(group, "commands"):
+        if not words or words[0] not in group.commands:
+            return "" if words[:1] in ([], ["--help"], ["--version"]) else f"no command {words[:1]}"
+        if not hasattr(group.commands[words[0]], "commands"):
+            return wrong_use(group, words)
+        group, words = group.commands[words[0]], words[1:]
+    return ""
+
+
+@pytest.mark.parametrize("page", READMES, ids=[str(p.relative_to(ROOT)) for p in READMES])
+def test_commands_of_readmes_are_such_as_there_are(page: Path) -> None:
+    lines = commands(page.read_text("utf-8"))
+    assert [(words, said) for words in lines if (said := wrong(words))] == []
+
+
+def test_lines_of_a_set_up_are_such_as_there_are(tmp_path: Path) -> None:
+    """TOML that a page shows without making it a file of its commands."""
+    found = [block for page in PAGES for block in blocks(page.read_text("utf-8"))]
+    shown = [block.text for block in found if block.kind == "toml" and not block.file]
+    assert len(shown) >= 3
+    for text in shown:
+        (tmp_path / "s.toml").write_text(text, encoding="utf-8")
+        setup, faults = load_setup(str(tmp_path / "s.toml"))
+        assert setup is not None, [str(d) for d in faults]
+
+
+def test_a_command_that_is_none_is_noticed() -> None:
+    assert wrong(["convert", "a.cls", "-m", "x", "-c", "y"]) != "" and wrong(["convrt"]) != ""
+    assert wrong(["machine", "show", "x", "--figur", "y"]) != ""
+    assert wrong(["convert", "a.cls", "-m", "x", "-c", "y", "-o", "z"]) == ""
+
+
+def test_there_is_a_page_for_what_shops_ask() -> None:
+    names = [p.stem for p in (ROOT / "docs" / "how-to").glob("*.md")]
+    assert len(names) >= HOW_TOS and len(list((ROOT / "docs" / "tutorials").glob("*.md"))) == 4
+    index = (ROOT / "docs" / "index.md").read_text("utf-8")
+    assert all(f"tutorials/{p.stem}" in index for p in (ROOT / "docs" / "tutorials").glob("*.md"))
+    assert re.search(r"^how-to/\*$", index, re.MULTILINE)
