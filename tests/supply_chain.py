@@ -3,7 +3,7 @@
     python tests/supply_chain.py               writes docs/licences.md
     python tests/supply_chain.py --sbom FILE   writes CycloneDX JSON 1.5, with the hashes of requirements.lock
 
-The parts are those that the `dependencies` of pyproject.toml need, followed through the metadata of what is installed.
+The parts are those that the `dependencies` and the extras for users of pyproject.toml need, followed through the metadata of what is installed.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "licences.md"
+OF_DEVELOPERS = ("dev", "docs")
+"""extras that no user installs"""
 HEAD = """# Licences of what an installation brings
 
 Written by `python tests/supply_chain.py` from the metadata of the packages; versions: `requirements.lock`. The licence
@@ -38,7 +40,9 @@ def plain(name: str) -> str:
 def parts() -> dict[str, set[str]]:
     """package -> the packages that need it; "postproc" for those of pyproject.toml."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    todo = [("postproc", Requirement(text)) for text in project["dependencies"]]
+    extras = [text for name, some in project["optional-dependencies"].items() if name not in OF_DEVELOPERS for text in some]
+    todo = [("postproc", need) for text in (*project["dependencies"], *extras)
+            if plain((need := Requirement(text)).name) != "postproc"]
     found: dict[str, set[str]] = {}
     while todo:
         parent, need = todo.pop()

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, get_args
 
 from toolpaths.choices import FigureEnding
+from toolpaths.extras import need
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,9 +39,11 @@ def image(size: tuple[float, float], title: str, fill: Callable[[Figure], None],
 
     Raises:
         ValueError: for another ending.
+        DiagnosticError: where matplotlib is not installed.
     """
     if ending not in FORMATS:
         raise ValueError(f"no figure format {ending!r}; known: {', '.join(FORMATS)}")
+    need("matplotlib", "drawings need")
     import matplotlib
     from matplotlib.figure import Figure
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import signal
 import threading
 import time
@@ -15,6 +14,7 @@ from postproc.base.version import VERSION
 from postproc.batch.receipts import BY_CODE, Receipt, kept, written
 from postproc.batch.tasks import Task
 from toolpaths.diagnostics import DiagnosticError, error
+from toolpaths.extras import need
 
 MOST_MESSAGES = 5
 """lines of what a command says that are kept"""
@@ -89,9 +89,7 @@ def _remote(task: Task, key: str, runner: Runner) -> Receipt:
 
 
 def _on_dask(tasks: Sequence[tuple[Task, str]], runner: Runner, where: Where) -> Iterator[tuple[int, Receipt]]:
-    if importlib.util.find_spec("distributed") is None:
-        raise DiagnosticError([error("batch.no_dask", "several workers need the packages dask and distributed, which are "
-                                     "not installed: pip install 'postproc[batch]', or run it with -j 1")])
+    need("distributed", "several workers need")
     from distributed import as_completed
 
     ended: Any = as_completed

@@ -78,13 +78,21 @@ def report_text(fault: BaseException, arguments: list[str]) -> str:
 
 
 def _failed(fault: Exception) -> int:
-    """Memory that is used up is no fault of the program; all else is."""
+    """Memory that is used up and a package that is not installed are no faults of the program; all else is."""
+    if _of_extras(fault):
+        _say(str(fault))
+        return 1
     if not _of_memory(fault):
         return _internal(fault)
     fault.__traceback__ = fault.__context__ = fault.__cause__ = None  # what the command held is free for the message
     _say("memory is used up; the command ended; each of its files is whole, new or as it was; allow it more (ulimit -v, "
          "the limit of the container), end other programs, or convert the operations of the file one by one")
     return 1
+
+
+def _of_extras(fault: BaseException) -> bool:
+    """True for the DiagnosticError of `toolpaths.extras`, wherever it was raised."""
+    return any(getattr(one, "code", "") == "extra.missing" for one in getattr(fault, "diagnostics", ()))
 
 
 def _of_memory(fault: BaseException | None) -> bool:

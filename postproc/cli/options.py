@@ -88,10 +88,18 @@ def figure_ending(figure: Path | None) -> FigureEnding | None:
 
 
 def ending_of(file: Path, endings: Any, option: str, wrong: str) -> Any:
-    """The ending of a file as a value of a Literal; wrong use of `option` where it is none."""
+    """The ending of a file as a value of a Literal; wrong use of `option` where it is none.
+
+    Raises:
+        DiagnosticError: where what draws is not installed: said before anything is computed.
+    """
     ending = file.suffix.lower()
     if ending not in get_args(endings):
         raise typer.BadParameter(f"{file.name} {wrong}", param_hint=option)
+    if ending in get_args(FigureEnding):
+        from toolpaths.extras import need
+
+        need("matplotlib", "drawings need")
     return ending
 
 

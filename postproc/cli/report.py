@@ -76,6 +76,10 @@ def report_command(file: ClFile, machine: Machines, controller: Controllers,
         inputs |= {f"{what} {name}": place for what, place in own_files(name).items()}
     for name in controller:
         inputs |= {f"{what} {name}": place for what, place in own_files("", name).items()}
+    if figures is not None:
+        from toolpaths.extras import need
+
+        need("matplotlib", "drawings need")
     refuse_overwriting({"-o": str(output), "--json": json, **_figure_files(figures, len(machine) * len(controller))}, inputs)
     from postproc.base.options import Options
     from postproc.page.document import document, report_dict, texts_of

@@ -26,6 +26,7 @@ from postproc.setup.bodies import SolidModel as Given
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.extras import need
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -84,7 +85,12 @@ class StationaryBodies:
 
 
 def _manager(meshes: dict[str, Trimesh]) -> Any:
-    """Bodies for collision queries."""
+    """Bodies for collision queries.
+
+    Raises:
+        DiagnosticError: where python-fcl is not installed.
+    """
+    need("fcl", "places next to meshes need")
     from trimesh import collision
 
     manager: Any = collision.CollisionManager()  # type: ignore[no-untyped-call]  # trimesh states no types here

@@ -12,6 +12,7 @@ from postproc.orientation.passes.contact import Contact, contact_of
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic
+from toolpaths.extras import need
 from toolpaths.shape import Curves
 from toolpaths.units import DEG
 
@@ -66,6 +67,7 @@ def mesh_normals(mesh: Trimesh, centres: Floats, radius: float, slack: float) ->
     The normal points from the nearest point of the part to the centre; the ball touches where that is
     `radius` away, `slack` more or less, and the centre is outside.
     """
+    need("rtree", "normals of a mesh need")
     from trimesh.proximity import closest_point
 
     result = np.full((len(centres), 3), np.nan)
