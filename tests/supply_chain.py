@@ -3,7 +3,8 @@
     python tests/supply_chain.py               writes docs/licences.md
     python tests/supply_chain.py --sbom FILE   writes CycloneDX JSON 1.5, with the hashes of requirements.lock
 
-The parts are those that the `dependencies` and the extras for users of pyproject.toml need, followed through the metadata of what is installed.
+The parts are those that the `dependencies` of pyproject.toml and its extras for users need, followed through the metadata
+of what is installed.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ def _without(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     f"errors check {SAMPLES}/errors/mikron-ucp710.toml -m mikron-ucp710 --figure out.png",
     f"time {SAMPLES}/pocket.cls -m mill-3axis --figure out.svg",
     f"orient {SAMPLES}/test_part.cls -m mikron-ucp710 --figure out.svg",
-    f"convert {SAMPLES}/pocket.cls -m mikron-ucp710 -c linuxcnc -o out.ngc --error-model {SAMPLES}/errors/mikron-ucp710.toml "
+    f"convert {SAMPLES}/pocket.cls -m mikron-ucp710 -c linuxcnc -o o.ngc --error-model {SAMPLES}/errors/mikron-ucp710.toml "
     "--residuals out.png", f"report {SAMPLES}/pocket.cls -m mill-3axis -c linuxcnc -o out.html --figures pictures"])
 def test_drawings_without_matplotlib(words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _without("matplotlib", monkeypatch)
