@@ -71,9 +71,10 @@ numeric: $(STAMP)
 		NUMBA_CPU_NAME=$$kind NUMBA_CPU_FEATURES= NUMBA_CACHE_DIR="$(CURDIR)/.pytest_cache/numba-$$kind" \
 		$(BIN)/pytest -m numeric $(NUMERIC) || exit 1; done
 
-# The documentation as a site that opens offline: out/docs/index.html. Warnings are errors.
+# The documentation as a site that opens offline, out/docs/index.html, and out/postproc.1 for man. Warnings are errors.
 docs: $(STAMP)
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
+	$(BIN)/python -m sphinx -q -b man docs out
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -24,6 +24,7 @@ myst_heading_anchors = 3
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 napoleon_google_docstring = True
+man_pages = [("reference/generated/commands", "postproc", "CL file in, proved G-code out", author, 1)]
 html_theme = "furo"
 html_title = f"postproc {VERSION}"
 html_copy_source = False

@@ -5,6 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from postproc.base.neighbours import foreign
+
 if TYPE_CHECKING:
     from postproc.base.options import Options
     from postproc.base.version import VERSION
@@ -27,4 +29,6 @@ def __getattr__(name: str) -> Any:
     """The public calls, imported on first use so that the command line starts at once."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if other := foreign():
+        raise ImportError(other)
     return getattr(import_module(_HOME[name]), name)

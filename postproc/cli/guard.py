@@ -35,8 +35,8 @@ def guarded(command: Callable[[], object]) -> int:
     pipe end quietly.
     """
     try:
-        if short := _too_little_memory():
-            _say(short)
+        if wrong := _too_little_memory() or _other_packages():
+            _say(wrong)
             return 1
         try:
             command()
@@ -119,6 +119,13 @@ def _too_little_memory() -> str:
         return ""
     return (f"the memory limit of {limit >> 20} MB is too small, at least {_LEAST_MEMORY >> 20} MB are needed; "
             f"nothing was written; raise it: ulimit -v {_LEAST_MEMORY >> 10}")
+
+
+def _other_packages() -> str:
+    """What is said where packages of others stand in the place of ours; "" where none do."""
+    from postproc.base.neighbours import foreign
+
+    return foreign()
 
 
 def _internal(fault: BaseException) -> int:

@@ -55,3 +55,12 @@ def test_each_extra_brings_its_packages(monkeypatch: pytest.MonkeyPatch) -> None
             with pytest.raises(DiagnosticError, match=rf"extra\.missing.*{package}.*postproc\[{extra}\]"):
                 need(name, "this needs")
     assert {"numpy", "scipy", "trimesh", "ruckig"} <= core
+
+
+def test_all_is_what_the_extras_of_users_bring() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    assert set(extras["all"]) == {text for extra in {extra for _, extra in EXTRAS.values()} for text in extras[extra]}
+
+
+def test_the_lock_names_no_folder() -> None:
+    assert "file:" not in (ROOT / "requirements.lock").read_text("utf-8")
