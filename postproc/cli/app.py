@@ -71,7 +71,7 @@ if TYPE_CHECKING:
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
 
-app = typer.Typer(name="postproc", cls=Group, no_args_is_help=True, add_completion=False, rich_markup_mode=None,
+app = typer.Typer(name="postproc", cls=Group, no_args_is_help=True, rich_markup_mode=None,
                   context_settings={"help_option_names": ["-h", "--help"]},
                   help="CL file in, proved G-code out: a toolpath post-processor that plans the machine's motion.")
 app.add_typer(machine_app, name="machine")

@@ -46,7 +46,25 @@ MaxBlocks = Annotated[int | None, typer.Option("--max-blocks", metavar="N", min=
                                                callback=lambda context, value: _hold_blocks(context, value),
                                                help="blocks of a program with macros that are executed before it "
                                                "counts as endless (default 1000000)")]
-MachineName = Annotated[str, typer.Option("-m", "--machine", metavar="MACHINE",
+
+
+def _names(start: str, *folders: str) -> list[str]:
+    """Built-in names of some folders and TOML files of the present one that begin so, for completion in a shell."""
+    here = Path(__file__).parents[2]
+    known = [file for folder in folders for file in (here / folder).glob("*.toml")]
+    return sorted([one.stem for one in known if one.stem.startswith(start)] + [str(one) for one in Path().glob(
+        "*.toml") if str(one).startswith(start)])
+
+
+def _machines(incomplete: str) -> list[str]:
+    return _names(incomplete, "machines/data", "machines/catalogue")
+
+
+def _controllers(incomplete: str) -> list[str]:
+    return _names(incomplete, "postproc/controllers")
+
+
+MachineName = Annotated[str, typer.Option("-m", "--machine", metavar="MACHINE", autocompletion=_machines,
                                          help="name from `postproc machine list`, or a TOML file")]
 ToleranceOption = Annotated[float, typer.Option("--tolerance", metavar="MM", min=1e-6, max=10.0,
                                                 help="largest deviation of the tip")]
@@ -58,7 +76,7 @@ DialectOption = Annotated[GivenDialect, word_option(
     "a .clt that lacks the ROTABL which turn its frame back)", "--axis-from")]
 HooksFile = Annotated[str, typer.Option("--hooks", metavar="FILE", help="TOML file whose [hooks] are blocks of the shop; "
                                         "those of the set-up go before them")]
-ControllerName = Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER",
+ControllerName = Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER", autocompletion=_controllers,
                                              help="name from `postproc controller list`, or a TOML file")]
 MaxTilt = Annotated[float, typer.Option("--max-tilt", metavar="DEG", min=0.0, max=120.0, help="largest angle of "
                                         "a chosen axis to the surface normal, else to the programmed axis")]

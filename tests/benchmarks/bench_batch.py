@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from postproc.batch.run import Ran, Where, runs  # noqa: E402
+from postproc.batch.run import Ran, Runner, Where, runs  # noqa: E402
 from postproc.cli.app import run_command  # noqa: E402
 from tests.postproc.batch.batch_kit import batch_folder, with_keys  # noqa: E402
 
@@ -49,11 +49,11 @@ def scheduled(seconds: Sequence[float], workers: int, handing_out: float) -> flo
     return max(free)
 
 
-def timed(folder: Path, jobs: str, runner: object, where: Where) -> tuple[float, list[float]]:
+def timed(folder: Path, jobs: str, runner: Runner, where: Where) -> tuple[float, list[float]]:
     """Wall time of a batch, and seconds of each of its tasks."""
     tasks = with_keys(batch_folder(folder, jobs))
     began = time.perf_counter()
-    found = dict(runs(tasks, runner, where))  # type: ignore[arg-type]  # a runner
+    found = dict(runs(tasks, runner, where))
     return time.perf_counter() - began, [found[k].seconds for k in range(len(tasks))]
 
 
