@@ -28,6 +28,7 @@ def foreign() -> str:
         places = [Path(one) for one in (spec.submodule_search_locations or [] if spec else [])]
         if here / name not in places or mark not in _names_in(here / name):
             other = spec.origin if spec is not None else "nothing"
-            return (f"Python finds {other} in the place of the package {name} of postproc ({here / name}); run it from another "
-                    "folder, or install postproc into an environment of its own (pipx install postproc, python -m venv)")
+            return (f"Python finds {other} in the place of the package {name} of postproc ({here / name}); "
+                    "run it from another folder, or install postproc into an environment of its own "
+                    "(pipx install postproc, python -m venv)")
     return ""

@@ -24,7 +24,8 @@ def test_another_one_is_named(name: str, package: bool, tmp_path: Path) -> None:
     bomb.parent.mkdir(exist_ok=True)
     bomb.write_text("raise SystemExit('run by mistake')", encoding="utf-8")
     call = f"import sys; sys.path[:0] = [{str(tmp_path)!r}, {str(ROOT)!r}]; from postproc.__main__ import main; main()"
-    ran = subprocess.run([sys.executable, "-c", call, "--version"], capture_output=True, text=True, cwd=tmp_path, check=False)
+    ran = subprocess.run([sys.executable, "-c", call, "--version"], capture_output=True, text=True, cwd=tmp_path,
+                         check=False)
     assert ran.returncode == 1 and str(bomb) in ran.stderr and "environment of its own" in ran.stderr, ran.stderr
     assert "by mistake" not in ran.stderr and len(ran.stderr.splitlines()) == 1
 
