@@ -8,9 +8,9 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
-from reference_pages import write_pages  # noqa: E402
+from reference_pages import write_pages  # noqa: E402  # of this tree
 
-from postproc.base.version import VERSION  # noqa: E402
+from postproc.base.version import VERSION  # noqa: E402  # of this tree
 
 project = "postproc"
 author = "the postproc maintainers"

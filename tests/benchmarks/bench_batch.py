@@ -19,9 +19,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from postproc.batch.run import Ran, Runner, Where, runs  # noqa: E402
-from postproc.cli.app import run_command  # noqa: E402
-from tests.postproc.batch.batch_kit import batch_folder, with_keys  # noqa: E402
+from postproc.batch.run import Ran, Runner, Where, runs  # noqa: E402  # of this tree
+from postproc.cli.app import run_command  # noqa: E402  # of this tree
+from tests.postproc.batch.batch_kit import batch_folder, with_keys  # noqa: E402  # of this tree
 
 JOBS = """output = "out"
 controllers = ["linuxcnc"]
