@@ -64,6 +64,7 @@ FLOORS = (
     ("postproc.cycle_time", "how long a program takes, with a band"),
     ("postproc.time_fit", "the model of a control fitted to measured runs"),
     ("postproc.time_study", "times side by side, what if, tables, a figure"),
+    ("postproc.differences", "what two programs do differently"),
     ("postproc.placement", "where the part stands on the table"),
     ("postproc.alignment", "a part that is not where it was meant, measured"),
     ("postproc.report", "summary, trace, residual field"),

@@ -16,6 +16,8 @@ from postproc.base.options import FeedModeChoice, FeedSource, OutputMode
 from postproc.cli.batch import EXAMPLE as BATCHES
 from postproc.cli.batch import batch
 from postproc.cli.calibrate import calibrate
+from postproc.cli.compare import EXAMPLE as DIFFERENCES
+from postproc.cli.compare import compare
 from postproc.cli.console import (
     Json,
     controller_of,
@@ -85,6 +87,7 @@ app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog=PLACES)(place)
 app.command("report", epilog=REPORTS)(report_command)
 app.command(epilog=BATCHES)(batch)
+app.command(epilog=DIFFERENCES)(compare)
 
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]
 Errors = Annotated[str, typer.Option("--error-model", metavar="E.toml", help="file of the machine's geometric errors: "

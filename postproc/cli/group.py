@@ -35,8 +35,8 @@ def width() -> int:
     return get_terminal_size((PIPE, 24)).columns if sys.stdout.isatty() else PIPE
 
 
-ORDER = ("convert", "verify", "inspect", "trace", "time", "report", "orient", "place", "calibrate", "errors", "machine",
-         "controller", "setup", "batch")
+ORDER = ("convert", "verify", "compare", "inspect", "trace", "time", "report", "orient", "place", "calibrate", "errors",
+         "machine", "controller", "setup", "batch")
 """commands as the help lists them, the first ones first; others follow"""
 
 

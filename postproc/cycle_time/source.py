@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.control.control import Control, InterpolationMode
 from postproc.control.rollover import rollovers
@@ -19,6 +21,7 @@ from postproc.pipeline.result import PostResult
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
+from postproc.readback.execution.poses import BlockPoses, poses_before
 from postproc.readback.text.canonical import Canonical
 from postproc.reference.cutcom_of_tools import radii_of
 from postproc.reference.holes import Phase
@@ -49,15 +52,39 @@ def from_conversion(result: PostResult, override: float = 1.0) -> MotionBlocks:
     return _blocks(code, motion, result.machine, job.control, result.controller, origin, override)
 
 
-def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup: SetupFile, file: str = "",
-               others: Mapping[str, bytes] | None = None,
-               override: float = 1.0, unknown_length: float = 0.0) -> tuple[MotionBlocks | None, list[Diagnostic]]:
-    """The blocks of a program, from the machine's home; None and why where it cannot be executed.
+@dataclass(frozen=True)
+class ExecutedProgram:
+    """A program as its control runs it on a machine, from the machine's home.
 
-    Tool lengths come from the set-up, by length register as by tool number; the work offset stands where the set-up puts
-    the part. `others`: files of subprograms by name; `override` as of `blocks_of`.
-    `unknown_length`: mm that a length register holds of which the set-up says nothing.
+    Attributes:
+        lengths: gauge length by tool number and length register, mm
+        control: of the first work offset
     """
+
+    code: Canonical
+    motion: Motion
+    machine: Machine
+    control: Control
+    controller: ControllerFile
+    lengths: Mapping[int, float]
+
+    def poses(self) -> BlockPoses:
+        """Tip and tool axis at any place of its blocks, in the part frame's place on the table."""
+        by_length: dict[float, Kinematics] = {}
+
+        def kinematics(number: int) -> Kinematics:
+            length = self.lengths.get(number, 0.0)
+            if length not in by_length:
+                by_length[length] = self.machine.kinematics.with_tool(length)
+            return by_length[length]
+
+        return BlockPoses(self.control, kinematics, dict(self.lengths), poses_before(self.motion, self.control))
+
+
+def executed_program(data: bytes, machine: Machine, controller: ControllerFile, setup: SetupFile, file: str = "",
+                     others: Mapping[str, bytes] | None = None,
+                     unknown_length: float = 0.0) -> tuple[ExecutedProgram | None, list[Diagnostic]]:
+    """A program executed; None and why where it cannot be. Arguments as of `from_gcode`."""
     controller = with_shop(controller, machine, setup)
     origins, found = _origins(setup, machine)
     if has_errors(found):
@@ -67,7 +94,6 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
     controls = {code: Control(machine, law, origin, base=law, rapids=machine.rapids or controller.kinematics.rapids,
                               feed_rule=controller.feed.length, rolls=rollovers(machine, controller)[0])
                 for code, origin in origins}
-    control = next(iter(controls.values()))
     lengths = {int(number): tool.length for number, tool in setup.tools.items()}
     code, motion, more = _executed(data, controller, controls, lengths, radii_of(setup), file, others)
     if motion is not None and (unknown := unknown_lengths(motion, lengths)):
@@ -82,16 +108,39 @@ def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup:
     found += more
     if code is None or motion is None or has_errors(found):
         return None, found
-    missing = motion.missing_feed
-    if missing.any():
-        found.append(error("gcode.feed", "cutting blocks without a feed in force", file=file,
-                           lines=motion.line[missing][:6].tolist(), count=int(missing.sum()), hint="state F before them"))
+    return ExecutedProgram(code, motion, machine, next(iter(controls.values())), controller, lengths), found
+
+
+def from_gcode(data: bytes, machine: Machine, controller: ControllerFile, setup: SetupFile, file: str = "",
+               others: Mapping[str, bytes] | None = None,
+               override: float = 1.0, unknown_length: float = 0.0) -> tuple[MotionBlocks | None, list[Diagnostic]]:
+    """The blocks of a program, from the machine's home; None and why where it cannot be executed.
+
+    Tool lengths come from the set-up, by length register as by tool number; the work offset stands where the set-up puts
+    the part. `others`: files of subprograms by name; `override` as of `blocks_of`.
+    `unknown_length`: mm that a length register holds of which the set-up says nothing.
+    """
+    program, found = executed_program(data, machine, controller, setup, file, others, unknown_length)
+    if program is None:
         return None, found
-    blocks = _blocks(code, motion, machine, control, controller, None, override) if len(motion) else None
+    blocks, more = program_blocks(program, file, override)
+    return blocks, [*found, *more]
+
+
+def program_blocks(program: ExecutedProgram, file: str = "", override: float = 1.0,
+                   ) -> tuple[MotionBlocks | None, list[Diagnostic]]:
+    """The blocks of a program that was executed; None and why where they take no time that can be said."""
+    motion, missing = program.motion, program.motion.missing_feed
+    if missing.any():
+        return None, [error("gcode.feed", "cutting blocks without a feed in force", file=file,
+                            lines=motion.line[missing][:6].tolist(), count=int(missing.sum()), hint="state F before them")]
+    blocks = None
+    if len(motion):
+        blocks = _blocks(program.code, motion, program.machine, program.control, program.controller, None, override)
     if blocks is None or not len(blocks):
-        return None, [*found, error("gcode.no_motion", "the program moves nothing", file=file,
-                                    hint="name a program that has moves: G0, G1 with axis words")]
-    return blocks, found
+        return None, [error("gcode.no_motion", "the program moves nothing", file=file,
+                            hint="name a program that has moves: G0, G1 with axis words")]
+    return blocks, []
 
 
 def unknown_lengths(motion: Motion, lengths: Mapping[int, float]) -> list[int]:

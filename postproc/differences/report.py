@@ -1,0 +1,100 @@
+"""The differences of two programs as figures, text and a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from postproc.cycle_time.report import clock
+from postproc.cycle_time.source import ExecutedProgram
+from postproc.differences.compare import ProgramDifferences, StretchPair
+from postproc.differences.stretches import stretches
+from toolpaths.choices import FigureEnding
+from toolpaths.drawing import image
+from toolpaths.table_text import table_text
+from toolpaths.units import DEG
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHOWN = 12
+"""rows of a table"""
+COLOURS = ("#0072b2", "#d55e00")
+"""of A and B, for all eyes (Okabe and Ito)"""
+
+
+def as_dict(found: ProgramDifferences, names: tuple[str, str], seconds: tuple[float, float],
+            tolerance: tuple[float, float]) -> dict[str, Any]:
+    """Figures of --json; `tolerance`: mm and rad within which paths count as the same."""
+    return {"a": names[0], "b": names[1], "same": found.same(*tolerance), "cuts": found.cuts,
+            "cycle_time_s": list(seconds), "worst_cut": _pair(found.worst(True)), "worst_link": _pair(found.worst(False)),
+            "apart": [_pair(one) for one in found.pairs if one.cut and _apart(one, tolerance)],
+            "lone": [{"program": one.program, "line": one.line, "length_mm": one.length} for one in found.lone],
+            "states": [{"what": one.what, "a": one.value_a, "b": one.value_b, "cuts": one.count, "line_a": one.line_a,
+                        "line_b": one.line_b} for one in found.states]}
+
+
+def _pair(one: StretchPair | None) -> dict[str, Any] | None:
+    return None if one is None else {
+        "cut": one.cut, "line_a": one.worst_a, "line_b": one.worst_b, "tip_mm": one.gap.tip, "axis_deg": one.gap.axis / DEG,
+        "backward": one.gap.backward}
+
+
+def _apart(one: StretchPair, tolerance: tuple[float, float]) -> bool:
+    return one.gap.tip > tolerance[0] or one.gap.axis > tolerance[1] or one.gap.backward
+
+
+def as_text(found: ProgramDifferences, names: tuple[str, str], seconds: tuple[float, float],
+            tolerance: tuple[float, float]) -> str:
+    """For people: first whether they cut the same, then what differs."""
+    worst, rapid = found.worst(True), found.worst(False)
+    lines = [f"A: {names[0]}", f"B: {names[1]}",
+             f"cuts: {'the same' if found.same(*tolerance) else 'different'}, {found.cuts} in A"]
+    if worst:
+        turned = max(one.gap.axis for one in found.pairs if one.cut) / DEG
+        lines[-1] += f"; tips at most {worst.gap.tip:.6f} mm apart, axes {turned:.6f} degrees"
+    if rapid:
+        lines.append(f"between cuts: paths at most {rapid.gap.tip:.3f} mm apart, lines {rapid.worst_a} and {rapid.worst_b}")
+    lines.append(f"time: A {clock(seconds[0])}, B {clock(seconds[1])}")
+    apart = [one for one in found.pairs if one.cut and _apart(one, tolerance)]
+    lines += _table("cuts apart", [(one.worst_a, one.worst_b, f"{one.gap.tip:.4f}", f"{one.gap.axis / DEG:.4f}",
+                                    "other direction" if one.gap.backward else "") for one in apart],
+                    ("line A", "line B", "mm", "degrees", ""), "rrrrl")
+    alone = [(one.program.upper(), one.line, f"{one.length:.1f}") for one in found.lone]
+    lines += _table("cuts in one program alone", alone, ("in", "line", "mm"), "lrr")
+    lines += _table("states of cuts", [(one.what, one.value_a, one.value_b, one.count, one.line_a, one.line_b)
+                                       for one in found.states], ("", "A", "B", "cuts", "line A", "line B"), "lllrrr")
+    return "\n".join(lines)
+
+
+def _table(title: str, rows: Sequence[tuple[object, ...]], heads: tuple[str, ...], align: str) -> list[str]:
+    if not rows:
+        return []
+    more = [f"  and {len(rows) - SHOWN} more: --json has them all"] if len(rows) > SHOWN else []
+    return [f"{title}:", *table_text(rows[:SHOWN], heads, align, indent=2), *more]
+
+
+def overlay(programs: tuple[ExecutedProgram, ExecutedProgram], names: tuple[str, str], ending: FigureEnding) -> bytes:
+    """Cuts of both programs over each other, from above and from the front; mm on the table."""
+    drawn = [stretches(one) for one in programs]
+
+    def view(columns: tuple[int, int], labels: tuple[str, str]) -> Callable[[Any], None]:
+        def fill(axes: Any) -> None:
+            for one, colour, name, width in zip(drawn, COLOURS, ("A", "B"), (2.4, 0.9), strict=True):
+                for k in range(len(one)):
+                    if one.cut[k]:
+                        tip = one.tip[one.first[k]:one.last[k] + 1]
+                        axes.plot(tip[:, columns[0]], tip[:, columns[1]], color=colour, linewidth=width)
+                axes.plot([], [], color=colour, linewidth=width, label=name)
+            axes.set_aspect("equal")
+            axes.set_xlabel(f"{labels[0]}, mm")
+            axes.set_ylabel(f"{labels[1]}, mm")
+            axes.legend()
+        return fill
+
+    def sheet(figure: Figure) -> None:
+        left, right = figure.subplots(1, 2)
+        view((0, 1), ("x", "y"))(left)
+        view((0, 2), ("x", "z"))(right)
+
+    return image((11.0, 5.5), f"A {names[0]}   B {names[1]}", sheet, ending)

@@ -1,0 +1,79 @@
+"""A program as stretches: cuts, holes, and what lies between them, as places of the tool on the part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.cycle_time.source import ExecutedProgram
+from postproc.readback.execution.execute import Motion
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
+
+PLACES = 4
+"""places of a straight block that are looked at"""
+ARC_PLACES = 16
+"""places of an arc; a whole turn is followed within 2 % of its radius"""
+
+
+@dataclass(frozen=True)
+@arrays(tip="P 3", axis="P 3", line="int64: P", first="int64: S", last="int64: S", cut="bool: S", row="int64: S",
+        row_last="int64: S")
+class Stretches:
+    """S stretches of a program over P places.
+
+    Attributes:
+        tip (P, 3): mm, in the table frame; axis (P, 3): unit
+        line (P,): of the program
+        first, last (S,): places of a stretch, from where it begins to where it ends, both included
+        cut (S,): True for a cut or a whole hole, False for all that lies between two of these
+        row, row_last (S,): executed blocks that it begins and ends with
+    """
+
+    tip: Floats
+    axis: Floats
+    line: Ints
+    first: Ints
+    last: Ints
+    cut: Bools
+    row: Ints
+    row_last: Ints
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+def stretches(program: ExecutedProgram) -> Stretches:
+    """The stretches of a program; blocks that move nothing are left out, a tool change ends a cut."""
+    motion, poses = program.motion, program.poses()
+    rows = np.arange(len(motion), dtype=np.int64)
+    here = np.where(motion.code == 2, ARC_PLACES, PLACES)
+    row = np.repeat(rows, here)
+    number = np.arange(len(row)) - np.repeat(np.cumsum(here) - here, here)
+    tip, axis = poses.poses(motion, row, (number + 1.0) / here[row])
+    begin = poses.poses(motion, rows[:1], 0.0) if len(rows) else (np.zeros((0, 3)), np.zeros((0, 3)))
+    moved = _moved(np.concatenate([begin[0], tip]), np.concatenate([begin[1], axis]), row, len(motion))
+    return _cut_up(motion, moved, row, np.concatenate([begin[0], tip]), np.concatenate([begin[1], axis]))
+
+
+def _moved(tip: Floats, axis: Floats, row: Ints, count: int) -> Bools:
+    """(E,) blocks in which the tool moves on the part."""
+    step = np.linalg.norm(np.diff(tip, axis=0), axis=1) + np.linalg.norm(np.diff(axis, axis=0), axis=1)
+    return np.asarray(np.bincount(row, weights=np.nan_to_num(step), minlength=count) > 1e-9)
+
+
+def _cut_up(motion: Motion, moved: Bools, row: Ints, tip: Floats, axis: Floats) -> Stretches:
+    """Stretches of the blocks that move; `tip`, `axis` hold one place before the first block."""
+    kept = np.flatnonzero(moved & ~(motion.hole & (motion.code == 0)))  # how pecks come back is the cycle's own
+    cutting, tool = motion.code[kept] > 0, motion.tool[kept]
+    hole = np.where(motion.hole[kept], motion.block[kept], -1)
+    new = np.ones(len(kept), dtype=bool)
+    new[1:] = (cutting[1:] != cutting[:-1]) | (cutting[1:] & ((tool[1:] != tool[:-1]) | (hole[1:] != hole[:-1])))
+    begins = np.flatnonzero(new)
+    ends = np.append(begins[1:], len(kept)) - 1
+    where = np.searchsorted(row, kept)
+    upto = np.searchsorted(row, kept, side="right")
+    line = np.concatenate([motion.line[row[:1]], motion.line[row]]).astype(np.int64)
+    return Stretches(tip, axis, line, where[begins].astype(np.int64), upto[ends].astype(np.int64), cutting[begins],
+                     kept[begins].astype(np.int64), kept[ends].astype(np.int64))
