@@ -160,4 +160,4 @@ def test_rotary_axes_stand_still_where_the_tool_axis_does(case: Case) -> None:
     turning = [k for k, letter in enumerate(run.own.letters) if letter in "ABC"]
     rotary = np.array([run.ends[k].q[turning] for k in run.at])
     same = (axis[1:] == axis[:-1]).all(axis=1)
-    assert same.sum() > 10 and np.array_equal(rotary[1:][same], rotary[:-1][same])
+    assert same.sum() > 8 and np.array_equal(rotary[1:][same], rotary[:-1][same])
