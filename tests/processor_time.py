@@ -22,7 +22,7 @@ BUDGET = 480.0
 """s of processor for all of `make test`"""
 USUAL = 0.115
 """s that `yardstick` takes on the machine for which the budget is meant, with nothing else to do"""
-OF_A_FILE, OF_A_TEST = 0.07, 0.02
+OF_A_FILE, OF_A_TEST = 0.10, 0.02
 """shares of the whole run that one file and one test may take"""
 WHOLE = 5000
 """tests from which a run counts as the whole suite"""
