@@ -15,6 +15,8 @@ BESIDE_PACKAGE = {"__file__"}
 
 def bare(text: str) -> list[int]:
     """Lines that ask a path outside a `try` that takes OSError."""
+    if not any(f".{name}(" in text for name in ASKS):
+        return []
     tree = ast.parse(text)
     held = {id(inner) for node in ast.walk(tree) if isinstance(node, ast.Try) and any(
         "OSError" in ast.unparse(h.type) for h in node.handlers if h.type) for part in node.body for inner in ast.walk(part)}

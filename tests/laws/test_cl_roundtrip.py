@@ -18,7 +18,7 @@ from toolpaths.cl.text.source import normalise
 from toolpaths.diagnostics import Severity, has_errors
 from toolpaths.toolpath import FeedMode, Toolpath
 
-SLOW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+SLOW = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 number = st.one_of(st.integers(-500, 500).map(str), st.floats(-1e4, 1e4).map(lambda x: f"{x:.4f}"),
                    st.floats(-1e3, 1e3).map(repr), st.sampled_from([".5", "-0", "1.", "-.25", "+3", "1E2", "2.5e-3"]))
 blank = st.sampled_from(["", "", "", " ", "  "])

@@ -23,7 +23,7 @@ from tests.postproc.time_kit import calibrated
 EACH, MEAN = 0.01, 0.003
 """shares of the time that an estimate may be off, each and on average"""
 seen: dict[str, float] = {}
-SIMULATED = ("zigzag, G61.1", "arcs, G64 P0.05", "tool changes", "5 axes, G93, G64 P0.01", "5 axes, control's kinematics")
+SIMULATED = ("arcs, G64 P0.05", "5 axes, G93, G64 P0.01", "5 axes, control's kinematics")
 """run in the simulator by every `make test`, the others with -m slow: all are compared with its recorded
 times by tests/postproc/cycle_time/test_cycle_time_models.py"""
 

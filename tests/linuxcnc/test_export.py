@@ -53,6 +53,7 @@ def test_the_interpreter_takes_the_exported_ini(tmp_path: Path) -> None:
     assert "PROGRAM_END" in done.stdout and ends == pytest.approx([20.0, 10.0]), done.stdout + done.stderr
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "length"), [("5axiskins", 0.0), ("5axiskins", 75.5), ("linuxcnc-xyzac-trt", 75.5)])
 def test_the_imported_machine_stands_where_linuxcnc_stands(standstill, name: str, length: float, tmp_path: Path) -> None:
     """A head under 5axiskins, whose pivot length is a sum with the tool's, and tables; through the INI."""

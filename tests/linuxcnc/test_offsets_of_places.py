@@ -38,6 +38,7 @@ def words(letters: tuple[str, ...], values: Floats) -> str:
     return "".join(f" {letter}{value:.12f}" for letter, value in zip(letters, values, strict=True))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("order", ["tool", "part"])
 @pytest.mark.parametrize(("file", "machine", "places"), [
     ("pocket.cls", "mill-3axis", TWO), ("pocket.cls", "mill-4axis", FACES)])

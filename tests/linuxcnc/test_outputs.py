@@ -30,20 +30,24 @@ RESIDUE = 2e-4
 MADE = {"bicubic.cls": ("mill-3axis", "planar-delta-z"), "blade.cls": ("linuxcnc-xyzbc-trt",),
         "five_faces.cls": ("trunnion-bc",), "five_tilted.cls": ("nutating-head",),
         "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
-        "inch_plate.apt": ("mill-4axis",), "indexed_4axis.cls": ("mill-4axis",),
-        "pocket.cls": ("uranesx", "rotary-delta", "triaglide", "delta-cone", "delta-coplanar", "delta-hybrid",
-                       "linuxcnc-lineardelta"),
-        "test_part.cls": ("delta-parallel-x", "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact",
-                          "delta-star"),
+        "inch_plate.apt": ("rotary-delta", "triaglide", "delta-cone", "delta-coplanar", "delta-hybrid",
+                           "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact", "delta-star"),
+        "indexed_4axis.cls": ("mill-4axis",), "pocket.cls": ("uranesx", "linuxcnc-lineardelta"),
+        "test_part.cls": ("delta-parallel-x",),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
 """machines on which each sample is made: every sample, and every machine whose letters LinuxCNC's interpreter has"""
 ORIGINS = {"planar-delta-z": (-41.0, -30.0, -125.0), "rotary-delta": (-40.0, -30.0, -200.0),
            "triaglide": (-40.0, -30.0, -200.0)}
 """mm, of the part on machines in whose middle it has no room"""
+PLATE = (-40.0, -30.0, -230.0)
+"""mm, of the plate on Deltas"""
 MORE = {"bicubic.cls": ("uranesx",), "blade.cls": ("head-table",),
         "five_faces.cls": ("mikron-ucp710", "linuxcnc-xyzac-trt"),
-        "five_tilted.cls": ("fork-head-ab", "linuxcnc-xyzbc-trt"), "inch_plate.apt": ("nutating-head",),
-        "pocket.cls": ("mill-3axis", "mikron-ucp710"), "test_part.cls": ("mill-3axis", "trunnion-bc")}
+        "five_tilted.cls": ("fork-head-ab", "linuxcnc-xyzbc-trt"), "inch_plate.apt": ("nutating-head", "mill-4axis"),
+        "pocket.cls": ("mill-3axis", "mikron-ucp710", "rotary-delta", "triaglide", "delta-cone", "delta-coplanar",
+                       "delta-hybrid"),
+        "test_part.cls": ("mill-3axis", "trunnion-bc", "delta-parallel-x-compact", "delta-parallel-z",
+                          "delta-parallel-z-compact", "delta-star")}
 """further ones, with -m slow"""
 CODES = {73, 81, 82, 83, 84, 85, 86, 89}
 
@@ -97,8 +101,9 @@ def convert(path: Toolpath, found: list, machine: str, setup: SetupFile | None =
 def all_outputs(interpret, sample: str, names: tuple[str, ...]) -> list[Output]:
     """The sample on each of the machines."""
     path, found = toolpaths.read(SAMPLES / sample)
-    made = [convert(path, found, name, setup_file().model_copy(update={"part": PartPlacement(origin=ORIGINS.get(
-        name, (0.0, 0.0, 0.0)))})) for name in names]
+    plate = sample == "inch_plate.apt" and names == MADE[sample]
+    made = [convert(path, found, name, setup_file().model_copy(update={"part": PartPlacement(
+        origin=PLATE if plate else ORIGINS.get(name, (0.0, 0.0, 0.0)))})) for name in names]
     assert all(r.ok for r in made), [(r.machine.name, [str(d) for d in r.diagnostics]) for r in made if not r.ok]
     with ThreadPoolExecutor(2) as pool:
         return list(pool.map(lambda r: outputs.output(r, interpret), made))

@@ -32,6 +32,7 @@ def random_poses(machine: Machine, count: int) -> Floats:
     return np.hstack([rng.uniform(-200, 200, (count, 3)), rng.uniform(-0.95, 0.95, (count, len(rotary))) * span])
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "tool_length"), [("linuxcnc-xyzac-trt", 0.0), ("linuxcnc-xyzac-trt", 75.5),
                                                  ("linuxcnc-xyzbc-trt", 75.5)])
 def test_joints_at_standstill_are_our_inverse(standstill, name: str, tool_length: float) -> None:
@@ -71,6 +72,7 @@ def test_straight_move_takes_length_over_feed_and_one_ramp(recorded, tmp_path: P
     np.testing.assert_allclose(run.joints[-1], np.add(machine.home, [100, 0, 0]), atol=1e-9)
 
 
+@pytest.mark.slow  # whoever compares a time with a recorded one at another warp shows it too
 def test_warp_does_not_change_the_machine_time(recorded, tmp_path: Path) -> None:
     program = write(tmp_path, "G21 G90 G94 G61\nF6000\nG1 X50\nG1 Y30\nM2\n")
     times = [recorded(machines.load("mill-3axis"), program, warp=warp).seconds for warp in (Fraction(3, 4), 20)]

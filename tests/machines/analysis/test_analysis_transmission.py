@@ -1,7 +1,8 @@
 """What the analysis gives: transmission, singularity, reachable box, tilt; printed figures are in tests/laws."""
 
 import json
-from functools import partial
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -142,9 +143,15 @@ def test_reachable_box_of_a_serial_machine_is_its_travel() -> None:
         np.testing.assert_allclose(found["reachable_box_mm"][letter], [lower, upper], atol=1e-3)
 
 
+@cache
+def analysed(name: str) -> dict[str, Any]:
+    """Figures of a built-in machine."""
+    return analyse(machines.load(name))
+
+
 @pytest.mark.parametrize("name", ["uranesx", "h4a-c-table"])
 def test_report_has_its_units_in_its_keys(name: str) -> None:
-    found = analyse(machines.load(name))
+    found = analysed(name)
     assert found["condition_number"]["worst"] > 1.0 and found["reachable_box_mm"] is not None
     assert set(found["workspace_mm"]) == set("xyz")
 
@@ -152,7 +159,7 @@ def test_report_has_its_units_in_its_keys(name: str) -> None:
 @pytest.mark.parametrize("name", machines.names())
 def test_every_machine_is_analysed(name: str) -> None:
     """Unlimited axes included; the box is there for all that reach their middle with the tool as at home."""
-    found = analyse(machines.load(name))
+    found = analysed(name)
     assert found["axes"] == list(machines.load(name).axis_names) and found["reachable_box_mm"] is not None
 
 

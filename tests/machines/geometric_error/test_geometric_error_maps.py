@@ -209,7 +209,7 @@ def test_a_map_is_refined_to_a_stated_loss_and_no_further() -> None:
     actual, nominal = full.on(kin), full.zero().on(kin)
     base = random_map(("X", "Y", "Z"), (np.array([-150.0, 150.0]),) * 3)
     sizes, probe = [], joints(kin, 3000, 9)
-    for loss in (0.01, 0.003, 0.001):
+    for loss in (0.01, 0.003):
         made, noted = refined(actual, nominal, base, np.zeros(3), loss, 500_000)
         found = map_loss(ErrorModel(map=made).on(kin), actual, probe)
         assert noted.tip_worst <= loss and found.tip_worst < 1.05 * loss
@@ -217,7 +217,7 @@ def test_a_map_is_refined_to_a_stated_loss_and_no_further() -> None:
         coarser = map_of(actual, nominal, random_map(base.letters, half), np.zeros(3))
         assert map_loss(ErrorModel(map=coarser).on(kin), actual, probe).tip_worst > loss
         sizes.append(made.table.size)
-    assert sizes[0] < sizes[1] < sizes[2]
+    assert sizes[0] < sizes[1]
     with pytest.raises(ValueError, match="takes more than 1000 nodes"):
         refined(actual, nominal, base, np.zeros(3), 1e-5, 1000)
 

@@ -134,6 +134,7 @@ def test_a_machine_on_rods_reaches_its_bound(name: str) -> None:
     assert 0.3 < reached.max() <= 1.0 + 1e-6
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", ["h4a-c-table", "h4a-spindle-axis"])
 @pytest.mark.parametrize("constant", ["EB0S", "EA0S", "EX0S"])
 def test_rates_hold_at_every_place_within_reach(name: str, constant: str) -> None:

@@ -34,6 +34,7 @@ def poses(kinematics: H4Linear, n: int, seed: int = 0) -> tuple[Floats, Floats, 
     return tip, axis, p
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("changes", [{}, {"sense": -1.0, "tool_length": 30.0}])
 def test_forward_of_inverse_is_identity_over_the_workspace(name: str, changes: dict[str, object]) -> None:

@@ -140,7 +140,8 @@ SLIPS = {
 
 
 AGAIN = {"probe, a tenth", "laser, a tenth", "reversal, a tenth", "dx turned round", "six, ez tenfold", "probe far",
-         "ex turned round", "ex for ey"}
+         "ex turned round", "ex for ey", "dz tenfold", "C turned round", "laser tenfold", "reversal tenfold",
+         "urad under arcsec", "six, places tenfold", "set-ups backwards", "six in mm"}
 """faults that others show of another file, or the other way round: with -m slow"""
 
 

@@ -59,6 +59,7 @@ def errors(result: PostResult) -> list[tuple[str, str]]:
     return [(d.code, d.message) for d in result.diagnostics if d.severity is Severity.ERROR]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "controller"), GOES)
 def test_the_words_are_the_contour_and_the_tool_runs_as_the_file_says(name: str, controller: str) -> None:
     result = good(made(name, controller))

@@ -43,6 +43,7 @@ def test_the_same_block_at_several_places_is_asked_for_at_each() -> None:
         assert "verify.hook" in verdict(result, "\n".join(lines[:n] + lines[n + 1:]) + "\n"), n
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["fanuc-30i", "heidenhain-tnc640"])
 @pytest.mark.parametrize("number", ["101", "102", "111", "112", "121", "122", "131", "132"])
 def test_a_block_beyond_the_nearest_cut_is_not_where_it_is_asked_for(controller: str, number: str) -> None:

@@ -65,6 +65,7 @@ def verdict(result: PostResult, text: str) -> set[str]:
     return {d.code for d in found if d.severity is Severity.ERROR}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("controller", "output"), [(c, m) for c in CONTROLS for m in ("auto", "axes")])
 def test_no_feed_word_is_above_the_largest_feed(controller: str, output: str) -> None:
     """Nor does any axis move faster at feed than it may; what is limited is named with its lines."""
@@ -82,6 +83,7 @@ def test_no_feed_word_is_above_the_largest_feed(controller: str, output: str) ->
     assert said.severity is Severity.WARNING and "900 mm/min are limited to 400 mm/min" in said.message and said.count == 8
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("mode", ["auto", "per-minute"])
 @pytest.mark.parametrize("controller", CONTROLS)
 def test_in_inches_the_same_feed_is_the_largest(controller: str, mode: FeedModeChoice) -> None:

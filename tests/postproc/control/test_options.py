@@ -76,6 +76,7 @@ def test_auto_uses_only_what_is_fitted(controller: str) -> None:
     assert laws(converted(controller, "tilted_planes = false\ntip_control = false")) == {"axes"}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("controller", "mode"), [(c, m) for c in BOUGHT for m in ("tilted", "tcp")])
 def test_a_mode_that_is_asked_for_is_refused_with_the_line_of_the_machine_file(controller: str, mode: str) -> None:
     path = sides() if mode == "tcp" else toolpath(point(9 * tilted(20, 5), tilted(20, 5)))
@@ -115,6 +116,7 @@ def test_each_setting_is_confirmed_by_itself(controller: str, output: str, words
     assert gone and left == [line for line in sure if "NEEDS" in line]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", BOUGHT)
 @pytest.mark.parametrize("option", ["tilted_planes", "tip_control"])
 def test_a_program_that_uses_what_is_not_fitted_is_found(controller: str, option: str) -> None:

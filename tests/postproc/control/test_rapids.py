@@ -57,6 +57,7 @@ def errors(result: PostResult, text: str) -> set[str]:
     return {d.code for d in found if d.severity is Severity.ERROR}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", BENT)
 @pytest.mark.parametrize("output", ["auto", "axes", "tilted"])
 def test_rapids_stay_rapid_and_keep_above_what_is_cut(controller: str, output: str) -> None:
@@ -90,6 +91,7 @@ def test_every_position_of_the_cl_file_is_still_reached(controller: str) -> None
     assert np.allclose(result.job.moves.tip[last], straight.job.moves.tip)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", BENT)
 @pytest.mark.parametrize("written", ["auto", "axes", "tilted"])
 def test_the_proof_knows_nothing_of_how_rapids_were_split(controller: str, written: str) -> None:
@@ -210,6 +212,7 @@ def test_the_read_back_knows_what_is_cut_by_itself(controller: str, monkeypatch:
     assert not made.ok and any(d.code == "verify.link" and "below what is cut" in d.message for d in made.diagnostics)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", BENT)
 @pytest.mark.parametrize("stock", [False, True])
 def test_the_second_witness_holds_dog_legs_above_what_is_cut(controller: str, stock: bool) -> None:
@@ -230,6 +233,7 @@ def test_the_second_witness_holds_dog_legs_above_what_is_cut(controller: str, st
         assert (("clearance" in {f.code for f in said.findings}) is finds), (level, said.findings)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", BENT)
 @pytest.mark.parametrize("aside", [0.011, 0.015, 0.019, 0.025, 0.2])
 def test_a_rapid_that_goes_up_and_little_aside(controller: str, aside: float) -> None:

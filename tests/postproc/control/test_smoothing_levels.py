@@ -95,6 +95,7 @@ def test_what_the_control_or_the_file_has_not_is_refused_with_what_it_has(contro
     good(convert(part(), MACHINE, controller, setup(**follow)))
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", LEVELS)
 @pytest.mark.parametrize("asked", ["finishing", 0.003])
 def test_no_level_on_a_control_without_smoothing(controller: str, asked: str | float, tmp_path: Path) -> None:

@@ -40,6 +40,7 @@ def test_tools_are_called_by_their_names(controller: str) -> None:
         assert 'TOOL CALL "BM6" Z S2000' in both and '"' not in plain
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", NAMED)
 @pytest.mark.parametrize(("old", "new", "code"), [
     ("EM10_ROUGH", "BM6", "verify."), ("EM10_ROUGH", "EM99", "gcode.tool_name"), ("BM6", "EM10_ROUGH", "verify.")])

@@ -33,6 +33,7 @@ def arc(folder: Path, degrees: float) -> PostResult:
                             diagnostics=found)
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("degrees", [90.5, 91.0, 92.0, 95.0])
 def test_an_arc_that_ends_behind_its_summit_ends_by_the_new_way(tmp_path: Path, degrees: float) -> None:
     """At 92 degrees of a radius of 50 mm Y has come back by 30 um, six times its play."""

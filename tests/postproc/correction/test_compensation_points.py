@@ -35,7 +35,7 @@ CASES = [("five_faces.cls", "mikron-ucp710", "fanuc-30i", "tools"),
          ("five_tilted.cls", "mikron-ucp710", "heidenhain-tnc640", "tools"),
          ("tool_axis_tour.apt", "mikron-ucp710", "fanuc-30i", "tools"),
          ("five_faces.cls", "linuxcnc-xyzac-trt", "linuxcnc", "tools"),
-         ("pocket.cls", "mikron-ucp710", "linuxcnc", "tools"), ("pocket.cls", "uranesx", "linuxcnc", "delta"),
+         ("pocket.cls", "mikron-ucp710", "linuxcnc", "tools"), ("inch_plate.apt", "uranesx", "linuxcnc", "delta"),
          ("h4a_indexed.cls", "h4a-c-table", "linuxcnc", "h4a")]
 
 

@@ -60,7 +60,7 @@ CASES: list[Case] = [
     ("pocket.cls", "head-table", "fanuc-30i", "auto", 13),  # holes next to a steep error
     ("pocket.cls", "mill-4axis", "haas-ngc", "auto", 12),  # holes whose levels need unlike corrections
 ]
-AGAIN = (CASES[1], CASES[2], CASES[4], CASES[6], CASES[9], CASES[10], CASES[14], CASES[15])
+AGAIN = (CASES[0], CASES[1], CASES[2], CASES[3], CASES[4], CASES[6], CASES[9], CASES[10], CASES[14], CASES[15])
 """samples, machines and controls that other cases hold: with -m slow"""
 
 
@@ -160,4 +160,4 @@ def test_rotary_axes_stand_still_where_the_tool_axis_does(case: Case) -> None:
     turning = [k for k, letter in enumerate(run.own.letters) if letter in "ABC"]
     rotary = np.array([run.ends[k].q[turning] for k in run.at])
     same = (axis[1:] == axis[:-1]).all(axis=1)
-    assert same.sum() > 10 and np.array_equal(rotary[1:][same], rotary[:-1][same])
+    assert same.sum() > 8 and np.array_equal(rotary[1:][same], rotary[:-1][same])

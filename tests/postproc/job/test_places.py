@@ -66,6 +66,7 @@ def sequence(result: PostResult) -> list[tuple[int, int]]:
     return [one for k, one in enumerate(both) if k == 0 or both[k - 1] != one]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("control", CONTROLS)
 @pytest.mark.parametrize("order", ["tool", "part"])
 def test_cuts_are_those_of_each_part_alone(control: str, order: PlaceOrder) -> None:

@@ -64,6 +64,7 @@ def test_the_free_joint_takes_the_spin(name: str) -> None:
     assert free_joint(kin, tip, leaning, m.home) == -1 and held_joints(kin, tip, leaning, 0.3, m.home) is None
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "controller", "mode"), [
     ("mikron-ucp710", "linuxcnc", "axes"), ("mikron-ucp710", "siemens-840d", "tilted"),
     ("trunnion-bc", "fanuc-30i", "tilted"),

@@ -53,7 +53,7 @@ def test_a_plan_takes_as_long_as_its_program(name: str, counts: dict[str, Any]) 
     m, (setup, _) = machine(name), load_setup(SAMPLES / "tools.setup.toml")
     m = replace(m, turns=tuple(replace(turns, **counts) if m.endless[j] else turns for j, turns in enumerate(m.turns)))
     assert setup is not None
-    choice, found = orient(strips(), m, setup, Options())
+    choice, found = orient(strips(), m, setup, Options(max_tilt=5.0))
     assert choice is not None, found
     counted, written, wound = {}, {}, {}
     for plan in ("keep", "auto"):

@@ -90,14 +90,14 @@ def _between_cl_points(tip: np.ndarray, cl: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("tool_change", [False, True])
 def test_random_pairs_of_faces(name: str, tool_change: bool) -> None:
     rng, done = np.random.default_rng(17), 0
-    for _ in range(10):
+    for _ in range(6):
         result = convert(toolpath(*two_faces(rng, tool_change)), name)
         if not result.ok:
             assert codes(d for d in result.diagnostics if d.severity == 2) <= {"travel.exceeded", "link.blocked"}
             continue
         assert check(result) > 50
         done += 1
-    assert done >= 5
+    assert done >= 3
 
 
 @pytest.mark.parametrize(("file", "name"), [("five_faces.cls", "mikron-ucp710"), ("five_tilted.cls", "head-table"),

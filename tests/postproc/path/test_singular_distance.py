@@ -9,11 +9,11 @@ import pytest
 
 import machines
 import postproc
-import toolpaths
 from machines.kinematics.legs.on_legs import OnLegs
 from postproc.setup.model import load_setup
 from tests.machines.random_slides import random_slides
 from tests.postproc.joint_kit import machine
+from tests.postproc.kit import few_sides
 
 SAMPLES = Path(__file__).parents[3] / "samples"
 PARALLEL = [name for name in machines.names() if machine(name).kinematics.singular_names]
@@ -51,7 +51,7 @@ def test_between_points_it_is_never_above_dense_truth(name: str) -> None:
 
 
 def test_a_stated_distance_is_kept_or_refused_with_lines() -> None:
-    path, _ = toolpaths.read(SAMPLES / "h4a_dome.cls")
+    path = few_sides("h4a_dome.cls")
     setup, _ = load_setup(SAMPLES / "h4a.setup.toml")
     assert setup is not None
     kept = postproc.convert(path, machine("h4a-c-table"), setup=setup)

@@ -41,6 +41,7 @@ def half_circle(sense: int, upper: bool) -> list[str]:
             circle([0, 0, 0], [0, 0, -sense], 10), f"GOTO/{last}", "END-OF-PATH"]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("sense", [1, -1])
 @pytest.mark.parametrize("upper", [True, False])
 def test_bulge_of_an_arc_counts(sense: int, upper: bool) -> None:

@@ -43,6 +43,7 @@ def readings(result: PostResult) -> np.ndarray:
     return np.array([[float(v) for v in re.findall(r"[XYZABC](-?[\d.]+)", one)] for one in found])
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "controller"), PLACES)
 @pytest.mark.parametrize("setup", [OFF, TURNED])
 def test_all_poses_are_of_one_point(name: str, controller: str, setup: str) -> None:
@@ -58,6 +59,7 @@ def test_all_poses_are_of_one_point(name: str, controller: str, setup: str) -> N
     assert len(re.findall(r"(?m)\bM0\b$", result.text)) == POSES
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize(("name", "controller"), PLACES)
 def test_the_program_goes_to_what_it_says(name: str, controller: str) -> None:
     """At every stop the axes stand, as the program is read back, where the comment before it has them."""

@@ -38,10 +38,10 @@ def calls(work: Callable[[], Any]) -> int:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_calls_grow_no_faster_than_the_file(kind: str) -> None:
-    converted(kind, 22)  # imports, compiled code, what many of a kind alone ask for
-    few, more, many = (calls(lambda n=n: converted(kind, n)) for n in (22, 44, 66))
+    converted(kind, 16)  # imports, compiled code, what many of a kind alone ask for
+    few, more, many = (calls(lambda n=n: converted(kind, n)) for n in (16, 32, 48))
     assert many - more <= 1.1 * (more - few) + 500, (few, more, many)
-    assert (many - more) / 22 < MOST.get(kind, np.inf), "each is worked out by itself"
+    assert (many - more) / 16 < MOST.get(kind, np.inf), "each is worked out by itself"
 
 
 @pytest.mark.parametrize(("machine", "controller"),

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import toolpaths
 from postproc.base.options import Options
 from postproc.path import travel
 from postproc.pipeline.convert import convert
@@ -17,7 +16,7 @@ from postproc.readback.comparison import checks, compare, slow_moves, states
 from postproc.readback.execution import sections
 from postproc.readback.text import modal, words
 from postproc.reference import moves
-from tests.postproc.kit import good
+from tests.postproc.kit import few_sides, good
 from toolpaths.rotations import cross, lengths
 
 SAMPLES = Path(__file__).parents[3] / "samples"
@@ -28,8 +27,7 @@ CASES = (("five_faces.cls", "linuxcnc"), ("five_faces.cls", "fanuc-30i"), ("five
 
 
 def made(name: str, controller: str) -> PostResult:
-    path, found = toolpaths.read(SAMPLES / name)
-    return convert(path, "mikron-ucp710", controller, options=Options(), diagnostics=found)
+    return convert(few_sides(name), "mikron-ucp710", controller, options=Options())
 
 
 def all_of(result: PostResult) -> dict[str, object]:

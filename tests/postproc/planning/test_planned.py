@@ -19,9 +19,8 @@ from postproc.planning.pass_geometry import PassGeometry, chains, pass_geometry,
 from postproc.planning.planned import PassFeed, PlannedMotion, Source, joint_limits, plan_pass, planned_motion
 from postproc.planning.steady_feed import CORNER, steady_speed
 from postproc.setup.model import load_setup
-from tests.postproc.kit import SAMPLES, convert, good, goto, machine, toolpath
+from tests.postproc.kit import SAMPLES, convert, few_sides, good, goto, machine, toolpath
 from tests.toolpaths.smoothing_kit import smooth
-from toolpaths import read
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import DiagnosticError
 from toolpaths.rotations import angle_between
@@ -50,7 +49,7 @@ def waves(name: str) -> PostResult:
 @cache
 def dome() -> PostResult:
     setup, _ = load_setup(SAMPLES / "h4a.setup.toml")
-    return good(convert(read(SAMPLES / "h4a_dome.cls")[0], "h4a-c-table", setup=setup))
+    return good(convert(few_sides("h4a_dome.cls"), "h4a-c-table", setup=setup))
 
 
 def geometry(result: PostResult, sharpest: float = 2.4) -> list[PassGeometry]:

@@ -39,6 +39,7 @@ def read(lines: list[str]) -> Toolpath:
     return path
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["linuxcnc", "haas-ngc", "fanuc-30i", "heidenhain-tnc640"])
 @pytest.mark.parametrize("index", ["plane", "home"])
 def test_a_ring_of_tilted_holes_is_no_rewind(controller: str, index: str) -> None:

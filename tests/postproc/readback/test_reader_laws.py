@@ -191,6 +191,7 @@ def test_tip_words_are_the_tip_whatever_the_rotary_axes_do(dialect: str, name: s
     assert np.abs(motion.end[:, [letters.index(a) for a in rotary]] - stated).max() < 1e-9
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("dialect", [FANUC, HAAS, SIEMENS, TNC])
 @pytest.mark.parametrize(("name", "rotary"), TABLES)
 def test_three_laws_agree_between_the_ends_too(dialect: str, name: str, rotary: dict[str, float]) -> None:

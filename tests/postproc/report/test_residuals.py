@@ -74,7 +74,7 @@ def test_the_field_is_that_of_the_machine_in_the_frame_of_the_part() -> None:
 def test_the_worst_are_those_of_the_summary() -> None:
     setup, _ = load_setup("samples/tools.setup.toml")
     assert setup is not None
-    result, noted = field("blade.cls", "mikron-ucp710", setup)
+    result, noted = field("tool_axis_tour.apt", "mikron-ucp710", setup)
     proof = after_formatting(result)
     assert proof is not None and result.compensation is not None and len(noted.line) == len(proof.points)
     assert np.allclose(np.linalg.norm(noted.after[:, :3], axis=1), proof.tip, atol=1e-12)

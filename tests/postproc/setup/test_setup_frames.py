@@ -50,6 +50,7 @@ def cuts(result: PostResult) -> np.ndarray:
     return np.array([s.end for s in execute(result) if s.kind != "rapid"])
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table"])
 @pytest.mark.parametrize("turn", [20.0, -35.0])
 def test_turning_the_part_about_c_changes_only_c(name: str, turn: float) -> None:

@@ -46,6 +46,7 @@ def plant(monkeypatch: pytest.MonkeyPatch, change: Callable[[Floats], Floats]) -
     monkeypatch.setattr(postproc.compile.compile, "plan_feeds", planted)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", ["linuxcnc", "siemens-840d", "heidenhain-tnc640"])
 @pytest.mark.parametrize("change", [lambda s: s / 1.01, lambda s: np.roll(s, 1), lambda s: 1.02 * s],
                          ids=["faster", "of the block before", "slower"])

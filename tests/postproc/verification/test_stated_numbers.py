@@ -33,6 +33,7 @@ def headers(result: PostResult, text: str) -> list[str]:
     return [d.message for d in check_header(text.encode(), result.job, "p.nc")]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("inch", [False, True])
 @pytest.mark.parametrize("control", CONTROLS)
 def test_a_number_changed_in_the_header_is_found(control: str, inch: bool) -> None:

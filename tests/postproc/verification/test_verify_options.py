@@ -14,7 +14,7 @@ import toolpaths
 from postproc.base.options import Options
 from postproc.pipeline.convert import verify
 from postproc.pipeline.result import PostResult, VerifyResult
-from tests.postproc.kit import SAMPLES, TOOLS
+from tests.postproc.kit import SAMPLES, TOOLS, few_sides
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Toolpath
 
@@ -24,7 +24,7 @@ ALL = ("linuxcnc", "fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640")
 
 @cache
 def faces() -> Toolpath:
-    return toolpaths.read(SAMPLES / "five_faces.cls")[0]
+    return few_sides("five_faces.cls")
 
 
 @cache

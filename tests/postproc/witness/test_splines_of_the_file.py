@@ -49,6 +49,7 @@ END-OF-PATH
 ENDS = {"closed": "10,0", "open": "12,-9", "nearly closed": "10.005,0"}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("end", ENDS)
 @pytest.mark.parametrize(("machine", "control"), [("mill-3axis", "fanuc-30i"), ("mikron-ucp710", "heidenhain-tnc640")])
 def test_splines_are_compared(machine: str, control: str, end: str) -> None:

@@ -53,12 +53,14 @@ def assert_alike(machine: Machine, file: Path, seed: int) -> None:
     np.testing.assert_allclose(own[1], axis, rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("name", SERIAL)
 def test_component_location_and_spindle_errors_of_every_kind(name: str, seed: int, tmp_path: Path) -> None:
     assert_alike(machines.load(name), Draw(tmp_path, SecondMachine(name), seed, both=seed == 1).write(), seed)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("name", "letters"), [case for case in CASES if case[0] in SERIAL])
 def test_maps_of_every_order_unit_and_direction(name: str, letters: str, seed: int, tmp_path: Path) -> None:

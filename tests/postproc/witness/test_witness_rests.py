@@ -32,6 +32,7 @@ def said(result: PostResult, comparison: Comparison) -> set[str]:
                                            comparison)[1]}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("control", CONTROLS)
 @pytest.mark.parametrize("text", [
     HEAD + CUTS.format("DELAY/1.5\n", "DELAY/2\n", "DELAY/1\nSTOP\n", "STOP\n") + "FINI\n",

@@ -79,6 +79,7 @@ def test_the_spindle_of_the_setup_is_expected(setup: dict[str, object],
 SECOND = b"LOADTL/2\nSPINDL/RPM,3000,CLW\nGOTO/0,0,20\nGOTO/0,0,-1\nGOTO/5,0,-1\n"
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("between", [b"", b"COOLNT/OFF\n"])
 @pytest.mark.parametrize("stated", [{"tools": {"2": {"coolant": "mist"}}}, {"output": {"coolant": "flood"}}])
 def test_coolant_of_the_setup_for_a_tool_behind_one_with_its_own(stated: dict[str, object], between: bytes,

@@ -42,6 +42,7 @@ def pecks(result: PostResult) -> list[float]:
     return bottoms[:bottoms.index(max(bottoms)) + 1]
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("units", ["mm", "inch"])
 @pytest.mark.parametrize("controller", NAMES)
 @pytest.mark.parametrize(("first", "then"), [(5.0, 3.0), (5.0, 1.5), (6.0, 5.0)])
@@ -138,6 +139,7 @@ def test_pecks_of_both_kinds_stand_next_to_each_other() -> None:
     assert re.search(r"G83 X30\. Y0\. Z-12\. R3\. Q4\.", text)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("controller", NAMES)
 @pytest.mark.parametrize(("depth", "step"), [(9.0, 3.0), (7.62, 2.54), (10.0, 3.33333), (12.0, 4.0)])
 def test_pecks_that_divide_the_hole_are_no_more_in_inches(controller: str, depth: float, step: float) -> None:

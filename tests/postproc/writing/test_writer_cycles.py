@@ -93,6 +93,7 @@ def test_cycles_on_a_head_at_an_angle_are_single_moves() -> None:
     assert np.allclose(tips[-1][-1], np.array([10, 0, 0]) - 12 * axis, atol=1e-3)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("between", [[], ["COOLNT/FLOOD"], ["DELAY/1"]])
 @pytest.mark.parametrize("controller", ["linuxcnc", "generic-iso"])
 def test_no_cycle_goes_back_to_a_first_level_that_the_tool_has_left(between: list[str],

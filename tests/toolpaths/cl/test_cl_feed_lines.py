@@ -36,6 +36,7 @@ def read(text: str, fewest: int, monkeypatch: pytest.MonkeyPatch) -> tuple[Toolp
     return toolpaths.read_bytes(text, file="test.apt")
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("together", [7, 50_000])
 @pytest.mark.parametrize("form", FORMS)
 def test_feeds_by_arrays_are_those_of_the_records(form: str, together: int,

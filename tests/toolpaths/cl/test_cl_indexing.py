@@ -45,6 +45,7 @@ def path_of(run_options: m.SpellingOptions, *changes: tuple[str, str]) -> ReadRe
     return read_bytes(text)
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("units", ["MM", "INCHES"])
 @pytest.mark.parametrize("approach", ["before", "between", "after"])
 @pytest.mark.parametrize("multax", [False, True])
