@@ -1,10 +1,10 @@
 """A machine from a machine file of Autodesk's older form (.machine; XML of HSM and Fusion): axes, ranges, speeds.
 
-Sources: machine files in public, Autodesk/cam-posteditor, vs-code-extension/res/Machines (commits 19010fae, 78477181,
-90e7df1e): attributes with units ("-120deg 120deg", "21600deg/min", "15s"), older ones without; 0 states nothing. Of two rotary
-axes on one side U carries V: "YXBC axis on the Table" has U = B, "XYZCA axis on the Head" U = C. The direction of a rotary axis
-is that of `createAxis` in posts, how the tool moves relative to the part: Autodesk's post for the Pocket NC V2 has table axes
-[-1, 0, 0] and [0, -1, 0], as the maker's own kinematics of that machine.
+Sources: machine files in public, Autodesk/cam-posteditor, vs-code-extension/res/Machines (commits 19010fae,
+78477181, 90e7df1e): attributes with units ("-120deg 120deg", "21600deg/min", "15s"), older ones without; 0 states nothing.
+Of two rotary axes on one side U carries V: "YXBC axis on the Table" has U = B, "XYZCA axis on the Head" U = C. The
+direction of a rotary axis is that of `createAxis` in posts, how the tool moves relative to the part: Autodesk's post for
+the Pocket NC V2 has table axes [-1, 0, 0] and [0, -1, 0], as the maker's own kinematics of that machine.
 """
 
 from __future__ import annotations
@@ -145,8 +145,8 @@ def _line_of(draft: Draft, axis: _Axis) -> None:
     elif draft.user(f"{key}.direction") is None:
         draft.error("import.geometry", f"axis {name} has no direction", line, f"--set {key}.direction=[1,0,0]")
     if draft.user(f"{key}.point") is None:
-        draft.error("import.geometry", f"the place of the line of {name}: its offset ({values.get('offset', 'none')}) counts "
-                    "from a place of the model that is not documented", line,
+        draft.error("import.geometry", f"the place of the line of {name}: its offset ({values.get('offset', 'none')}) "
+                    "counts from a place of the model that is not documented", line,
                     f"--set {key}.point=[0,0,-400], a point of its line in machine coordinates, all axes at 0")
 
 
