@@ -18,7 +18,7 @@ from machines.sheet.pivots import points_of
 from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
 from machines.sheet.touched import AGREE, apart_by, strange_turns, untold, wrong_sign
 from machines.toml_lines import KeyPath
-from machines.user_file import UserFile, ValueSource, read_toml, validate
+from machines.user_file import UserFile, ValueSource, read_toml, validate, without_faults
 from toolpaths.diagnostics import Diagnostic, has_errors
 
 ENDLESS = "endless"
@@ -99,7 +99,9 @@ def new_machine(source: str | Path, name: str = "") -> NewMachine:
     file, found = read_toml(source, kind="data sheet")
     sheet, more = validate(file, DataSheet) if file is not None else (None, [])
     if file is None or sheet is None:
-        return NewMachine(None, "", [*found, *more])
+        rest = without_faults(file, DataSheet) if file is not None and not found else None
+        others = _made(file, rest, name).diagnostics if file is not None and rest is not None else []
+        return NewMachine(None, "", [*found, *more, *(d for d in others if d.code == "sheet.figure")])
     made = _made(file, sheet, name)
     return made if made.machine is None else _compared(made, file, sheet)
 

@@ -102,6 +102,8 @@ class _Asking:
 
         from postproc.setup_sheet.questions import parsed
 
+        if question.kind == "origin" and not _terminal():
+            return ""  # answers that come from a file end with the values; --origin states the place
         one = question if question.default is not None else replace(question, default=self.last.get(question.kind))
         while True:
             typer.echo(one.prompt(), nl=False, err=True)
@@ -146,6 +148,13 @@ def _known_register(code: str) -> None:
     except ValidationError:
         raise typer.BadParameter(f"{code!r} is no register of a work offset: G54, G54.1 P12, G154 P40, G520, preset 12",
                                  param_hint="--work-offset-code") from None
+
+
+def _terminal() -> bool:
+    """True where somebody sits there."""
+    import sys
+
+    return sys.stdin is not None and sys.stdin.isatty()
 
 
 def _line() -> str:

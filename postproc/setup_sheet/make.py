@@ -29,6 +29,9 @@ from postproc.setup_sheet.text import ORIGIN, TOOL_NUMBERS, SheetHeader, sheet_t
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
 
+_SAME_PLACE = 0.005
+"""mm up to which the place that was offered has been accepted, as it was printed"""
+
 
 @dataclass(frozen=True)
 class SetupSheet:
@@ -81,9 +84,19 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     return again if again.text else first
 
 
-def _origin(given: GivenAnswers, ask: Callable[[Question], float | str] | None) -> tuple[float, float, float] | None:
-    """Where the part stands, mm, by whom knows it."""
-    return given.origin if given.origin is not None or ask is None else three_numbers(str(ask(origin_question())))
+def _stated(fit: Fit, at: Callable[[tuple[float, float, float]], Fit],
+            ask: Callable[[Question], float | str] | None, progress: Progress | None) -> Fit:
+    """The part where somebody says that it stands, where travel or the table's origin has chosen its place; `at` fits it
+    there."""
+    if ask is None or fit.place is None or not fit.result.ok or not (below_origin(fit) or looked_for(fit)):
+        return fit
+    if progress is not None:
+        progress("", 0, 0)
+    said = three_numbers(str(ask(origin_question(fit.setup.part.origin))))
+    if said is None:
+        return fit
+    same = max(abs(a - b) for a, b in zip(said, fit.setup.part.origin, strict=True)) < _SAME_PLACE
+    return replace(fit, place=replace(fit.place, stated=True)) if same else at(said)
 
 
 def _asked_once(ask: Callable[[Question], float | str]) -> Callable[[Question], float | str]:
@@ -129,7 +142,10 @@ def _made(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
     values = sheet_values(facts, answers, toolpath.name or Path(toolpath.file).name, code,
                           machine.name)
     setup = SetupFile.model_validate({**values, "work_offset": toolpath.frames[0].name})
-    fit = fitted(toolpath, machine, controller, setup, options, found, progress, _origin(given, ask))
+    def at(origin: tuple[float, float, float] | None) -> Fit:
+        return fitted(toolpath, machine, controller, setup, options, found, progress, origin)
+
+    fit = _stated(at(given.origin), at, ask, progress)
     if below_origin(fit) or (assume and looked_for(fit)):
         fit = replace(fit, setup=fit.setup.model_copy(update={"assumed": [*fit.setup.assumed, ORIGIN]}))
     made = SetupSheet("", tuple(known), facts, tuple(questions), tuple(answers.items()), fit)

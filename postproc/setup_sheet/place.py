@@ -77,7 +77,8 @@ class Fit:
 
 
 def fitted(toolpath: Toolpath, machine: Machine, controller: str | Path, setup: SetupFile, options: Options,
-           found: list[Diagnostic], progress: Progress | None = None, origin: tuple[float, float, float] | None = None) -> Fit:
+           found: list[Diagnostic], progress: Progress | None = None,
+           origin: tuple[float, float, float] | None = None) -> Fit:
     """The first place that a conversion proves; arguments as of `convert`, `found` is what reading found, `origin` (mm) is
     where the part stands, where that is known: then only how it is turned is looked for."""
     def converted(one: SetupFile) -> PostResult:

@@ -28,8 +28,6 @@ _UNITS: dict[QuestionKind, str] = {"tool_number": "", "gauge_length": "mm", "spi
                                    "coolant": "", "origin": "mm"}
 _OPTIONS: dict[QuestionKind, str] = {"tool_number": "--tool-number", "gauge_length": "--gauge-length",
                                      "spindle": "--spindle", "feed": "--feed", "coolant": "--coolant", "origin": "--origin"}
-A_PLACE_THAT_FITS = "a place that fits"
-"""answer to where the part stands: it is looked for"""
 
 
 @dataclass(frozen=True)
@@ -117,9 +115,10 @@ def number_questions(named: tuple[NumberedTool, ...]) -> list[Question]:
                      f"({one.why})", float(one.number), float(one.number), one.name) for one in named if one.assumed]
 
 
-def origin_question() -> Question:
-    """Where the part stands, for those who know it: else a place that travel allows is looked for."""
-    return Question("origin", 0, "origin of the CL file on the table: x, y, z in the table frame", A_PLACE_THAT_FITS, None)
+def origin_question(found: tuple[float, float, float]) -> Question:
+    """Where the part stands on a table that turns; offered is the place that travel has chosen."""
+    return Question("origin", 0, "origin of the CL file in the table frame: x, y, z (offered: a place that travel allows)",
+                    ", ".join(f"{v:g}" for v in found), None)
 
 
 def questions_of(facts: SheetFacts) -> list[Question]:
@@ -156,7 +155,7 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
         known = get_args(CoolantKind)
         return (text.lower(), "") if text.lower() in known else (None, f"{text!r} is not one of {', '.join(known)}")
     if question.kind == "origin":
-        return (text, "") if three_numbers(text) or text == A_PLACE_THAT_FITS else (None, f"{text!r} is not x, y, z in mm")
+        return (text, "") if three_numbers(text) else (None, f"{text!r} is not x, y, z in mm")
     if _thousands(text):
         return None, f"{text!r} may be {text.replace(',', '')} or {text.replace(',', '.')}: write it without the comma"
     try:
