@@ -145,7 +145,11 @@ def _made(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
     def at(origin: tuple[float, float, float] | None) -> Fit:
         return fitted(toolpath, machine, controller, setup, options, found, progress, origin)
 
-    fit = _stated(at(given.origin), at, ask, progress)
+    first = at(given.origin)
+    if any(d.code == "rapid.off_line" for d in first.result.diagnostics):
+        setup = setup.model_copy(update={"output": setup.output.model_copy(update={"rapids_as_feed": True})})
+        first = at(given.origin)
+    fit = _stated(first, at, ask, progress)
     if below_origin(fit) or (assume and looked_for(fit)):
         fit = replace(fit, setup=fit.setup.model_copy(update={"assumed": [*fit.setup.assumed, ORIGIN]}))
     made = SetupSheet("", tuple(known), facts, tuple(questions), tuple(answers.items()), fit)

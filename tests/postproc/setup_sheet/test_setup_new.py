@@ -347,6 +347,18 @@ def test_a_question_on_a_terminal_stays_on_its_line(tmp_path: Path) -> None:
     os.close(ours)
 
 
+def test_rapids_that_would_leave_their_line_are_feed_moves(tmp_path: Path) -> None:
+    """A rapid up and aside from the cut, far off the table: found with the place, and said with its reason."""
+    (file := tmp_path / "part.apt").write_text(
+        "UNITS/MM\nLOADTL/1\nSPINDL/RPM,900,CLW\nFEDRAT/MMPM,200\nRAPID\nGOTO/812,-333,190\nGOTO/812,-333,140\n"
+        "GOTO/862,-333,140\nGOTO/862,-313,140\nRAPID\nGOTO/812,-333,190\nFINI\n")
+    made = sheet(file, "mikron-ucp710", "fanuc-30i")
+    result = proved(file, made, "mikron-ucp710", "fanuc-30i", tmp_path)
+    assert result.ok and tomllib.loads(made.text)["output"]["rapids_as_feed"] is True
+    straight = sheet(file, "mikron-ucp710", "linuxcnc")
+    assert straight.text and "rapids_as_feed" not in straight.text, "a control whose rapids are straight needs none"
+
+
 def test_who_knows_where_the_part_stands_says_so(tmp_path: Path) -> None:
     """An option or an answer is taken as it is, and not assumed; where it is out of travel, the place that fits is named."""
     file, out = bare(tmp_path), tmp_path / "s.toml"
