@@ -120,19 +120,13 @@ def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]
         return None, [_diagnostic(file, model, fault) for fault in _faults(file.values, model, found)]
 
 
-def without_faults(file: UserFile, model: type[M]) -> M | None:
-    """The rest of a file that does not fit its model, its wrong keys left out, to find faults that they do not touch."""
-    values = deepcopy(file.values)
+def wrong_keys(file: UserFile, model: type[BaseModel]) -> list[KeyPath]:
+    """Where a file does not fit its model, by path of keys."""
     try:
-        model.model_validate_json(json.dumps(values, default=str))
+        model.model_validate_json(json.dumps(file.values, default=str))
     except ValidationError as found:
-        for fault in _faults(values, model, found):
-            at: Any = values
-            for key in fault.path[:-1]:
-                at = at[key] if isinstance(at, dict) and key in at else {}
-            if isinstance(at, dict):
-                at.pop(fault.path[-1] if fault.path else "", None)
-    return validate(replace(file, values=values), model)[0]
+        return [fault.path for fault in _faults(file.values, model, found) if fault.path]
+    return []
 
 
 def nearest(word: str, known: Sequence[str]) -> str:
