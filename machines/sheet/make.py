@@ -7,7 +7,6 @@ from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from machines.figures import ASSUMED, SOURCE
 from machines.loader import as_warnings, assemble, check
@@ -19,7 +18,7 @@ from machines.sheet.pivot_text import read_pivots
 from machines.sheet.pivots import points_of
 from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
 from machines.sheet.touched import AGREE, apart_by, strange_turns, untold, wrong_sign
-from machines.toml_lines import KeyPath
+from machines.toml_lines import KeyPath, Values
 from machines.user_file import UserFile, ValueSource, read_toml, validate, wrong_keys
 from toolpaths.diagnostics import Diagnostic, has_errors
 
@@ -110,13 +109,13 @@ def new_machine(source: str | Path, name: str = "") -> NewMachine:
 
 def _without_wrong_keys(file: UserFile) -> DataSheet | None:
     """The rest of a sheet with keys that do not fit, to find faults that they do not touch."""
-    values = deepcopy(file.values)
+    values: Values = deepcopy(file.values)
     for *tables, key in wrong_keys(file, DataSheet):
-        at: Any = values
+        at: Values = values
         for one in tables:
-            at = at.get(one) if isinstance(at, dict) else None
-        if isinstance(at, dict):
-            at.pop(str(key), None)
+            inside = at.get(str(one))
+            at = inside if isinstance(inside, dict) else {}
+        at.pop(str(key), None)
     return validate(replace(file, values=values), DataSheet)[0]
 
 
