@@ -18,7 +18,7 @@ from machines.sheet.pivot_text import read_pivots
 from machines.sheet.pivots import points_of
 from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
 from machines.sheet.touched import AGREE, apart_by, strange_turns, untold, wrong_sign
-from machines.toml_lines import KeyPath, Values
+from machines.toml_lines import KeyPath
 from machines.user_file import UserFile, ValueSource, read_toml, validate, wrong_keys
 from toolpaths.diagnostics import Diagnostic, has_errors
 
@@ -109,9 +109,9 @@ def new_machine(source: str | Path, name: str = "") -> NewMachine:
 
 def _without_wrong_keys(file: UserFile) -> DataSheet | None:
     """The rest of a sheet with keys that do not fit, to find faults that they do not touch."""
-    values: Values = deepcopy(file.values)
+    values = deepcopy(file.values)
     for *tables, key in wrong_keys(file, DataSheet):
-        at: Values = values
+        at = values
         for one in tables:
             inside = at.get(str(one))
             at = inside if isinstance(inside, dict) else {}
