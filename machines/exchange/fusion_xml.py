@@ -87,7 +87,7 @@ class _Axis:
 def _elements(text: str) -> list[_Element]:
     """All elements in their order; text of those that hold nothing else."""
     found: list[_Element] = []
-    parser = expat.ParserCreate()
+    parser = expat.ParserCreate("utf-8")  # as the text has been read, whatever its first line says
 
     def begins(name: str, values: dict[str, str]) -> None:
         found.append(_Element(name.split(":")[-1], values, parser.CurrentLineNumber))
