@@ -82,8 +82,8 @@ def test_lines_are_asked_for_by_the_words_that_state_them(tmp_path: Path) -> Non
         "kinematics.axes.B.point=[0", "kinematics.axes.C.point=[0"]
 
 
-@pytest.mark.parametrize(("old", "new"), [('encoding="UTF-8"', 'encoding="none"'), ('range="-500mm 0mm"', 'range="1e999mm 0mm"'),
-                                          ("</model>", "</model>\x01")])
+@pytest.mark.parametrize(("old", "new"), [
+    ('encoding="UTF-8"', 'encoding="none"'), ('range="-500mm 0mm"', 'range="1e999mm 0mm"'), ("</model>", "</model>\x01")])
 def test_odd_files_are_read_or_refused(old: str, new: str, tmp_path: Path) -> None:
     assert old in FILE
     machine, found = imported(tmp_path, FILE.replace(old, new, 1))
