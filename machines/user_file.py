@@ -120,6 +120,15 @@ def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]
         return None, [_diagnostic(file, model, fault) for fault in _faults(file.values, model, found)]
 
 
+def wrong_keys(file: UserFile, model: type[BaseModel]) -> list[KeyPath]:
+    """Where a file does not fit its model, by path of keys."""
+    try:
+        model.model_validate_json(json.dumps(file.values, default=str))
+    except ValidationError as found:
+        return [fault.path for fault in _faults(file.values, model, found) if fault.path]
+    return []
+
+
 def nearest(word: str, known: Sequence[str]) -> str:
     """A hint: the known word nearest to `word`, else the list of all."""
     match = nearest_word(word, known)

@@ -9,6 +9,7 @@ from machines.exchange.choices import GivenForm, MachineForm
 from machines.exchange.draft import Draft, finish
 from machines.exchange.freecad import read_freecad
 from machines.exchange.fusion import read_fusion
+from machines.exchange.fusion_xml import read_fusion_xml
 from machines.exchange.linuxcnc_ini import read_linuxcnc
 from machines.exchange.siemens import read_siemens
 from machines.machine import Machine
@@ -16,7 +17,8 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import advice, read_input, reason
 
 _READERS: dict[MachineForm, Callable[[Path, str, Sequence[str]], tuple[Draft, dict[str, bool]]]] = {
-    "linuxcnc-ini": read_linuxcnc, "siemens": read_siemens, "freecad": read_freecad, "fusion": read_fusion}
+    "linuxcnc-ini": read_linuxcnc, "siemens": read_siemens, "freecad": read_freecad, "fusion": read_fusion,
+    "fusion-xml": read_fusion_xml}
 UNDOCUMENTED: dict[MachineForm, str] = {
     "heidenhain": "the form of Heidenhain's kinematics (KinematicsDesign, CfgKin..., backups of cycle 450) is not published"}
 """form: why it is not read"""
@@ -45,6 +47,8 @@ def import_machine(path: Path, form: GivenForm, stated: Sequence[str]) -> tuple[
 
 
 def _form_of(path: Path, text: str) -> MachineForm | None:
+    if text.lstrip().startswith("<") and "<machine" in text[:2000]:
+        return "fusion-xml"
     if path.suffix.lower() in (".mch", ".machine") or (text.lstrip().startswith("{") and '"kinematics"' in text):
         return "fusion"
     if text.lstrip().startswith("{") and '"axes"' in text:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from machines.figures import ASSUMED, SOURCE
@@ -18,7 +19,7 @@ from machines.sheet.pivots import points_of
 from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
 from machines.sheet.touched import AGREE, apart_by, strange_turns, untold, wrong_sign
 from machines.toml_lines import KeyPath
-from machines.user_file import UserFile, ValueSource, read_toml, validate
+from machines.user_file import UserFile, ValueSource, read_toml, validate, wrong_keys
 from toolpaths.diagnostics import Diagnostic, has_errors
 
 ENDLESS = "endless"
@@ -99,9 +100,23 @@ def new_machine(source: str | Path, name: str = "") -> NewMachine:
     file, found = read_toml(source, kind="data sheet")
     sheet, more = validate(file, DataSheet) if file is not None else (None, [])
     if file is None or sheet is None:
-        return NewMachine(None, "", [*found, *more])
+        rest = _without_wrong_keys(file) if file is not None and not found else None
+        others = _made(file, rest, name).diagnostics if file is not None and rest is not None else []
+        return NewMachine(None, "", [*found, *more, *(d for d in others if d.code == "sheet.figure")])
     made = _made(file, sheet, name)
     return made if made.machine is None else _compared(made, file, sheet)
+
+
+def _without_wrong_keys(file: UserFile) -> DataSheet | None:
+    """The rest of a sheet with keys that do not fit, to find faults that they do not touch."""
+    values = deepcopy(file.values)
+    for *tables, key in wrong_keys(file, DataSheet):
+        at = values
+        for one in tables:
+            inside = at.get(str(one))
+            at = inside if isinstance(inside, dict) else {}
+        at.pop(str(key), None)
+    return validate(replace(file, values=values), DataSheet)[0]
 
 
 def _compared(made: NewMachine, file: UserFile, sheet: DataSheet) -> NewMachine:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from machines.models import Vector
 from machines.user_model import UserModel
@@ -12,6 +12,16 @@ from machines.user_model import UserModel
 Jog = Literal["right up", "right down", "front up", "front down", "clockwise", "anti-clockwise", "tip left", "tip right",
               "tip back", "tip front"]
 """what is seen when a rotary axis is jogged by +10 degrees from 0"""
+_SPELLINGS = {"counterclockwise": "anti-clockwise", "counter-clockwise": "anti-clockwise", "anticlockwise": "anti-clockwise",
+              "ccw": "anti-clockwise", "cw": "clockwise"}
+
+
+def spelt(text: str) -> str:
+    """A jog in other spellings as the word that it stands for."""
+    words = " ".join(text.lower().split())
+    return _SPELLINGS.get(words, words)
+
+
 ZeroEnd = Literal["upper", "lower", "middle"]
 PivotForm = Literal["machine", "haas", "siemens", "heidenhain", "fanuc"]
 
@@ -29,7 +39,7 @@ class AxisSheet(UserModel):
     """where the control counts from, of a travel that is stated by its length: its upper end, as most do, or others"""
     home: str = ""
     """where programs begin and tools change; left out: the machine's zero, or the nearest that travel allows"""
-    jog: Jog | None = None
+    jog: Annotated[Jog | None, BeforeValidator(lambda said: spelt(said) if isinstance(said, str) else said)] = None
     """rotary axes: what a jog by +10 degrees showed; left out: the sense of ISO 841 is assumed"""
 
 

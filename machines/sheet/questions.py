@@ -9,7 +9,7 @@ from typing import get_args
 
 from machines.sheet.jog import QUESTIONS
 from machines.sheet.make import ENDLESS
-from machines.sheet.model import PivotForm, ZeroEnd
+from machines.sheet.model import PivotForm, ZeroEnd, spelt
 from machines.sheet.pivots import names_of
 from machines.sheet.quantity import QuantityKind, read_quantity
 
@@ -118,7 +118,7 @@ def _turn(sheet: _Sheet, letter: str, in_table: bool) -> Iterator[str]:
     def seen(text: str) -> str:
         if text:
             words = {word: word for word in (along, against)} | {word.split()[-1]: word for word in (along, against)}
-            return json.dumps(words.get(text.lower())) if text.lower() in words else _none_of(text, along, against)
+            return json.dumps(words[spelt(text)]) if spelt(text) in words else _none_of(text, along, against)
         return ""
 
     yield ""

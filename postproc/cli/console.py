@@ -156,6 +156,9 @@ def progress_bar() -> Iterator[Progress]:
     task = bar.add_task("")
 
     def shown(stage: str, at: int, total: int) -> None:
+        if not stage:
+            bar.stop()
+            return
         bar.start()  # not before: a bar that stands already wipes out what is asked on its line
         bar.update(task, description=stage, completed=at, total=total)
 
@@ -167,7 +170,7 @@ def progress_bar() -> Iterator[Progress]:
 
 def _say(stage: str, said: list[str]) -> None:
     """Each stage once, as it begins."""
-    if said[-1:] != [stage]:
+    if stage and said[-1:] != [stage]:
         said.append(stage)
         typer.echo(stage, err=True)
 

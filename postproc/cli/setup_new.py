@@ -49,6 +49,8 @@ def setup_new(file: ClFile, machine: MachineName,
                                                          help="feed of cuts for which the CL file states none")] = None,
               coolant: Annotated[str, typer.Option("--coolant", metavar="KIND", help="where the CL file states none: off, "
                                                    "flood, mist, through, air")] = "",
+              origin: Annotated[str, typer.Option("--origin", metavar="X,Y,Z", help="mm, where the origin of the CL file "
+                                                  "stands in the table frame; default: a place that fits")] = "",
               work_offset_code: Annotated[str, typer.Option("--work-offset-code", metavar="CODE", help="register of the "
                                                             "work offset, as the control names it")] = "G54",
               tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
@@ -60,7 +62,7 @@ def setup_new(file: ClFile, machine: MachineName,
     refuse_overwriting({"-o": str(output), "--json": json}, {"the CL file": str(file), **own_files(machine, controller)})
     if there_is(output) and not force:
         raise typer.BadParameter(f"{output} exists; --force replaces it", param_hint="-o")
-    given = _given(gauge_length or [], spindle or [], feed, coolant, tool_number or [])
+    given = _given(gauge_length or [], spindle or [], feed, coolant, tool_number or [], origin)
     _known_register(work_offset_code)
     options = Options(tolerance, axis_tolerance, units=units, dialect=dialect,
                       allow_unknown=tuple(w.upper() for w in allow_unknown or ()))
@@ -100,6 +102,8 @@ class _Asking:
 
         from postproc.setup_sheet.questions import parsed
 
+        if question.kind == "origin" and not _terminal():
+            return ""  # answers that come from a file end with the values; --origin states the place
         one = question if question.default is not None else replace(question, default=self.last.get(question.kind))
         while True:
             typer.echo(one.prompt(), nl=False, err=True)
@@ -114,12 +118,16 @@ class _Asking:
         """The options of the command line with what was answered before standard input ended."""
         from dataclasses import replace
 
+        from postproc.setup_sheet.questions import three_numbers
+
         result = given
         for question, value in self.done:
             if question.name:
                 result = replace(result, tool_number={**result.tool_number, question.name: int(float(value))})
             elif question.kind == "coolant":
                 result = replace(result, coolant=str(value))
+            elif question.kind == "origin":
+                result = replace(result, origin=three_numbers(str(value)))
             elif question.kind == "feed":
                 result = replace(result, feed=float(value))
             elif question.kind == "spindle":
@@ -142,6 +150,13 @@ def _known_register(code: str) -> None:
                                  param_hint="--work-offset-code") from None
 
 
+def _terminal() -> bool:
+    """True where somebody sits there."""
+    import sys
+
+    return sys.stdin is not None and sys.stdin.isatty()
+
+
 def _line() -> str:
     """One line of standard input.
 
@@ -156,17 +171,21 @@ def _line() -> str:
     return line
 
 
-def _given(lengths: list[str], speeds: list[str], feed: float | None, coolant: str, numbers: list[str]) -> GivenAnswers:
+def _given(lengths: list[str], speeds: list[str], feed: float | None, coolant: str, numbers: list[str],
+           origin: str) -> GivenAnswers:
     from typing import get_args
 
     from postproc.setup.spindle import CoolantKind
-    from postproc.setup_sheet.questions import GivenAnswers
+    from postproc.setup_sheet.questions import GivenAnswers, three_numbers
 
     if coolant and coolant not in get_args(CoolantKind):
         raise typer.BadParameter(f"{coolant!r} is not available; choose from {', '.join(get_args(CoolantKind))}",
                                  param_hint="--coolant")
+    place = three_numbers(origin)
+    if origin and place is None:
+        raise typer.BadParameter(f"{origin!r} is not X,Y,Z in mm", param_hint="--origin")
     return GivenAnswers(_numbers(lengths, "--gauge-length", 2000.0), _numbers(speeds, "--spindle", 200000.0), feed, coolant,
-                        _by_name(numbers))
+                        _by_name(numbers), place)
 
 
 def _by_name(values: list[str]) -> dict[str, int]:

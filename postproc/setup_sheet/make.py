@@ -14,11 +14,23 @@ from postproc.base.progress import Progress
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import NumberedTool, SheetFacts, facts_of, named_tools, taken_numbers
-from postproc.setup_sheet.place import Fit, below_origin, beyond, fitted
-from postproc.setup_sheet.questions import Answer, GivenAnswers, Question, answered, number_questions, questions_of
+from postproc.setup_sheet.place import Fit, below_origin, beyond, fitted, found_place, looked_for
+from postproc.setup_sheet.questions import (
+    Answer,
+    GivenAnswers,
+    Question,
+    answered,
+    number_questions,
+    origin_question,
+    questions_of,
+    three_numbers,
+)
 from postproc.setup_sheet.text import ORIGIN, TOOL_NUMBERS, SheetHeader, sheet_text, sheet_values
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
+
+_SAME_PLACE = 0.005
+"""mm up to which the place that was offered has been accepted, as it was printed"""
 
 
 @dataclass(frozen=True)
@@ -72,6 +84,21 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
     return again if again.text else first
 
 
+def _stated(fit: Fit, at: Callable[[tuple[float, float, float]], Fit],
+            ask: Callable[[Question], float | str] | None, progress: Progress | None) -> Fit:
+    """The part where somebody says that it stands, where travel or the table's origin has chosen its place; `at` fits it
+    there."""
+    if ask is None or fit.place is None or not fit.result.ok or not (below_origin(fit) or looked_for(fit)):
+        return fit
+    if progress is not None:
+        progress("", 0, 0)
+    said = three_numbers(str(ask(origin_question(fit.setup.part.origin))))
+    if said is None:
+        return fit
+    same = max(abs(a - b) for a, b in zip(said, fit.setup.part.origin, strict=True)) < _SAME_PLACE
+    return replace(fit, place=replace(fit.place, stated=True)) if same else at(said)
+
+
 def _asked_once(ask: Callable[[Question], float | str]) -> Callable[[Question], float | str]:
     """The same, with one answer to each question."""
     said: dict[str, float | str] = {}
@@ -115,8 +142,15 @@ def _made(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
     values = sheet_values(facts, answers, toolpath.name or Path(toolpath.file).name, code,
                           machine.name)
     setup = SetupFile.model_validate({**values, "work_offset": toolpath.frames[0].name})
-    fit = fitted(toolpath, machine, controller, setup, options, found, progress)
-    if below_origin(fit):
+    def at(origin: tuple[float, float, float] | None) -> Fit:
+        return fitted(toolpath, machine, controller, setup, options, found, progress, origin)
+
+    first = at(given.origin)
+    if any(d.code == "rapid.off_line" for d in first.result.diagnostics):
+        setup = setup.model_copy(update={"output": setup.output.model_copy(update={"rapids_as_feed": True})})
+        first = at(given.origin)
+    fit = _stated(first, at, ask, progress)
+    if below_origin(fit) or (assume and looked_for(fit)):
         fit = replace(fit, setup=fit.setup.model_copy(update={"assumed": [*fit.setup.assumed, ORIGIN]}))
     made = SetupSheet("", tuple(known), facts, tuple(questions), tuple(answers.items()), fit)
     if not fit.result.ok:
@@ -205,16 +239,24 @@ def _assumed(made: SetupSheet, fit: Fit) -> list[Diagnostic]:
     values = dict(made.answers)
     named = made.facts.named if made.facts is not None else ()
     numbers = ", ".join(f"{one.name} = T{one.number}" for one in named if one.assumed)
-    return [warning("setup.assumed", f"{key} = {values[key].value} {keys[key].unit} is assumed: nobody has stated it",
+    said = [warning("setup.assumed", f"{key} = {values[key].value} {keys[key].unit} is assumed: nobody has stated it",
                     hint=f"state it by {keys[key].option}, or in the file, and take its name out of `assumed`")
-            for key in fit.setup.assumed if key in keys] + ([
-                warning("setup.assumed", f"{ORIGIN} is assumed: cuts reach {below_origin(fit):g} mm below the table's "
-                        "origin, where nobody has stated that there is room",
-                        hint="state in [part] where the part stands, and take "
-                        f"`{ORIGIN}` out of `assumed`")] if ORIGIN in fit.setup.assumed else []) + ([
-                warning("setup.assumed", f"{TOOL_NUMBERS}: {numbers} is assumed: nobody has stated it", hint="see that the "
-                        "magazine holds them so, or put in its numbers, and take `tool_numbers` out of `assumed`")]
-                if numbers else [])
+            for key in fit.setup.assumed if key in keys]
+    if ORIGIN in fit.setup.assumed:
+        said.append(_place_assumed(fit))
+    if numbers:
+        said.append(warning("setup.assumed", f"{TOOL_NUMBERS}: {numbers} is assumed: nobody has stated it", hint="see that "
+                            "the magazine holds them so, or put in its numbers, and take `tool_numbers` out of `assumed`"))
+    return said
+
+
+def _place_assumed(fit: Fit) -> Diagnostic:
+    """Why the place of the part is assumed."""
+    depth = below_origin(fit)
+    why = f"cuts reach {depth:g} mm below the table's origin, where nobody has stated that there is room" if depth else (
+        f"travel alone has chosen {list(fit.setup.part.origin)} mm, which may be in the air or in the table")
+    return warning("setup.assumed", f"{ORIGIN} is assumed: {why}", hint="state where the part stands by --origin X,Y,Z, or "
+                   f"in [part], and take `{ORIGIN}` out of `assumed`")
 
 
 def _not_fitted(fit: Fit) -> list[Diagnostic]:
@@ -224,4 +266,6 @@ def _not_fitted(fit: Fit) -> list[Diagnostic]:
                  + "".join(f"; {why}" for why in fit.lacks[:3]),
                  hint="a machine with more travel, shorter tools, or a file for each side of the part")]
     said = said if fit.tried > 1 or fit.lacks else []
+    if fit.place is not None and fit.place.stated:
+        said = found_place(fit.result, fit.result.toolpath)
     return [*errors, *said]

@@ -18,6 +18,8 @@ _TURNED, _STEADY = 60.0 * DEG, 15.0 * DEG
 """rad from which an axis stands apart from both its neighbours, and up to which these agree"""
 _LEAST = 5
 """points that all others are at least"""
+_PARKED_FOR = frozenset({"LOADTL", "STOP", "OPSTOP"})
+"""records for which CAM systems park the tool"""
 _HINT = "correct the record there, or have the CAM system write it again; all else is looked at when it is right"
 
 
@@ -49,8 +51,14 @@ def _far_point(toolpath: Toolpath, rows: Ints, longest: float) -> Diagnostic | N
 
 
 def _parked(toolpath: Toolpath, row: int) -> bool:
-    """True where rapids alone lead from there to the end of the file, or from its start there: a park point. It is
-    stated on purpose, and where it is out of reach the error of travel names it."""
+    """True where rapids alone lead from there to the end of the file, or from its start there, and where a rapid leads there
+    and a tool change or a stop is next: a park point. It is stated on purpose, and where it is out of reach the error of
+    travel names it."""
+    behind = row + 1
+    if toolpath.kind[row] == Kind.RAPID and behind < len(toolpath) and (
+            toolpath.tool[behind] != toolpath.tool[row]
+            or any(event.index == behind and event.word in _PARKED_FOR for event in toolpath.events)):
+        return True
     cuts = (toolpath.role != Role.START) & ((toolpath.kind != Kind.RAPID) | (toolpath.role == Role.HOLE))
     return not cuts[row:].any() or not cuts[: row + 1].any()
 

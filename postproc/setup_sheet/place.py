@@ -46,10 +46,14 @@ class FoundPlace:
     part: PartPlacement
     attitude: Attitude
     margin: float
+    stated: bool = False
+    """True: somebody has said where the part stands"""
 
     @property
     def why(self) -> str:
         """Why the part stands there."""
+        if self.stated:
+            return f"{self.attitude.why}; where it was said to stand"
         where = "origin on the table's origin" if np.isnan(self.margin) else (
             f"all axes stay {self.margin:.0f} mm inside travel" if self.margin >= 1.0 else "where travel allows it")
         return f"{self.attitude.why}; {where}"
@@ -73,18 +77,22 @@ class Fit:
 
 
 def fitted(toolpath: Toolpath, machine: Machine, controller: str | Path, setup: SetupFile, options: Options,
-           found: list[Diagnostic], progress: Progress | None = None) -> Fit:
-    """The first place that a conversion proves; arguments as of `convert`, `found` is what reading found."""
+           found: list[Diagnostic], progress: Progress | None = None,
+           origin: tuple[float, float, float] | None = None) -> Fit:
+    """The first place that a conversion proves; arguments as of `convert`, `found` is what reading found, `origin` (mm) is
+    where the part stands, where that is known: then only how it is turned is looked for."""
     def converted(one: SetupFile) -> PostResult:
         return convert(toolpath, machine, controller, one, options, list(found), progress)
 
     attitudes = attitudes_of(toolpath, machine, options.axis_tolerance * DEG)
-    begin = FoundPlace(_part(attitudes[0], np.zeros(3)), attitudes[0], np.nan)
+    at = np.zeros(3) if origin is None else np.array(origin)
+    begin = FoundPlace(_part(attitudes[0], at), attitudes[0], np.nan, origin is not None)
     first = converted(placed_at(setup, begin))
     if first.ok or not beyond(first):
         return Fit(placed_at(setup, begin), first, begin, 1, ())
     tried, lacks = 1, list[str]()
-    for place in _places(toolpath, machine, setup, options, attitudes, lacks):
+    turned = (FoundPlace(_part(one, at), one, np.nan, True) for one in attitudes[1:] if one.unreachable == 0.0)
+    for place in turned if origin is not None else _places(toolpath, machine, setup, options, attitudes, lacks):
         result = converted(placed_at(setup, place))
         tried += 1
         if result.ok:
@@ -98,10 +106,22 @@ def below_origin(fit: Fit) -> float:
     """mm that cuts reach below the origin of a table that turns, where the part was put on it; 0 elsewhere: a part on a
     table that does not turn is found by its work offset alone."""
     job = fit.result.job
-    if job is None or not len(table_axes(job.control)) or fit.place is None or not np.isnan(fit.place.margin):
+    if job is None or not _turning_table(fit) or fit.place is None or fit.place.stated:
+        return 0.0
+    if not np.isnan(fit.place.margin):
         return 0.0
     cuts = job.moves.tip[job.moves.kind != Kind.RAPID]
     return max(0.0, -float((cuts @ job.machine.home_axis).min(initial=0.0)))
+
+
+def _turning_table(fit: Fit) -> bool:
+    """True where the program depends on where the part stands on the table."""
+    return fit.result.job is not None and len(table_axes(fit.result.job.control)) > 0
+
+
+def looked_for(fit: Fit) -> bool:
+    """True where travel alone has chosen a place on a table that turns."""
+    return fit.place is not None and not fit.place.stated and not np.isnan(fit.place.margin) and _turning_table(fit)
 
 
 def placed_at(setup: SetupFile, place: FoundPlace) -> SetupFile:

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 from postproc.setup.spindle import CoolantKind
 from postproc.setup_sheet.facts import NumberedTool, SheetFacts, ToolFacts
 
-QuestionKind = Literal["tool_number", "gauge_length", "spindle", "feed", "coolant"]
+QuestionKind = Literal["tool_number", "gauge_length", "spindle", "feed", "coolant", "origin"]
 AnswerSource = Literal["answered", "assumed"]
 ASSUMED_SPEED = 1000.0
 """rev/min, for a first run in the air: no cutting speed"""
@@ -23,11 +23,11 @@ ASSUMED_LENGTH = 150.0
 _ABOVE_CUTTER = 50.0
 """mm from the end of a cutter, as CAM draws it, to the gauge point, where that is assumed"""
 _LARGEST: dict[QuestionKind, float] = {"tool_number": 999999.0, "gauge_length": 2000.0, "spindle": 200000.0,
-                                       "feed": 200000.0}
+                                       "feed": 200000.0, "origin": 100000.0}
 _UNITS: dict[QuestionKind, str] = {"tool_number": "", "gauge_length": "mm", "spindle": "rev/min", "feed": "mm/min",
-                                   "coolant": ""}
+                                   "coolant": "", "origin": "mm"}
 _OPTIONS: dict[QuestionKind, str] = {"tool_number": "--tool-number", "gauge_length": "--gauge-length",
-                                     "spindle": "--spindle", "feed": "--feed", "coolant": "--coolant"}
+                                     "spindle": "--spindle", "feed": "--feed", "coolant": "--coolant", "origin": "--origin"}
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,8 @@ class Question:
         """The option that answers it."""
         if self.name:
             return f"{_OPTIONS[self.kind]} {shlex.quote(f'{self.name}=N')}"
-        value = "KIND" if self.kind == "coolant" else {"mm": "MM", "rev/min": "RPM"}.get(self.unit, "MM/MIN")
+        words: dict[QuestionKind, str] = {"coolant": "KIND", "origin": "X,Y,Z"}
+        value = words.get(self.kind) or {"mm": "MM", "rev/min": "RPM"}.get(self.unit, "MM/MIN")
         return f"{_OPTIONS[self.kind]} {f'{self.number}=' if self.number else ''}{value}"
 
     def prompt(self) -> str:
@@ -93,6 +94,8 @@ class GivenAnswers:
     feed: float | None = None
     coolant: str = ""
     tool_number: Mapping[str, int] = field(default_factory=dict)
+    origin: tuple[float, float, float] | None = None
+    """mm, where the origin of the CL file's absolute frame stands in the table frame; None: a place is looked for"""
 
     def of(self, question: Question) -> float | str | None:
         """The answer to a question, None where there is none."""
@@ -110,6 +113,12 @@ def number_questions(named: tuple[NumberedTool, ...]) -> list[Question]:
     """The number in the magazine of each tool to which the CL file gives none of its own; a free one is offered."""
     return [Question("tool_number", 0, f"tool {json.dumps(one.name, ensure_ascii=False)}: number in the magazine "
                      f"({one.why})", float(one.number), float(one.number), one.name) for one in named if one.assumed]
+
+
+def origin_question(found: tuple[float, float, float]) -> Question:
+    """Where the part stands on a table that turns; offered is the place that travel has chosen."""
+    return Question("origin", 0, "origin of the CL file in the table frame: x, y, z (offered: a place that travel allows)",
+                    ", ".join(f"{v:g}" for v in found), None)
 
 
 def questions_of(facts: SheetFacts) -> list[Question]:
@@ -145,6 +154,8 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
     if question.kind == "coolant":
         known = get_args(CoolantKind)
         return (text.lower(), "") if text.lower() in known else (None, f"{text!r} is not one of {', '.join(known)}")
+    if question.kind == "origin":
+        return (text, "") if three_numbers(text) else (None, f"{text!r} is not x, y, z in mm")
     if _thousands(text):
         return None, f"{text!r} may be {text.replace(',', '')} or {text.replace(',', '.')}: write it without the comma"
     try:
@@ -157,6 +168,15 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
     if not 0.0 < value <= largest:
         return None, f"{text} is not above 0 and at most {largest:g} {question.unit}"
     return value, ""
+
+
+def three_numbers(text: str) -> tuple[float, float, float] | None:
+    """Three lengths in mm between commas or blanks; None where they are none."""
+    try:
+        x, y, z = (float(word) for word in text.replace(",", " ").split())
+    except ValueError:
+        return None
+    return (x, y, z) if all(abs(v) <= _LARGEST["origin"] for v in (x, y, z)) else None
 
 
 def _thousands(text: str) -> bool:

@@ -143,6 +143,9 @@ def _output(header: SheetHeader, setup: SetupFile, facts: SheetFacts, answers: M
                     f"(lines {lines})")
     else:
         yield "# feed: every cut has one in the CL file"
+    if setup.output.rapids_as_feed:
+        yield _line("rapids_as_feed", "true", "rapids of several axes would leave their line here (dog-leg): G1 at the "
+                    "speed of the slowest axis; not needed where [control] rapids = \"straight\" of the machine file holds")
     if coolant is not None:
         why = "the CL file states none: off" if coolant.value == "off" and coolant.source == "assumed" else _from(coolant)
         yield _line("coolant", json.dumps(coolant.value), why)

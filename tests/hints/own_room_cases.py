@@ -19,6 +19,9 @@ NORMAL = START.replace("LOADTL/1\n", "CUTTER/10,5\nLOADTL/1\n") + "MULTAX/ON\n" 
 ROOT = Path(__file__).parents[2]
 LAWS = (ROOT / "tests" / "golden" / "three_laws.cls").read_text("utf-8")
 TOOLS = (ROOT / "samples" / "tools.setup.toml").read_text("utf-8")
+ISO_HOLE = "MODE/MILL\nPARTNO/'plate'\nPPRINT/'plate'\nUNITS/MM\nMULTAX/OFF\nLOADTL/3, 0, 60.0, 8\nRAPID\n" + (
+    "GOTO/10.0, 20.0, 35.0\nCYCLE/DRILL, 12.0, MMPM, 300.0, 3.0, RAPTO, 1.0\nGOTO/10.0, 20.0, 8.0\nCYCLE/OFF\nEND\nFINI\n")
+"""Autodesk's ISO 4343 with the tool at 35 mm before a cycle whose clearance height is 3 mm"""
 BALL = START.replace("LOADTL/1\n", "CUTTER/10,5\nLOADTL/1\n") + CUT
 
 
@@ -131,5 +134,10 @@ _MACHINES = [
              {"part.cls": LAWS, "s.toml": TOOLS + "\n[output]\nfiles = true\n"}, "into folders of their own",
              (Edit(COMMAND, "right.nc", "own/right.nc"),),
              first=("convert part.cls -m mikron-ucp710 -c fanuc-30i --setup s.toml -o left.nc",)),
+    HintCase("file.input", "convert O1002 -m mikron-ucp710 -c fanuc-30i --setup s.toml -o main.nc",
+             {"O1002": LAWS, "s.toml": TOOLS + "\n[output]\nfiles = true\n"}, "write into another folder",
+             (Edit(COMMAND, "main.nc", "other/main.nc"),)),
+    HintCase("cl.cycle-height", "inspect part.apt", {"part.apt": ISO_HOLE}, "give the dialect: (--dialect generic)",
+             (Edit(COMMAND, "", r" \1"),)),
 ]
 OWN_ROOMS = [*_MACHINES, *_OUTPUT, *_PROOFS, *_CUTTERS, *_TABLES, *_AXES]

@@ -27,6 +27,8 @@ _REACH = [
             Edit("m.toml", '"sign"', r"\1"), m=machine_text("mikron-ucp710").replace(
                 '[axes.C]\n', '[axes.C]\nmodulo = true\nrollover = "sign"\n'), control="siemens-840d",
             more=" --output-mode axes"),
+    convert("place.found", START + CUT, r"\[part\] (origin = \[.*?\]), (x_axis = \[.*?\]), (y_axis = \[.*?\]) in the set-up",
+            sheet("", r"[part]\n\1\n\2\n\3\n"), machine="haas-umc-750", control="haas-ngc", stops=("travel.exceeded",)),
     convert("reach.clearance", START + CUT, r"\(part\.(origin)\)", sheet("190.0", "-60.0"), machine=DELTA,
             setup=AT.format(z=190.0)),
 ]

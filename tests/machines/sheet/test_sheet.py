@@ -163,6 +163,26 @@ def test_all_faults_come_in_one_run(tmp_path: Path) -> None:
     assert [d.lines[0] for d in found] == [line_of(text, part) for part in ('"762"', '"fast"', "tip left", "2.8 h")]
 
 
+def test_a_misspelt_key_hides_no_wrong_figure(tmp_path: Path) -> None:
+    """Keys that do not fit are left out, and the figures of the rest are looked at in the same run."""
+    text = TRUNNION.replace("rapid = ", "rapids = ", 1).replace("[Y]", "[Y]\nzeros = \"upper\"", 1)
+    faults = made(tmp_path, text.replace('jog = "anti-clockwise"', 'jog = "left"')).diagnostics
+    assert {d.code for d in faults} == {"file.unknown-key", "file.range"}, "without the speed of X nothing can be made"
+    text = TRUNNION.replace("[Y]", "[Y]\nzeros = \"upper\"", 1).replace('jog = "anti-clockwise"', 'jog = "left"')
+    assert text.count(" m/min") >= 1
+    faults = made(tmp_path, text.replace(" m/min", "", 1)).diagnostics
+    assert {d.code for d in faults} == {"file.unknown-key", "file.range", "sheet.figure"}, faults
+
+
+@pytest.mark.parametrize("word", ["counterclockwise", "Anti-Clockwise", "CCW", "anticlockwise"])
+def test_a_jog_in_another_spelling(word: str, tmp_path: Path) -> None:
+    ours, other = (made(tmp_path, TRUNNION.replace('"anti-clockwise"', f'"{said}"')).machine
+                   for said in (word, "anti-clockwise"))
+    assert ours is not None and other is not None and '"anti-clockwise"' in TRUNNION
+    q = np.array([[0.0, 0.0, 0.0, 0.2, 0.7]])
+    np.testing.assert_array_equal(ours.kinematics.forward(q)[1], other.kinematics.forward(q)[1])
+
+
 @pytest.mark.parametrize(("letter", "in_table"), QUESTIONS)
 def test_what_a_jog_shows_is_what_the_machine_does(letter: str, in_table: bool, tmp_path: Path) -> None:
     """By forward kinematics alone: where a point of the table, or the tip, is after the jog."""

@@ -128,10 +128,14 @@ def test_one_wrong_number_is_one_error(what: str, tmp_path: Path) -> None:
     assert code != "path.odd_record" or f"p.apt:{line}:" in got.stderr
 
 
+CUT = "GOTO/0,0,5\nFEDRAT/MMPM,600\nGOTO/0,0,0\nRAPID\nGOTO/0,0,9\nFINI"
+
+
 @pytest.mark.parametrize(("far", "code"), [
-    ("FINI", "travel.exceeded"), ("GOTO/0,0,5\nFEDRAT/MMPM,600\nGOTO/0,0,0\nRAPID\nGOTO/0,0,9\nFINI", "path.odd_record")])
+    ("FINI", "travel.exceeded"), (CUT, "path.odd_record"), (f"STOP\nRAPID\n{CUT}", "travel.exceeded"),
+    (f"LOADTL/2\nSPINDL/RPM,3000,CLW\nRAPID\n{CUT}", "travel.exceeded")])
 def test_a_park_point_is_no_odd_record(far: str, code: str, tmp_path: Path) -> None:
-    """Rapids alone behind it: its line is named by travel; with a cut behind it, it is a damaged number."""
+    """Rapids alone behind it, a tool change or a stop: its line is named by travel; with a cut behind it, it is damaged."""
     text = "\n".join([*START, *SQUARE, "RAPID", "GOTO/0,0,5000", far])
     (tmp_path / "p.apt").write_text(text)
     (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 120.0\n")

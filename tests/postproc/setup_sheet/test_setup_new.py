@@ -84,7 +84,8 @@ def test_what_is_written_converts(shape: str, case: str, name: str, controller: 
     assumed |= {"tool_numbers"} if any(one.assumed for one in made.facts.named) else set()
     x, y = (np.array(setup["part"][key]) for key in ("x_axis", "y_axis"))
     low = (toolpaths.read(file)[0].tip @ [x[2], y[2], np.cross(x, y)[2]]).min()
-    assumed |= {"part.origin"} if name != "mill-3axis" and low < 0.0 and not any(setup["part"]["origin"]) else set()
+    chosen = low < 0.0 or any(setup["part"]["origin"])  # below the table's origin, or where travel alone has room
+    assumed |= {"part.origin"} if name != "mill-3axis" and chosen else set()
     assert set(setup.get("assumed", [])) == assumed
     assert {d.message.split(" = ")[0] for d in result.diagnostics if d.code == "setup.assumed"} == assumed
     assert result.text.count("ASSUMED") == len(assumed)
@@ -225,7 +226,7 @@ def test_gauge_lengths_are_asked_for_where_no_place_fits_without(tmp_path: Path)
 
     typed = new_setup(path, machine("haas-umc-750"), "haas-ngc", Options(), GivenAnswers(), answer, False, found)
     first = ["tools.1.spindle", "tools.2.spindle"]
-    assert asked == [*first, "tools.1.gauge_length", "tools.2.gauge_length"], asked
+    assert asked == [*first, "tools.1.gauge_length", "tools.2.gauge_length", "output.origin"], asked
     assert "gauge_length = 180 " in typed.text and "travel is checked with it" in typed.text
 
 
@@ -344,6 +345,51 @@ def test_a_question_on_a_terminal_stays_on_its_line(tmp_path: Path) -> None:
             said += part
     assert command.wait(60) == 0 and b"1 question" in said
     os.close(ours)
+
+
+def test_rapids_that_would_leave_their_line_are_feed_moves(tmp_path: Path) -> None:
+    """A rapid up and aside from the cut, far off the table: found with the place, and said with its reason."""
+    (file := tmp_path / "part.apt").write_text(
+        "UNITS/MM\nLOADTL/1\nSPINDL/RPM,900,CLW\nFEDRAT/MMPM,200\nRAPID\nGOTO/812,-333,190\nGOTO/812,-333,140\n"
+        "GOTO/862,-333,140\nGOTO/862,-313,140\nRAPID\nGOTO/812,-333,190\nFINI\n")
+    made = sheet(file, "mikron-ucp710", "fanuc-30i")
+    result = proved(file, made, "mikron-ucp710", "fanuc-30i", tmp_path)
+    assert result.ok and tomllib.loads(made.text)["output"]["rapids_as_feed"] is True
+    straight = sheet(file, "mikron-ucp710", "linuxcnc")
+    assert straight.text and "rapids_as_feed" not in straight.text, "a control whose rapids are straight needs none"
+
+
+def test_who_knows_where_the_part_stands_says_so(tmp_path: Path) -> None:
+    """An option or an answer is taken as it is, and not assumed; where it is out of travel, the place that fits is named."""
+    file, out = bare(tmp_path), tmp_path / "s.toml"
+    words = ("setup", "new", file, "-m", "haas-umc-750", "-c", "haas-ngc", "-o", out, "--yes", "--force")
+    assert "part.origin is assumed: travel alone has chosen" in run(*words).stderr
+    found = tomllib.loads(out.read_text())["part"]["origin"]
+    at = [found[0] + 3.0, found[1] - 2.0, found[2] - 40.0]
+    said = run(*words, "--origin", ",".join(map(str, at)))
+    setup = tomllib.loads(out.read_text())
+    assert setup["part"]["origin"] == at and "part.origin" not in setup["assumed"] and "said to stand" in said.stdout
+    refused = run(*words, "--origin", "0,0,0", code=1).stderr
+    assert "travel.exceeded" in refused and refused.count("[part] origin = ") == 1
+    assert "is not X,Y,Z in mm" in run(*words, "--origin", "0,0", code=2).stderr
+
+
+def test_a_place_that_was_offered_is_accepted_or_another_stated(tmp_path: Path) -> None:
+    path, found = toolpaths.read(bare(tmp_path))
+    given = GivenAnswers(spindle={0: 3000.0}, feed=300.0, coolant="off", tool_number={"EM10": 1})
+    drawn: list[str] = []
+
+    def made(answer: str) -> SetupSheet:
+        def ask(question: Question) -> float | str:
+            assert question.kind == "origin" and drawn[-1] == "", "nothing is drawn while somebody is asked"
+            return parsed(question, answer)[0] or ""
+
+        return new_setup(path, machine("haas-umc-750"), "haas-ngc", Options(), given, ask, False, found, "G54",
+                         lambda stage, at, total: drawn.append(stage))
+
+    offered, other = made(""), made("-380 -250 -300")
+    assert offered.fit is not None and other.fit is not None and not offered.fit.setup.assumed
+    assert offered.fit.place.stated and other.fit.setup.part.origin == (-380.0, -250.0, -300.0)
 
 
 @pytest.mark.parametrize("name", ['EM"10\\n', "EM\x7f10", "EM\x0110", "Фреза\u2028Ø10\x85"])
