@@ -40,7 +40,7 @@ SMOOTH_BUMP = (140.0, -420.0, 420.0, -140.0)
 """140 x^3 (1 - x)^3, whose integral is 1 and whose derivatives up to the second vanish at 0 and 1"""
 TAKES_BACK = 0.3
 """mm of an interval that takes back what the ones before went astray"""
-COMPILE_FROM = 2_000
+COMPILE_FROM = 30
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.clock.control import ControlMotion, ControlSettings, execute
+from postproc.clock.control import ControlMotion, execute
 from postproc.clock.path import CommandedPath
+from postproc.clock.settings import ControlSettings
 from postproc.cycle_time.blocks import CornerMode, MotionBlocks
 from postproc.cycle_time.lookahead import TANGENT, directions, limits, lookahead
 from postproc.cycle_time.model import CycleTimeModel
@@ -26,8 +27,6 @@ SHORTEST = 1e-9
 """mm or rad that a block counts at least"""
 MOST_BLOCKS, MOST_STOPS = 300_000, 5_000
 """blocks and rests up to which the control is executed"""
-STRICT_UP_TO = 5_000
-"""blocks up to which every sample of the motion is measured"""
 AT_SPEED = 0.999
 """of the speed asked for that counts as constant speed"""
 
@@ -47,11 +46,7 @@ def control(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
         return replace(lookahead(blocks, model), found=(warning(
             "time.plan", f"the motion of the control cannot be planned, times are those of the model lookahead: {fault}",
             hint=f"{REPORT}; --model lookahead needs no plan"),))
-    times = _on_the_clock(blocks, form, moved, owner, stops, target, model.stop_time)
-    return times if moved.solved else replace(times, found=(warning(
-        "time.unsolved", "the least time of some stretches between these lines was not found; the time is longer than "
-        "necessary, within all limits", lines=blocks.line[[0, -1]].tolist(),
-        hint=f"{REPORT}; --model lookahead needs no plan"),))
+    return _on_the_clock(blocks, form, moved, owner, stops, target, model.stop_time)
 
 
 def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bools,
@@ -69,7 +64,7 @@ def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bool
                          np.concatenate([[True], stops[owner] & last]), np.where(axes.rotary, ARM, 1.0))
     jerk = axes.jerk if model.jerk else np.full(len(axes.letters), np.inf)
     return execute(path, ControlSettings(axes.velocity, axes.acceleration, jerk, buffer=model.lookahead,
-                                         block_time=model.block_time, strict=len(blocks) <= STRICT_UP_TO)), owner
+                                         block_time=model.block_time)), owner
 
 
 def rests(blocks: MotionBlocks, form: Shape) -> Bools:

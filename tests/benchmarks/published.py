@@ -16,8 +16,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 
-from postproc.clock.control import ControlSettings, execute
+from postproc.clock.control import execute
 from postproc.clock.path import CommandedPath
+from postproc.clock.settings import ControlSettings
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import SplinePath
 from postproc.feedrate.plan import PlannerOptions, plan
