@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.clock.allowed import NO_MOTION, SLOWEST, Allowed, allowed
+from postproc.clock.landing import landed, short_move
 from postproc.clock.path import BlendedPath, CommandedPath, blended
 from postproc.clock.settings import ControlSettings
 from postproc.clock.speed_kernels import run, slow_down
@@ -157,21 +158,7 @@ def _moved(part: Allowed, settings: ControlSettings) -> Floats:
             break
         if len(made) > CALLS:
             raise ArithmeticError(f"no end is reached within {sum(map(len, made)) * settings.cycle:.3g} s")
-    return np.concatenate(made)
-
-
-def short_move(start: float, length: float, jerk: float, cycle: float) -> Floats:
-    """(M, 3) place, speed and acceleration of a move from rest to rest by jerk alone, in four equal phases: length =
-    jerk T^3/32. It takes whole cycles."""
-    count = max(int(np.ceil(np.cbrt(32.0 * length / jerk) / cycle)), 1)
-    whole = count * cycle
-    j, t = 32.0 * length / whole**3, np.arange(1.0, float(count)) * cycle
-    late = np.minimum(t, whole - t)
-    gain = np.where(late < whole / 4.0, j * late, j * (whole / 2.0 - late)) * np.where(t > whole / 2.0, -1.0, 1.0)
-    speed = np.where(late < whole / 4.0, j * late**2 / 2.0, j * (whole**2 / 16.0 - (whole / 2.0 - late) ** 2 / 2.0))
-    rest = whole / 2.0 - late
-    place = np.where(late < whole / 4.0, j * late**3 / 6.0, length / 2.0 - j * (whole**2 / 16.0 * rest - rest**3 / 6.0))
-    return np.stack([start + np.where(t > whole / 2.0, length - place, place), speed, gain], axis=1)
+    return landed(np.concatenate(made), float(s[-1]), settings.cycle)
 
 
 def _jerk_used(part: Allowed, moved: Floats, settings: ControlSettings) -> Floats:

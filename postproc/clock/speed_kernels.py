@@ -137,6 +137,7 @@ def run(s: Floats, v: Floats, a: Floats, cycle: float, d1: Floats, d2: Floats, d
             more = a[at] + (a[at + 1] - a[at]) * min((there - s[at]) / (s[at + 1] - s[at]), 1.0)
         needed = (more - gain) / cycle
         near = abs(speed + (gain + more) / 2.0 * cycle - faster) <= NEAR * (j_high - j_low) * cycle * cycle
+        near = near and there > x + speed * cycle / 4.0
         along = near and SLACK * j_low <= needed <= SLACK * j_high and there < s[-1] and can_brake(
             s, v, at, there, faster, more, cycle, d1, d2, d3, acceleration, jerk, straight)
         if not along:
