@@ -154,7 +154,8 @@ def _moved(part: Allowed, settings: ControlSettings) -> Floats:
         out = np.empty((FEWEST + round(1.5 * rough / settings.cycle), 3))
         made.append(out[:loop(s, v, a, settings.cycle, *bends, state, out)])
         if state[1] <= 0.0 and state[0] < s[-1]:
-            made.append(short_move(state[0], s[-1] - state[0], float(part.straight[-1, 1]), settings.cycle))
+            most = float(part.cap[np.searchsorted(s, state[0]) - 1:].min())
+            made.append(short_move(state[0], s[-1] - state[0], float(part.straight[-1, 1]), most, settings.cycle))
             break
         if len(made) > CALLS:
             raise ArithmeticError(f"no end is reached within {sum(map(len, made)) * settings.cycle:.3g} s")

@@ -38,15 +38,15 @@ def landed(moved: Floats, end: float, cycle: float) -> Floats:
     return np.concatenate([moved[:at + 1], tail])
 
 
-def short_move(start: float, length: float, jerk: float, cycle: float) -> Floats:
+def short_move(start: float, length: float, jerk: float, speed: float, cycle: float) -> Floats:
     """(M, 3) place, speed and acceleration of a move from rest to rest by jerk alone, in four equal phases: length =
-    jerk T^3/32. It takes whole cycles."""
-    count = max(int(np.ceil(np.cbrt(32.0 * length / jerk) / cycle)), 1)
+    jerk T^3/32, largest speed 2 length/T. It takes whole cycles."""
+    count = max(int(np.ceil(max(np.cbrt(32.0 * length / jerk), 2.0 * length / speed) / cycle)), 1)
     whole = count * cycle
     j, t = 32.0 * length / whole**3, np.arange(1.0, float(count)) * cycle
     late = np.minimum(t, whole - t)
     gain = np.where(late < whole / 4.0, j * late, j * (whole / 2.0 - late)) * np.where(t > whole / 2.0, -1.0, 1.0)
-    speed = np.where(late < whole / 4.0, j * late**2 / 2.0, j * (whole**2 / 16.0 - (whole / 2.0 - late) ** 2 / 2.0))
+    v = np.where(late < whole / 4.0, j * late**2 / 2.0, j * (whole**2 / 16.0 - (whole / 2.0 - late) ** 2 / 2.0))
     rest = whole / 2.0 - late
     place = np.where(late < whole / 4.0, j * late**3 / 6.0, length / 2.0 - j * (whole**2 / 16.0 * rest - rest**3 / 6.0))
-    return np.stack([start + np.where(t > whole / 2.0, length - place, place), speed, gain], axis=1)
+    return np.stack([start + np.where(t > whole / 2.0, length - place, place), v, gain], axis=1)
