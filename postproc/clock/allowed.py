@@ -64,7 +64,7 @@ def allowed(commanded: CommandedPath, path: BlendedPath, settings: ControlSettin
     acceleration, jerk = settings.acceleration, settings.jerks
     cap = _by_block(path, block_speeds(commanded, path, settings), s)
     if settings.corner_step is not None:
-        passed, sharp = _by_steps(commanded, path, settings.corner_step, s)
+        passed, sharp = _by_steps(commanded, path, settings.corner_step, settings.acceleration, s)
         cap = np.minimum(cap, passed)
         d2q, d3q = (np.where(sharp[:, None], 0.0, one) for one in (d2q, d3q))
     with np.errstate(divide="ignore"):
@@ -139,14 +139,18 @@ def _by_block(path: BlendedPath, speed: Floats, s: Floats) -> Floats:
     return np.minimum(speed[before], speed[behind])
 
 
-def _by_steps(commanded: CommandedPath, path: BlendedPath, step: Floats, s: Floats) -> tuple[Floats, Bools]:
+def _by_steps(commanded: CommandedPath, path: BlendedPath, step: Floats, acceleration: Floats,
+              s: Floats) -> tuple[Floats, Bools]:
     """(largest speed, whether the path turns at once) at places (N,): corners are passed at the speed at which no joint's
-    velocity jumps by more than `step` (A,)."""
+    velocity jumps by more than `step` (A,), nor by more than it changes by over the time of half a block on either side."""
     along = np.diff(path.ends)
     moving = np.flatnonzero(along > 0.0)
     slope = np.diff(commanded.points, axis=0)[moving] / along[moving, None]
+    around = (along[moving[1:]] + along[moving[:-1]]) / 2.0
     with np.errstate(divide="ignore"):
-        passed = (step / np.abs(np.diff(slope, axis=0))).min(axis=1, initial=np.inf)
+        turn = np.abs(np.diff(slope, axis=0))
+        passed = np.minimum((step / turn).min(axis=1, initial=np.inf),
+                            np.sqrt((acceleration / turn).min(axis=1, initial=np.inf) * around))
     corner = path.ends[moving[1:]]
     cap, sharp = np.full(len(s), np.inf), np.zeros(len(s), dtype=bool)
     for side in (-CORNER, CORNER):

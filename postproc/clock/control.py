@@ -21,6 +21,10 @@ FEWEST, LONGEST, CALLS = 256, 1e6, 8
 """cycles that are made room for at least each time; s, and times, after which a motion is given up"""
 ROUNDS, USED = 6, 1.08
 """times that bends are passed more slowly at most, until no joint uses more than USED of the jerk that is planned with"""
+SLIGHT = 0.1
+"""share of a jerk: bends that take less do not become slower"""
+GENTLE = 0.95
+"""of the accelerations and jerks has the braking curve, so that the motion can come up to it from below"""
 BACKWARD = -0.5
 """cosine of the change of direction below which the axes rest"""
 NEAR, LEAST = 2, 0.8
@@ -145,7 +149,8 @@ def _moved(part: Allowed, settings: ControlSettings) -> Floats:
     """(M, 3) the motion from rest to rest under the largest speeds of a part."""
     s, v, a = part.s, np.empty(len(part.s)), np.empty(len(part.s))
     bends = part.dq, part.d2q, part.d3q, settings.acceleration, settings.jerks, part.straight
-    chosen(slow_down, len(s), COMPILE_FROM)(s, part.cap, *bends, v, a)
+    gentle = (*bends[:3], GENTLE * settings.acceleration, GENTLE * settings.jerks, GENTLE * part.straight)
+    chosen(slow_down, len(s), COMPILE_FROM)(s, part.cap, *gentle, v, a)
     rough = float((np.diff(s) / np.maximum((v[1:] + v[:-1]) / 2.0, SLOWEST)).sum())
     if rough > LONGEST:
         raise ArithmeticError(f"the motion takes {rough:.3g} s")
@@ -163,12 +168,13 @@ def _moved(part: Allowed, settings: ControlSettings) -> Floats:
 
 
 def _jerk_used(part: Allowed, moved: Floats, settings: ControlSettings) -> Floats:
-    """(M,) largest share of a joint's jerk each cycle, by the derivatives of the path."""
+    """(M,) largest share of a joint's jerk each cycle, by the derivatives of the path; 0 where bends take little of it."""
     s, v, a = moved.T
     j = np.diff(a, append=0.0) / settings.cycle
     k = np.clip(np.searchsorted(part.s, s, side="right") - 1, 0, len(part.s) - 2)
-    jerk = part.dq[k] * j[:, None] + 3.0 * part.d2q[k] * (v * a)[:, None] + part.d3q[k] * (v**3)[:, None]
-    return np.asarray(np.abs(jerk / settings.jerks).max(axis=1))
+    bend = 3.0 * part.d2q[k] * (v * a)[:, None] + part.d3q[k] * (v**3)[:, None]
+    used = np.abs((part.dq[k] * j[:, None] + bend) / settings.jerks)
+    return np.asarray(np.where(np.abs(bend / settings.jerks) > SLIGHT, used, 0.0).max(axis=1))
 
 
 def _slower(part: Allowed, moved: Floats, used: Floats) -> Floats:

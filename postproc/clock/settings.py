@@ -11,7 +11,7 @@ from toolpaths.shapes import arrays
 
 STEEPEST = 0.02
 """s in which full acceleration is built up where no jerk is stated"""
-RESERVE = 0.95
+PLANNED = 0.98
 """of the jerks is planned with: the rest is for what changes within a cycle"""
 
 
@@ -44,4 +44,4 @@ class ControlSettings:
     @property
     def jerks(self) -> Floats:
         """(A,) jerks that are planned with."""
-        return np.asarray(np.minimum(RESERVE * self.jerk, self.acceleration / STEEPEST))
+        return np.asarray(np.minimum(PLANNED * self.jerk, self.acceleration / STEEPEST))

@@ -63,8 +63,11 @@ def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bool
     path = CommandedPath(points, length, target[owner], np.concatenate([[0.0], np.where(last, tolerance[owner], inner)]),
                          np.concatenate([[True], stops[owner] & last]), np.where(axes.rotary, ARM, 1.0))
     jerk = axes.jerk if model.jerk else np.full(len(axes.letters), np.inf)
-    return execute(path, ControlSettings(axes.velocity, axes.acceleration, jerk, buffer=model.lookahead,
-                                         block_time=model.block_time)), owner
+    weight = path.weight
+    step = None if model.corner_step is None else model.corner_step / weight
+    smoothing = np.full(len(weight), model.smoothing) if model.smoothing > 0.0 else None
+    return execute(path, ControlSettings(axes.velocity, axes.acceleration, jerk, model.lookahead, model.block_time,
+                                         model.cycle, model.bend_acceleration, model.bend_jerk, step, smoothing)), owner
 
 
 def rests(blocks: MotionBlocks, form: Shape) -> Bools:
