@@ -27,6 +27,8 @@ SHORTEST = 1e-9
 """mm or rad that a block counts at least"""
 MOST_BLOCKS, MOST_STOPS = 300_000, 5_000
 """blocks and rests up to which the control is executed"""
+BENT = 0.002
+"""of the largest acceleration, by which it changes from cycle to cycle where jerk limits"""
 AT_SPEED = 0.999
 """of the speed asked for that counts as constant speed"""
 
@@ -118,8 +120,11 @@ def _on_the_clock(blocks: MotionBlocks, form: Shape, moved: ControlMotion, owner
     peak = np.maximum(peak, form.length / np.maximum(seconds, 1e-300))
     constant = v.min(axis=0, initial=np.inf) >= AT_SPEED * target[which]
     steady = np.minimum(summed(np.where(constant, step, 0.0), which, len(blocks)), seconds)
+    change = np.abs(np.diff(moved.a))
+    bent = change > BENT * np.abs(moved.a).max(initial=0.0)
+    jerk = np.minimum(summed(np.where(bent & ~constant, step, 0.0), which, len(blocks)), seconds - steady)
     lost = np.maximum(seconds - form.length / np.maximum(peak, 1e-300), 0.0)
     around = stops | np.concatenate([[True], stops[:-1]])
-    return BlockTimes(begin, begin + seconds + np.where(stops, stop_time, 0.0), seconds - steady, steady,
-                      np.zeros(len(blocks)), peak, np.where(around, lost, 0.0) + np.where(stops, stop_time, 0.0),
+    return BlockTimes(begin, begin + seconds + np.where(stops, stop_time, 0.0), seconds - steady - jerk, steady,
+                      jerk, peak, np.where(around, lost, 0.0) + np.where(stops, stop_time, 0.0),
                       np.where(around, 0.0, lost), p.seconds.copy())
