@@ -111,6 +111,33 @@ def can_brake(s: Floats, v: Floats, k: int, x: float, speed: float, gain: float,
 
 
 @loop
+def largest(s: Floats, v: Floats, k: int, x: float, speed: float, gain: float, cycle: float, d1: Floats, d2: Floats,
+            d3: Floats, acceleration: Floats, jerk: Floats, straight: Floats) -> tuple[float, float, float]:
+    """(place, speed, acceleration) a cycle later with the largest jerk from which the motion can brake."""
+    a_low, a_high, j_low, j_high = left(k, speed, gain, d1, d2, d3, acceleration, jerk, straight)
+    low, high, best, tried = j_low, j_high, j_low, j_high
+    for _ in range(HALVINGS):
+        more = min(gain + tried * cycle, a_high)
+        faster = speed + (gain + more) / 2.0 * cycle
+        there = x + cycle * (speed + cycle * (2.0 * gain + more) / 6.0)
+        if faster >= 0.0 and can_brake(s, v, k, there, faster, more, cycle, d1, d2, d3, acceleration, jerk, straight):
+            best = low = tried
+            if tried == j_high:
+                break
+        else:
+            high = tried
+        tried = (low + high) / 2.0
+    more = max(min(gain + best * cycle, a_high), a_low)
+    faster = speed + (gain + more) / 2.0 * cycle
+    there = min(x + max(cycle * (speed + cycle * (2.0 * gain + more) / 6.0), 0.0), s[-1])
+    _, most = braked(s, v, k, there)
+    if faster > most * (1.0 + TOUCH) + TOUCH_SPEED:
+        faster = most
+        more = (faster - speed) / cycle
+    return there, faster, more
+
+
+@loop
 def run(s: Floats, v: Floats, a: Floats, cycle: float, d1: Floats, d2: Floats, d3: Floats, acceleration: Floats,
         jerk: Floats, straight: Floats, state: Floats, out: Floats) -> int:
     """Fill out (M, 3) with place, speed, acceleration each cycle and return how many there are; `state` (3,) is where it
@@ -127,9 +154,7 @@ def run(s: Floats, v: Floats, a: Floats, cycle: float, d1: Floats, d2: Floats, d
         if x >= s[-1] - straight[k, 1] * cycle * cycle * cycle:
             state[0], state[1], state[2] = s[-1], 0.0, 0.0
             break
-        _, a_high, j_low, j_high = left(k, speed, gain, d1, d2, d3, acceleration, jerk, straight)
-        a_low = -a_high
-        # along the braking curve
+        _, _, j_low, j_high = left(k, speed, gain, d1, d2, d3, acceleration, jerk, straight)
         at, there, faster, more = k, x, speed, gain
         for _ in range(3):
             there = min(x + cycle * (speed + cycle * (2.0 * gain + more) / 6.0), s[-1])
@@ -141,27 +166,7 @@ def run(s: Floats, v: Floats, a: Floats, cycle: float, d1: Floats, d2: Floats, d
         along = near and SLACK * j_low <= needed <= SLACK * j_high and there < s[-1] and can_brake(
             s, v, at, there, faster, more, cycle, d1, d2, d3, acceleration, jerk, straight)
         if not along:
-            a_low, a_high, j_low, j_high = left(k, speed, gain, d1, d2, d3, acceleration, jerk, straight)
-            low, high, best, tried = j_low, j_high, j_low, j_high
-            for _ in range(HALVINGS):
-                more = min(gain + tried * cycle, a_high)
-                faster = speed + (gain + more) / 2.0 * cycle
-                there = x + cycle * (speed + cycle * (2.0 * gain + more) / 6.0)
-                if faster >= 0.0 and can_brake(s, v, k, there, faster, more, cycle, d1, d2, d3, acceleration, jerk,
-                                               straight):
-                    best = low = tried
-                    if tried == j_high:
-                        break
-                else:
-                    high = tried
-                tried = (low + high) / 2.0
-            more = max(min(gain + best * cycle, a_high), a_low)
-            faster = speed + (gain + more) / 2.0 * cycle
-            there = min(x + max(cycle * (speed + cycle * (2.0 * gain + more) / 6.0), 0.0), s[-1])
-            at, most = braked(s, v, k, there)
-            if faster > most * (1.0 + TOUCH) + TOUCH_SPEED:
-                faster = most
-                more = (faster - speed) / cycle
+            there, faster, more = largest(s, v, k, x, speed, gain, cycle, d1, d2, d3, acceleration, jerk, straight)
             if faster <= 0.0:
                 faster = more = 0.0
                 there = min(x + speed / 2.0 * cycle, s[-1])
