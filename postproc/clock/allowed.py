@@ -141,8 +141,9 @@ def _by_block(path: BlendedPath, speed: Floats, s: Floats) -> Floats:
 
 def _by_steps(commanded: CommandedPath, path: BlendedPath, step: Floats, acceleration: Floats,
               s: Floats) -> tuple[Floats, Bools]:
-    """(largest speed, whether the path turns at once) at places (N,): corners are passed at the speed at which no joint's
-    velocity jumps by more than `step` (A,), nor by more than it changes by over the time of half a block on either side."""
+    """(largest speed, whether the path turns at once) at places (N,): corners without a tolerance are passed at the speed at
+    which no joint's velocity jumps by more than `step` (A,), nor by more than its acceleration allows in half a block on
+    either side."""
     along = np.diff(path.ends)
     moving = np.flatnonzero(along > 0.0)
     slope = np.diff(commanded.points, axis=0)[moving] / along[moving, None]
@@ -151,7 +152,8 @@ def _by_steps(commanded: CommandedPath, path: BlendedPath, step: Floats, acceler
         turn = np.abs(np.diff(slope, axis=0))
         passed = np.minimum((step / turn).min(axis=1, initial=np.inf),
                             np.sqrt((acceleration / turn).min(axis=1, initial=np.inf) * around))
-    corner = path.ends[moving[1:]]
+    at = commanded.tolerance[moving[1:]] == 0.0
+    corner, passed = path.ends[moving[1:]][at], passed[at]
     cap, sharp = np.full(len(s), np.inf), np.zeros(len(s), dtype=bool)
     for side in (-CORNER, CORNER):
         k = np.searchsorted(corner, s + side) - (side > 0.0)

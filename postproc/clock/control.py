@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.clock.allowed import NO_MOTION, SLOWEST, Allowed, allowed
 from postproc.clock.landing import landed, short_move
-from postproc.clock.path import BlendedPath, CommandedPath, blended
+from postproc.clock.path import BlendedPath, CommandedPath, blended, sharp
 from postproc.clock.settings import ControlSettings
 from postproc.clock.speed_kernels import run, slow_down
 from toolpaths.arrays import Bools, Floats
@@ -100,7 +100,7 @@ def execute(commanded: CommandedPath, settings: ControlSettings) -> ControlMotio
         ArithmeticError: no end was reached.
     """
     if settings.corner_step is not None:
-        commanded = replace(commanded, tolerance=np.zeros_like(commanded.tolerance))
+        commanded = sharp(commanded)
     commanded = replace(commanded, stop=commanded.stop | _turns_back(commanded))
     path = blended(commanded)
     delay = 0.0 if settings.smoothing is None else float(settings.smoothing.max())

@@ -191,6 +191,16 @@ def fitted(path: CommandedPath) -> tuple[Floats, Floats, Floats, Ints]:
     return wide / path.weight, length, np.concatenate([path.tolerance[:1], tolerance]), owner
 
 
+def sharp(path: CommandedPath) -> CommandedPath:
+    """The path whose points keep their tolerance only where they stand on a curve: corners are not rounded off."""
+    flat = path.points * path.weight
+    step = np.diff(flat, axis=0)
+    chord = np.maximum(np.linalg.norm(step, axis=1), 1e-12)
+    smooth, _ = _curved(step / chord[:, None], chord, path)
+    keeps = np.concatenate([[False], smooth, [False]])
+    return replace(path, tolerance=np.where(keeps, path.tolerance, 0.0))
+
+
 def _curved(u: Floats, chord: Floats, path: CommandedPath) -> tuple[Bools, Floats]:
     """Of inner points (N - 1,): whether both blocks are of one curve, change of direction."""
     turn = np.linalg.norm(np.diff(u, axis=0), axis=1)

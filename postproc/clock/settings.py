@@ -26,7 +26,7 @@ class ControlSettings:
         cycle: s of interpolation: the motion is sampled, and planned, at this
         bend_acceleration, bend_jerk: shares of the limits that bends may take; the rest is for changes of speed
         corner_step (A,): mm/s or rad/s by which the velocity of each axis may jump at a corner; None: corners are rounded
-            off within the tolerance instead
+            off within the tolerance instead, as points on curves are in any case
         smoothing (A,): s over which a filter averages the set points of each axis; None: no filter
     """
 
