@@ -1,143 +1,197 @@
-"""A control with look-ahead and limited jerk, as sound as the planner: times of blocks, and the motion of the axes."""
+"""A control with look-ahead and limited jerk, executed cycle by cycle: times of blocks, and the motion of the axes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
-from postproc.clock.path import BlendedPath, CommandedPath, blended
-from postproc.feedrate.feed import StepFeed
-from postproc.feedrate.limits import JointLimits
-from postproc.feedrate.motion import Plan
-from postproc.feedrate.plan import PlannerOptions, plan
-from toolpaths.arrays import Floats
+from postproc.clock.allowed import NO_MOTION, SLOWEST, Allowed, allowed
+from postproc.clock.landing import landed, short_move
+from postproc.clock.path import BlendedPath, CommandedPath, blended, sharp
+from postproc.clock.settings import ControlSettings
+from postproc.clock.speed_kernels import run, slow_down
+from toolpaths.arrays import Bools, Floats
+from toolpaths.compiled import chosen
 from toolpaths.shapes import arrays
 
-STEEPEST = 0.02
-"""s in which full acceleration is built up where no jerk is stated"""
-AVERAGED = 10
-"""blocks over which the time of taking up blocks is averaged"""
-SLOWEST = 1e-3
-"""mm/s or rad/s: least speed to which few blocks read ahead hold the axes"""
-ALIKE, STEP = 0.02, 1e-3
-"""steps of the logarithm of speeds that taking up blocks allows, and of feeds along the path of all axes"""
-NO_MOTION = 1e-12
-"""mm or rad, against division by 0"""
+COMPILE_FROM = 30
+"""places from which the loops are compiled: each cycle looks some tens of cycles ahead"""
+FEWEST, LONGEST, CALLS = 256, 1e6, 8
+"""cycles that are made room for at least each time; s, and times, after which a motion is given up"""
+ROUNDS, USED = 6, 1.08
+"""times that bends are passed more slowly at most, until no joint uses more than USED of the jerk that is planned with"""
+SLIGHT = 0.1
+"""share of a jerk: bends that take less do not become slower"""
+GENTLE = 0.95
+"""of the accelerations and jerks has the braking curve, so that the motion can come up to it from below"""
+BACKWARD = -0.5
+"""cosine of the change of direction below which the axes rest"""
+NEAR, LEAST = 2, 0.8
+"""cycles around such a place that become slower, and the share of the speed that is left at least each time"""
 
 
 @dataclass(frozen=True)
-@arrays(velocity="A", acceleration="A", jerk="A")
-class ControlSettings:
-    """How a control plans.
+@arrays(t="T", q="T A", qd="T A", qdd="T A", qddd="T A")
+class AxisMotion:
+    """Set points of the axes each cycle, behind their filters.
 
     Attributes:
-        velocity, acceleration, jerk (A,): largest of each axis, mm or rad per s, s2, s3; jerk inf where none is stated
-        buffer: blocks that are read ahead; block_time: s that each takes at least
-        strict: no sample exceeds a limit; else samples between the plan's knots may exceed jerks by some tenths
+        t (T,): s; q, qd, qdd, qddd (T, A): position, velocity, acceleration and jerk, mm or rad and s; the last two are the
+            differences of qd from cycle to cycle
     """
 
-    velocity: Floats
-    acceleration: Floats
-    jerk: Floats
-    buffer: int = 200
-    block_time: float = 0.0
-    strict: bool = True
+    t: Floats
+    q: Floats
+    qd: Floats
+    qdd: Floats
+    qddd: Floats
 
 
 @dataclass(frozen=True)
-@arrays(s="T", t="T", v="T", ends="V")
+@arrays(s="T", t="T", v="T", a="T", ends="V")
 class ControlMotion:
-    """The executed motion, rests without time.
+    """The executed motion, rests without time but for what filters take to settle.
 
     Attributes:
-        plan: None where nothing moves
-        s, t, v (T,): places along `path`, time and speed there; the ends of blocks and the knots of the plan
+        s, t, v, a (T,): places along `path`, time, speed and acceleration there, each cycle
         ends (V,): s at which each point of the commanded path is reached
+        delay: s by which filters hold the axes back
     """
 
     path: BlendedPath
-    plan: Plan | None
+    settings: ControlSettings
     s: Floats
     t: Floats
     v: Floats
+    a: Floats
     ends: Floats
+    delay: float
 
     @property
     def seconds(self) -> float:
-        """Time of the whole motion."""
+        """Time of the whole motion, until the axes stand."""
         return float(self.t[-1])
-
-    @property
-    def solved(self) -> bool:
-        """Whether no stretch takes longer than the limits ask for."""
-        return self.plan is None or self.plan.solved
-
-    def joints(self) -> Floats:
-        """(K, A) machine coordinates each `plan.step`."""
-        return self.path.q[:1] if self.plan is None else self.plan.trajectory().q
 
     def times(self) -> Floats:
         """(V,) s at which each point of the commanded path is reached."""
-        return np.interp(self.ends, self.s, self.t)
+        moving = np.concatenate([[True], np.diff(self.s) > 0.0])
+        t = np.interp(self.ends, self.s[moving], self.t[moving]) + self.delay / 2.0
+        return np.asarray(np.where(self.ends >= self.s[-1], self.t[-1], np.where(self.ends <= self.s[0], self.t[0], t)))
+
+    def axes(self) -> AxisMotion:
+        """Position and derivatives of each axis by time."""
+        step = self.settings.cycle
+        if len(self.s) == 1:
+            still = np.zeros_like(self.path.q)
+            return AxisMotion(self.t, self.path.q, still, still, still)
+        d = self.path.derivatives(self.s)
+        q, qd = d.q, d.dq * self.v[:, None]
+        for j, seconds in enumerate(() if self.settings.smoothing is None else self.settings.smoothing.tolist()):
+            q[:, j], qd[:, j] = (_mean(one[:, j], round(seconds / step)) for one in (q, qd))
+        qdd = np.diff(qd, axis=0, prepend=qd[:1]) / step
+        return AxisMotion(self.t, q, qd, qdd, np.diff(qdd, axis=0, prepend=qdd[:1]) / step)
 
 
 def execute(commanded: CommandedPath, settings: ControlSettings) -> ControlMotion:
     """What the control makes of a path.
 
     Raises:
-        ValueError: no speed above 0 is allowed somewhere.
-        ArithmeticError: no motion within the limits was found.
+        ArithmeticError: no end was reached.
     """
+    if settings.corner_step is not None:
+        commanded = sharp(commanded)
+    commanded = replace(commanded, stop=commanded.stop | _turns_back(commanded))
     path = blended(commanded)
+    delay = 0.0 if settings.smoothing is None else float(settings.smoothing.max())
     if path.s[-1] <= path.s[0]:
         still = np.zeros(1)
-        return ControlMotion(path, None, still, still, still, path.ends)
-    jerk = np.minimum(settings.jerk, settings.acceleration / STEEPEST)
-    limits = JointLimits(settings.velocity, settings.acceleration, jerk)
-    made = plan(path, limits, StepFeed(*_feed(commanded, path, settings)), path.stops[1:-1].tolist(),
-                PlannerOptions(strict=settings.strict))
-    knots = [np.clip(one.eased.parameter(one.profile.sigma)[0], one.eased.first, one.eased.last) for one in made.pieces]
-    s = np.unique(np.concatenate([path.ends, *knots]))
-    return ControlMotion(path, made, s, np.maximum.accumulate(made.time(s)), made.speed(s), path.ends)
+        return ControlMotion(path, settings, still, still, still, still, path.ends, 0.0)
+    room = allowed(commanded, path, settings)
+    settle = np.zeros((round(delay / settings.cycle), 3))
+    parts: list[Floats] = []
+    for first, last in zip(room.rests[:-1].tolist(), room.rests[1:].tolist(), strict=True):
+        moved = _between_rests(room, first, last, settings)
+        parts += [moved, settle + np.array([room.s[last], 0.0, 0.0])]
+    parts.append(np.array([[room.s[-1], 0.0, 0.0]]))
+    s, v, a = np.concatenate(parts).T
+    s = np.maximum.accumulate(np.minimum(s, path.end))
+    return ControlMotion(path, settings, s, settings.cycle * np.arange(float(len(s))), v, a, path.ends, delay)
 
 
-def _feed(commanded: CommandedPath, path: BlendedPath, settings: ControlSettings) -> tuple[Floats, Floats]:
-    """(edges, values) of the largest speed along the path: the feed, blocks taken up, blocks read ahead."""
-    along = np.diff(path.ends)
-    moving = along > 0.0
-    speed = np.full(len(along), np.inf)
-    ratio = along[moving] / commanded.length[moving]
-    speed[moving] = commanded.speed[moving] * np.exp(np.round(np.log(ratio) / STEP) * STEP)
-    n = len(along)
-    k = np.arange(n)
-    if settings.block_time > 0.0:
-        low, high = np.maximum(k - AVERAGED // 2, 0), np.minimum(k + AVERAGED // 2 + 1, n)
-        held = (path.ends[high] - path.ends[low]) / (high - low) / settings.block_time
-        speed = np.where(held < speed, _stepped(held), speed)
-    held = _seen(commanded, path, settings)
-    speed = np.where(held < speed, _stepped(held), speed)
-    return np.append(path.ends[:-1][moving], path.ends[-1]), speed[moving]
+def _turns_back(commanded: CommandedPath) -> Bools:
+    """(V,) where the path turns by more than 120 degrees, at which the axes rest."""
+    step = np.diff(commanded.points, axis=0) * commanded.weight
+    moving = np.flatnonzero(np.linalg.norm(step, axis=1) > NO_MOTION)
+    u = step[moving] / np.linalg.norm(step[moving], axis=1)[:, None]
+    result = np.zeros(len(commanded.points), dtype=bool)
+    result[moving[1:]] = (u[1:] * u[:-1]).sum(axis=1) < BACKWARD
+    return result
 
 
-def _seen(commanded: CommandedPath, path: BlendedPath, settings: ControlSettings) -> Floats:
-    """(N,) speed from which the axes come to rest, at constant jerk, within the blocks read ahead of each block's end;
-    inf where they rest before."""
-    n = len(commanded.length)
-    last = np.minimum(np.arange(n) + settings.buffer, n)
-    room = np.maximum(path.ends[last] - path.ends[1:], 0.5 * np.diff(path.ends))
-    slope = np.abs(np.diff(commanded.points, axis=0)) / np.maximum(np.diff(path.ends), NO_MOTION)[:, None]
-    width = min(settings.buffer, n)
-    steepest = maximum_filter1d(slope, width, axis=0, origin=-(width // 2), mode="nearest")
-    most = np.maximum(steepest, NO_MOTION)
-    a = (settings.acceleration / most).min(axis=1)
-    j = (np.minimum(settings.jerk, settings.acceleration / STEEPEST) / most).min(axis=1)
-    ramp = 0.5 * a * a / j
-    v = np.where(room < a**3 / j**2, np.cbrt(room * room * j), np.sqrt(ramp * ramp + 2.0 * a * room) - ramp)
-    return np.where(last == n, np.inf, np.maximum(v, SLOWEST))
+def _between_rests(room: Allowed, first: int, last: int, settings: ControlSettings) -> Floats:
+    """(M, 3) place, speed and acceleration each cycle from one rest to before the next; where a joint's jerk is exceeded in
+    a bend the bend is passed more slowly."""
+    part = room.between(first, last)
+    best, least = np.zeros((0, 3)), np.inf
+    for _ in range(ROUNDS):
+        moved = _moved(part, settings)
+        used = _jerk_used(part, moved, settings)
+        if used.max(initial=0.0) < least:
+            best, least = moved, float(used.max(initial=0.0))
+        if least <= USED:
+            break
+        part = replace(part, cap=_slower(part, moved, used))
+    return best
 
 
-def _stepped(speed: Floats) -> Floats:
-    """Speeds in steps, so that they change only where they differ clearly."""
-    return np.exp(np.floor(np.log(np.maximum(speed, SLOWEST)) / ALIKE) * ALIKE)
+def _moved(part: Allowed, settings: ControlSettings) -> Floats:
+    """(M, 3) the motion from rest to rest under the largest speeds of a part."""
+    s, v, a = part.s, np.empty(len(part.s)), np.empty(len(part.s))
+    bends = part.dq, part.d2q, part.d3q, settings.acceleration, settings.jerks, part.straight
+    gentle = (*bends[:3], GENTLE * settings.acceleration, GENTLE * settings.jerks, GENTLE * part.straight)
+    chosen(slow_down, len(s), COMPILE_FROM)(s, part.cap, *gentle, v, a)
+    rough = float((np.diff(s) / np.maximum((v[1:] + v[:-1]) / 2.0, SLOWEST)).sum())
+    if rough > LONGEST:
+        raise ArithmeticError(f"the motion takes {rough:.3g} s")
+    loop, state, made = chosen(run, len(s), COMPILE_FROM), np.array([s[0], 0.0, 0.0]), []
+    while state[0] < s[-1] or state[1] > 0.0:
+        out = np.empty((FEWEST + round(1.5 * rough / settings.cycle), 3))
+        made.append(out[:loop(s, v, a, settings.cycle, *bends, state, out)])
+        if state[1] <= 0.0 and state[0] < s[-1]:
+            most = float(part.cap[np.searchsorted(s, state[0]) - 1:].min())
+            made.append(short_move(state[0], s[-1] - state[0], float(part.straight[-1, 1]), most, settings.cycle))
+            break
+        if len(made) > CALLS:
+            raise ArithmeticError(f"no end is reached within {sum(map(len, made)) * settings.cycle:.3g} s")
+    return landed(np.concatenate(made), float(s[-1]), settings.cycle)
+
+
+def _jerk_used(part: Allowed, moved: Floats, settings: ControlSettings) -> Floats:
+    """(M,) largest share of a joint's jerk each cycle, by the derivatives of the path; 0 where bends take little of it."""
+    s, v, a = moved.T
+    j = np.diff(a, append=0.0) / settings.cycle
+    k = np.clip(np.searchsorted(part.s, s, side="right") - 1, 0, len(part.s) - 2)
+    bend = 3.0 * part.d2q[k] * (v * a)[:, None] + part.d3q[k] * (v**3)[:, None]
+    used = np.abs((part.dq[k] * j[:, None] + bend) / settings.jerks)
+    return np.asarray(np.where(np.abs(bend / settings.jerks) > SLIGHT, used, 0.0).max(axis=1))
+
+
+def _slower(part: Allowed, moved: Floats, used: Floats) -> Floats:
+    """(N,) largest speeds, reduced around where a jerk is exceeded by its cube root (jerks of a path go by v^3)."""
+    cap, s = part.cap.copy(), moved[:, 0]
+    for i in np.flatnonzero(used > USED).tolist():
+        low, high = np.searchsorted(part.s, s[[max(i - NEAR, 0), min(i + NEAR, len(s) - 1)]]).tolist()
+        rows = slice(low, high + 1)
+        cap[rows] = np.minimum(cap[rows], max(moved[i, 1] * max(used[i] ** (-1.0 / 3.0), LEAST), SLOWEST))
+    return cap
+
+
+def _mean(values: Floats, count: int) -> Floats:
+    """Values (T,), each with the mean of the last `count`."""
+    if count <= 1:
+        return values
+    total = np.cumsum(np.concatenate([np.full(count, values[0]), values]))
+    return np.asarray((total[count:] - total[:-count]) / count)
+
+

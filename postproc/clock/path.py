@@ -40,7 +40,7 @@ SMOOTH_BUMP = (140.0, -420.0, 420.0, -140.0)
 """140 x^3 (1 - x)^3, whose integral is 1 and whose derivatives up to the second vanish at 0 and 1"""
 TAKES_BACK = 0.3
 """mm of an interval that takes back what the ones before went astray"""
-COMPILE_FROM = 2_000
+COMPILE_FROM = 30
 
 
 @dataclass(frozen=True)
@@ -189,6 +189,16 @@ def fitted(path: CommandedPath) -> tuple[Floats, Floats, Floats, Ints]:
     tolerance = np.minimum(path.tolerance[owner], path.tolerance[owner + 1])
     tolerance = np.where(part >= 1.0 - 1e-12, path.tolerance[owner + 1], tolerance)
     return wide / path.weight, length, np.concatenate([path.tolerance[:1], tolerance]), owner
+
+
+def sharp(path: CommandedPath) -> CommandedPath:
+    """The path whose points keep their tolerance only where they stand on a curve: corners are not rounded off."""
+    flat = path.points * path.weight
+    step = np.diff(flat, axis=0)
+    chord = np.maximum(np.linalg.norm(step, axis=1), 1e-12)
+    smooth, _ = _curved(step / chord[:, None], chord, path)
+    keeps = np.concatenate([[False], smooth, [False]])
+    return replace(path, tolerance=np.where(keeps, path.tolerance, 0.0))
 
 
 def _curved(u: Floats, chord: Floats, path: CommandedPath) -> tuple[Bools, Floats]:

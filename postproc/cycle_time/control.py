@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.clock.control import ControlMotion, ControlSettings, execute
+from postproc.clock.control import ControlMotion, execute
 from postproc.clock.path import CommandedPath
+from postproc.clock.settings import ControlSettings
 from postproc.cycle_time.blocks import CornerMode, MotionBlocks
 from postproc.cycle_time.lookahead import TANGENT, directions, limits, lookahead
 from postproc.cycle_time.model import CycleTimeModel
@@ -26,8 +27,8 @@ SHORTEST = 1e-9
 """mm or rad that a block counts at least"""
 MOST_BLOCKS, MOST_STOPS = 300_000, 5_000
 """blocks and rests up to which the control is executed"""
-STRICT_UP_TO = 5_000
-"""blocks up to which every sample of the motion is measured"""
+BENT = 0.002
+"""of the largest acceleration, by which it changes from cycle to cycle where jerk limits"""
 AT_SPEED = 0.999
 """of the speed asked for that counts as constant speed"""
 
@@ -47,11 +48,7 @@ def control(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
         return replace(lookahead(blocks, model), found=(warning(
             "time.plan", f"the motion of the control cannot be planned, times are those of the model lookahead: {fault}",
             hint=f"{REPORT}; --model lookahead needs no plan"),))
-    times = _on_the_clock(blocks, form, moved, owner, stops, target, model.stop_time)
-    return times if moved.solved else replace(times, found=(warning(
-        "time.unsolved", "the least time of some stretches between these lines was not found; the time is longer than "
-        "necessary, within all limits", lines=blocks.line[[0, -1]].tolist(),
-        hint=f"{REPORT}; --model lookahead needs no plan"),))
+    return _on_the_clock(blocks, form, moved, owner, stops, target, model.stop_time)
 
 
 def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bools,
@@ -68,8 +65,11 @@ def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bool
     path = CommandedPath(points, length, target[owner], np.concatenate([[0.0], np.where(last, tolerance[owner], inner)]),
                          np.concatenate([[True], stops[owner] & last]), np.where(axes.rotary, ARM, 1.0))
     jerk = axes.jerk if model.jerk else np.full(len(axes.letters), np.inf)
-    return execute(path, ControlSettings(axes.velocity, axes.acceleration, jerk, buffer=model.lookahead,
-                                         block_time=model.block_time, strict=len(blocks) <= STRICT_UP_TO)), owner
+    weight = path.weight
+    step = None if model.corner_step is None else model.corner_step / weight
+    smoothing = np.full(len(weight), model.smoothing) if model.smoothing > 0.0 else None
+    return execute(path, ControlSettings(axes.velocity, axes.acceleration, jerk, model.lookahead, model.block_time,
+                                         model.cycle, model.bend_acceleration, model.bend_jerk, step, smoothing)), owner
 
 
 def rests(blocks: MotionBlocks, form: Shape) -> Bools:
@@ -120,8 +120,11 @@ def _on_the_clock(blocks: MotionBlocks, form: Shape, moved: ControlMotion, owner
     peak = np.maximum(peak, form.length / np.maximum(seconds, 1e-300))
     constant = v.min(axis=0, initial=np.inf) >= AT_SPEED * target[which]
     steady = np.minimum(summed(np.where(constant, step, 0.0), which, len(blocks)), seconds)
+    change = np.abs(np.diff(moved.a))
+    bent = change > BENT * np.abs(moved.a).max(initial=0.0)
+    jerk = np.minimum(summed(np.where(bent & ~constant, step, 0.0), which, len(blocks)), seconds - steady)
     lost = np.maximum(seconds - form.length / np.maximum(peak, 1e-300), 0.0)
     around = stops | np.concatenate([[True], stops[:-1]])
-    return BlockTimes(begin, begin + seconds + np.where(stops, stop_time, 0.0), seconds - steady, steady,
-                      np.zeros(len(blocks)), peak, np.where(around, lost, 0.0) + np.where(stops, stop_time, 0.0),
+    return BlockTimes(begin, begin + seconds + np.where(stops, stop_time, 0.0), seconds - steady - jerk, steady,
+                      jerk, peak, np.where(around, lost, 0.0) + np.where(stops, stop_time, 0.0),
                       np.where(around, 0.0, lost), p.seconds.copy())

@@ -39,6 +39,8 @@ GAP_CYCLES = 4.0
 
 _TOGETHER = 100_000
 """corners that are looked at together"""
+ON_CYCLE = 1e-6
+"""of a servo cycle: nearer to its begin a moment falls on it"""
 COMMAND = {Cause.DWELL: 0.004, Cause.TOOL_CHANGE: 0.038, Cause.SPINDLE: 0.005, Cause.OTHER: 0.007, Cause.INDEXING: 0.0}
 """s that a command takes next to its own time, measured: the task's cycle is 1 ms, that of tool changes (io) 10 ms"""
 SETTLED = 0.003
@@ -267,13 +269,15 @@ def _timed(blocks: MotionBlocks, s: PlannerSegments, row: Row, settings: Setting
 def _overlapping(row: Row, r: Ramps, settings: Settings) -> Floats:
     """(M,) s before the end of a segment at which the next begins.
 
-    It begins with the servo cycle in which the speed falls below that of the blend, half a cycle before it
-    does on average; of segments that only gain and lose speed the part that does not overlap (measured: the
-    rounded peak takes the rest).
+    Segments begin with a servo cycle, the next one with the cycle in which the speed falls below that of the blend: as much
+    before it as that moment is behind the begin of its cycle, half a cycle on average and nothing where it falls on one; of
+    segments that only gain and lose speed the part that does not overlap (measured: the rounded peak takes the rest).
     """
     overlap = np.where(row.ends == OVERLAP, np.minimum(row.overlap_speed / row.rate, r.down), 0.0)
     part = np.maximum(np.minimum(r.steady / settings.cycle, 1.0), 1.0 - overlap / np.maximum(r.down, 1e-300))
-    return np.asarray(overlap + np.where(overlap > 0.0, settings.blend_cycles * settings.cycle * part, 0.0))
+    within = np.mod((r.seconds - overlap) / settings.cycle + ON_CYCLE, 1.0) - ON_CYCLE
+    early = 2.0 * settings.blend_cycles * settings.cycle * within * part
+    return np.asarray(overlap + np.where(overlap > 0.0, np.maximum(early, 0.0), 0.0))
 
 
 def _ahead(row: Row, depth: int) -> Floats:

@@ -60,7 +60,7 @@ class CycleTimeModel(UserModel):
     description: str = ""
     kind: Literal["ideal", "lookahead", "control", "linuxcnc"] = "lookahead"
     """ideal: as fast as the limits allow inside the corner tolerance; lookahead: a control that sees a number of blocks;
-    control: its path and the planner's motion on it; linuxcnc: LinuxCNC's planner"""
+    control: look-ahead and jerk executed cycle by cycle; linuxcnc: LinuxCNC's planner"""
     corner_tolerance: float = Field(default=0.01, gt=0.0, le=10.0)
     """mm that corners may be rounded off where the program does not say"""
     stated_share: float = Field(default=1.0, gt=0.0, le=1000.0)
@@ -83,6 +83,16 @@ class CycleTimeModel(UserModel):
     """s in position before motion goes on after a stop"""
     spindle_time: float = Field(default=0.0, ge=0.0, le=60.0)
     """s at rest at each M3 or M4: what the spindle takes to come up to speed where the control waits for it"""
+    cycle: float = Field(default=0.002, ge=0.0001, le=0.1)
+    """s of interpolation, of kind control"""
+    bend_acceleration: float = Field(default=0.75, gt=0.0, le=0.95)
+    """share of the axes' accelerations that bends may take, of kind control"""
+    bend_jerk: float = Field(default=0.75, gt=0.0, le=0.95)
+    """share of the axes' jerks that bends may take, of kind control"""
+    corner_step: float | None = Field(default=None, gt=0.0, le=1e4)
+    """mm/s by which each axis' velocity may jump at a corner, instead of a corner rounded off; of kind control"""
+    smoothing: float = Field(default=0.0, ge=0.0, le=1.0)
+    """s over which the set points of the axes are averaged, of kind control"""
     servo_cycle: float = Field(default=0.001, gt=0.0, le=0.1)
     """s, of LinuxCNC"""
     own_share: float = Field(default=0.03, ge=0.0, le=1.0)

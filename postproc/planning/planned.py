@@ -100,10 +100,12 @@ class PlannedMotion:
     Attributes:
         source: what the passes are made from
         needed (K,): least seconds of each block of the Path at a constant feed that keeps the limits, 0 where none binds
+        strict: no sample of a plan exceeds a limit; else those between its knots may, jerks by some tenths
     """
 
     source: Source
     needed: Floats
+    strict: bool = False
 
     @cached_property
     def passes(self) -> tuple[PassGeometry, ...]:
@@ -127,7 +129,7 @@ class PlannedMotion:
 
     def _plan(self, one: PassGeometry) -> Plan:
         try:
-            options = PlannerOptions(override=self.source.override)
+            options = PlannerOptions(override=self.source.override, strict=self.strict)
             return plan_pass(one, self.source.moves, self.source.bounds_of(one), options)
         except (ValueError, ArithmeticError) as fault:
             lines = self.source.moves.line[one.move[[0, -1]]].tolist()

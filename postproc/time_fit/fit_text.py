@@ -22,7 +22,7 @@ SENSE = {
 def as_toml(model: CycleTimeModel) -> str:
     """The model as a file that `load_model` reads."""
     lines = []
-    for name, value in model.model_dump(exclude={"calibration"}).items():
+    for name, value in model.model_dump(exclude={"calibration"}, exclude_none=True).items():
         lines.append(f"{name} = {_toml(value)}")
     if model.calibration is not None:
         lines += ["", "[calibration]"]
