@@ -16,7 +16,7 @@ import numpy as np
 from machines.kinematics.base import ErrorForm, ErrorForms, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry
 from machines.kinematics.legs.attitudes import direction_of, tilt_of
-from machines.kinematics.legs.bounds import MovingLoops
+from machines.kinematics.legs.bounds import MovingLoops, PlatformJets
 from machines.kinematics.legs.over_workspace import OverWorkspace
 from machines.kinematics.legs.poses import UP, PosesOfLegs
 from machines.kinematics.legs.rods_on_slides import RodsOnSlides
@@ -41,8 +41,9 @@ class OnLegs(PosesOfLegs):
     @cached_property
     def on_rods(self) -> RodsOnSlides | None:  # type: ignore[override]  # nothing assigns it
         """Its rods, of a platform that only translates on three slides and whose gauge point is its reference point."""
-        whole = self.legs.on_slides is not None and self.loops.freedoms == ("x", "y", "z") and not self.gauge.any()
-        return RodsOnSlides(self) if whole and not len(self.carriers) else None
+        whole = self.legs.on_slides is not None and self.loops.freedoms == ("x", "y", "z") and not self.gauge.any() \
+            and self.loops.kept is None
+        return RodsOnSlides(self, self.loops.joints) if whole and not len(self.carriers) else None
 
     @property
     def leg_names(self) -> tuple[str, ...]:
@@ -127,10 +128,14 @@ class OnLegs(PosesOfLegs):
             rods = ends - self.legs.feet(middle)
             jet, _ = RodLoop(rods, np.zeros_like(rods), self.on_rods.legs, step, False).jets(place, np.zeros(len(place)))
             return jet + TaylorVector((-self.tool_length * UP).tolist()), TaylorVector(UP.tolist())
-        jets = MovingLoops(self.loops, place, turn, middle[:, self.legs_at], step[:, self.legs_at]).jets()
+        jets = self.moving(place, turn, middle, step)
         shift, moved = (list((v[:, self.carriers_at] @ self.carriers).T) for v in (middle, step))
         return (jets.point(self.gauge - self.tool_length * UP) + TaylorVector(shift, moved),
                 jets.direction(UP) if self.tilts else TaylorVector(UP.tolist()))
+
+    def moving(self, place: Floats, turn: Floats, middle: Floats, step: Floats) -> PlatformJets:
+        """The platform along straight moves by `step` (N, J); `place`, `turn` and joints `middle` (N, J) in their middle."""
+        return MovingLoops(self.loops, place, turn, middle[:, self.legs_at], step[:, self.legs_at]).jets()
 
     # ---- singular positions, clearances --------------------------------------------------------------------
 
