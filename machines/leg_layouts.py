@@ -37,7 +37,9 @@ class DriveModel(UserModel):
     arm: BoundedVector = (0.0, 0.0, 0.0)
     """arm: from the axis to the rod's foot at q = 0, square to the axis"""
     joint: BoundedVector
-    """platform joint relative to the platform's reference point"""
+    """platform joint relative to the platform's reference point, or to the hinge of its bar"""
+    bar: str | None = None
+    """name of the bar of the platform that the joint is on, which keeps its direction; default: on the platform itself"""
     rod: Length
     """length of the rods; of a leg of changing length at q = 0"""
     root: Literal[1, -1] = 1

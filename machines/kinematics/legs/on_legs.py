@@ -15,7 +15,7 @@ import numpy as np
 
 from machines.kinematics.base import ErrorForm, ErrorForms, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry
-from machines.kinematics.legs.attitudes import direction_of, tilt_of
+from machines.kinematics.legs.attitudes import attitude, tilt_of
 from machines.kinematics.legs.bounds import MovingLoops, PlatformJets
 from machines.kinematics.legs.over_workspace import OverWorkspace
 from machines.kinematics.legs.poses import UP, PosesOfLegs
@@ -87,9 +87,10 @@ class OnLegs(PosesOfLegs):
         A platform that turns in every direction tilts in another one at every place, GOLDEN rad farther each.
         """
         heading = GOLDEN * np.arange(len(platform), dtype=np.float64)
-        axis = self._within(direction_of(self.loops.turns, platform[:, 3], heading))
-        gauge = self.turn_of(axis, np.zeros(len(axis))) @ self.gauge
-        return np.asarray(self.inverse(platform[:, :3] + gauge - self.tool_length * axis, axis)[0])
+        axis, spin = attitude(self.loops.turns, platform[:, 3], heading)
+        axis = self._within(axis)
+        gauge = self.turn_of(axis, spin) @ self.gauge
+        return np.asarray(self.inverse(platform[:, :3] + gauge - self.tool_length * axis, axis, spin)[0])
 
     # ---- rates, bounds -------------------------------------------------------------------------------------
 
@@ -157,7 +158,8 @@ class OnLegs(PosesOfLegs):
         place, turn = self._platform(q, near)
         shift = np.asarray(q)[:, self.carriers_at] @ self.carriers
         axis, turned = turn[:, :, 2], None if self.loops.closed_form else turn
-        return ClearanceGeometry(place + shift, tilt_of(self.loops.turns, axis), self.legs.feet(q[:, self.legs_at]),
+        tilt = self.one_turn.turn_of(turn) if self.loops.turns == "c" and self.one_turn else tilt_of(self.loops.turns, axis)
+        return ClearanceGeometry(place + shift, tilt, self.legs.feet(q[:, self.legs_at]),
                                  self.loops.ends(place, turn), place + turn @ self.gauge, axis, turned)
 
     def middle_rig(self) -> ClearanceGeometry:
