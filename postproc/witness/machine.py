@@ -18,7 +18,7 @@ LIMITS = ("least", "greatest", "velocity", "acceleration", "jerk", "home")
 _UP = np.array([0.0, 0.0, 1.0])
 ROD = 1e-4
 """mm by which a rod may miss its length"""
-SPIN_STEPS = 3
+SPIN_STEPS = 5
 
 
 def largest_feed(table: dict[str, Any]) -> float:

@@ -49,7 +49,7 @@ FAULTS = (
     Fault("Delta: the other assembly", "kinematics", "PosesOfLegs._modes",
           "foot + self._side * out, foot - self._side * out", "foot - self._side * out, foot + self._side * out",
           ("delta",)),
-    Fault("H4: tilt of the platform x 1.001", "kinematics", "H4Linear._platform_at", "- tilted(reach, tilt), tilt])",
+    Fault("H4: tilt of the platform x 1.001", "kinematics", "LegsWithAxis._platform_at", "- self._tilted(reach, tilt), tilt])",
           "- tilted(reach, tilt), 1.001 * tilt])", ("rods leaning",)),
     Fault("gauge length of rods x 1.001", "kinematics", "PosesOfLegs._ends", "self.tool_length * UP -",
           "1.001 * self.tool_length * UP -", ("delta",)),

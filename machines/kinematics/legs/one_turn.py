@@ -83,8 +83,8 @@ class OneTurn:
     def turn(self, theta: Floats) -> Floats:
         """R (N, 3, 3) of turns (N,)."""
         i, j, k = self.order
-        result = np.zeros((len(theta), 3, 3))
-        result[:, i, i] = 1.0 + 0.0 * theta
+        result = np.tile(np.where(np.isfinite(theta), 0.0, np.nan)[:, None, None], (1, 3, 3))
+        result[:, i, i] += 1.0
         result[:, j, j] = result[:, k, k] = np.cos(theta)
         result[:, k, j] = np.sin(theta)
         result[:, j, k] = -result[:, k, j]
