@@ -3,8 +3,8 @@
 Each driven leg is a row (r, b x r) of the platform's constraints, each pair of parallel rods another: it stops the turn
 about r x s, with s from one rod to the other (Company 2000, V-1 to V-5). Together they must hold all six motions, or x, y
 and the turn about z where the joints are hinges along z (no z among the freedoms); and no pair may stop a turn that the
-machine is to have. A bar that is hinged to the platform adds one motion, its turn about the hinge, which the pairs that hold it
-must stop. Where there are as many rows as motions their determinant, V-4 and det Jx in one, must keep its sign.
+machine is to have. A bar that is hinged to the platform adds one motion, its turn about the hinge, which the pairs that hold
+it must stop. Where there are as many rows as motions their determinant, V-4 and det Jx in one, must keep its sign.
 """
 
 from __future__ import annotations
@@ -116,16 +116,16 @@ class Constraints:
         least = least_singular(rows) if rows.shape[1] >= rows.shape[2] else 0.0
         pairs = sum(pair is not None for pair in self.pairs)
         if least < LEAST:
-            yield KeyProblem("machine.mobility", ("legs",), f"{self.rods.shape[1]} legs and {pairs} pairs of rods do not hold "
-                             f"the platform everywhere (least singular value {least:.3g}): it moves otherwise than "
+            yield KeyProblem("machine.mobility", ("legs",), f"{self.rods.shape[1]} legs and {pairs} pairs of rods do not "
+                             f"hold the platform everywhere (least singular value {least:.3g}): it moves otherwise than "
                              f"freedoms = {freedoms}",
                              "give `rods` of the legs that are pairs, or the freedoms that the machine has")
         elif rows.shape[1] == rows.shape[2]:
             value = np.linalg.det(rows)
             if value.min() < 0.0 < value.max():
                 yield KeyProblem("machine.mobility", ("legs",), "legs and pairs of rods together hold the platform with one "
-                                 f"sign at {at(int(value.argmin()))} and with the other at {at(int(value.argmax()))}: between "
-                                 "them is a place where they do not (V-4)", "make the workspace smaller, or let the pairs "
+                                 f"sign at {at(int(value.argmin()))} and with the other at {at(int(value.argmax()))}: "
+                                 "between them is a place where they do not (V-4)", "make the workspace smaller, or let the pairs "
                                  "reach the platform from other sides")
 
     def _across(self, k: int) -> Floats:
@@ -141,8 +141,8 @@ class Constraints:
             if pair is None or self.bars[k] is not None:
                 continue
             if np.abs(unit(self._across(k)) @ turns).max(initial=0.0) > STOPPED:
-                yield KeyProblem("machine.mobility", ("legs", self.kinematics.leg_names[k], "rods"), "the pair of rods stops a "
-                                 f"turn that freedoms = {list(loops.freedoms)} has", "let the joints of the pair lie along "
+                yield KeyProblem("machine.mobility", ("legs", self.kinematics.leg_names[k], "rods"), "the pair of rods stops "
+                                 f"a turn that freedoms = {list(loops.freedoms)} has", "let the joints of the pair lie along "
                                  "the axis of that turn, or write one rod")
                 return
 

@@ -46,8 +46,10 @@ class CarrierModel(UserModel):
 
 
 class BarModel(UserModel):
-    """One `[kinematics.bars.NAME]` table: a part of the platform, hinged to it about the direction of its one turn; the pairs
-    of rods that hold it leave it its direction (Company 2000, V-5)."""
+    """One `[kinematics.bars.NAME]` table: a part of the platform, hinged to it about the direction of its one turn.
+
+    The pairs of rods that hold it leave it its direction (Company 2000, V-5).
+    """
 
     hinge: BoundedVector
     """mm, from the platform's reference point"""
@@ -102,7 +104,7 @@ class LegsModel(KinematicsModel):
 
     @property
     def gruebler(self) -> int:
-        """Freedoms by the count of Gruebler: rods with spherical joints, in the plane hinges; 1 more for each hinge of a bar.
+        """Freedoms by the count of Gruebler: rods with spherical joints, in the plane hinges; 1 more for the hinge of a bar.
 
         Of a platform whose pairs hold it twice it is less than what moves.
         """
@@ -148,7 +150,7 @@ class LegsModel(KinematicsModel):
             ValueError: where it is none; the message says what the module needs.
         """
         legs = list(self.drives.values())
-        if tuple(self.drives) != ("X", "Y", "Z") or self.carriers or self.rotary or {leg.drive for leg in legs} != {"slide"} \
+        if tuple(self.drives) != ("X", "Y", "Z") or self.carriers or {leg.drive for leg in legs} != {"slide"} \
                 or set(self.freedoms) != set("xyz"):
             raise ValueError(f"module {module!r} is not known for this machine; a platform free in x y z on slides X, Y, Z "
                              "has lineardeltakins")
@@ -199,8 +201,8 @@ class LegsModel(KinematicsModel):
         turns = "".join(sorted(set(self.freedoms) & set("abc")))
         if self.bars and len(turns) != 1:
             yield KeyProblem("machine.geometry", ("bars",), f"bars are hinged about the one turn of a platform; freedoms = "
-                             f"{list(self.freedoms)} has {len(turns)} turns", "take bars out, or write the freedoms that the "
-                             "legs leave the platform")
+                             f"{list(self.freedoms)} has {len(turns)} turns", "take bars out, or write the freedoms that "
+                             "the legs leave the platform")
         held = [leg.bar for leg in self.drives.values()]
         for name, leg in self.legs.items():
             if leg.bar is not None and leg.bar not in self.bars:
@@ -214,8 +216,8 @@ class LegsModel(KinematicsModel):
         if self.rotary is not None:
             yield from self.rotary.problems((*self.drives, *self.carriers))
             if turns not in ("a", "b"):
-                yield KeyProblem("machine.geometry", ("rotary",), "a rotary axis stands beside a platform that tilts about x or "
-                                 f"y; this one is free in {' '.join(self.freedoms)}", "take [kinematics.rotary] out, or "
+                yield KeyProblem("machine.geometry", ("rotary",), "a rotary axis stands beside a platform that tilts about x "
+                                 f"or y; this one is free in {' '.join(self.freedoms)}", "take [kinematics.rotary] out, or "
                                  "write the freedoms x y z a, or x y z b, where the legs leave them")
 
     def _freedom_problems(self) -> Iterator[KeyProblem]:

@@ -32,7 +32,8 @@ class RotaryModel(UserModel):
     @property
     def place(self) -> str:
         """Where it stands, in words."""
-        return f"{self.letter} " + ("table under the part" if self.carries == "part" else "axis between platform and spindle")
+        where = "table under the part" if self.carries == "part" else "axis between platform and spindle"
+        return f"{self.letter} {where}"
 
     def on(self, legs: OnLegs, gauge: Floats) -> LegsWithAxis:
         """The machine: `legs` tilt about x or y, the gauge point at `gauge` (3,) mm from their reference point."""

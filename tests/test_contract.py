@@ -109,7 +109,7 @@ def test_the_kinds_are_known() -> None:
 
 
 @pytest.mark.parametrize("text", [
-    "isinstance(kin, Serial)", "isinstance(machine.kinematics, OnLegs | with_axis.LegsWithAxis)", "hasattr(kinematics, 'rig')",
+    "isinstance(kin, Serial)", "isinstance(machine.kinematics, OnLegs | on.LegsWithAxis)", "hasattr(kinematics, 'rig')",
     "type(machine.kinematics) is Serial", "getattr(kin, 'sense', 1.0)", "model.kind == 'serial'", "kin.slides_affine"])
 def test_an_asking_is_noticed(text: str) -> None:
     assert list(asks(ast.walk(ast.parse(text))))

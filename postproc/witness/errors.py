@@ -315,7 +315,7 @@ def error_rods(table: dict[str, Any], model: dict[str, Any]) -> Rods | None:
         x = unit(next(x for v in sides if (x := v - v @ along * along) @ x > 1e-18))
         guide = np.eye(3) if drive == "length" else np.stack([x, np.cross(along, x), along], axis=1)
         more, u = (rad if drive == "arm" else mm) * given.get("drive", 0.0), turn @ along
-        for k, shift in enumerate(np.array(not bars and leg.get("rods") or [(0.0, 0.0, 0.0)])):
+        for k, shift in enumerate(np.array((not bars and leg.get("rods")) or [(0.0, 0.0, 0.0)])):
             own, end = (mm * np.array((given.get(key) or {k: np.zeros(3)})[k]) for key in ("carriage", "platform"))
             start = foot + offset + mm * np.array(given.get("rail", (0.0, 0.0, 0.0))) + turn @ (shift - offset)
             arms = rotations(u, np.array([more]))[0] @ (turn @ arm + guide @ own)

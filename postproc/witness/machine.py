@@ -153,7 +153,7 @@ class Rods:
             platform = _between(np.broadcast_to(apply(platform, tool), axis.shape), axis) @ platform
         expected, gauge, reach = apply(platform, tool), tip + length[:, None] * axis, apply(head, self.reach[None])
         off, slope = self._legs(q, letters, gauge, platform, reach, axis)
-        for _ in range(SPIN_STEPS if self.wrong or "c" in self.turns else 0):  # between two blocks the tool turns about itself
+        for _ in range(SPIN_STEPS if self.wrong or "c" in self.turns else 0):  # the tool turns about itself between blocks
             spin = -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)
             platform = _spun(axis, np.where(np.isfinite(spin), spin, 0.0)) @ platform
             off, slope = self._legs(q, letters, gauge, platform, reach, axis)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from toolpaths.arrays import Floats
 
 

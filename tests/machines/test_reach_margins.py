@@ -7,8 +7,8 @@ import pytest
 
 import machines
 from machines.kinematics.clearance_geometry import ClearanceSizes
-from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.reach import Margins, is_checked, reach, reach_between, segment_distance
 from tests.machines.random_slides import random_slides
 

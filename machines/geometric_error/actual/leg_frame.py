@@ -13,8 +13,8 @@ counts; R_k: z along the line of the drive, x from the rail to the joint, of an 
 
 Six rods hold a platform in space, two pairs more than hold one in its plane (the turn about z is what they have in common):
 then the rods share what is too much, by least squares of their stretches. Where the file gives fewer rods, what holds the
-platform otherwise is perfect: it keeps its freedoms. So it is where legs hold bars of the platform: each pair is one rod in its
-middle, and a bar keeps its direction.
+platform otherwise is perfect: it keeps its freedoms. So it is where legs hold bars of the platform: each pair is one rod in
+its middle, and a bar keeps its direction.
 """
 
 from __future__ import annotations

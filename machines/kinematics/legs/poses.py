@@ -186,8 +186,11 @@ class PosesOfLegs(Kinematics):
             place = self._modes(q, near)[0]
             return place, np.where(np.isnan(place[:, :1, None]), np.nan, np.eye(3))
         if (one := self.one_turn) is not None:
-            start = None if near is None else self._near(np.broadcast_to(near, (len(q), 6)), q)
-            p = one.forward(q[:, self.legs_at], None if start is None else np.column_stack([start[0], one.turn_of(start[1])]))
+            start = None
+            if near is not None:
+                place, turn = self._near(np.broadcast_to(near, (len(q), 6)), q)
+                start = np.column_stack([place, one.turn_of(turn)])
+            p = one.forward(q[:, self.legs_at], start)
             p = np.where(np.isfinite(q).all(axis=1)[:, None], p, np.nan)
             return p[:, :3], one.turn(p[:, 3])
         place, turn = np.empty((len(q), 3)), np.empty((len(q), 3, 3))

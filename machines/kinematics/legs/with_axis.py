@@ -172,7 +172,8 @@ class LegsWithAxis(Kinematics):
     def _platform_of(self, pose: Floats, turn: Floats) -> Floats:
         _, tool, _ = self.axis.tool(turn, self.tool_length)
         axis, (_, j, k) = self.axis.to_part(pose[:, 3:], -turn), self.platform.order
-        tilt = np.arctan2(tool[:, j] * axis[:, k] - tool[:, k] * axis[:, j], tool[:, j] * axis[:, j] + tool[:, k] * axis[:, k])
+        tilt = np.arctan2(tool[:, j] * axis[:, k] - tool[:, k] * axis[:, j],
+                          tool[:, j] * axis[:, j] + tool[:, k] * axis[:, k])
         return self._platform_at(pose[:, :3], tilt, turn)
 
     def place(self, p: Floats, turn: Floats) -> tuple[Floats, Floats, Floats]:
@@ -260,8 +261,8 @@ class LegsWithAxis(Kinematics):
         p = self.solve_platform(middle)
         if self.on_rods is not None:  # the same bounds of a turn about x alone
             ends = self.platform.ends(p)
-            rods = RodLoop(ends - self.legs.feet(middle[:, :-1]), ends - p[:, None, :3], self.on_rods.legs, step[:, :-1], True)
-            place, tilt = rods.jets(p[:, :3], p[:, 3])
+            rods, arms = ends - self.legs.feet(middle[:, :-1]), ends - p[:, None, :3]
+            place, tilt = RodLoop(rods, arms, self.on_rods.legs, step[:, :-1], True).jets(p[:, :3], p[:, 3])
         else:
             place, tilt = self.on_legs.moving(p[:, :3], self.platform.turn(p[:, 3]), middle[:, :-1], step[:, :-1]).tilting(
                 p[:, 3], self.platform.order[0])

@@ -19,8 +19,8 @@ from machines.analysis.transmission import (
     speed_acceleration,
     worst,
 )
-from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from postproc.cli.app import app
 
 

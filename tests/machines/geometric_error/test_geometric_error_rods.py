@@ -19,8 +19,8 @@ from machines.geometric_error.actual.rods import RodErrors, RodFrame, rod_frame
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load, load_checked
-from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from tests.machines.error_models import joints, model, rod_errors
 from tests.machines.random_slides import random_slides
 from toolpaths.arrays import Floats

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import machines
-from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.legs import drives
 from machines.kinematics.legs.bounds import MovingLoops
 from machines.kinematics.legs.loops import Loops
 from machines.kinematics.legs.modes import found_modes
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from machines.loader import load_checked

@@ -12,8 +12,8 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.machine import Machine
 from postproc.pipeline.result import PostResult
 from postproc.readback.execution import assembly
