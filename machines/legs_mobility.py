@@ -123,10 +123,10 @@ class Constraints:
         elif rows.shape[1] == rows.shape[2]:
             value = np.linalg.det(rows)
             if value.min() < 0.0 < value.max():
-                yield KeyProblem("machine.mobility", ("legs",), "legs and pairs of rods together hold the platform with one "
-                                 f"sign at {at(int(value.argmin()))} and with the other at {at(int(value.argmax()))}: "
-                                 "between them is a place where they do not (V-4)", "make the workspace smaller, or let the pairs "
-                                 "reach the platform from other sides")
+                yield KeyProblem("machine.mobility", ("legs",), "legs and pairs of rods together hold the platform with "
+                                 f"one sign at {at(int(value.argmin()))}, with the other at {at(int(value.argmax()))}: "
+                                 "between them is a place where they do not (V-4)", "make the workspace smaller, or let the "
+                                 "pairs reach the platform from other sides")
 
     def _across(self, k: int) -> Floats:
         """(N, 3): the turn that the pair of leg k stops, times the distance of its rods by the lever."""
@@ -141,9 +141,9 @@ class Constraints:
             if pair is None or self.bars[k] is not None:
                 continue
             if np.abs(unit(self._across(k)) @ turns).max(initial=0.0) > STOPPED:
-                yield KeyProblem("machine.mobility", ("legs", self.kinematics.leg_names[k], "rods"), "the pair of rods stops "
-                                 f"a turn that freedoms = {list(loops.freedoms)} has", "let the joints of the pair lie along "
-                                 "the axis of that turn, or write one rod")
+                yield KeyProblem("machine.mobility", ("legs", self.kinematics.leg_names[k], "rods"), "the pair of rods "
+                                 f"stops a turn that freedoms = {list(loops.freedoms)} has", "let the joints of the pair "
+                                 "lie along the axis of that turn, or write one rod")
                 return
 
     def _rows(self) -> Floats:

@@ -101,8 +101,8 @@ class H4LinearModel(SliderModel):
 
     def _gauge(self) -> Floats:
         """(3,) mm from the reference point."""
-        pivot = np.array(self.rotary.pivot) if self.rotary.carries == "spindle" else np.zeros(3)
-        return pivot - np.array([0.0, 0.0, self.gauge])
+        pivot = self.rotary.pivot if self.rotary.carries == "spindle" else (0.0, 0.0, 0.0)
+        return np.array([pivot[0], pivot[1], pivot[2] - self.gauge])
 
     def _leg_problems(self) -> Iterator[KeyProblem]:
         yield from super()._leg_problems()

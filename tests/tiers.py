@@ -14,7 +14,6 @@ QUICK = (
     "tests/test_rooms.py",
     "tests/bad/test_bad_files.py",
     "tests/laws/test_acceptance.py",
-    "tests/laws/test_acceptance_legs.py",
     "tests/laws/test_serial_structures.py",
     "tests/machines/kinematics/test_delta_linear.py",
     "tests/machines/geometric_error/test_geometric_error_curves.py",

@@ -1,4 +1,4 @@
-"""Figures that documents print for machines on legs, recomputed by the core: symmetric H4 (V.6), six slides (annex F), 2D Delta.
+"""Figures that documents print for machines on legs, by the core: symmetric H4 (V.6), six slides (annex F), 2D Delta.
 
 Source: Company 2000, V-19, table V-33, annex F as corrected (chains at 0, 120, 240 degrees, A 50 mm inwards, Om 1 m above the
 joints); note "Etude du Robot Delta 2D".

@@ -191,7 +191,7 @@ class PosesOfLegs(Kinematics):
                 place, turn = self._near(np.broadcast_to(near, (len(q), 6)), q)
                 start = np.column_stack([place, one.turn_of(turn)])
             p = one.forward(q[:, self.legs_at], start)
-            p = np.where(np.isfinite(q).all(axis=1)[:, None], p, np.nan)
+            p = np.where(np.isfinite(q).all(axis=1, keepdims=True), p, np.nan)
             return p[:, :3], one.turn(p[:, 3])
         place, turn = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
         for part in blocks(len(q)):
