@@ -92,16 +92,16 @@ class StarLayout(UserModel):
     rail_ends: Interval | None = None
     """of all slides, as in the tables of legs"""
 
-    def problems(self) -> Iterator[KeyProblem]:
-        """Keys that do not go with the drive, an arm without its length, lists that are not one value a leg."""
-        yield from stray_keys(self, self.drive, ("layout",))
+    def problems(self, path: tuple[str, ...]) -> Iterator[KeyProblem]:
+        """Keys that do not go with the drive, an arm without its length, lists that are not one value a leg; `path` its own."""
+        yield from stray_keys(self, self.drive, path)
         if self.drive == "arm" and self.arm is None:
-            yield KeyProblem("machine.geometry", ("layout", "arm"), "drive = 'arm' and no length of the arms",
+            yield KeyProblem("machine.geometry", (*path, "arm"), "drive = 'arm' and no length of the arms",
                              "write arm = mm from the axis to the elbow")
         for key in ("angles", "joint_angles", "aside"):
             values = getattr(self, key)
             if key in self.model_fields_set and values is not None and len(values) != len(self.letters):
-                yield KeyProblem("machine.geometry", ("layout", key), f"{key}: {len(values)} values for "
+                yield KeyProblem("machine.geometry", (*path, key), f"{key}: {len(values)} values for "
                                  f"{len(self.letters)} letters", "write one value a leg, or leave the key out")
 
     def legs(self) -> dict[str, DriveModel]:

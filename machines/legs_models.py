@@ -65,6 +65,8 @@ class LegsModel(KinematicsModel):
     """mm from the reference point of the level platform"""
     layout: StarLayout | None = None
     """legs in a ring, so that nobody types their coordinates"""
+    rings: dict[str, StarLayout] = Field(default_factory=dict)
+    """further rings, each a layout of its own drives and sizes, by any name"""
     legs: dict[str, DriveModel] = Field(default_factory=dict)
     """by axis letter; where the layout has a leg of that letter, in its place"""
     bars: dict[str, BarModel] = Field(default_factory=dict)
@@ -80,8 +82,16 @@ class LegsModel(KinematicsModel):
 
     @property
     def drives(self) -> dict[str, DriveModel]:
-        """All legs: those of the layout, of which tables of `legs` take the place, then the others."""
-        return (self.layout.legs() if self.layout else {}) | self.legs
+        """All legs: those of the layout and the rings, of which tables of `legs` take the place, then the others."""
+        found = dict[str, DriveModel]()
+        for _, layout in self._layouts():
+            found |= layout.legs()
+        return found | self.legs
+
+    def _layouts(self) -> list[tuple[tuple[str, ...], StarLayout]]:
+        """With their paths in the table."""
+        first = [] if self.layout is None else [(("layout",), self.layout)]
+        return [*first, *((("rings", name), ring) for name, ring in self.rings.items())]
 
     @property
     def axis_names(self) -> tuple[str, ...]:
@@ -160,7 +170,8 @@ class LegsModel(KinematicsModel):
 
     def problems(self) -> Iterator[KeyProblem]:
         """Vectors that are no directions, letters, freedoms that do not go with the legs; faults over the workspace."""
-        found = list(self.layout.problems() if self.layout else ()) or [*self._table_problems(), *self._freedom_problems()]
+        found = [fault for path, layout in self._layouts() for fault in layout.problems(path)] or [
+            *self._table_problems(), *self._freedom_problems()]
         yield from found
         if not found:
             legs = list(self.drives.values())
@@ -218,7 +229,7 @@ class LegsModel(KinematicsModel):
             if turns not in ("a", "b"):
                 yield KeyProblem("machine.geometry", ("rotary",), "a rotary axis stands beside a platform that tilts about x "
                                  f"or y; this one is free in {' '.join(self.freedoms)}", "take [kinematics.rotary] "
-                                 "out, or write the freedoms x y z a, or x y z b, where the legs leave them")
+                                 "out, or write the freedoms x y z a, or x y z b, where legs leave them")
 
     def _freedom_problems(self) -> Iterator[KeyProblem]:
         yield from self._jointed_problems()

@@ -230,7 +230,8 @@ def ring(layout: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 def legs_of(kinematics: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """The tables of all legs, by letter."""
-    return {**(ring(kinematics["layout"]) if "layout" in kinematics else {}), **kinematics.get("legs", {})}
+    rings = [*([kinematics["layout"]] if "layout" in kinematics else []), *kinematics.get("rings", {}).values()]
+    return {name: leg for part in (*map(ring, rings), kinematics.get("legs", {})) for name, leg in part.items()}
 
 
 def rods(table: dict[str, Any]) -> Rods:

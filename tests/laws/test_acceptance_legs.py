@@ -1,7 +1,7 @@
 """Figures that documents print for machines on legs, by the core: symmetric H4 (V.6), six slides (annex F), 2D Delta.
 
-Source: Company 2000, V-19, table V-33, annex F as corrected (chains at 0, 120, 240 degrees, A 50 mm inwards, Om 1 m above the
-joints); note "Etude du Robot Delta 2D".
+Source: Company 2000, V-19, table V-33, annex F as corrected (chains at 0, 120, 240 degrees, A 50 mm inwards, Om 1 m above
+the joints); note "Etude du Robot Delta 2D".
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from toolpaths.arrays import Floats
 Phi = tuple[int, ...]
 PLACES = ((180, 225, 270), (270, 315, 0), (0, 45, 90), (90, 135, 180))
 """degrees that a motor of V-21 may stand at: away from the platform, by 45"""
-PRINTED = {"B": (2.03, 19.12), "C": (2.22, 11.42), "E": (1.74, 6.71), "F": (1.81, 14.12), "G": (2.03, 9.07), "H": (1.40, 14.02),
-           "I": (1.90, 5.69), "K": (1.83, 9.03)}
+PRINTED = {"B": (2.03, 19.12), "C": (2.22, 11.42), "E": (1.74, 6.71), "F": (1.81, 14.12), "G": (2.03, 9.07),
+           "H": (1.40, 14.02), "I": (1.90, 5.69), "K": (1.83, 9.03)}
 """best and worst condition number in the cylinder: the rows of table V-33 that are known"""
 
 
@@ -36,7 +36,7 @@ def on_legs(name: str) -> OnLegs:
 
 
 def test_the_leg_of_a_rotary_delta_is_sized_by_the_angle_between_rod_and_arm() -> None:
-    """V-19, H 100, r 260, L 480 mm: cos b - sin b = 1/3, b 31.367 degrees; so it stands at both ends of a diameter of 420 mm."""
+    """V-19, H 100, r 260, L 480 mm: cos b - sin b = 1/3, b 31.367 degrees, so at both ends of a diameter of 420 mm."""
     angle = np.radians(31.367)
     x, z = -210.0 + 260.0 - 480.0 * np.sin(angle), 100.0 + 480.0 * np.cos(angle)
     np.testing.assert_allclose([x, z], [-200.0, 510.0], atol=0.5)  # V-20

@@ -2,8 +2,8 @@
 
 The platform's reference point is C, its turn R; the joint of leg k is B = C + R b, on a bar that is hinged to the platform
 and keeps its direction C + R b + k. With r = B - A the loops are r.r = l^2, and a platform that moves by (v, omega) moves
-them by r.v + (R b x r).omega: the rows of Jx (II-12 to II-18, V-18, V-23 of Company 2000). Only the freedoms that the machine
-has are solved for, all others are held.
+them by r.v + (R b x r).omega: the rows of Jx (II-12 to II-18, V-18, V-23 of Company 2000). Only the freedoms that the
+machine has are solved for, all others are held.
 """
 
 from __future__ import annotations
