@@ -93,7 +93,7 @@ class StarLayout(UserModel):
     """of all slides, as in the tables of legs"""
 
     def problems(self, path: tuple[str, ...]) -> Iterator[KeyProblem]:
-        """Keys that do not go with the drive, an arm without its length, lists that are not one value a leg; `path` its own."""
+        """Keys that do not go with the drive, an arm without its length, lists that are not one value a leg; at `path`."""
         yield from stray_keys(self, self.drive, path)
         if self.drive == "arm" and self.arm is None:
             yield KeyProblem("machine.geometry", (*path, "arm"), "drive = 'arm' and no length of the arms",

@@ -227,8 +227,8 @@ class LegsModel(KinematicsModel):
         if self.rotary is not None:
             yield from self.rotary.problems((*self.drives, *self.carriers))
             if turns not in ("a", "b"):
-                yield KeyProblem("machine.geometry", ("rotary",), "a rotary axis stands beside a platform that tilts about x "
-                                 f"or y; this one is free in {' '.join(self.freedoms)}", "take [kinematics.rotary] "
+                yield KeyProblem("machine.geometry", ("rotary",), "a rotary axis stands beside a platform that tilts about "
+                                 f"x or y; this one is free in {' '.join(self.freedoms)}", "take [kinematics.rotary] "
                                  "out, or write the freedoms x y z a, or x y z b, where legs leave them")
 
     def _freedom_problems(self) -> Iterator[KeyProblem]:

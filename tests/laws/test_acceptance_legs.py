@@ -55,8 +55,8 @@ def test_the_leg_of_a_rotary_delta_is_sized_by_the_angle_between_rod_and_arm() -
 @cache
 def cylinder() -> tuple[Floats, Floats]:
     """(places (N, 3) mm, turns (N,)): radius 160 mm, 410 to 510 mm below the motors, 45 degrees either way."""
-    r, a, z, turn = (x.ravel() for x in np.meshgrid(np.linspace(0.0, 160.0, 6), np.radians(15.0) * np.arange(24),
-                                                    np.linspace(-50.0, 50.0, 6), np.radians([-45.0, -22.5, 0.0, 22.5, 45.0])))
+    sides = np.linspace(0.0, 160.0, 6), np.radians(15.0) * np.arange(24), np.linspace(-50.0, 50.0, 6)
+    r, a, z, turn = (x.ravel() for x in np.meshgrid(*sides, np.radians([-45.0, -22.5, 0.0, 22.5, 45.0])))
     return np.column_stack([r * np.cos(a), r * np.sin(a), z]), turn
 
 
@@ -128,7 +128,8 @@ def six_slides() -> LegFrame:
 
     drives = replace(kinematics.legs, points=ring(279.0 - 50.0, 0.0), directions=np.tile([0.0, 0.0, 1.0], (6, 1)),
                      lengths=np.full(6, 348.0), roots=-np.ones(6))
-    return leg_frame(replace(kinematics, loops=Loops(drives, ring(107.0, -1000.0), FREEDOMS), clearance=None, gauge=np.zeros(3)))
+    loops = Loops(drives, ring(107.0, -1000.0), FREEDOMS)
+    return leg_frame(replace(kinematics, loops=loops, clearance=None, gauge=np.zeros(3)))
 
 
 def sensitivity(place: Floats, turn: Floats) -> Floats:
@@ -168,8 +169,9 @@ def test_largest_effect_of_a_slides_place_over_the_workspace() -> None:
         one[:, i, j] = -one[:, j, i]
         turn = turn @ one
     found = sensitivity(50.0 * grid[:, :3] + np.array([0.0, 0.0, 1400.0]), turn)[:, :, :3]
-    np.testing.assert_allclose(np.linalg.norm(found[:, :3], axis=1).max(axis=0), [2.4812, 1.7646, 5.2422], atol=1e-4)
-    np.testing.assert_allclose(1000.0 * np.linalg.norm(found[:, 3:], axis=1).max(axis=0), [3.9264, 2.1175, 6.3577], atol=1e-4)
+    place, turned = (np.linalg.norm(part, axis=1).max(axis=0) for part in (found[:, :3], 1000.0 * found[:, 3:]))
+    np.testing.assert_allclose(place, [2.4812, 1.7646, 5.2422], atol=1e-4)
+    np.testing.assert_allclose(turned, [3.9264, 2.1175, 6.3577], atol=1e-4)
 
 
 # ---- 2D Delta ----------------------------------------------------------------------------------------------
