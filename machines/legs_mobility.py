@@ -113,20 +113,19 @@ class Constraints:
         if stopped:
             return
         rows, freedoms = self._rows(), list(self.kinematics.loops.freedoms)
+        value = np.linalg.det(rows) if rows.shape[1] == rows.shape[2] else np.ones(1)
         least = least_singular(rows) if rows.shape[1] >= rows.shape[2] else 0.0
         pairs = sum(pair is not None for pair in self.pairs)
-        if least < LEAST:
+        if value.min() < 0.0 < value.max():
+            yield KeyProblem("machine.mobility", ("legs",), "legs and pairs of rods together hold the platform with one "
+                             f"sign at {at(int(value.argmin()))}, with the other at {at(int(value.argmax()))}: between "
+                             "them is a place where they do not (V-4)", "make the workspace smaller, or let the pairs "
+                             "reach the platform from other sides")
+        elif least < LEAST:
             yield KeyProblem("machine.mobility", ("legs",), f"{self.rods.shape[1]} legs and {pairs} pairs of rods do not "
                              f"hold the platform everywhere (least singular value {least:.3g}): it moves otherwise than "
                              f"freedoms = {freedoms}",
                              "give `rods` of the legs that are pairs, or the freedoms that the machine has")
-        elif rows.shape[1] == rows.shape[2]:
-            value = np.linalg.det(rows)
-            if value.min() < 0.0 < value.max():
-                yield KeyProblem("machine.mobility", ("legs",), "legs and pairs of rods together hold the platform with "
-                                 f"one sign at {at(int(value.argmin()))}, with the other at {at(int(value.argmax()))}: "
-                                 "between them is a place where they do not (V-4)", "make the workspace smaller, or let the "
-                                 "pairs reach the platform from other sides")
 
     def _across(self, k: int) -> Floats:
         """(N, 3): the turn that the pair of leg k stops, times the distance of its rods by the lever."""
