@@ -45,7 +45,7 @@ class CarrierModel(UserModel):
     """unit vector: how positive q moves the tool, seen from the part"""
 
 
-class BarModel(UserModel):
+class PlatformBarModel(UserModel):
     """One `[kinematics.bars.NAME]` table: a part of the platform, hinged to it about the direction of its one turn.
 
     The pairs of rods that hold it leave it its direction (Company 2000, V-5).
@@ -69,7 +69,7 @@ class LegsModel(KinematicsModel):
     """further rings, each a layout of its own drives and sizes, by any name"""
     legs: dict[str, DriveModel] = Field(default_factory=dict)
     """by axis letter; where the layout has a leg of that letter, in its place"""
-    bars: dict[str, BarModel] = Field(default_factory=dict)
+    bars: dict[str, PlatformBarModel] = Field(default_factory=dict)
     """jointed parts of the platform, by name"""
     carriers: dict[str, CarrierModel] = Field(default_factory=dict)
     """by axis letter"""
@@ -109,8 +109,8 @@ class LegsModel(KinematicsModel):
         kinds = " and ".join(f"{drives.count(d)} legs {'of changing length' if d == 'length' else f'on {d}s'}"
                              for d in dict.fromkeys(drives))
         carried = f", carried along {' '.join(self.carriers)}" if self.carriers else ""
-        beside = "" if self.rotary is None else f", {self.rotary.place}"
-        return f"{kinds}, platform free in {' '.join(self.freedoms)} (Gruebler {self.gruebler}){carried}{beside}"
+        where = "" if self.rotary is None else f", {self.rotary.place}"
+        return f"{kinds}, platform free in {' '.join(self.freedoms)} (Gruebler {self.gruebler}){carried}{where}"
 
     @property
     def gruebler(self) -> int:
@@ -227,7 +227,7 @@ class LegsModel(KinematicsModel):
         if self.rotary is not None:
             yield from self.rotary.problems((*self.drives, *self.carriers))
             if turns not in ("a", "b"):
-                yield KeyProblem("machine.geometry", ("rotary",), "a rotary axis stands beside a platform that tilts about "
+                yield KeyProblem("machine.geometry", ("rotary",), "a rotary axis goes with a platform that tilts about "
                                  f"x or y; this one is free in {' '.join(self.freedoms)}", "take [kinematics.rotary] "
                                  "out, or write the freedoms x y z a, or x y z b, where legs leave them")
 

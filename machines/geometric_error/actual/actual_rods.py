@@ -1,4 +1,4 @@
-"""A Delta on slides with its errors, and platforms that tilt beside a rotary axis: through the exact closure of their rods.
+"""A Delta on slides with its errors, and platforms that tilt next to a rotary axis: through the exact closure of their rods.
 
 The rotary axis (table under the part, or axis at the spindle) and the spindle take the errors of a serial machine's axis;
 they stand before and after the platform in the chain.

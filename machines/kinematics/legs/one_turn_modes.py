@@ -1,6 +1,6 @@
 """All real assembly modes of a platform on four rods that moves by three translations and a turn about a fixed axis.
 
-Written for a turn about x; the axes of others are named anew in cyclic order. For a given turn the platform's reference
+Written for a turn about x; of others x, y, z are taken in cyclic order. For a given turn the platform's reference
 point C lies on four spheres around e_k = A_k - Rx(theta) b_k. The differences of the sphere equations are linear in C,
 M(theta) C = r(theta); with C = adj(M) r / det M put into the first sphere, |adj(M) r - det M e_1|^2 - (l_1 det M)^2 = 0 is a
 trigonometric polynomial in theta. Its coefficients come from equally spaced samples, its roots from the eigenvalues of the

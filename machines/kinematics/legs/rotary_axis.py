@@ -1,4 +1,4 @@
-"""A rotary axis beside a platform that tilts about x or y: a table under the part, or an axis between platform and spindle.
+"""A rotary axis next to a platform that tilts about x or y: a table under the part, or an axis between platform and spindle.
 
 With t the direction of the tilt, s = t x z: the level tool axis z tilted by theta is cos(theta) z + sin(theta) s. Source:
 Company 2000, V.5.2 (both machines, tilt about x).

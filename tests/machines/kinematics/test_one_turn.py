@@ -1,4 +1,4 @@
-"""Platforms of one turn: bars that keep their direction, a rotary axis beside a tilting platform, all their modes."""
+"""Platforms of one turn: bars that keep their direction, a rotary axis next to a tilting platform, all their modes."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_the_platform_turns_the_tool_about_itself_where_it_is_asked_to() -> None
     assert np.isnan(kin.inverse(tip, np.array([[0.1, 0.0, 0.995]]))).all()
 
 
-# ---- a rotary axis beside legs -----------------------------------------------------------------------------
+# ---- a rotary axis next to legs -----------------------------------------------------------------------------
 
 
 def h4a_as_legs(name: str, folder: Path) -> LegsWithAxis:
@@ -161,7 +161,7 @@ def test_v4_is_refused_where_the_condition_number_is_good(phi: tuple[int, ...], 
      "machine.geometry", "no leg holds the bar 'side'"),
     ("h4-rotary", '"z", "c"]', '"z"]', "machine.geometry", "has 0 turns"),
     ("h4-rotary", "rods = [[0, -30, 0], [0, 30, 0]]\n", "", "machine.mobility", "do not hold the platform everywhere"),
-    ("tilting-arms-c-table", '"z", "b"]', '"z", "c"]', "machine.geometry", "a rotary axis stands beside a platform"),
+    ("tilting-arms-c-table", '"z", "b"]', '"z", "c"]', "machine.geometry", "a rotary axis goes with a platform"),
     ("tilting-arms-c-table", 'letter = "C"', 'letter = "A"', "machine.axis-letter", "A drives a leg too"),
     ("tilting-arms-c-table", 'carries = "part"', 'carries = "part"\npivot = [1, 0, 0]', "machine.geometry", "a table turns"),
 ])
