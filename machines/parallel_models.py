@@ -37,8 +37,8 @@ class LinearDeltaModel(SliderModel):
         return tuple(self.legs)
 
     def describe(self) -> str:
-        """The kind."""
-        return "linear Delta"
+        """The kind, and the count of Gruebler where the file says where its rods are."""
+        return "linear Delta" + self.gruebler(3)
 
     def build(self) -> OnLegs:
         """The kinematics at the gauge point: a machine on legs whose platform is free in x, y and z."""
@@ -87,8 +87,8 @@ class H4LinearModel(SliderModel):
         return (*self.legs, self.rotary.letter)
 
     def describe(self) -> str:
-        """The kind and where the fifth axis is."""
-        return f"H4a, {self.rotary.place}"
+        """The kind, where the fifth axis is, and the count of Gruebler of the platform."""
+        return f"H4a, {self.rotary.place}" + self.gruebler(4)
 
     def build(self) -> LegsWithAxis:
         """The kinematics at the gauge point: a machine on legs whose platform is free in x, y, z and the turn about x."""

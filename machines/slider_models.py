@@ -114,6 +114,11 @@ class SliderModel(KinematicsModel):
         """In mm and rad."""
         return clearance_sizes(list(self.legs.values()), self.clearance)
 
+    def gruebler(self, legs: int) -> str:
+        """The count of Gruebler in words, of rods with spherical joints; "" where a leg does not say what its rods are."""
+        rods = [len(leg.rods) for leg in self.legs.values()]
+        return f" (Gruebler {legs + 6 - sum(rods)})" if all(rods) else ""
+
     @property
     @abstractmethod
     def leg_count(self) -> int:
