@@ -9,8 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from machines.key_problem import KeyProblem
-from machines.models import Vector
-from machines.slider_models import Interval
+from machines.models import Interval, Vector
 from machines.user_model import UserModel
 from toolpaths.units import DEG
 
@@ -89,6 +88,8 @@ class StarLayout(UserModel):
     """mm between the two rods of a leg; default: single rods"""
     root: Literal[1, -1] = 1
     """of all legs; of arms: -1 with their elbows outside, as rotary Deltas are built, 1 inside"""
+    rail_offset: Size = 0.0
+    """mm outwards from the line of the foot to the middle of the rail, of all slides"""
     rail_ends: Interval | None = None
     """of all slides, as in the tables of legs"""
 
@@ -118,7 +119,7 @@ class StarLayout(UserModel):
             drive=self.drive, rod=self.rod, root=self.root, direction=direction,
             point=_sum((self.radius, out), (aside, side), (self.height, _UP)),
             joint=_sum((self.joint_radius, joint_out), (aside, joint_side), (self.joint_height, _UP)),
-            arm=_sum((self.arm or 0.0, out)), rail_ends=self.rail_ends,
+            arm=_sum((self.arm or 0.0, out)), rail_ends=self.rail_ends, rail_offset=_sum((self.rail_offset, out)),
             rods=() if self.pair is None else tuple(_sum((half, side)) for half in (0.5 * self.pair, -0.5 * self.pair)))
 
 

@@ -34,7 +34,7 @@ class LinearDeltaModel(SliderModel):
     @property
     def axis_names(self) -> tuple[str, ...]:
         """Letters of the slides in the file's order."""
-        return tuple(self.legs)
+        return tuple(self.slides)
 
     def describe(self) -> str:
         """The kind, and the count of Gruebler where the file says where its rods are."""
@@ -50,7 +50,7 @@ class LinearDeltaModel(SliderModel):
         """Workspace out of reach or singular; pairs of rods that leave the platform a turn."""
         yield from reach_faults(self.build_legs(), self.platform_joints(), self.workspace.build(),
                                 self.axis_names)
-        pairs = [leg.rods for leg in self.legs.values()]
+        pairs = [leg.rods for leg in self.slides.values()]
         if all(len(pair) == 2 for pair in pairs):
             across = np.array([np.subtract(pair[0], pair[1]) for pair in pairs])
             yield from delta_faults(self.build_legs(), self.platform_joints(), self.workspace.build(), across)
@@ -84,7 +84,7 @@ class H4LinearModel(SliderModel):
     @property
     def axis_names(self) -> tuple[str, ...]:
         """Letters of the slides in the file's order, then the rotary axis."""
-        return (*self.legs, self.rotary.letter)
+        return (*self.slides, self.rotary.letter)
 
     def describe(self) -> str:
         """The kind, where the fifth axis is, and the count of Gruebler of the platform."""
@@ -96,7 +96,7 @@ class H4LinearModel(SliderModel):
 
     def _on_legs(self) -> OnLegs:
         loops = Loops(on_slides(self.build_legs()), self.platform_joints(), ("x", "y", "z", "a"))
-        return OnLegs(loops, self.workspace.build(), self._gauge(), tuple(self.legs), (False,) * 4, np.arange(4),
+        return OnLegs(loops, self.workspace.build(), self._gauge(), tuple(self.slides), (False,) * 4, np.arange(4),
                       np.zeros(0, dtype=np.int64), np.zeros((0, 3)), self.build_clearance())
 
     def _gauge(self) -> Floats:
@@ -106,8 +106,8 @@ class H4LinearModel(SliderModel):
 
     def _leg_problems(self) -> Iterator[KeyProblem]:
         yield from super()._leg_problems()
-        if sorted(len(leg.rods) for leg in self.legs.values()) != [1, 1, 2, 2]:
-            count = ", ".join(f"{name} {len(leg.rods)}" for name, leg in self.legs.items())
+        if sorted(len(leg.rods) for leg in self.slides.values()) != [1, 1, 2, 2]:
+            count = ", ".join(f"{name} {len(leg.rods)}" for name, leg in self.slides.items())
             yield KeyProblem("machine.geometry", ("legs",), f"rods per leg: {count}; an H4a has two pairs and two single "
                              "rods", "write rods = [[x, 0, 0], [-x, 0, 0]] for a pair, [[x, 0, 0]] for a single rod")
         low, high = self.workspace.tilt
@@ -118,4 +118,4 @@ class H4LinearModel(SliderModel):
 
     def mobility_problems(self) -> Iterator[KeyProblem]:
         """Workspace out of reach or singular; condition V-4."""
-        yield from h4_faults(self._on_legs(), [leg.rods for leg in self.legs.values()])
+        yield from h4_faults(self._on_legs(), [leg.rods for leg in self.slides.values()])

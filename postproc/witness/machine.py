@@ -218,12 +218,13 @@ def ring(layout: dict[str, Any]) -> dict[str, dict[str, Any]]:
     for name, *turns, aside in zip(names, angles, layout.get("joint_angles") or angles, asides, strict=True):
         (out, there), lean = np.exp(1j * np.radians(turns)), math.radians(layout.get("lean", 0.0))
         foot, end = (layout["radius"] + 1j * aside) * out, (layout["joint_radius"] + 1j * aside) * there
-        half = 0.5j * layout.get("pair", 0.0) * out
+        half, rail = 0.5j * layout.get("pair", 0.0) * out, layout.get("rail_offset", 0.0) * out
         level = 1j * out if layout["drive"] == "arm" else math.sin(lean) * out
         found[name] = {
             **layout, "direction": (level.real, level.imag, 0.0 if layout["drive"] == "arm" else math.cos(lean)),
             "point": (foot.real, foot.imag, layout.get("height", 0.0)), "arm": (arm * out.real, arm * out.imag, 0.0),
             "joint": (end.real, end.imag, layout.get("joint_height", 0.0)),
+            "rail_offset": (rail.real, rail.imag, 0.0),
             "rods": [(side * half.real, side * half.imag, 0.0) for side in (1.0, -1.0)] if half else []}
     return found
 
