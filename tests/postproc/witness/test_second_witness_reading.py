@@ -94,7 +94,7 @@ def test_poses_of_every_machine(name: str) -> None:
     travel, speed = limits_of(table, m.axis_names)
     np.testing.assert_allclose(travel, np.stack([m.limits.lower, m.limits.upper], axis=1))
     np.testing.assert_allclose(speed, m.limits.velocity)
-    q = m.home + rng.normal(size=(50, len(m.home))) * np.where(m.rotary, 0.4, 20.0)
+    q = m.home + rng.normal(size=(50, len(m.home))) * np.where(m.rotary, np.where(m.kinematics.drives_tip, 0.1, 0.4), 20.0)
     tip, axis = m.kinematics.with_tool(length).forward(q)
     met = np.isfinite(np.hstack([tip, axis])).all(axis=1)  # arms as they come take a platform out of its reach
     q, tip, axis = q[met], tip[met], axis[met]
