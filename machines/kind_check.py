@@ -55,8 +55,8 @@ def _letters(kin: Kinematics) -> Iterator[KeyProblem]:
     if len(kin.axis_names) != len(kin.rotary) or len(set(kin.axis_names)) != len(kin.axis_names) or not kin.axis_names:
         yield _problem(f"axis_names {kin.axis_names} and rotary {kin.rotary} do not go together, one letter a joint")
         return
-    for letter, rotary in zip(kin.axis_names, kin.rotary, strict=True):
-        allowed = ROTARY if rotary else LINEAR
+    for letter, rotary, drive in zip(kin.axis_names, kin.rotary, kin.drives_tip, strict=True):
+        allowed = (ROTARY + LINEAR if drive else ROTARY) if rotary else LINEAR  # a crank may have any letter
         if len(letter) != 1 or letter not in allowed:
             yield _problem(f"{letter!r} is not a letter of a {'rotary' if rotary else 'linear'} axis, allowed: "
                            f"{' '.join(allowed)}")

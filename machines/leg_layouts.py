@@ -9,8 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from machines.key_problem import KeyProblem
-from machines.models import Vector
-from machines.slider_models import Interval
+from machines.models import Interval, Vector
 from machines.user_model import UserModel
 from toolpaths.units import DEG
 
@@ -37,7 +36,9 @@ class DriveModel(UserModel):
     arm: BoundedVector = (0.0, 0.0, 0.0)
     """arm: from the axis to the rod's foot at q = 0, square to the axis"""
     joint: BoundedVector
-    """platform joint relative to the platform's reference point"""
+    """platform joint relative to the platform's reference point, or to the hinge of its bar"""
+    bar: str | None = None
+    """name of the bar of the platform that the joint is on, which keeps its direction; default: on the platform itself"""
     rod: Length
     """length of the rods; of a leg of changing length at q = 0"""
     root: Literal[1, -1] = 1
@@ -87,19 +88,21 @@ class StarLayout(UserModel):
     """mm between the two rods of a leg; default: single rods"""
     root: Literal[1, -1] = 1
     """of all legs; of arms: -1 with their elbows outside, as rotary Deltas are built, 1 inside"""
+    rail_offset: Size = 0.0
+    """mm outwards from the line of the foot to the middle of the rail, of all slides"""
     rail_ends: Interval | None = None
     """of all slides, as in the tables of legs"""
 
-    def problems(self) -> Iterator[KeyProblem]:
-        """Keys that do not go with the drive, an arm without its length, lists that are not one value a leg."""
-        yield from stray_keys(self, self.drive, ("layout",))
+    def problems(self, path: tuple[str, ...]) -> Iterator[KeyProblem]:
+        """Keys that do not go with the drive, an arm without its length, lists that are not one value a leg; at `path`."""
+        yield from stray_keys(self, self.drive, path)
         if self.drive == "arm" and self.arm is None:
-            yield KeyProblem("machine.geometry", ("layout", "arm"), "drive = 'arm' and no length of the arms",
+            yield KeyProblem("machine.geometry", (*path, "arm"), "drive = 'arm' and no length of the arms",
                              "write arm = mm from the axis to the elbow")
         for key in ("angles", "joint_angles", "aside"):
             values = getattr(self, key)
             if key in self.model_fields_set and values is not None and len(values) != len(self.letters):
-                yield KeyProblem("machine.geometry", ("layout", key), f"{key}: {len(values)} values for "
+                yield KeyProblem("machine.geometry", (*path, key), f"{key}: {len(values)} values for "
                                  f"{len(self.letters)} letters", "write one value a leg, or leave the key out")
 
     def legs(self) -> dict[str, DriveModel]:
@@ -116,7 +119,7 @@ class StarLayout(UserModel):
             drive=self.drive, rod=self.rod, root=self.root, direction=direction,
             point=_sum((self.radius, out), (aside, side), (self.height, _UP)),
             joint=_sum((self.joint_radius, joint_out), (aside, joint_side), (self.joint_height, _UP)),
-            arm=_sum((self.arm or 0.0, out)), rail_ends=self.rail_ends,
+            arm=_sum((self.arm or 0.0, out)), rail_ends=self.rail_ends, rail_offset=_sum((self.rail_offset, out)),
             rods=() if self.pair is None else tuple(_sum((half, side)) for half in (0.5 * self.pair, -0.5 * self.pair)))
 
 

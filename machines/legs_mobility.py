@@ -3,18 +3,20 @@
 Each driven leg is a row (r, b x r) of the platform's constraints, each pair of parallel rods another: it stops the turn
 about r x s, with s from one rod to the other (Company 2000, V-1 to V-5). Together they must hold all six motions, or x, y
 and the turn about z where the joints are hinges along z (no z among the freedoms); and no pair may stop a turn that the
-machine is to have.
+machine is to have. A bar that is hinged to the platform adds one motion, its turn about the hinge, which the pairs that hold
+it must stop. Where there are as many rows as motions their determinant, V-4 and det Jx in one, must keep its sign.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from machines.key_problem import KeyProblem
-from machines.kinematics.legs.attitudes import direction_of
+from machines.kinematics.legs.attitudes import attitude
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.mobility import LEAST, place_words, sign_fault
 from toolpaths.arrays import Floats
@@ -34,16 +36,17 @@ def examined(kinematics: OnLegs) -> tuple[Floats, Floats, Floats]:
     if kinematics.loops.turns == "abc":
         heading = np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False)
         place, tilt, heading = (np.repeat(place, HEADINGS, axis=0), np.repeat(tilt, HEADINGS), np.tile(heading, len(place)))
-    axis = direction_of(kinematics.loops.turns, tilt, heading)
-    turn, held = kinematics.turn_of(axis, np.zeros(len(axis))), kinematics.loops.basis[:3].any(axis=1)
+    axis, spin = attitude(kinematics.loops.turns, tilt, heading)
+    turn, held = kinematics.turn_of(axis, spin), kinematics.loops.basis[:3].any(axis=1)
     return np.where(held, place, 0.0), turn, tilt
 
 
-def leg_faults(kinematics: OnLegs, pairs: Sequence[Floats | None]) -> Iterator[KeyProblem]:
+def leg_faults(kinematics: OnLegs, pairs: Sequence[Floats | None], bars: Sequence[str | None]) -> Iterator[KeyProblem]:
     """Legs out of reach, a singular platform, motions that nothing holds.
 
     Args:
         pairs: of each leg from one rod to the other (3,) mm, None of a single rod
+        bars: of each leg the bar of the platform that it holds, None of the platform itself
     """
     place, turn, tilt = examined(kinematics)
     loops, legs = kinematics.loops, kinematics.legs
@@ -59,7 +62,8 @@ def leg_faults(kinematics: OnLegs, pairs: Sequence[Floats | None]) -> Iterator[K
     yield from sign_fault("machine.singular", "det Jx (rods as unit vectors, moments by the longest arm)",
                           np.linalg.det(jx / legs.spans(q)[:, :, None]), partial(place_words, place, tilt),
                           "the platform is singular there: move the drives or make the workspace smaller")
-    yield from _held(kinematics, pairs, unit(rods), loops.arms(turn))
+    held = Constraints(kinematics, pairs, bars, unit(rods), ends - place[:, None, :])
+    yield from held.faults(partial(place_words, place, tilt))
 
 
 def travel_faults(kinematics: OnLegs, travel: Floats, home: Floats) -> Iterator[KeyProblem]:
@@ -86,28 +90,77 @@ def travel_faults(kinematics: OnLegs, travel: Floats, home: Floats) -> Iterator[
                          f"travel {low[k] / size:g} to {high[k] / size:g}", hint)
 
 
-def _held(kinematics: OnLegs, pairs: Sequence[Floats | None], rods: Floats, arms: Floats) -> Iterator[KeyProblem]:
-    loops = kinematics.loops
-    held = [cross(rods[:, k], np.broadcast_to(s / np.linalg.norm(s), rods[:, k].shape))
-            for k, s in enumerate(pairs) if s is not None]
-    turns = loops.basis[3:][:, loops.basis[3:].any(axis=0)]
-    for k, row in zip([k for k, s in enumerate(pairs) if s is not None], held, strict=True):
-        if np.abs(row @ turns).max(initial=0.0) > STOPPED:
-            yield KeyProblem("machine.mobility", ("legs", kinematics.leg_names[k], "rods"), "the pair of rods stops a "
-                             f"turn that freedoms = {list(loops.freedoms)} has", "let the joints of the pair lie along the "
-                             "axis of that turn, or write one rod")
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """What legs and pairs hold, at N places.
+
+    Attributes:
+        pairs, bars: as of `leg_faults`
+        rods: (N, K, 3) unit vectors
+        arms: (N, K, 3) mm from the reference point to the joints
+    """
+
+    kinematics: OnLegs
+    pairs: Sequence[Floats | None]
+    bars: Sequence[str | None]
+    rods: Floats
+    arms: Floats
+
+    def faults(self, at: Callable[[int], str]) -> Iterator[KeyProblem]:
+        """Pairs that stop what is to move, motions that nothing holds; `at` gives the words of a place."""
+        stopped = list(self._stopped())
+        yield from stopped
+        if stopped:
             return
-    apart = [float(np.linalg.norm(s)) / loops.lever for s in pairs if s is not None]
-    rows = np.concatenate([np.concatenate([rods, cross(arms, rods) / loops.lever], axis=2),
-                           *(np.concatenate([0.0 * row, size * row], axis=1)[:, None]
-                             for row, size in zip(held, apart, strict=True))], axis=1)
-    columns = [0, 1, 2, 3, 4, 5] if "z" in loops.freedoms else [0, 1, 5]
-    least = least_singular(rows[:, :, columns]) if rows.shape[1] >= len(columns) else 0.0
-    if least < LEAST:
-        yield KeyProblem("machine.mobility", ("legs",), f"{rods.shape[1]} legs and {len(held)} pairs of rods do not hold "
-                         f"the platform everywhere (least singular value {least:.3g}): it moves otherwise than "
-                         f"freedoms = {list(loops.freedoms)}",
-                         "give `rods` of the legs that are pairs, or the freedoms that the machine has")
+        rows, freedoms = self._rows(), list(self.kinematics.loops.freedoms)
+        value = np.linalg.det(rows) if rows.shape[1] == rows.shape[2] else np.ones(1)
+        least = least_singular(rows) if rows.shape[1] >= rows.shape[2] else 0.0
+        pairs = sum(pair is not None for pair in self.pairs)
+        if value.min() < 0.0 < value.max():
+            yield KeyProblem("machine.mobility", ("legs",), "legs and pairs of rods together hold the platform with one "
+                             f"sign at {at(int(value.argmin()))}, with the other at {at(int(value.argmax()))}: between "
+                             "them is a place where they do not (V-4)", "make the workspace smaller, or let the pairs "
+                             "reach the platform from other sides")
+        elif least < LEAST:
+            yield KeyProblem("machine.mobility", ("legs",), f"{self.rods.shape[1]} legs and {pairs} pairs of rods do not "
+                             f"hold the platform everywhere (least singular value {least:.3g}): it moves otherwise than "
+                             f"freedoms = {freedoms}",
+                             "give `rods` of the legs that are pairs, or the freedoms that the machine has")
+
+    def _across(self, k: int) -> Floats:
+        """(N, 3): the turn that the pair of leg k stops, times the distance of its rods by the lever."""
+        pair = self.pairs[k]
+        assert pair is not None
+        return cross(self.rods[:, k], np.broadcast_to(pair / self.kinematics.loops.lever, self.rods[:, k].shape))
+
+    def _stopped(self) -> Iterator[KeyProblem]:
+        loops = self.kinematics.loops
+        turns = loops.basis[3:][:, loops.basis[3:].any(axis=0)]
+        for k, pair in enumerate(self.pairs):
+            if pair is None or self.bars[k] is not None:
+                continue
+            if np.abs(unit(self._across(k)) @ turns).max(initial=0.0) > STOPPED:
+                yield KeyProblem("machine.mobility", ("legs", self.kinematics.leg_names[k], "rods"), "the pair of rods "
+                                 f"stops a turn that freedoms = {list(loops.freedoms)} has", "let the joints of the pair "
+                                 "lie along the axis of that turn, or write one rod")
+                return
+
+    def _rows(self) -> Floats:
+        """(N, rows, motions): of the platform, turns by the lever, then of each bar its turn about its hinge."""
+        loops, bars = self.kinematics.loops, list(dict.fromkeys(bar for bar in self.bars if bar is not None))
+        about = loops.basis[3:][:, loops.basis[3:].any(axis=0)][:, 0] if bars else np.zeros(3)
+        rows = []
+        for k, (pair, bar) in enumerate(zip(self.pairs, self.bars, strict=True)):
+            kept = np.zeros(3) if loops.kept is None else loops.kept[k]
+            own = np.array([bar == name for name in bars], dtype=np.float64)
+            swing = self.rods[:, k] @ np.cross(about, kept) / loops.lever
+            rows.append(np.column_stack([self.rods[:, k], cross(self.arms[:, k], self.rods[:, k]) / loops.lever,
+                                         swing[:, None] * own]))
+            if pair is not None:
+                across = self._across(k)
+                rows.append(np.column_stack([0.0 * across, across, (across @ about)[:, None] * own]))
+        columns = [0, 1, 2, 3, 4, 5] if "z" in loops.freedoms else [0, 1, 5]
+        return np.stack(rows, axis=1)[:, :, columns + list(range(6, 6 + len(bars)))]
 
 
 def least_singular(rows: Floats) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from machines.key_problem import KeyProblem
+from machines.kinematics.base import Kinematics
 from machines.kinematics.chain import LINEAR, ROTARY
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import FREEDOMS, Loops
@@ -20,6 +21,7 @@ from machines.leg_layouts import BoundedVector, DriveModel, StarLayout, stray_ke
 from machines.legs_mobility import leg_faults, travel_faults
 from machines.machine import ControlKinematics
 from machines.models import KinematicsModel, Vector
+from machines.rotary_models import RotaryModel
 from machines.slider_models import (
     UNIT,
     ClearanceModel,
@@ -32,7 +34,7 @@ from machines.user_model import UserModel
 from toolpaths.arrays import Floats
 
 Freedom = Literal["x", "y", "z", "a", "b", "c"]
-PLATFORMS = ("xy", "xyz", "xyza", "xyzb", "xyzabc")
+PLATFORMS = ("xy", "xyz", "xyza", "xyzb", "xyzc", "xyzabc")
 """freedoms that a platform may have"""
 
 
@@ -41,6 +43,16 @@ class CarrierModel(UserModel):
 
     direction: Vector
     """unit vector: how positive q moves the tool, seen from the part"""
+
+
+class PlatformBarModel(UserModel):
+    """One `[kinematics.bars.NAME]` table: a part of the platform, hinged to it about the direction of its one turn.
+
+    The pairs of rods that hold it leave it its direction (Company 2000, V-5).
+    """
+
+    hinge: BoundedVector
+    """mm, from the platform's reference point"""
 
 
 class LegsModel(KinematicsModel):
@@ -53,44 +65,80 @@ class LegsModel(KinematicsModel):
     """mm from the reference point of the level platform"""
     layout: StarLayout | None = None
     """legs in a ring, so that nobody types their coordinates"""
+    rings: dict[str, StarLayout] = Field(default_factory=dict)
+    """further rings, each a layout of its own drives and sizes, by any name"""
     legs: dict[str, DriveModel] = Field(default_factory=dict)
     """by axis letter; where the layout has a leg of that letter, in its place"""
+    bars: dict[str, PlatformBarModel] = Field(default_factory=dict)
+    """jointed parts of the platform, by name"""
     carriers: dict[str, CarrierModel] = Field(default_factory=dict)
     """by axis letter"""
+    rotary: RotaryModel | None = None
+    """rotary axis under the part or at the spindle, of a platform that tilts about x or y"""
     workspace: WorkspaceModel
-    """of the platform's reference point, carried; tilt: of a platform that turns in every direction [0, largest]"""
+    """of the platform's reference point, carried; tilt: range of its one turn, of one that turns in every direction [0,
+    largest] from z"""
     clearance: ClearanceModel = ClearanceModel()
 
     @property
     def drives(self) -> dict[str, DriveModel]:
-        """All legs: those of the layout, of which tables of `legs` take the place, then the others."""
-        return (self.layout.legs() if self.layout else {}) | self.legs
+        """All legs: those of the layout and the rings, of which tables of `legs` take the place, then the others."""
+        found = dict[str, DriveModel]()
+        for _, layout in self._layouts():
+            found |= layout.legs()
+        return found | self.legs
+
+    def _layouts(self) -> list[tuple[tuple[str, ...], StarLayout]]:
+        """With their paths in the table."""
+        first = [] if self.layout is None else [(("layout",), self.layout)]
+        return [*first, *((("rings", name), ring) for name, ring in self.rings.items())]
 
     @property
     def axis_names(self) -> tuple[str, ...]:
-        """Legs in the file's order, then carriers; linear ones before arms."""
+        """Legs in the file's order, then carriers; linear ones before arms; last the rotary axis."""
+        return (*self._leg_axes, *(() if self.rotary is None else (self.rotary.letter,)))
+
+    @property
+    def _leg_axes(self) -> tuple[str, ...]:
         arms = [name for name, leg in self.drives.items() if leg.drive == "arm"]
         return (*(name for name in self.drives if name not in arms), *self.carriers, *arms)
 
     def describe(self) -> str:
-        """How many legs of what, freedoms, and the count of Gruebler (spherical joints, of hinges along z in the plane)."""
+        """How many legs of what, freedoms, and the count of Gruebler."""
         drives = [leg.drive for leg in self.drives.values()]
         kinds = " and ".join(f"{drives.count(d)} legs {'of changing length' if d == 'length' else f'on {d}s'}"
                              for d in dict.fromkeys(drives))
-        count = len(drives) + (6 if "z" in self.freedoms else 3) - sum(max(len(leg.rods), 1) for leg in self.drives.values())
         carried = f", carried along {' '.join(self.carriers)}" if self.carriers else ""
-        return f"{kinds}, platform free in {' '.join(self.freedoms)} (Gruebler {count}){carried}"
+        where = "" if self.rotary is None else f", {self.rotary.place}"
+        return f"{kinds}, platform free in {' '.join(self.freedoms)} (Gruebler {self.gruebler}){carried}{where}"
 
-    def build(self) -> OnLegs:
+    @property
+    def gruebler(self) -> int:
+        """Freedoms by the count of Gruebler: rods with spherical joints, in the plane hinges; 1 more for the hinge of a bar.
+
+        Of a platform whose pairs hold it twice it is less than what moves.
+        """
+        rods = sum(max(len(leg.rods), 1) for leg in self.drives.values())
+        return len(self.drives) + (6 if "z" in self.freedoms else 3) + len(self.bars) - rods
+
+    def build(self) -> Kinematics:
         """The kinematics at the gauge point."""
-        names, legs = self.axis_names, list(self.drives.values())
+        return self._on_legs() if self.rotary is None else self.rotary.on(self._on_legs(), np.array(self.gauge))
+
+    def _on_legs(self) -> OnLegs:
+        names, legs = self._leg_axes, list(self.drives.values())
         drives = Drives(
             np.array([leg.point for leg in legs]), np.array([leg.direction for leg in legs]),
             np.array([float(leg.rod) for leg in legs]), np.array([float(leg.root) for leg in legs]),
             np.array([leg.arm if leg.drive == "arm" else (0.0, 0.0, 0.0) for leg in legs]),
             np.array([leg.drive == "slide" for leg in legs]), np.array([leg.drive == "arm" for leg in legs]))
+        joints, kept = np.array([leg.joint for leg in legs]), None
+        if self.bars:
+            on_bar = np.array([leg.bar is not None for leg in legs])[:, None]
+            hinges = np.array([(0.0, 0.0, 0.0) if leg.bar is None else self.bars[leg.bar].hinge for leg in legs])
+            joints, kept = np.where(on_bar, hinges, joints), np.where(on_bar, joints, 0.0)
         return OnLegs(
-            Loops(drives, np.array([leg.joint for leg in legs]), tuple(sorted(self.freedoms, key=FREEDOMS.index))),
+            Loops(drives, joints, tuple(sorted(self.freedoms, key=FREEDOMS.index)), kept),
             self._space(), np.array(self.gauge), names,
             tuple(name in self.drives and self.drives[name].drive == "arm" for name in names),
             np.array([names.index(name) for name in self.drives]),
@@ -122,21 +170,24 @@ class LegsModel(KinematicsModel):
 
     def problems(self) -> Iterator[KeyProblem]:
         """Vectors that are no directions, letters, freedoms that do not go with the legs; faults over the workspace."""
-        found = list(self.layout.problems() if self.layout else ()) or [*self._table_problems(), *self._freedom_problems()]
+        found = [fault for path, layout in self._layouts() for fault in layout.problems(path)] or [
+            *self._table_problems(), *self._freedom_problems()]
         yield from found
         if not found:
-            yield from leg_faults(self.build(), [_pair(leg) for leg in self.drives.values()])
+            legs = list(self.drives.values())
+            yield from leg_faults(self._on_legs(), [_pair(leg) for leg in legs], [leg.bar for leg in legs])
 
     def travel_problems(self, travel: Floats, home: Floats) -> Iterator[KeyProblem]:
         """See the base class."""
-        yield from travel_faults(self.build(), travel, home)
+        count = len(self._leg_axes)
+        yield from travel_faults(self._on_legs(), travel[:count], home[:count])
 
     def _table_problems(self) -> Iterator[KeyProblem]:
         for name, leg in self.legs.items():
             yield from stray_keys(leg, leg.drive, ("legs", name))
         yield from rail_problems(list(self.drives.values()), self.clearance)
         for name, leg in self.drives.items():
-            yield from _letter(name, ("legs", name), ROTARY if leg.drive == "arm" else LINEAR, leg.drive)
+            yield from _letter(name, ("legs", name), ROTARY + LINEAR if leg.drive == "arm" else LINEAR, leg.drive)
             yield from _direction(leg.direction, ("legs", name, "direction"))
             if leg.drive == "arm" and not 0.0 < np.linalg.norm(leg.arm) < 1e6:
                 yield KeyProblem("machine.geometry", ("legs", name), f"the arm of leg {name} is {list(leg.arm)}",
@@ -157,7 +208,31 @@ class LegsModel(KinematicsModel):
                 yield KeyProblem("machine.axis-letter", ("carriers", name), f"{name} drives a leg too",
                                  "choose another letter")
 
+    def _jointed_problems(self) -> Iterator[KeyProblem]:
+        turns = "".join(sorted(set(self.freedoms) & set("abc")))
+        if self.bars and len(turns) != 1:
+            yield KeyProblem("machine.geometry", ("bars",), f"bars are hinged about the one turn of a platform; freedoms = "
+                             f"{list(self.freedoms)} has {len(turns)} turns", "take bars out, or write the freedoms that "
+                             "the legs leave the platform")
+        held = [leg.bar for leg in self.drives.values()]
+        for name, leg in self.legs.items():
+            if leg.bar is not None and leg.bar not in self.bars:
+                yield KeyProblem("machine.geometry", ("legs", name, "bar"), f"{leg.bar!r} is none of the bars "
+                                 f"{', '.join(self.bars) or '(there are none)'}", "write a [kinematics.bars.NAME] table for "
+                                 "it, or its name as there")
+        for name in self.bars:
+            if name not in held:
+                yield KeyProblem("machine.geometry", ("bars", name), f"no leg holds the bar {name!r}",
+                                 f"write bar = {name!r} in the tables of its legs, or take the bar out")
+        if self.rotary is not None:
+            yield from self.rotary.problems((*self.drives, *self.carriers))
+            if turns not in ("a", "b"):
+                yield KeyProblem("machine.geometry", ("rotary",), "a rotary axis goes with a platform that tilts about "
+                                 f"x or y; this one is free in {' '.join(self.freedoms)}", "take [kinematics.rotary] "
+                                 "out, or write the freedoms x y z a, or x y z b, where legs leave them")
+
     def _freedom_problems(self) -> Iterator[KeyProblem]:
+        yield from self._jointed_problems()
         own = "".join(sorted(self.freedoms, key=FREEDOMS.index))
         if own not in PLATFORMS:
             yield KeyProblem("machine.geometry", ("freedoms",), f"{list(self.freedoms)} is none of "
@@ -177,7 +252,7 @@ class LegsModel(KinematicsModel):
         if not (low == high == 0.0 or (least <= low <= 0.0 <= high < most and low > -90.0)):
             yield KeyProblem("machine.geometry", ("workspace", "tilt"), f"{[low, high]} degrees cannot be the tilt of "
                              f"this platform, free in {' '.join(own)}", "write tilt = [0, largest] with a b c, [lower, "
-                             "upper] about one axis with a or b, less than 90 degrees; none without turns")
+                             "upper] about one axis with a, b or c, less than 90 degrees; none without turns")
 
 
 def _pair(leg: DriveModel) -> Floats | None:

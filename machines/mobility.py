@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from machines.key_problem import KeyProblem
-from machines.kinematics.h4_platform import H4Platform
+from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.sliders import Legs, determinant
 from machines.kinematics.workspace import Workspace
 from machines.models import Vector
@@ -59,14 +59,14 @@ def delta_faults(legs: Legs, joints: Floats, space: Workspace, across: Floats) -
                           "change the direction of `rods`")
 
 
-def h4_faults(legs: Legs, joints: Floats, space: Workspace, rods: Sequence[Sequence[Vector]],
-              names: Sequence[str]) -> Iterator[KeyProblem]:
+def h4_faults(kinematics: OnLegs, rods: Sequence[Sequence[Vector]]) -> Iterator[KeyProblem]:
     """Condition V-4 (V.4.2 for the H4a) and det Jx over the workspace."""
+    names, legs, platform = kinematics.leg_names, kinematics.legs.on_slides, kinematics.one_turn
     direction = list(_direction_faults(rods, names))
     yield from direction
-    place, tilt = space.grid(GRID)
-    platform = H4Platform(legs, joints, space)
-    p = np.column_stack([place, tilt])
+    assert legs is not None and platform is not None
+    place, tilt = kinematics.workspace.grid(GRID)
+    p, joints = np.column_stack([place, tilt]), platform.loops.joints
     ends = platform.ends(p)
     far = list(_out_of_reach(legs, ends, place, tilt, names))
     yield from far

@@ -43,6 +43,7 @@ Register = Annotated[str, Field(pattern=r"^T( \+ [1-9][0-9]{0,3})?$")]
 MCode = Annotated[str, Field(pattern=r"^(M[0-9]{1,5})?$")]
 AxisFigure = Literal["travel", "velocity", "acceleration", "jerk", "home"]
 TimingFigure = Literal["tool_change", "clamp", "unclamp"]
+Interval = Annotated[tuple[float, float], AfterValidator(_upward)]
 Travel = Annotated[tuple[float, float] | Literal["unlimited"], AfterValidator(_upward)]
 
 

@@ -1,4 +1,4 @@
-"""`[kinematics] kind = "linear-delta"` and `"h4-linear"`: the two kinds and what makes them unusable."""
+"""`[kinematics] kind = "linear-delta"` and `"h4-linear"`: shorter tables of two forms of machines on legs."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ import numpy as np
 from pydantic import Field
 
 from machines.key_problem import KeyProblem
-from machines.kinematics.h4_axes import H4SpindleAxis, H4TableAxis
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.h4_platform import H4Platform
 from machines.kinematics.legs.drives import on_slides
 from machines.kinematics.legs.loops import Loops
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.machine import ControlKinematics
 from machines.mobility import delta_faults, h4_faults, reach_faults
-from machines.models import NotNegative, Vector, blanks
+from machines.models import NotNegative, blanks
+from machines.rotary_models import RotaryModel
 from machines.slider_models import SliderModel, lineardeltakins
-from machines.user_model import UserModel
+from toolpaths.arrays import Floats
 
 
 class LinearDeltaModel(SliderModel):
@@ -35,11 +34,11 @@ class LinearDeltaModel(SliderModel):
     @property
     def axis_names(self) -> tuple[str, ...]:
         """Letters of the slides in the file's order."""
-        return tuple(self.legs)
+        return tuple(self.slides)
 
     def describe(self) -> str:
-        """The kind."""
-        return "linear Delta"
+        """The kind, and the count of Gruebler where the file says where its rods are."""
+        return "linear Delta" + self.gruebler(3)
 
     def build(self) -> OnLegs:
         """The kinematics at the gauge point: a machine on legs whose platform is free in x, y and z."""
@@ -51,7 +50,7 @@ class LinearDeltaModel(SliderModel):
         """Workspace out of reach or singular; pairs of rods that leave the platform a turn."""
         yield from reach_faults(self.build_legs(), self.platform_joints(), self.workspace.build(),
                                 self.axis_names)
-        pairs = [leg.rods for leg in self.legs.values()]
+        pairs = [leg.rods for leg in self.slides.values()]
         if all(len(pair) == 2 for pair in pairs):
             across = np.array([np.subtract(pair[0], pair[1]) for pair in pairs])
             yield from delta_faults(self.build_legs(), self.platform_joints(), self.workspace.build(), across)
@@ -67,19 +66,6 @@ class LinearDeltaModel(SliderModel):
         Its joints stand at 90, 210 and 330 degrees, equal rods above the platform, whose size is taken off R.
         """
         return lineardeltakins(module, self.build_legs(), self.platform_joints())
-
-
-class RotaryModel(UserModel):
-    """`[kinematics.rotary]`: the fifth axis of an H4 machine."""
-
-    letter: Literal["A", "B", "C"]
-    """name of the axis"""
-    carries: Literal["part", "spindle"]
-    """part: a table about z through the machine origin; spindle: about the platform's y, between it and the spindle"""
-    positive: Literal[1, -1] = 1
-    """1 where growing values turn the tool, seen from the part, positively (ISO 841)"""
-    pivot: Vector = (0.0, 0.0, 0.0)
-    """spindle: a point of the axis relative to the platform's reference point, mm"""
 
 
 class H4LinearModel(SliderModel):
@@ -98,38 +84,38 @@ class H4LinearModel(SliderModel):
     @property
     def axis_names(self) -> tuple[str, ...]:
         """Letters of the slides in the file's order, then the rotary axis."""
-        return (*self.legs, self.rotary.letter)
+        return (*self.slides, self.rotary.letter)
 
     def describe(self) -> str:
-        """The kind and where the fifth axis is."""
-        where = "table under the part" if self.rotary.carries == "part" else "axis between platform and spindle"
-        return f"H4a, {self.rotary.letter} {where}"
+        """The kind, where the fifth axis is, and the count of Gruebler of the platform."""
+        return f"H4a, {self.rotary.place}" + self.gruebler(4)
 
-    def build(self) -> H4Linear:
-        """The kinematics at the gauge point."""
-        platform = H4Platform(self.build_legs(), self.platform_joints(), self.workspace.build())
-        sense, names, clearance = float(self.rotary.positive), self.axis_names, self.build_clearance()
-        if self.rotary.carries == "part":
-            return H4TableAxis(platform, self.gauge, sense, names, clearance=clearance)
-        return H4SpindleAxis(platform, self.gauge, sense, names, clearance=clearance,
-                             pivot=np.array(self.rotary.pivot))
+    def build(self) -> LegsWithAxis:
+        """The kinematics at the gauge point: a machine on legs whose platform is free in x, y, z and the turn about x."""
+        return self.rotary.on(self._on_legs(), self._gauge())
+
+    def _on_legs(self) -> OnLegs:
+        loops = Loops(on_slides(self.build_legs()), self.platform_joints(), ("x", "y", "z", "a"))
+        return OnLegs(loops, self.workspace.build(), self._gauge(), tuple(self.slides), (False,) * 4, np.arange(4),
+                      np.zeros(0, dtype=np.int64), np.zeros((0, 3)), self.build_clearance())
+
+    def _gauge(self) -> Floats:
+        """(3,) mm from the reference point."""
+        pivot = self.rotary.pivot if self.rotary.carries == "spindle" else (0.0, 0.0, 0.0)
+        return np.array([pivot[0], pivot[1], pivot[2] - self.gauge])
 
     def _leg_problems(self) -> Iterator[KeyProblem]:
         yield from super()._leg_problems()
-        if sorted(len(leg.rods) for leg in self.legs.values()) != [1, 1, 2, 2]:
-            count = ", ".join(f"{name} {len(leg.rods)}" for name, leg in self.legs.items())
+        if sorted(len(leg.rods) for leg in self.slides.values()) != [1, 1, 2, 2]:
+            count = ", ".join(f"{name} {len(leg.rods)}" for name, leg in self.slides.items())
             yield KeyProblem("machine.geometry", ("legs",), f"rods per leg: {count}; an H4a has two pairs and two single "
                              "rods", "write rods = [[x, 0, 0], [-x, 0, 0]] for a pair, [[x, 0, 0]] for a single rod")
         low, high = self.workspace.tilt
         if not -90.0 < low <= 0.0 <= high < 90.0:
             yield KeyProblem("machine.geometry", ("workspace", "tilt"), f"{[low, high]} does not hold 0 or reaches "
                              "90 degrees", "write tilt = [lower, upper] about the level platform, degrees")
-        if self.rotary.carries == "part" and self.rotary.pivot != (0.0, 0.0, 0.0):
-            yield KeyProblem("machine.geometry", ("rotary", "pivot"), "a table turns about z through the machine origin",
-                             "take pivot out and give the slides relative to the table's axis")
+        yield from self.rotary.problems(())
 
     def mobility_problems(self) -> Iterator[KeyProblem]:
         """Workspace out of reach or singular; condition V-4."""
-        legs, space = self.build_legs(), self.workspace.build()
-        rods = [leg.rods for leg in self.legs.values()]
-        yield from h4_faults(legs, self.platform_joints(), space, rods, tuple(self.legs))
+        yield from h4_faults(self._on_legs(), [leg.rods for leg in self.slides.values()])

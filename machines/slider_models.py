@@ -4,33 +4,25 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import Field
 
 from machines.key_problem import KeyProblem
 from machines.kinematics.chain import LINEAR
 from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
+from machines.leg_layouts import StarLayout
 from machines.machine import ControlKinematics
-from machines.models import KinematicsModel, NotNegative, Positive, Vector
+from machines.models import Interval, KinematicsModel, NotNegative, Positive, Vector
 from machines.user_model import UserModel
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
 UNIT = 1e-6
 """how far the length of a direction may be from 1 (it is normalised)"""
-
-
-def _upward(span: tuple[float, float]) -> tuple[float, float]:
-    if not span[0] < span[1]:
-        raise ValueError(f"{list(span)} is empty; write [lower, upper]")
-    return span
-
-
-Interval = Annotated[tuple[float, float], AfterValidator(_upward)]
 
 
 class LegModel(UserModel):
@@ -95,24 +87,49 @@ class ClearanceModel(UserModel):
 class SliderModel(KinematicsModel):
     """What these kinds share."""
 
-    legs: dict[str, LegModel]
-    """by axis letter"""
+    layout: StarLayout | None = None
+    """legs in a ring, so that nobody types their coordinates; as of kind "legs", of slides"""
+    legs: dict[str, LegModel] = Field(default_factory=dict)
+    """by axis letter; where the layout has a leg of that letter, in its place"""
     workspace: WorkspaceModel
     clearance: ClearanceModel = ClearanceModel()
 
+    @property
+    def slides(self) -> dict[str, LegModel]:
+        """All legs: those of the layout, of which tables of `legs` take the place, then the others."""
+        ring = {} if self.layout is None else self.layout.legs()
+        return {name: LegModel(slide=leg.point, direction=leg.direction, joint=leg.joint, rod=leg.rod, root=leg.root,
+                               rods=leg.rods, rail_offset=leg.rail_offset, rail_ends=leg.rail_ends)
+                for name, leg in ring.items()} | self.legs
+
+    def _layout_problems(self) -> Iterator[KeyProblem]:
+        if self.layout is None:
+            return
+        yield from self.layout.problems(("layout",))
+        if self.layout.drive != "slide":
+            yield KeyProblem("machine.geometry", ("layout", "drive"), f"the legs of kind {self.kind!r} are on slides",
+                             'write drive = "slide", or kind = "legs"')
+        if self.layout.rod <= 0.0:
+            yield KeyProblem("machine.geometry", ("layout", "rod"), "the rods have no length", "write it in mm")
+
     def build_legs(self) -> Legs:
         """The leg law's numbers."""
-        legs = self.legs.values()
+        legs = self.slides.values()
         return Legs(np.array([leg.slide for leg in legs]), np.array([leg.direction for leg in legs]),
                     np.array([leg.rod for leg in legs]), np.array([float(leg.root) for leg in legs]))
 
     def platform_joints(self) -> Floats:
         """(K, 3) mm"""
-        return np.array([leg.joint for leg in self.legs.values()])
+        return np.array([leg.joint for leg in self.slides.values()])
 
     def build_clearance(self) -> ClearanceSizes:
         """In mm and rad."""
-        return clearance_sizes(list(self.legs.values()), self.clearance)
+        return clearance_sizes(list(self.slides.values()), self.clearance)
+
+    def gruebler(self, legs: int) -> str:
+        """The count of Gruebler in words, of rods with spherical joints; "" where a leg does not say what its rods are."""
+        rods = [len(leg.rods) for leg in self.slides.values()]
+        return f" (Gruebler {legs + 6 - sum(rods)})" if all(rods) else ""
 
     @property
     @abstractmethod
@@ -121,17 +138,18 @@ class SliderModel(KinematicsModel):
 
     def problems(self) -> Iterator[KeyProblem]:
         """Vectors that are no directions, a workspace out of reach, a platform that moves otherwise than the kind."""
-        found = [*self._leg_problems(), *rail_problems(list(self.legs.values()), self.clearance)]
+        found = list(self._layout_problems()) or [
+            *self._leg_problems(), *rail_problems(list(self.slides.values()), self.clearance)]
         yield from found
         if not found:
             yield from self.mobility_problems()
 
     def _leg_problems(self) -> Iterator[KeyProblem]:
-        if len(self.legs) != self.leg_count:
+        if len(self.slides) != self.leg_count:
             yield KeyProblem("machine.geometry", ("legs",),
-                          f"{len(self.legs)} legs; kind {self.kind!r} has {self.leg_count}",
+                          f"{len(self.slides)} legs; kind {self.kind!r} has {self.leg_count}",
                           "write one [kinematics.legs.LETTER] table per leg")
-        for name, leg in self.legs.items():
+        for name, leg in self.slides.items():
             length = float(np.linalg.norm(leg.direction))
             if abs(length - 1.0) > UNIT:
                 yield KeyProblem("machine.geometry", ("legs", name, "direction"),

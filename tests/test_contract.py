@@ -105,11 +105,11 @@ def test_nothing_asks_for_a_concrete_kind() -> None:
 def test_the_kinds_are_known() -> None:
     """Those that machine files build are among what is looked for, with what stands between them and the contract."""
     built = {type(machines.load(name).kinematics).__name__ for name in machines.names()}
-    assert built <= concrete_kinds() and {"OnSlides", "ActualKinematics"} <= concrete_kinds()
+    assert built <= concrete_kinds() and {"PosesOfLegs", "ActualKinematics"} <= concrete_kinds()
 
 
 @pytest.mark.parametrize("text", [
-    "isinstance(kin, Serial)", "isinstance(machine.kinematics, OnLegs | h4.H4Linear)", "hasattr(kinematics, 'rig')",
+    "isinstance(kin, Serial)", "isinstance(machine.kinematics, OnLegs | on.LegsWithAxis)", "hasattr(kinematics, 'rig')",
     "type(machine.kinematics) is Serial", "getattr(kin, 'sense', 1.0)", "model.kind == 'serial'", "kin.slides_affine"])
 def test_an_asking_is_noticed(text: str) -> None:
     assert list(asks(ast.walk(ast.parse(text))))

@@ -65,7 +65,7 @@ def speed_acceleration(rods: RodPlatform, place: Floats, tilt: Floats) -> Floats
     With j a row of J^-1 the rod's equation, differentiated twice, gives (AB.u) qdd = AB.a + |v - u (j.v)|^2;
     over unit v that square is at most the squared norm of I - u j.
     """
-    jx = rods.loop_matrices(place, tilt)
+    jx = rods.rods_at(place)
     along = rods.legs.along(jx)
     inverse = jx / along[:, :, None]
     outer = rods.legs.directions[None, :, :, None] * inverse[:, :, None, :]

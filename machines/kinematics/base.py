@@ -259,7 +259,7 @@ class Kinematics(ABC):
     @property
     def over_workspace(self) -> PlatformPlaces | None:
         """The joints at places of its platform, of a machine whose `workspace` is about those."""
-        return self.on_rods
+        return None
 
     # ---- geometric errors, pivots --------------------------------------------------------------------------
 

@@ -1,10 +1,10 @@
-"""What the rods of a machine on slides say to who asks for them: clearances, errors of rods, transmission."""
+"""What the legs of a machine say to who asks for them: transmission of any legs, rods on slides for their errors."""
 
 from __future__ import annotations
 
 from typing import Protocol
 
-from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
+from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
@@ -61,15 +61,5 @@ class RodPlatform(Protocol):
     def gauge_below(self) -> float:
         """mm from the reference point of the level platform down to the gauge point, rotary axes at 0."""
 
-    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
-        """Where the parts are at joints q (N, J)."""
-
-    def middle_rig(self) -> ClearanceGeometry:
-        """The same in the middle of the workspace, N = 1."""
-
-    def joints_at(self, platform: Floats, turn: Floats) -> Floats:
-        """Joints (N, J) of places and tilts of the platform (N, 4) and rotary axes (N, R)."""
-
-    def loop_matrices(self, place: Floats, tilt: Floats) -> Floats:
-        """Jx (N, K, K) at places (N, 3) and tilts (N,): rods in mm and, of a platform that tilts, their
-        moments about its reference point in mm^2."""
+    def rods_at(self, place: Floats) -> Floats:
+        """Rods (N, K, 3) mm at places (N, 3) of the level platform."""

@@ -13,7 +13,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from machines.kinematics.sliders import Legs
 from toolpaths.arrays import Floats
 
 _MUCH, _PARTS = 0.02, 32
@@ -55,11 +54,3 @@ def _between(matrices: Matrices, q0: Floats, q1: Floats) -> tuple[Floats, Floats
                             for a, b in pairwise(seen)], axis=0)
     least = np.stack([distance(matrices, x) for x in places]).min(axis=0)
     return np.asarray(least - change[:, None]), np.asarray(change)
-
-
-def unit_free(jx: Floats, legs: Legs, joints: Floats) -> tuple[Floats, Floats]:
-    """(Jx (N, K, K) free of units, cosines (N, K)) of `RodPlatform.loop_matrices` and platform joints (K, 3)."""
-    if jx.shape[2] == 3:
-        return jx / legs.lengths[:, None], legs.transmission(jx)
-    arm = max(float(np.linalg.norm(joints[:, 1:], axis=1).max()), 1.0)
-    return jx / np.array([1.0, 1.0, 1.0, arm]) / legs.lengths[:, None], legs.transmission(jx[:, :, :3])

@@ -51,14 +51,15 @@ def figures_of(machine: Machine, table: str) -> dict[str, str]:
 
 
 def rotary_lines(machine: Machine) -> list[dict[str, Any]]:
-    """Where the rotary axes lie with all rotary joints at zero (a serial machine's slides too): `point` (mm)
-    and `direction` of each in the table frame, which then is the machine's; the point is that of the line
-    nearest to the origin."""
+    """Where the rotary axes lie with all of them at zero (a serial machine's slides too): `point` (mm) and `direction` of
+    each in the table frame, which then is the machine's; the point is that of the line nearest to the origin. Cranks of
+    platforms are none: they stand at home."""
     kin = machine.kinematics
-    q = np.where(np.array(machine.rotary) | kin.straight_slides, 0.0, machine.home)[None]
+    turning = np.array(machine.rotary) & ~np.array(kin.drives_tip)
+    q = np.where(turning | kin.straight_slides, 0.0, machine.home)[None]
     (tip,), rates = kin.forward(q)[0], kin.twist_jacobian(q)[0]
     lines = []
-    for j in np.flatnonzero(np.array(machine.rotary) & (np.linalg.norm(rates[3:], axis=0) > 0.0)).tolist():
+    for j in np.flatnonzero(turning & (np.linalg.norm(rates[3:], axis=0) > 0.0)).tolist():
         turn = rates[3:, j] / np.linalg.norm(rates[3:, j])
         turn = turn * np.sign(turn[np.abs(turn).argmax()])
         at = tip + np.cross(rates[3:, j], rates[:3, j]) / float(rates[3:, j] @ rates[3:, j])

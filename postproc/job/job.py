@@ -27,7 +27,7 @@ from postproc.job.records import job_records
 from postproc.job.rounding import Rounding, helix_bound, rounding_bound, without_splines
 from postproc.job.smoothing import SmoothingPlan, smoothing_plan
 from postproc.job.tool_names import called_tools
-from postproc.job.units import other_units
+from postproc.job.units import other_units, scaled_angles
 from postproc.path.links import SafeSpace, safe_space
 from postproc.reference.cutcom_of_tools import CutcomOfTool
 from postproc.reference.events import register_changes, tool_changes
@@ -251,7 +251,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     records, diagnostics = job_records(toolpath, machine, controller, setup, options.setup)
     toolpath = records.toolpath
     diagnostics += [*found, *work_offset(controller, setup, options), *called_tools(controller, options.setup),
-                    *other_units(controller, options.setup),
+                    *other_units(controller, options.setup), *scaled_angles(controller, machine, options.setup),
                     *smoothing_plan(controller, setup, options, toolpath, machine)[1]]
     toolpath, found = cut_operations(toolpath, setup.output.longest)
     diagnostics += [*found, *program_number(toolpath, controller, setup, options)]

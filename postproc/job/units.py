@@ -1,9 +1,21 @@
-"""Blocks of the controller file that state other units than the program is written in."""
+"""Units of the program that blocks of the controller file contradict, or that a machine's letters cannot have."""
 
 from __future__ import annotations
 
+from machines.kinematics.chain import ROTARY
+from machines.machine import Machine
 from postproc.controllers.model import ControllerFile
 from toolpaths.diagnostics import Diagnostic, error
+
+
+def scaled_angles(controller: ControllerFile, machine: Machine, file: str) -> list[Diagnostic]:
+    """An error where cranks have letters that a control takes for lengths and the program is in inches: it would scale their
+    degrees."""
+    letters = [name for name, turns in zip(machine.axis_names, machine.rotary, strict=True) if turns and name not in ROTARY]
+    if not letters or controller.format.units == "mm":
+        return []
+    return [error("output.units", f"words of {', '.join(letters)} are degrees, and controls scale words of that letter in "
+                  "programs in inches", file=file, hint='write [output] units = "mm" in the set-up')]
 
 
 def other_units(controller: ControllerFile, file: str) -> list[Diagnostic]:

@@ -47,7 +47,7 @@ def machine_tables(machine: Machine) -> list[dict[str, Any]]:
 
 def _limits_table(machine: Machine) -> dict[str, dict[str, Any]]:
     """Travel and velocity of each axis as a machine file states them."""
-    limits, units = machine.limits, _units(machine.axis_names).tolist()
+    limits, units = machine.limits, _units(machine).tolist()
     return {letter: {"velocity": v * unit, "acceleration": a * unit, "jerk": j * unit,
                      "travel": [low * unit, high * unit] if math.isfinite(low) and math.isfinite(high) else "unlimited"}
             for letter, unit, low, high, v, a, j in zip(
@@ -65,7 +65,7 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
     """The motion of a program, read back, as plain arrays."""
     motion, control = comparison.executed[1], job.control
     every = np.arange(len(motion))
-    degrees = _units(job.machine.axis_names)
+    degrees = _units(job.machine)
     joints = motion.end / degrees if control.base != "tcp" else poses.joints(motion, every, 1.0)
     straight = (motion.code != 2) & (motion.frame == 0) & (control.base != "tcp")
     if control.rapids == "dog-leg":
@@ -126,12 +126,12 @@ def offset_joints(control: Control) -> Floats | None:
     if control.base == "tcp" or control.measured or not control.machine.kinematics.straight_slides:
         return None
     return np.asarray(np.where(np.isin(np.arange(len(control.unit)), control.rotary), control.zero,
-                               control.work_offset / _units(control.machine.axis_names)))
+                               control.work_offset / _units(control.machine)))
 
 
-def _units(letters: tuple[str, ...]) -> Floats:
-    """(J,) word units per joint unit, by the letters of the axes alone."""
-    return np.array([math.degrees(1.0) if letter in "ABC" else 1.0 for letter in letters])
+def _units(machine: Machine) -> Floats:
+    """(J,) word units per joint unit."""
+    return np.where(machine.rotary, math.degrees(1.0), 1.0)
 
 
 def second_witness(source: ClSource | None, setup: SetupFile, options: Options, job: Job,

@@ -299,35 +299,38 @@ def _map(given: dict[str, Any], structure: str, letters: tuple[str, ...], files:
 
 
 def error_rods(table: dict[str, Any], model: dict[str, Any]) -> Rods | None:
-    """The rods of a machine file with the errors of a model file; None but of six, or two pairs in a plane, wrong alone."""
+    """The rods of a machine file with the errors of a model file; None but of six, of two pairs in a plane, or of one a leg
+    that holds a platform with bars, wrong alone."""
     nominal, legs = rods(table), legs_of(table["kinematics"])
-    if any(model.get(key) for key in ("components", "location", "map")) or nominal.rotary or any(
+    if any(model.get(key) for key in ("components", "location", "map")) or any(
             leg.get("pair") for leg in model["legs"].values()):
         return None
+    bars = bool(table["kinematics"].get("bars"))
     mm, rad, found = _UNITS[model.get("length_unit", "um")], _UNITS[model.get("angle_unit", "arcsec")], []
     middle = np.array([np.mean(table["kinematics"]["workspace"][k]) for k in "xyz"])
-    for (name, drive, (foot, along, joint, arm), size, root), leg in zip(nominal.legs, legs.values(), strict=True):
+    for (name, drive, (foot, along, joint, arm, kept), size, root), leg in zip(nominal.legs, legs.values(), strict=True):
         given, offset = model["legs"].get(name, {}), np.array(leg.get("rail_offset", (0.0, 0.0, 0.0)))
         turn = _displaced(rad * np.array([[0.0] * 3 + list(given.get("guide", (0.0, 0.0, 0.0)))]), np.zeros(3))[0, :3, :3]
         sides = (drive == "arm") * arm, -offset, middle - foot - offset, np.eye(3)[np.abs(along).argmin()]
         x = unit(next(x for v in sides if (x := v - v @ along * along) @ x > 1e-18))
         guide = np.eye(3) if drive == "length" else np.stack([x, np.cross(along, x), along], axis=1)
         more, u = (rad if drive == "arm" else mm) * given.get("drive", 0.0), turn @ along
-        for k, shift in enumerate(np.array(leg.get("rods") or [(0.0, 0.0, 0.0)])):
+        for k, shift in enumerate(np.array((not bars and leg.get("rods")) or [(0.0, 0.0, 0.0)])):
             own, end = (mm * np.array((given.get(key) or {k: np.zeros(3)})[k]) for key in ("carriage", "platform"))
             start = foot + offset + mm * np.array(given.get("rail", (0.0, 0.0, 0.0))) + turn @ (shift - offset)
             arms = rotations(u, np.array([more]))[0] @ (turn @ arm + guide @ own)
             start = start + (0.0 if drive == "arm" else guide @ own + (drive == "slide") * more * u)
             rod = size + mm * (given.get("length") or {k: 0.0})[k] + (drive == "length") * more
-            found.append((name, drive, np.array([start, u, joint + shift + end, arms]), rod, root))
-    return replace(nominal, legs=tuple(found), wrong=True) if len(found) == 6 - 2 * nominal.held[2] else None
+            found.append((name, drive, np.array([start, u, joint + shift + end, arms, kept]), rod, root))
+    due = len(nominal.legs) if bars else 6 - 2 * nominal.held[2]
+    return replace(nominal, legs=tuple(found), wrong=True) if len(found) == due else None
 
 
 def error_chain(table: dict[str, Any], model: dict[str, Any], files: dict[str, bytes]) -> ErrorChain | Rods | None:
     """The machine of a machine file with the errors of a model file over its CSV tables; None for one that is not known."""
     kind = table.get("kinematics", {}).get("kind", table.get("kinematics", {}).get("family"))
     if kind != "serial":
-        return error_rods(table, model) if kind in ("legs", "linear-delta") and model.get("legs") else None
+        return error_rods(table, model) if kind in ("legs", "linear-delta", "h4-linear") and model.get("legs") else None
     machine, structure = chain(table), table["kinematics"]["structure"]
     units = [_UNITS[model.get("length_unit", "um")]] * 3 + [_UNITS[model.get("angle_unit", "arcsec")]] * 3
     components: dict[str, list[tuple[int, ComponentError]]] = {}

@@ -15,9 +15,10 @@ from postproc.witness.text import Array
 _ALONG = {"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1), "U": (1, 0, 0), "V": (0, 1, 0), "W": (0, 0, 1),
           "A": (1, 0, 0), "B": (0, 1, 0), "C": (0, 0, 1)}
 LIMITS = ("least", "greatest", "velocity", "acceleration", "jerk", "home")
+_UP = np.array([0.0, 0.0, 1.0])
 ROD = 1e-4
 """mm by which a rod may miss its length"""
-SPIN_STEPS = 3
+SPIN_STEPS = 5
 
 
 def largest_feed(table: dict[str, Any]) -> float:
@@ -116,12 +117,14 @@ def chain(table: dict[str, Any]) -> Chain:
 @dataclass(frozen=True)
 class Rods:
     """A platform on rods: whether they have their lengths where a tool is claimed to be; of each leg its letter, its drive,
-    (foot at 0, direction, platform joint, arm) (4, 3), rod, root."""
+    (foot at 0, direction, platform joint, arm, what of the joint keeps its direction) (5, 3), rod, root.
+
+    `pivot` stands on the platform, the gauge point `reach` from it, turned by an axis at the spindle."""
 
     legs: tuple[tuple[str, str, Array, float, float], ...]
     turns: str
-    gauge: float
     pivot: Array
+    reach: Array
     rotary: str = ""
     carries: str = ""
     sense: float = 1.0
@@ -140,39 +143,64 @@ class Rods:
         1000); infinite where the foot of a rod stands on the wrong side of it."""
         turn = self.sense * q[:, letters.index(self.rotary)] if self.rotary else np.zeros(len(q))
         if self.carries == "part":
-            back = rotations(np.array([0.0, 0.0, 1.0]), -turn)
+            back = rotations(_UP, -turn)
             tip, axis = apply(back, tip), apply(back, axis)
-        s, c = (np.sin(turn), np.cos(turn)) if self.carries == "spindle" else (np.zeros(len(q)), np.ones(len(q)))
         for name, along in self.carriers.items():
             tip = tip - q[:, letters.index(name)][:, None] * along
-        k, sign, spins = int(self.turns != "b"), 1.0 if self.turns == "b" else -1.0, self.wrong or self.turns == "abc"
-        tilt = np.arctan2(sign * axis[:, k], axis[:, 2]) * bool(self.turns)
-        platform = least_turns(axis) if spins else rotations(np.eye(3)[1 - k], tilt)
-        expected = axis if spins else apply(platform, np.stack([s, 0.0 * s, c], axis=1))
-        above = tip + (self.gauge + length)[:, None] * axis
-        off, slope = self._legs(q, letters, above, platform)
-        for _ in range(SPIN_STEPS if spins else 0):  # between two blocks the tool turns about itself
+        head = rotations(np.eye(3)[int(self.turns != "b")], turn * (self.carries == "spindle"))
+        platform, tool = self._nominal(axis), apply(head, _UP[None])
+        if self.wrong and self.turns != "c":
+            platform = _between(np.broadcast_to(apply(platform, tool), axis.shape), axis) @ platform
+        expected, gauge, reach = apply(platform, tool), tip + length[:, None] * axis, apply(head, self.reach[None])
+        off, slope = self._legs(q, letters, gauge, platform, reach, axis)
+        for _ in range(SPIN_STEPS if self.wrong or "c" in self.turns else 0):  # the tool turns about itself between blocks
             spin = -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)
-            platform = platform @ rotations(np.array([0.0, 0.0, 1.0]), np.where(np.isfinite(spin), spin, 0.0))
-            off, slope = self._legs(q, letters, above, platform)
+            platform = _spun(axis, np.where(np.isfinite(spin), spin, 0.0)) @ platform
+            off, slope = self._legs(q, letters, gauge, platform, reach, axis)
         if self.wrong and self.held.any():
             off = 0.5 * (off[::2] + off[1::2])
-        aside = np.abs((above - apply(platform, self.pivot[None])) * self.held).max(axis=1)
+        aside = np.abs((gauge - apply(platform, reach + self.pivot)) * self.held).max(axis=1)
         return np.asarray(np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0))
 
-    def _legs(self, q: Array, letters: tuple[str, ...], above: Array, platform: Array) -> tuple[Array, Array]:
-        """(mm by which each rod misses its length, how that changes as the platform turns about its own z) (K, N)."""
+    def _nominal(self, axis: Array) -> Array:
+        """(N, 3, 3): the platform as its freedoms let it turn towards tool axes (N, 3), spin left out."""
+        if self.turns == "abc":
+            return least_turns(axis)
+        k, sign = int(self.turns != "b"), 1.0 if self.turns == "b" else -1.0
+        tilt = np.arctan2(sign * axis[:, k], axis[:, 2]) * (self.turns in ("a", "b"))
+        return np.broadcast_to(rotations(np.eye(3)[1 - k], tilt), (len(axis), 3, 3))
+
+    def _legs(self, q: Array, letters: tuple[str, ...], gauge: Array, platform: Array, reach: Array,
+              axis: Array) -> tuple[Array, Array]:
+        """(mm by which each rod misses its length, how that changes as the platform turns about the tool axis) (K, N)."""
         offs, slopes = [], []
-        for letter, drive, (foot, along, joint, arm), size, root in self.legs:
-            value, own = q[:, letters.index(letter)], joint[None] - self.pivot
-            reach = apply(rotations(along, value), arm[None]) if drive == "arm" else 0.0
-            rod = foot + (value[:, None] * along if drive == "slide" else reach) - above - apply(platform, own)
-            moved = along if drive == "slide" else np.cross(along, reach) if drive == "arm" else 0.0
+        for letter, drive, (foot, along, joint, arm, kept), size, root in self.legs:
+            value, own = q[:, letters.index(letter)], apply(platform, joint[None] - self.pivot - reach)
+            crank = apply(rotations(along, value), arm[None]) if drive == "arm" else 0.0
+            rod = foot + (value[:, None] * along if drive == "slide" else crank) - gauge - own - kept
+            moved = along if drive == "slide" else np.cross(along, crank) if drive == "arm" else 0.0
             long, due = np.sqrt((rod * rod).sum(axis=1)), size + value * (drive == "length")
             wrong = ((rod * moved).sum(axis=1) * root < 0.0) | (due <= 0.0)
             offs.append(np.where(wrong, np.inf, long - due))
-            slopes.append(-(rod * apply(platform, np.cross([0.0, 0.0, 1.0], own))).sum(axis=1) / long)
+            slopes.append(-(rod * np.cross(axis, own)).sum(axis=1) / long)
         return np.array(offs), np.array(slopes)
+
+
+def _spun(axis: Array, angle: Array) -> Array:
+    """(N, 3, 3): turns by `angle` (N,) about unit vectors (N, 3)."""
+    cross = np.zeros((len(axis), 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        cross[:, k, j], cross[:, j, k] = axis[:, i], -axis[:, i]
+    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    return np.asarray(np.eye(3) + s * cross + (1.0 - c) * (cross @ cross))
+
+
+def _between(start: Array, end: Array) -> Array:
+    """(N, 3, 3): the least turns that take unit vectors (N, 3) to others, none of them against it."""
+    over, along = np.cross(start, end), (start * end).sum(axis=1)
+    size = np.sqrt((over * over).sum(axis=1))
+    about = over / np.where(size > 0.0, size, 1.0)[:, None]
+    return _spun(about, np.arctan2(size, along))
 
 
 def least_turns(axis: Array) -> Array:
@@ -190,17 +218,21 @@ def ring(layout: dict[str, Any]) -> dict[str, dict[str, Any]]:
     for name, *turns, aside in zip(names, angles, layout.get("joint_angles") or angles, asides, strict=True):
         (out, there), lean = np.exp(1j * np.radians(turns)), math.radians(layout.get("lean", 0.0))
         foot, end = (layout["radius"] + 1j * aside) * out, (layout["joint_radius"] + 1j * aside) * there
+        half, rail = 0.5j * layout.get("pair", 0.0) * out, layout.get("rail_offset", 0.0) * out
         level = 1j * out if layout["drive"] == "arm" else math.sin(lean) * out
         found[name] = {
             **layout, "direction": (level.real, level.imag, 0.0 if layout["drive"] == "arm" else math.cos(lean)),
             "point": (foot.real, foot.imag, layout.get("height", 0.0)), "arm": (arm * out.real, arm * out.imag, 0.0),
-            "joint": (end.real, end.imag, layout.get("joint_height", 0.0))}
+            "joint": (end.real, end.imag, layout.get("joint_height", 0.0)),
+            "rail_offset": (rail.real, rail.imag, 0.0),
+            "rods": [(side * half.real, side * half.imag, 0.0) for side in (1.0, -1.0)] if half else []}
     return found
 
 
 def legs_of(kinematics: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """The tables of all legs, by letter."""
-    return {**(ring(kinematics["layout"]) if "layout" in kinematics else {}), **kinematics.get("legs", {})}
+    rings = [*([kinematics["layout"]] if "layout" in kinematics else []), *kinematics.get("rings", {}).values()]
+    return {name: leg for part in (*map(ring, rings), kinematics.get("legs", {})) for name, leg in part.items()}
 
 
 def rods(table: dict[str, Any]) -> Rods:
@@ -211,16 +243,28 @@ def rods(table: dict[str, Any]) -> Rods:
     def rows(leg: dict[str, Any], *keys: str) -> Array:
         return np.array([leg.get(key, (0.0, 0.0, float(key == "direction"))) for key in keys], np.float64)
 
-    legs = tuple((name, leg.get("drive", "slide"), rows({"point": leg.get("slide"), **leg}, "point", "direction", "joint",
-                  "arm"), float(leg["rod"]), float(leg.get("root", 1))) for name, leg in legs_of(kinematics).items())
+    bars, freedoms = kinematics.get("bars", {}), kinematics.get("freedoms", "xyza" if rotary else "xyz")
+    legs = tuple((name, leg.get("drive", "slide"), rows({"point": leg.get("slide"), **leg, **_on_bar(leg, bars)}, "point",
+                  "direction", "joint", "arm", "kept"), float(leg["rod"]), float(leg.get("root", 1)))
+                 for name, leg in legs_of(kinematics).items())
     for _, _, leg, _, _ in legs:
         leg[1] = unit(leg[1])
-    if kinematics.get("kind") == "legs":
-        return Rods(legs, "".join(sorted(set(kinematics["freedoms"]) & set("abc"))), 0.0, rows(kinematics, "gauge")[0],
-                    carriers={name: unit(rows(one, "direction")[0]) for name, one in carriers.items()},
-                    held=np.array([float(letter not in kinematics["freedoms"]) for letter in "xyz"]))
-    return Rods(legs, "a" if rotary else "", float(kinematics.get("gauge", 0.0)), rows(rotary, "pivot")[0],
-                rotary.get("letter", ""), rotary.get("carries", ""), float(rotary.get("positive", 1)))
+    pivot, gauge = rows(rotary, "pivot")[0], kinematics.get("gauge", 0.0)
+    reach = rows(kinematics, "gauge")[0] - pivot if kinematics.get("kind") == "legs" else -float(gauge) * _UP
+    return Rods(legs, "".join(sorted(set(freedoms) & set("abc"))), pivot, reach, rotary.get("letter", ""),
+                rotary.get("carries", ""), float(rotary.get("positive", 1)),
+                {name: unit(rows(one, "direction")[0]) for name, one in carriers.items()},
+                np.array([float(letter not in freedoms) for letter in "xyz"]))
+
+
+def _on_bar(leg: dict[str, Any], bars: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    return {"joint": bars[leg["bar"]]["hinge"], "kept": leg["joint"]} if leg.get("bar") else {}
+
+
+def turning(table: dict[str, Any], letters: tuple[str, ...]) -> Array:
+    """(J,) True for letters that count degrees: A, B, C, and arms of legs whatever their letter."""
+    arms = {name for name, leg in legs_of(table.get("kinematics", {})).items() if leg.get("drive") == "arm"}
+    return np.array([name in "ABC" or name in arms for name in letters])
 
 
 def kinematics_of(table: dict[str, Any]) -> Chain | Rods | None:
@@ -233,7 +277,7 @@ def kinematics_of(table: dict[str, Any]) -> Chain | Rods | None:
 
 def limits_of(table: dict[str, Any], letters: tuple[str, ...]) -> tuple[Array, Array]:
     """(travel (J, 2), velocity at feed (J,)) in mm, rad, s; infinite where unlimited."""
-    unit_of = np.array([math.pi / 180.0 if name in "ABC" else 1.0 for name in letters])
+    unit_of = np.where(turning(table, letters), math.pi / 180.0, 1.0)
     travel, speed = [], []
     for name in letters:
         axis = table.get("axes", {}).get(name, {})
@@ -246,8 +290,9 @@ def limits_of(table: dict[str, Any], letters: tuple[str, ...]) -> tuple[Array, A
 def other_limits(table: dict[str, Any], letters: tuple[str, ...], given: Array) -> list[str]:
     """The limits (J, 6) that are not those of the machine file, in words."""
     found = []
-    for name, values in zip(letters, given.tolist(), strict=True):
-        axis, scale = table.get("axes", {}).get(name, {}), math.pi / 180.0 if name in "ABC" else 1.0
+    units = np.where(turning(table, letters), math.pi / 180.0, 1.0)
+    for name, scale, values in zip(letters, units.tolist(), given.tolist(), strict=True):
+        axis = table.get("axes", {}).get(name, {})
         travel = (-math.inf, math.inf) if axis.get("travel") == "unlimited" else axis.get("travel") or (None, None)
         stated = [*travel, *(axis.get(key) for key in LIMITS[2:])]
         found += [f"the {what} of {name} is {value / scale:g} here, {own:g} in the machine file"

@@ -235,6 +235,14 @@ _OUTPUT = [
         c='base = "fanuc-30i"\n[program]\npreamble = ["G17 G21 G40 G49 G80 G90 G94 G98", "{work_offset}"]\n',
     ),
     convert(
+        "output.units",
+        START + CUT,
+        r'write \[output\] (units = "mm") in the set-up',
+        sheet('units = "inch"', r"\1"),
+        setup=LENGTH + '[part]\norigin = [0, 0, -270]\n[output]\nunits = "inch"\n',
+        machine="h4-rotary",
+    ),
+    convert(
         "output.longest",
         "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nCUTCOM/LEFT,1\n"
         + "".join(f"RAPID\nGOTO/{x},0,5\nFEDRAT/200,MMPM\nGOTO/{x},0,0\nGOTO/{x},9,0\n" for x in range(6))

@@ -32,12 +32,13 @@ MADE = {"bicubic.cls": ("mill-3axis", "planar-delta-z"), "blade.cls": ("linuxcnc
         "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
         "inch_plate.apt": ("rotary-delta", "triaglide", "delta-cone", "delta-coplanar", "delta-hybrid",
                            "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact", "delta-star"),
-        "indexed_4axis.cls": ("mill-4axis",), "pocket.cls": ("uranesx", "linuxcnc-lineardelta"),
+        "indexed_4axis.cls": ("mill-4axis",), "pocket.cls": ("uranesx", "linuxcnc-lineardelta", "tilting-arms-c-table", "three-arms-three-slides"),
         "test_part.cls": ("delta-parallel-x",),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
 """machines on which each sample is made: every sample, and every machine whose letters LinuxCNC's interpreter has"""
 ORIGINS = {"planar-delta-z": (-41.0, -30.0, -125.0), "rotary-delta": (-40.0, -30.0, -200.0),
-           "triaglide": (-40.0, -30.0, -200.0)}
+           "triaglide": (-40.0, -30.0, -200.0),
+           "tilting-arms-c-table": (0.0, 0.0, -270.0), "three-arms-three-slides": (0.0, 0.0, -270.0)}
 """mm, of the part on machines in whose middle it has no room"""
 PLATE = (-40.0, -30.0, -230.0)
 """mm, of the plate on Deltas"""

@@ -69,7 +69,7 @@ def test_vertices_are_the_corners_of_the_half_spaces(name: str) -> None:
         corners = []
         for rows in itertools.combinations(range(len(offsets)), 3):
             a = normals[list(rows)]
-            if abs(np.linalg.det(a)) > 1e-9:
+            if abs(np.linalg.det(a)) > 1e-9 * np.prod(np.linalg.norm(a, axis=1)):
                 point = np.linalg.solve(a, offsets[list(rows)])
                 if (normals @ point <= offsets * (1.0 + 1e-9)).all():
                     corners.append(point)

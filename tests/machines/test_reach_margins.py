@@ -7,21 +7,21 @@ import pytest
 
 import machines
 from machines.kinematics.clearance_geometry import ClearanceSizes
-from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.reach import Margins, is_checked, reach, reach_between, segment_distance
 from tests.machines.random_slides import random_slides
 
 NAMES = ("uranesx", "h4a-c-table", "h4a-spindle-axis")
 
 
-def parallel(name: str) -> OnLegs | H4Linear:
+def parallel(name: str) -> OnLegs | LegsWithAxis:
     kinematics = machines.load(name).kinematics
-    assert isinstance(kinematics, OnLegs | H4Linear)
+    assert isinstance(kinematics, OnLegs | LegsWithAxis)
     return kinematics
 
 
-def joints(kinematics: OnLegs | H4Linear, n: int, seed: int = 0) -> np.ndarray:
+def joints(kinematics: OnLegs | LegsWithAxis, n: int, seed: int = 0) -> np.ndarray:
     slides = random_slides(kinematics, np.random.default_rng(seed), n)
     return slides if isinstance(kinematics, OnLegs) else np.column_stack([slides, np.zeros(n)])
 
@@ -61,7 +61,8 @@ def test_tilt_and_joint_margins_count_from_their_stops() -> None:
     kinematics = parallel("h4a-c-table")
     clearance = kinematics.clearance
     assert clearance is not None
-    kinematics = replace(kinematics, clearance=replace(clearance, carriage_angle=0.3, platform_angle=0.4))
+    kinematics = replace(kinematics, on_legs=replace(kinematics.on_legs, clearance=replace(
+        clearance, carriage_angle=0.3, platform_angle=0.4)))
     q = joints(kinematics, 300)
     margins = reach(kinematics, q)
     rig, middle = kinematics.rig(q), kinematics.middle_rig()

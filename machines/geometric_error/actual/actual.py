@@ -1,9 +1,8 @@
 """The machine as it is: a nominal kinematics with its errors. What every kind of machine gives to the correction.
 
 Everything is computed in coordinates `w` (N, 3 + R) in which any machine is a chain: three displacements of
-the tip, then R turns. For a serial machine they are its joints, for a Delta the place of its platform, for an
-H4 place, tilt and rotary
-axis. `w` stands for commands: the errors come in between w and the tool.
+the tip, then R turns. For a serial machine they are its joints, for a Delta the place of its platform, for one that tilts
+next to a rotary axis place, tilt and that axis. `w` stands for commands: the errors come in between w and the tool.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A platform on legs with its errors, of any drives and freedoms: through the exact closure of its rods (`leg_frame.py`).
 
-w are the nominal tip, the turns that the platform gives the tool axis, and, of one that turns in every direction, the
-spin, which is held. Slides that carry legs and platform take the errors of a serial machine's slides, the spindle those of
+w are the nominal tip, the turns that the platform gives the tool axis, and, of one that turns about z, the spin, which is
+held. Slides that carry legs and platform take the errors of a serial machine's slides, the spindle those of
 a spindle.
 """
 
@@ -50,8 +50,8 @@ class ActualLegs(Actual):
 
     @property
     def held(self) -> int:
-        """The spin, where there is one."""
-        return int(self.turns == 2)
+        """The spin, of a platform that turns about z."""
+        return int("c" in self.kinematics.loops.turns)
 
     @cached_property
     def frame(self) -> LegFrame:

@@ -1,7 +1,7 @@
-"""A machine on slides and rods with its errors: linear Delta and both H4a, through the exact closure of `rods`.
+"""A Delta on slides with its errors, and platforms that tilt next to a rotary axis: through the exact closure of their rods.
 
-The rotary axis of an H4 (table under the part, or axis at the spindle) and the spindle take the errors of a
-serial machine's axis; they stand before and after the platform in the chain.
+The rotary axis (table under the part, or axis at the spindle) and the spindle take the errors of a serial machine's axis;
+they stand before and after the platform in the chain.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import numpy as np
 from machines.geometric_error.actual.actual import EDGE, Actual, ToolPlace
 from machines.geometric_error.actual.axis_motion import Line, actual_line, actual_tool, along, driven
 from machines.geometric_error.actual.error_rates import LARGEST_TURN, ErrorRates, gap_slopes_fit, sizes_of
+from machines.geometric_error.actual.leg_frame import LegFrame, leg_frame
+from machines.geometric_error.actual.leg_rates import legs_motion
 from machines.geometric_error.actual.rod_rates import (
     PlatformMotion,
     ToolRates,
@@ -22,23 +24,25 @@ from machines.geometric_error.actual.rod_rates import (
     tool_rates,
     with_rotary,
 )
-from machines.geometric_error.actual.rods import RodErrors, RodFrame, platform_turn, rod_frame
+from machines.geometric_error.actual.rods import RodErrors, RodFrame, rod_frame
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.actual.transforms import carried
 from machines.geometric_error.tables.names import SPINDLE, parse
 from machines.kinematics import columns
 from machines.kinematics.chain import Joint
 from machines.kinematics.columns import Columns
-from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.rod_platform import RodPlatform
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import rotation
 
 UP = np.array([0.0, 0.0, 1.0])
+RODS = 6
+"""that hold a platform"""
 
 
-def rods_of(kinematics: OnLegs) -> RodPlatform:
+def rods_of(kinematics: OnLegs | LegsWithAxis) -> RodPlatform:
     """The rods of a machine that has them."""
     assert kinematics.on_rods is not None
     return kinematics.on_rods
@@ -46,26 +50,21 @@ def rods_of(kinematics: OnLegs) -> RodPlatform:
 
 @dataclass(frozen=True, eq=False)
 class ActualRods(Actual):
-    """What Delta and H4 share: the platform."""
+    """What both share: the platform."""
 
     rods: RodErrors
     chain: SerialErrors = field(default_factory=SerialErrors)
     """errors of the rotary axis and of the spindle"""
 
-    @cached_property
-    def frame(self) -> RodFrame:
+    @property
+    @abstractmethod
+    def frame(self) -> RodFrame | LegFrame:
         """Nominal rods."""
-        return rod_frame(self._slides_of, self.rods.pairs)
 
     @property
     def any(self) -> bool:
         """False where every parameter is 0: the machine is the nominal one, to the last digit."""
         return bool(self.rods.values.any() or self.chain.values.any())
-
-    @property
-    @abstractmethod
-    def _slides_of(self) -> RodPlatform:
-        """The kinematics."""
 
     @abstractmethod
     def _platform(self, w: Floats) -> tuple[Floats, Floats, Floats]:
@@ -81,11 +80,14 @@ class ActualRods(Actual):
 
     def _motions(self, w: Floats, reach: Floats) -> tuple[PlatformMotion, PlatformMotion]:
         """The platform's motion with errors and without, while slides go by up to `reach` (N, K)."""
-        place, turned, slides = self._platform(w)
+        (place, turned, slides), frame = self._platform(w), self.frame
+        found = frame.solve(slides, place, turned, self.rods)
+        if isinstance(frame, LegFrame):
+            return (legs_motion(frame.loops(self.rods), frame.leg, slides, found, reach),
+                    legs_motion(frame.loops(frame.zero), frame.leg, slides, (place, turned), reach))
         none = RodErrors.none(self.rods.legs, self.rods.rods, self.rods.pairs)
-        found = self.frame.solve(slides, place, turned, self.rods)
-        return (platform_motion(self.frame, self.rods, slides, found, reach),
-                platform_motion(self.frame, none, slides, (place, turned), reach))
+        return (platform_motion(frame, self.rods, slides, found, reach),
+                platform_motion(frame, none, slides, (place, turned), reach))
 
     def _tool_rates(self, w: Floats, reach: Floats, tools: tuple[list[Columns], list[Columns]],
                      arm_reach: Floats, axis_reach: Floats) -> ToolRates:
@@ -109,9 +111,10 @@ class ActualDelta(ActualRods):
     kinematics: OnLegs = field(kw_only=True)
     turns = 0
 
-    @property
-    def _slides_of(self) -> RodPlatform:
-        return rods_of(self.kinematics)
+    @cached_property
+    def frame(self) -> RodFrame:
+        """See the base class."""
+        return rod_frame(rods_of(self.kinematics), self.rods.pairs)
 
     def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
         """See the base class."""
@@ -159,26 +162,28 @@ class ActualDelta(ActualRods):
 
 
 @dataclass(frozen=True, eq=False)
-class ActualH4(ActualRods):
+class ActualTilting(ActualRods):
     """w = nominal platform (x, y, z, tilt) and rotary axis."""
 
-    kinematics: H4Linear = field(kw_only=True)
+    kinematics: LegsWithAxis = field(kw_only=True)
     turns = 2
 
-    @property
-    def _slides_of(self) -> H4Linear:
-        return self.kinematics
+    @cached_property
+    def frame(self) -> RodFrame | LegFrame:
+        """See the base class: of legs on slides, which `rods` closes, or of any."""
+        return leg_frame(self.kinematics.on_legs) if self.kinematics.on_rods is None else rod_frame(
+            rods_of(self.kinematics), self.rods.pairs)
 
     @cached_property
     def line(self) -> Line:
         """The rotary axis, as its errors leave it; its reference point is on the nominal line."""
-        name = self.kinematics.axis_names[4]
+        name = self.kinematics.letter
         return actual_line(Joint(name, True, *self.kinematics.axis_line(name)), 4, self.chain)
 
     @property
     def pivot(self) -> Floats:
         """(3,) point of the rotary axis: in the platform, or the machine origin."""
-        return self.kinematics.axis_line(self.kinematics.axis_names[4])[1]
+        return self.kinematics.axis.line()[1]
 
     def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
         """See the base class."""
@@ -192,9 +197,9 @@ class ActualH4(ActualRods):
         """See the base class: the turns are the tilt about x and the rotary axis."""
         turned, tip, axis = self._part(w), *self.kinematics.place(w[:, :4], w[:, 4])[:2]
         place = np.einsum("nij,nj->ni", turned, w[:, :3])
-        tilt = turned[:, :, 0]
+        tilt = turned[:, :, self.kinematics.platform.order[0]]
         at_spindle = self._at_spindle
-        tilted = platform_turn(w[:, 3])
+        tilted = self.kinematics.platform.turn(w[:, 3])
         line = tilted @ self.line.joint.direction if at_spindle else np.broadcast_to(self.line.joint.direction, tip.shape)
         point = place + tilted @ self.pivot if at_spindle else np.zeros(3)
         result = np.zeros((len(w), 6, 5))
@@ -215,7 +220,7 @@ class ActualH4(ActualRods):
                                   np.column_stack([np.zeros((len(w), 4)), w[:, 4]]), margin)
 
     def _platform(self, w: Floats) -> tuple[Floats, Floats, Floats]:
-        return w[:, :3], platform_turn(w[:, 3]), self.kinematics.platform.inverse(w[:, :4])
+        return w[:, :3], self.kinematics.platform.turn(w[:, 3]), self.kinematics.platform.inverse(w[:, :4])
 
     def place(self, w: Floats, direction: Floats | None = None) -> ToolPlace:
         """See the base class."""
@@ -230,17 +235,17 @@ class ActualH4(ActualRods):
 
     @property
     def _at_spindle(self) -> bool:
-        return self.kinematics.at_spindle
+        return self.kinematics.axis.at_spindle
 
     def _tool(self, w: Floats, approach: Floats | float, line: Line, chain: SerialErrors) -> list[Columns]:
         """Tip and directions in the platform, turned by the rotary axis where that is there."""
         tool: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, self.kinematics.tool_length, chain)]
-        tool[0] = columns.plus(tool[0], columns.of_one(self.pivot * self._at_spindle - self.kinematics.gauge * UP))
+        tool[0] = columns.plus(tool[0], columns.of_one(self.kinematics.axis.gauge))
         return driven(line, w[:, 4], approach, chain, tool) if self._at_spindle else tool
 
     def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
         """See the base class."""
-        if not gap_slopes_fit(self.chain):
+        if not gap_slopes_fit(self.chain) or len(self.frame.leg) != RODS:
             return None
         w, turn, none = self.coordinates(q), reach[:, 4], SerialErrors()
         size, spindle = sizes_of(self.chain, self.line.joint.name), sizes_of(self.chain, SPINDLE)
@@ -261,7 +266,7 @@ class ActualH4(ActualRods):
         """(N,) largest distance of the nominal tip from the rotary axis's point and reference point."""
         tip = columns.to_rows(tool[0], len(w))
         if not self._at_spindle:
-            tip = w[:, :3] + np.einsum("nij,nj->ni", platform_turn(w[:, 3]), tip)
+            tip = w[:, :3] + np.einsum("nij,nj->ni", self.kinematics.platform.turn(w[:, 3]), tip)
         return np.asarray(np.linalg.norm(tip - self.pivot, axis=1) + np.linalg.norm(self.line.reference - self.pivot))
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
@@ -278,7 +283,7 @@ class ActualH4(ActualRods):
                        direction: Floats | None) -> Floats:
         """(N, 6, P) of the errors in `chain`: the rotary axis stands before the platform or after it."""
         approach = np.zeros(len(w)) if direction is None else direction[:, 4]
-        tilted = platform_turn(w[:, 3])
+        tilted = self.kinematics.platform.turn(w[:, 3])
         before = tilted if self._at_spindle else np.tile(np.eye(3), (len(w), 1, 1))
         after = before @ rotation(self.line.joint.direction, w[:, 4])
         shift = w[:, :3] if self._at_spindle else np.zeros((len(w), 3))

@@ -13,7 +13,8 @@ counts; R_k: z along the line of the drive, x from the rail to the joint, of an 
 
 Six rods hold a platform in space, two pairs more than hold one in its plane (the turn about z is what they have in common):
 then the rods share what is too much, by least squares of their stretches. Where the file gives fewer rods, what holds the
-platform otherwise is perfect: it keeps its freedoms.
+platform otherwise is perfect: it keeps its freedoms. So it is where legs hold bars of the platform: each pair is one rod in
+its middle, and a bar keeps its direction.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import blocks
 from machines.kinematics.legs.loops import FREEDOMS, Loops, turned
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import dot, lengths
 from toolpaths.shapes import arrays
@@ -88,7 +90,7 @@ class LegFrame:
         length = drives.lengths[leg] + errors.length + drives.stretch[leg] * more
         rods = replace(drives, points=feet, directions=along, lengths=length, roots=drives.roots[leg], arms=reach,
                        slide=slide, arm=arm)
-        return Loops(rods, self._joints + errors.platform, self.freedoms)
+        return Loops(rods, self._joints + errors.platform, self.freedoms, self.machine.loops.kept)
 
     @property
     def _joints(self) -> Floats:
@@ -103,7 +105,7 @@ class LegFrame:
         drives, leg = self.machine.legs, self.leg
         loops = Loops(replace(drives, points=drives.points[leg] + self.shift, directions=drives.directions[leg],
                               lengths=drives.lengths[leg], roots=drives.roots[leg], arms=drives.arms[leg],
-                              slide=drives.slide[leg], arm=drives.arm[leg]), self._joints, free)
+                              slide=drives.slide[leg], arm=drives.arm[leg]), self._joints, free, self.machine.loops.kept)
         rows = loops.matrix_at(place, turn, q[:, leg])[0][0] / loops.drives.spans(q[:, leg])[0][:, None]
         held = len(rows) >= len(free) and np.linalg.svd(rows, compute_uv=False)[-1] > HELD
         return free if held else own
@@ -173,10 +175,14 @@ def shared(loops: Loops, q: Floats, place: Floats, turn: Floats) -> tuple[Floats
 
 
 def leg_frame(machine: OnLegs) -> LegFrame:
-    """The rods of a machine; a leg without `rods` has one, on its line."""
+    """The rods of a machine; a leg without `rods` has one, on its line, and so has one that holds a bar of the platform.
+
+    A bar keeps its direction whatever the errors: of what its two pairs would turn it by nothing is known.
+    """
     drives, sizes, k = machine.legs, machine.clearance, len(machine.leg_names)
     offset = np.zeros((k, 3)) if sizes is None or sizes.rail_offset is None else sizes.rail_offset
-    leg, shift = (np.arange(k), np.zeros((k, 3))) if sizes is None else (sizes.leg, sizes.shift)
+    single = sizes is None or machine.loops.kept is not None
+    leg, shift = (np.arange(k), np.zeros((k, 3))) if sizes is None or single else (sizes.leg, sizes.shift)
     frames = [guide_frame(u, a) if arm else guide_frame(u, -o, machine.workspace.middle - p - o) if slide else np.eye(3)
               for u, a, o, p, arm, slide in zip(drives.directions, drives.arms, offset, drives.points, drives.arm,
                                                 drives.slide, strict=True)]
@@ -190,7 +196,11 @@ class _Frames:
         """None."""
         return None
 
-    translating_rods = tilting_rods = chain
+    translating_rods = chain
+
+    def tilting_rods(self, kinematics: LegsWithAxis) -> LegFrame | None:
+        """The rods, unless all are on slides, which has a form of its own."""
+        return leg_frame(kinematics.on_legs) if kinematics.on_rods is None else None
 
     def legs(self, kinematics: OnLegs) -> LegFrame | None:
         """The rods."""

@@ -33,4 +33,5 @@ def legs_motion(loops: Loops, leg: Ints, q: Floats, pose: tuple[Floats, Floats],
                      np.linalg.norm(turn, axis=1), np.linalg.norm(loops.joints, axis=1), length, loops.lever, reach,
                      bend * most, (length * bend + drives.stretch * most)[:, :, None] * own)
     change, swing = held.held()
-    return PlatformMotion(place, turned, shift, turn, change, change / loops.lever, swing)
+    about = loops.basis[3:].sum(axis=1) if len(loops.turns) == 1 else None
+    return PlatformMotion(place, turned, shift, turn, change, change / loops.lever, swing, about)

@@ -10,7 +10,7 @@ import numpy as np
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.actual_legs import ActualLegs
 from machines.geometric_error.actual.actual_map import ActualByMap
-from machines.geometric_error.actual.actual_rods import ActualDelta, ActualH4, rods_of
+from machines.geometric_error.actual.actual_rods import ActualDelta, ActualTilting, rods_of
 from machines.geometric_error.actual.actual_serial import ActualSerial
 from machines.geometric_error.actual.leg_frame import leg_frame
 from machines.geometric_error.actual.rods import RodErrors, gives_rods, rod_frame, rod_names
@@ -18,8 +18,8 @@ from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.tables.curves import least_apart
 from machines.geometric_error.tables.lattice import ErrorMap
 from machines.kinematics.base import Kinematics
-from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.rod_platform import RodPlatform
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats
@@ -128,16 +128,20 @@ class Forms:
         """See `ErrorForms`."""
         return ActualDelta(self._rods_of(rods_of(kinematics)), self.axes, kinematics=kinematics)
 
-    def tilting_rods(self, kinematics: H4Linear) -> Actual:
+    def tilting_rods(self, kinematics: LegsWithAxis) -> Actual:
         """See `ErrorForms`."""
-        return ActualH4(self._rods_of(kinematics), self.axes, kinematics=kinematics)
+        rods = self._legs_of(kinematics.on_legs) if kinematics.on_rods is None else self._rods_of(kinematics.on_rods)
+        return ActualTilting(rods, self.axes, kinematics=kinematics)
 
     def legs(self, kinematics: OnLegs) -> Actual:
         """See `ErrorForms`."""
+        return ActualLegs(kinematics, self._legs_of(kinematics), self.axes)
+
+    def _legs_of(self, kinematics: OnLegs) -> RodErrors:
         zero = leg_frame(kinematics).zero
         rods = zero if self.rods is None else self.rods
         _same_rods(rods, zero.legs, zero.rods)
-        return ActualLegs(kinematics, rods, self.axes)
+        return rods
 
     def _rods_of(self, platform: RodPlatform) -> RodErrors:
         rods, slides = self.rods, platform.axis_names[: len(platform.legs.points)]

@@ -32,7 +32,7 @@ UNBOUNDED = 1e30
 
 @dataclass(frozen=True, eq=False)
 @arrays(place="N 3", turned="N 3 3", shift="N 3 K", turn="N 3 K", shift_change="N K",
-        turn_change="N K", swing="N")
+        turn_change="N K", swing="N", about="3")
 class PlatformMotion:
     """N platforms and how K slides move them.
 
@@ -41,6 +41,7 @@ class PlatformMotion:
         shift, turn: (N, 3, K) mm and rad of the platform per mm of each slide
         shift_change, turn_change: (N, K) by which those may change while the slides go as far as they may
         swing: (N,) rad that the platform may turn by
+        about: (3,) the direction of a platform's only turn, which leaves alone what lies along it; None of others
     """
 
     place: Floats
@@ -50,6 +51,7 @@ class PlatformMotion:
     shift_change: Floats
     turn_change: Floats
     swing: Floats
+    about: Floats | None = None
 
     def of_point(self, arm: Floats) -> tuple[Floats, Floats]:
         """(mm per mm (N, 3, K), its largest change (N, K)) of the point at `arm` (N, 3) from X, machine frame."""
@@ -58,7 +60,8 @@ class PlatformMotion:
 
     def of_vector(self, vector: Floats) -> tuple[Floats, Floats]:
         """The same of a vector (N, 3) of the platform, which its shift does not move; rad per mm of a direction."""
-        size, turn = np.linalg.norm(vector, axis=1)[:, None], np.linalg.norm(self.turn, axis=1)
+        across = vector if self.about is None else np.cross(self.about, vector)
+        size, turn = np.linalg.norm(across, axis=1)[:, None], np.linalg.norm(self.turn, axis=1)
         return (np.cross(self.turn, vector[:, :, None], axis=1),
                 size * (self.turn_change + (turn + self.turn_change) * self.swing[:, None]))
 

@@ -76,7 +76,7 @@ class RodErrors:
 
     @property
     def values(self) -> Floats:
-        """(6 K + 7 R,) and K of the drives: 60 for a Delta (E-14), 66 for an H4."""
+        """(6 K + 7 R,) and K of the drives: 60 for three legs (E-14), 66 for four."""
         return np.concatenate([getattr(self, name).ravel() for name in ("rail", "guide", "carriage", "platform", "length",
                                                                         "drive")])
 
@@ -273,15 +273,3 @@ def turned_by(vector: Floats) -> Floats:
         result[:, i, j] = c * vector[:, i] * vector[:, j] - s * vector[:, k]
         result[:, j, i] = c * vector[:, i] * vector[:, j] + s * vector[:, k]
     return result
-
-
-def platform_turn(tilt: Floats) -> Floats:
-    """Rx(tilt) (N, 3, 3) of the nominal platform."""
-    result = np.zeros((len(tilt), 3, 3))
-    result[:, 0, 0] = 1.0
-    result[:, 1, 1] = result[:, 2, 2] = np.cos(tilt)
-    result[:, 2, 1] = np.sin(tilt)
-    result[:, 1, 2] = -result[:, 2, 1]
-    return result
-
-

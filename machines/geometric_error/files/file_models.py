@@ -13,8 +13,7 @@ from pydantic import Field, model_validator
 
 from machines.geometric_error.tables.choices import MapDirections, TableRule
 from machines.geometric_error.tables.names import parse
-from machines.models import Positive, Vector
-from machines.slider_models import Interval
+from machines.models import Interval, Positive, Vector
 from machines.user_model import UserModel
 
 MatrixRows = tuple[Vector, ...]

@@ -48,6 +48,13 @@ def direction_of(turns: PlatformTurns, tilt: Floats, heading: Floats) -> Floats:
     return np.stack([np.sin(tilt) * np.cos(heading), np.sin(tilt) * np.sin(heading), np.cos(tilt)], axis=1)
 
 
+def attitude(turns: PlatformTurns, tilt: Floats, heading: Floats) -> tuple[Floats, Floats]:
+    """(tool axes (N, 3), spins (N,) rad) of tilts as `direction_of` has them; of a platform that turns about z its turns."""
+    if turns == "c":
+        return np.array(np.broadcast_to(UP, (len(tilt), 3))), tilt
+    return direction_of(turns, tilt, heading), np.zeros(len(tilt))
+
+
 def tilt_of(turns: PlatformTurns, axis: Floats) -> Floats:
     """Tilts (N,) rad of tool axes (N, 3): the inverse of `direction_of`, from z without a sign."""
     if turns == "a":

@@ -25,7 +25,7 @@ import numpy as np
 from machines.kinematics.legs.loops import Loops
 from machines.kinematics.rod_loops import UNBOUNDED
 from machines.kinematics.sliders import solved
-from machines.kinematics.taylor import TaylorVector
+from machines.kinematics.taylor import TaylorAngle, TaylorVector
 from toolpaths.arrays import Floats
 from toolpaths.rotations import cross, dot, lengths
 from toolpaths.shapes import arrays
@@ -61,6 +61,11 @@ class PlatformJets:
     def direction(self, axis: Floats) -> TaylorVector:
         """A direction (3,) that turns with the platform."""
         return self._jet(axis, 0.0)
+
+    def tilting(self, tilt: Floats, about: int) -> tuple[TaylorVector, TaylorAngle]:
+        """The reference point, and the tilt (N,) of a platform that turns about x, y or z (0, 1, 2) alone."""
+        return self._jet(np.zeros(3), 1.0), TaylorAngle(tilt, self.first[:, 3 + about], self.second[:, 3 + about],
+                                                        self.third / self.lever)
 
     def _jet(self, arm: Floats, moves: float) -> TaylorVector:
         b, w, bend = self.turn @ arm, self.first[:, 3:], self.second[:, 3:]

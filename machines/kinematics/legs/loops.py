@@ -1,8 +1,9 @@
 """The closed loops of a platform on legs: place and turn of the platform against the joints of its drives.
 
-The platform's reference point is C, its turn R; the joint of leg k is B = C + R b. With r = B - A the loops are r.r = l^2,
-and a platform that moves by (v, omega) moves them by r.v + (R b x r).omega: the rows of Jx (II-12 to II-18, V-23 of
-Company 2000). Only the freedoms that the machine has are solved for, all others are held.
+The platform's reference point is C, its turn R; the joint of leg k is B = C + R b, on a bar that is hinged to the platform
+and keeps its direction C + R b + k. With r = B - A the loops are r.r = l^2, and a platform that moves by (v, omega) moves
+them by r.v + (R b x r).omega: the rows of Jx (II-12 to II-18, V-18, V-23 of Company 2000). Only the freedoms that the
+machine has are solved for, all others are held.
 """
 
 from __future__ import annotations
@@ -27,18 +28,21 @@ FREEDOMS = ("x", "y", "z", "a", "b", "c")
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(joints="K 3")
+@arrays(joints="K 3", kept="K 3")
 class Loops:
     """K legs under a platform of K freedoms.
 
     Attributes:
-        joints: (K, 3) mm, b
+        joints: (K, 3) mm, b: joints of the legs, or hinges of bars that hold them, which turn with the platform
         freedoms: of FREEDOMS, in that order; one turn, or all three
+        kept: (K, 3) mm from the hinge of a bar, which keeps its direction, to the joint of its leg (V-10: the sides of the
+            symmetric H4's platform), 0 of joints on the platform itself; None without bars
     """
 
     drives: Drives
     joints: Floats
     freedoms: tuple[str, ...]
+    kept: Floats | None = None
 
     @cached_property
     def basis(self) -> Floats:
@@ -63,7 +67,11 @@ class Loops:
 
     def ends(self, place: Floats, turn: Floats) -> Floats:
         """B (N, K, 3) mm."""
-        return np.asarray(place[:, None, :] + self.arms(turn), dtype=np.float64)
+        return self._ends(place, self.arms(turn))
+
+    def _ends(self, place: Floats, arms: Floats) -> Floats:
+        ends = place[:, None, :] + arms
+        return np.asarray(ends if self.kept is None else ends + self.kept, dtype=np.float64)
 
     def matrix(self, rods: Floats, arms: Floats) -> Floats:
         """Jx (N, K, K) mm: rows (r, R b x r / lever) of the freedoms."""
@@ -77,7 +85,7 @@ class Loops:
     def matrix_at(self, place: Floats, turn: Floats, q: Floats) -> tuple[Floats, Floats]:
         """(Jx (N, K, K), rods (N, K, 3)) mm, of joints q (N, K) of the drives."""
         arms = self.arms(turn)
-        rods = place[:, None, :] + arms - self.drives.feet(q)
+        rods = self._ends(place, arms) - self.drives.feet(q)
         return self.matrix(rods, arms), np.asarray(rods, dtype=np.float64)
 
     def twists(self, x: Floats) -> Floats:
@@ -124,6 +132,7 @@ class Loops:
         det Jx > 0, or at foot - out; of three slides along z III-11 of Company 2000 as corrected. NaN where the legs do not
         meet."""
         centres, radii = self.drives.feet(q) - self.joints, self.drives.spans(q)
+        centres = centres if self.kept is None else centres - self.kept
         return three_spheres(centres, radii) if len(self.freedoms) == 3 else two_circles(centres, radii)
 
     def side(self, place: Floats, turn: Floats, q: Floats) -> Floats:

@@ -15,8 +15,8 @@ import numpy as np
 
 from machines.kinematics.base import ErrorForm, ErrorForms, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry
-from machines.kinematics.legs.attitudes import direction_of, tilt_of
-from machines.kinematics.legs.bounds import MovingLoops
+from machines.kinematics.legs.attitudes import attitude, tilt_of
+from machines.kinematics.legs.bounds import MovingLoops, PlatformJets
 from machines.kinematics.legs.over_workspace import OverWorkspace
 from machines.kinematics.legs.poses import UP, PosesOfLegs
 from machines.kinematics.legs.rods_on_slides import RodsOnSlides
@@ -41,8 +41,9 @@ class OnLegs(PosesOfLegs):
     @cached_property
     def on_rods(self) -> RodsOnSlides | None:  # type: ignore[override]  # nothing assigns it
         """Its rods, of a platform that only translates on three slides and whose gauge point is its reference point."""
-        whole = self.legs.on_slides is not None and self.loops.freedoms == ("x", "y", "z") and not self.gauge.any()
-        return RodsOnSlides(self) if whole and not len(self.carriers) else None
+        whole = self.legs.on_slides is not None and self.loops.freedoms == ("x", "y", "z") and not self.gauge.any() \
+            and self.loops.kept is None
+        return RodsOnSlides(self, self.loops.joints) if whole and not len(self.carriers) else None
 
     @property
     def leg_names(self) -> tuple[str, ...]:
@@ -86,9 +87,10 @@ class OnLegs(PosesOfLegs):
         A platform that turns in every direction tilts in another one at every place, GOLDEN rad farther each.
         """
         heading = GOLDEN * np.arange(len(platform), dtype=np.float64)
-        axis = self._within(direction_of(self.loops.turns, platform[:, 3], heading))
-        gauge = self.turn_of(axis, np.zeros(len(axis))) @ self.gauge
-        return np.asarray(self.inverse(platform[:, :3] + gauge - self.tool_length * axis, axis)[0])
+        axis, spin = attitude(self.loops.turns, platform[:, 3], heading)
+        axis = self._within(axis)
+        gauge = self.turn_of(axis, spin) @ self.gauge
+        return np.asarray(self.inverse(platform[:, :3] + gauge - self.tool_length * axis, axis, spin)[0])
 
     # ---- rates, bounds -------------------------------------------------------------------------------------
 
@@ -127,10 +129,14 @@ class OnLegs(PosesOfLegs):
             rods = ends - self.legs.feet(middle)
             jet, _ = RodLoop(rods, np.zeros_like(rods), self.on_rods.legs, step, False).jets(place, np.zeros(len(place)))
             return jet + TaylorVector((-self.tool_length * UP).tolist()), TaylorVector(UP.tolist())
-        jets = MovingLoops(self.loops, place, turn, middle[:, self.legs_at], step[:, self.legs_at]).jets()
+        jets = self.moving(place, turn, middle, step)
         shift, moved = (list((v[:, self.carriers_at] @ self.carriers).T) for v in (middle, step))
         return (jets.point(self.gauge - self.tool_length * UP) + TaylorVector(shift, moved),
                 jets.direction(UP) if self.tilts else TaylorVector(UP.tolist()))
+
+    def moving(self, place: Floats, turn: Floats, middle: Floats, step: Floats) -> PlatformJets:
+        """The platform along straight moves by `step` (N, J); `place`, `turn` and joints `middle` (N, J) in their middle."""
+        return MovingLoops(self.loops, place, turn, middle[:, self.legs_at], step[:, self.legs_at]).jets()
 
     # ---- singular positions, clearances --------------------------------------------------------------------
 
@@ -152,7 +158,8 @@ class OnLegs(PosesOfLegs):
         place, turn = self._platform(q, near)
         shift = np.asarray(q)[:, self.carriers_at] @ self.carriers
         axis, turned = turn[:, :, 2], None if self.loops.closed_form else turn
-        return ClearanceGeometry(place + shift, tilt_of(self.loops.turns, axis), self.legs.feet(q[:, self.legs_at]),
+        tilt = self.one_turn.turn_of(turn) if self.loops.turns == "c" and self.one_turn else tilt_of(self.loops.turns, axis)
+        return ClearanceGeometry(place + shift, tilt, self.legs.feet(q[:, self.legs_at]),
                                  self.loops.ends(place, turn), place + turn @ self.gauge, axis, turned)
 
     def middle_rig(self) -> ClearanceGeometry:

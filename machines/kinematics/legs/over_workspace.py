@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from machines.kinematics.frames import tool_x
-from machines.kinematics.legs.attitudes import direction_of
+from machines.kinematics.legs.attitudes import attitude
 from machines.kinematics.legs.loops import Loops
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
@@ -43,8 +43,8 @@ class OverWorkspace:
     def loops_at(self, place: Floats, tilt: Floats, heading: float) -> tuple[Floats, Floats]:
         """See `Transmission`: own roots, spin 0; NaN where a leg does not reach."""
         loops, drives = self.loops, self.loops.drives
-        axis = direction_of(loops.turns, tilt, np.full(len(tilt), heading))
-        x = tool_x(axis, np.zeros(len(axis)))
+        axis, spin = attitude(loops.turns, tilt, np.full(len(tilt), heading))
+        x = tool_x(axis, spin)
         turn = np.stack([x, cross(axis, x), axis], axis=2)
         place = place * loops.basis[:3].any(axis=1)
         q = drives.solve(loops.ends(place, turn), drives.roots)

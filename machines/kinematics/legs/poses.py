@@ -16,6 +16,7 @@ from machines.kinematics.legs.attitudes import ROUND_OFF, nearest_directions
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import Loops
 from machines.kinematics.legs.modes import found_modes, in_order
+from machines.kinematics.legs.one_turn import OneTurn
 from machines.kinematics.singular_distance import NAMES
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, Ints
@@ -69,6 +70,12 @@ class PosesOfLegs(Kinematics):
     def branches(self) -> int:  # type: ignore[override]  # nothing assigns it
         """1, or every choice of roots"""
         return len(self.loops.drives.root_choices()) if self.all_roots else 1
+
+    @cached_property
+    def one_turn(self) -> OneTurn | None:
+        """The platform where it has one turn and all translations: such have closed forms."""
+        whole = self.loops.freedoms[:3] == ("x", "y", "z") and len(self.loops.turns) == 1
+        return OneTurn(self.loops, self.workspace) if whole else None
 
     @property
     def turns_tool(self) -> tuple[bool, ...]:
@@ -178,6 +185,14 @@ class PosesOfLegs(Kinematics):
         if self.loops.closed_form:
             place = self._modes(q, near)[0]
             return place, np.where(np.isnan(place[:, :1, None]), np.nan, np.eye(3))
+        if (one := self.one_turn) is not None:
+            start = None
+            if near is not None:
+                place, turn = self._near(np.broadcast_to(near, (len(q), 6)), q)
+                start = np.column_stack([place, one.turn_of(turn)])
+            p = one.forward(q[:, self.legs_at], start)
+            p = np.where(np.isfinite(q).all(axis=1, keepdims=True), p, np.nan)
+            return p[:, :3], one.turn(p[:, 3])
         place, turn = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
         for part in blocks(len(q)):
             hint = near[part] if near is not None and near.ndim == 2 else near
@@ -215,8 +230,13 @@ class PosesOfLegs(Kinematics):
         return places
 
     def assembly_modes(self, q: Floats) -> tuple[Floats, Floats]:
-        """See the base class: both of a platform that does not turn; of others those that are found (`modes.py`)."""
+        """See the base class: both of a platform that does not turn, up to 8 of one turn; of others those that are found
+        (`modes.py`)."""
         q = as_points(q, self.joints, "q")
+        if (one := self.one_turn) is not None:
+            poses = [(p, one.turn(p[:, 3])) for p in one.modes(q[:, self.legs_at])]
+            return (np.stack([self._tip(p[:, :3], turn, q) for p, turn in poses]),
+                    np.stack([np.where(np.isnan(p[:, :1]), np.nan, turn[:, :, 2]) for p, turn in poses]))
         if not self.loops.closed_form:
             return self._found_modes(q)
         tip = np.stack([self._tip(place, None, q) for place in self._modes(q)])

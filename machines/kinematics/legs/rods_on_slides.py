@@ -1,4 +1,4 @@
-"""A platform that only translates on three slides, as clearances, errors of rods and transmission ask for it."""
+"""A platform on slides that translates, and may tilt about x, as errors of rods and the proof by a grid ask for it."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from typing import Protocol
 
 import numpy as np
 
-from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
+from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.legs.drives import Drives
-from machines.kinematics.legs.loops import Loops
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 
 class RodMachine(Protocol):
-    """The machine that they are of (`OnLegs`)."""
+    """The machine that they are of (`OnLegs`, `LegsWithAxis`)."""
 
     @property
-    def loops(self) -> Loops:
-        """Its legs and platform joints."""
+    def legs(self) -> Drives:
+        """All on slides."""
 
     @property
     def workspace(self) -> Workspace:
@@ -35,25 +35,21 @@ class RodMachine(Protocol):
     def clearance(self) -> ClearanceSizes | None:
         """Sizes of the parts."""
 
-    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
-        """Where the parts are."""
-
-    def middle_rig(self) -> ClearanceGeometry:
-        """The same in the middle of the workspace."""
-
 
 @dataclass(frozen=True, eq=False)
+@arrays(platform_joints="K 3")
 class RodsOnSlides:
     """A `RodPlatform`."""
 
     machine: RodMachine
-    platform_turns = False
-    gauge_below = 0.0
+    platform_joints: Floats
+    platform_turns: bool = False
+    gauge_below: float = 0.0
 
     @cached_property
     def legs(self) -> Legs:
         """See `RodPlatform`."""
-        drives: Drives = self.machine.loops.drives
+        drives = self.machine.legs
         return Legs(drives.points, drives.directions, drives.lengths, drives.roots)
 
     @property
@@ -71,24 +67,7 @@ class RodsOnSlides:
         """See `RodPlatform`."""
         return self.machine.clearance
 
-    @property
-    def platform_joints(self) -> Floats:
+    def rods_at(self, place: Floats) -> Floats:
         """See `RodPlatform`."""
-        return self.machine.loops.joints
-
-    def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
-        """See `RodPlatform`."""
-        return self.machine.rig(q, near)
-
-    def middle_rig(self) -> ClearanceGeometry:
-        """See `RodPlatform`."""
-        return self.machine.middle_rig()
-
-    def joints_at(self, platform: Floats, turn: Floats) -> Floats:
-        """See `RodPlatform`."""
-        return self.legs.inverse(platform[:, None, :3] + self.platform_joints)
-
-    def loop_matrices(self, place: Floats, tilt: Floats) -> Floats:
-        """See `RodPlatform`: the rods."""
         ends = place[:, None, :] + self.platform_joints
         return np.asarray(ends - self.legs.carriages(self.legs.inverse(ends)), dtype=np.float64)

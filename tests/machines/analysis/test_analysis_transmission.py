@@ -20,8 +20,8 @@ from machines.analysis.transmission import (
     speed_acceleration,
     worst,
 )
-from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from postproc.cli.app import app
 
 
@@ -92,7 +92,7 @@ def test_force_is_dual_to_speed() -> None:
 def test_h4a_condition_number_stays_below_six() -> None:
     """V.7: 400 x 400 mm, 45 degrees in either direction, the turn divided by d = 100 mm."""
     kinematics = machines.load("h4a-c-table").kinematics
-    assert isinstance(kinematics, H4Linear) and kinematics.lever == 100.0
+    assert isinstance(kinematics, LegsWithAxis) and kinematics.transmits.lever == pytest.approx(100.0)
     found = worst(partial(condition_number, kinematics.transmits), kinematics.workspace, (9, 2, 9, 9))
     assert 5.7 < found.value < 6.0 and found.least > 3.0
 

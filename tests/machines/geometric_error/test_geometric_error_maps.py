@@ -139,7 +139,7 @@ def test_directions_of_the_machine_turn_with_the_table(name: str) -> None:
     w = actual.coordinates(q)
     moved = actual.place(w)[0] - kin.forward(q)[0]
     if name == "h4a-c-table":
-        c = kin.sense * q[:, 4]
+        c = kin.axis.sense * q[:, 4]
         x, y = 0.01 * np.cos(c) + 0.02 * np.sin(c), 0.01 * np.sin(c) - 0.02 * np.cos(c)
         wanted = np.stack([x, y, 0.03 + 0.0 * c], axis=1)
     else:  # the slides stand on the bed: moving them is a displacement along the machine's axes

@@ -12,15 +12,15 @@ from scipy.spatial.transform import Rotation
 
 import machines
 from machines.geometric_error.actual import rods, rods_loop
-from machines.geometric_error.actual.actual_rods import ActualDelta, ActualH4
+from machines.geometric_error.actual.actual_rods import ActualDelta, ActualTilting
 from machines.geometric_error.actual.correction import correct
 from machines.geometric_error.actual.model import ErrorModel
-from machines.geometric_error.actual.rods import RodErrors, RodFrame, platform_turn, rod_frame
+from machines.geometric_error.actual.rods import RodErrors, RodFrame, rod_frame
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.exchange.write_model import save
 from machines.geometric_error.files.loader import load, load_checked
-from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from tests.machines.error_models import joints, model, rod_errors
 from tests.machines.random_slides import random_slides
 from toolpaths.arrays import Floats
@@ -29,19 +29,19 @@ NAMES = ("uranesx", "h4a-c-table", "h4a-spindle-axis")
 TOOL = 70.0
 
 
-def kinematics(name: str) -> OnLegs | H4Linear:
+def kinematics(name: str) -> OnLegs | LegsWithAxis:
     found = machines.load(name).kinematics.with_tool(TOOL)
-    assert isinstance(found, OnLegs | H4Linear)
+    assert isinstance(found, OnLegs | LegsWithAxis)
     return found
 
 
-def platform(kin: OnLegs | H4Linear, n: int) -> tuple[Floats, Floats, Floats]:
+def platform(kin: OnLegs | LegsWithAxis, n: int) -> tuple[Floats, Floats, Floats]:
     """(slides, place, turn) of random nominal platforms."""
     rng = np.random.default_rng(1)
     place, tilt = kin.workspace.random(rng, n)
     if isinstance(kin, OnLegs):
-        return kin.legs.solve(place[:, None, :] + kin.loops.joints, kin.legs.roots), place, platform_turn(np.zeros(n))
-    return kin.platform.inverse(np.column_stack([place, tilt])), place, platform_turn(tilt)
+        return kin.legs.solve(place[:, None, :] + kin.loops.joints, kin.legs.roots), place, np.tile(np.eye(3), (n, 1, 1))
+    return kin.platform.inverse(np.column_stack([place, tilt])), place, kin.platform.turn(tilt)
 
 
 def closure(frame: RodFrame, slides: Floats, place: Floats, turned: Floats, errors: RodErrors) -> Floats:
@@ -124,7 +124,7 @@ def test_zero_is_exact_and_first_order_is_to_second_order(name: str) -> None:
     kin = kinematics(name)
     full = model(kin, 4)
     nominal = full.zero().on(kin)
-    assert isinstance(nominal, ActualDelta | ActualH4)
+    assert isinstance(nominal, ActualDelta | ActualTilting)
     w = nominal.coordinates(joints(kin, 100))
     tip, axis, _ = nominal.place(w)
     expected = (w, np.tile([0.0, 0.0, 1.0], (100, 1))) if isinstance(kin, OnLegs) else kin.place(w[:, :4], w[:, 4])[:2]
@@ -142,7 +142,7 @@ def test_zero_is_exact_and_first_order_is_to_second_order(name: str) -> None:
 def test_errors_of_the_rotary_axis_alone(name: str) -> None:
     """With perfect rods the H4 is a chain: its axis errors do what those of a serial machine do, at every tilt."""
     kin = kinematics(name)
-    assert isinstance(kin, H4Linear)
+    assert isinstance(kin, LegsWithAxis)
     axes = model(kin, 4).axes
     actual = ErrorModel(axes).on(kin)
     w = actual.coordinates(joints(kin, 50))
@@ -155,13 +155,13 @@ def test_errors_of_the_rotary_axis_alone(name: str) -> None:
 @pytest.mark.parametrize("name", ["h4a-c-table", "h4a-spindle-axis"])
 def test_the_zero_of_a_rotary_axis_counts_about_its_machine_axis(name: str) -> None:
     kin, step = kinematics(name), 1e-4
-    assert isinstance(kin, H4Linear)
+    assert isinstance(kin, LegsWithAxis)
     zero = SerialErrors(constants={f"E{kin.axis_names[4]}0{kin.axis_names[4]}": step})
     none = rod_errors(kin).with_values(np.zeros(len(rod_errors(kin).names)))
     actual = ErrorModel(zero, none).on(kin)
     w = actual.coordinates(joints(kin, 20))
     tip, axis, _ = actual.place(w)
-    wanted = kin.place(w[:, :4], w[:, 4] + step * kin.sense)
+    wanted = kin.place(w[:, :4], w[:, 4] + step * kin.axis.sense)
     assert tip == pytest.approx(wanted[0], abs=1e-8) and axis == pytest.approx(wanted[1], abs=1e-12)
     moved = actual.deviation(w, np.append(none.values, step))
     assert moved[:, :3] == pytest.approx(tip - kin.place(w[:, :4], w[:, 4])[0], abs=1e-5)

@@ -1,5 +1,6 @@
 """Linear Delta: identity over the workspace, both assembly modes, Jacobian, LinuxCNC's lineardeltakins."""
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 
 import machines
 from machines.kinematics.legs.on_legs import OnLegs
+from postproc.witness.machine import rods
 from toolpaths.arrays import Floats
 
 NAMES = [name for name in machines.names() if name.startswith("delta-")] + ["uranesx", "linuxcnc-lineardelta"]
@@ -134,3 +136,27 @@ def test_a_machine_file_that_does_not_work_is_refused_with_the_reason(tmp_path: 
     machine, diagnostics = machines.load_checked(file)
     assert machine is None
     assert diagnostics[0].code == code and words in diagnostics[0].message and diagnostics[0].lines
+
+
+@pytest.mark.parametrize(("name", "ring"), [
+    ("uranesx", "radius = 700\njoint_radius = 150\nrod = 1300\npair = 200\nrail_offset = 80\nrail_ends = [600, 1800]"),
+    ("delta-cone", "radius = 650\nlean = 30\njoint_radius = 0\nrod = 1550"),
+    ("delta-star", "radius = 0\nheight = 850\nlean = 90\njoint_radius = 0\nrod = 1500"),
+    ("delta-parallel-z", "angles = [180, 300, 60]\nradius = 850\njoint_radius = 0\nrod = 1400"),
+    ("linuxcnc-lineardelta", "angles = [90, 210, 330]\nradius = 130.25\njoint_radius = 0\nrod = 269"),
+])
+def test_a_ring_of_slides_is_the_machine_whose_legs_are_typed(name: str, ring: str, tmp_path: Path) -> None:
+    """All but round-off, rods and rails too; the second witness reads the same legs."""
+    text = (Path(machines.__file__).parent / "data" / f"{name}.toml").read_text("utf-8")
+    head, legs = text.split("[kinematics.legs.X]")
+    layout = f'[kinematics.layout]\nform = "star"\ndrive = "slide"\nletters = ["X", "Y", "Z"]\n{ring}\n\n'
+    (tmp_path / "own.toml").write_text(head + layout + legs[legs.index("[kinematics.workspace]"):], encoding="utf-8")
+    own, typed = (machines.load(one).kinematics for one in (tmp_path / "own.toml", name))
+    assert isinstance(own, OnLegs) and isinstance(typed, OnLegs) and own.clearance and typed.clearance
+    for what in ("points", "directions", "lengths", "roots"):
+        np.testing.assert_allclose(getattr(own.legs, what), getattr(typed.legs, what), atol=1e-12)
+    np.testing.assert_allclose(own.loops.joints, typed.loops.joints, atol=1e-12)
+    for what in ("shift", "rail_offset", "rail_ends"):
+        np.testing.assert_allclose(getattr(own.clearance, what), getattr(typed.clearance, what), atol=1e-12)
+    read = rods({"kinematics": tomllib.loads(head + layout)["kinematics"]})
+    np.testing.assert_allclose([leg[0] for _, _, leg, _, _ in read.legs], own.legs.points, atol=1e-12)

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import machines
-from machines.kinematics.h4_axes import H4SpindleAxis, H4TableAxis
-from machines.kinematics.h4_linear import H4Linear
-from machines.kinematics.h4_platform import H4Platform
+from machines.kinematics.legs.rotary_axis import HeadAxis, TableAxis
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.mobility import v4
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic
@@ -18,18 +17,18 @@ TABLE, SPINDLE = "h4a-c-table", "h4a-spindle-axis"
 NAMES = (TABLE, SPINDLE)
 
 
-def h4(name: str, **changes: object) -> H4Linear:
+def h4(name: str, sense: float = 1.0, **changes: object) -> LegsWithAxis:
     kinematics = machines.load(name).kinematics
-    assert isinstance(kinematics, H4Linear)
-    return replace(kinematics, **changes)
+    assert isinstance(kinematics, LegsWithAxis)
+    return replace(kinematics, axis=replace(kinematics.axis, sense=sense), **changes)
 
 
-def poses(kinematics: H4Linear, n: int, seed: int = 0) -> tuple[Floats, Floats, Floats]:
+def poses(kinematics: LegsWithAxis, n: int, seed: int = 0) -> tuple[Floats, Floats, Floats]:
     """(tip, axis, platform) of random places in the workspace with a random rotary axis."""
     rng = np.random.default_rng(seed)
     place, tilt = kinematics.workspace.random(rng, n)
     p = np.column_stack([place, tilt])
-    most = np.pi if isinstance(kinematics, H4TableAxis) else 0.8
+    most = np.pi if isinstance(kinematics.axis, TableAxis) else 0.8
     tip, axis, _ = kinematics.place(p, rng.uniform(-most, most, n))
     return tip, axis, p
 
@@ -74,9 +73,9 @@ def test_all_roots_are_poses_of_the_machine(name: str) -> None:
     own = kinematics.inverse(tip, axis)
     assert q.shape == (16 * len(own), 60, 5) == (every.branches, 60, 5)
     np.testing.assert_array_equal(q[: len(own)], own)
-    legs = every.platform.legs
+    legs = every.legs
     for branch in q[np.isfinite(q).all(axis=(1, 2))]:
-        carriages = legs.carriages(branch[:, :4])
+        carriages = legs.feet(branch[:, :4])
         if np.abs(carriages[:, 0] - carriages[:, 1]).max() < 1e-6:
             continue  # both pairs in one place: the platform is not held
         tips, axes = every.assembly_modes(branch)
@@ -123,7 +122,7 @@ def test_assembly_modes_close_the_rods_and_begin_with_the_home_mode(name: str) -
     assert set(count) <= {2, 4, 6, 8} and count.max() > 2
     for mode in modes:
         rows = np.isfinite(mode[:, 0])
-        rods = kinematics.platform.ends(mode[rows]) - kinematics.platform.legs.carriages(q[rows, :4])
+        rods = kinematics.platform.ends(mode[rows]) - kinematics.legs.feet(q[rows, :4])
         np.testing.assert_allclose(np.linalg.norm(rods, axis=2), 1000.0, atol=1e-8)
     tips, axes = kinematics.assembly_modes(q)
     np.testing.assert_allclose(tips[0], tip, atol=1e-9)
@@ -225,7 +224,7 @@ def test_v4_times_the_platform_is_the_full_constraint_matrix() -> None:
     rods = jx[:, [0, 0, 1, 1, 2, 3], :3]
     arms = ends[:, [0, 0, 1, 1, 2, 3]] + shift - p[:, None, :3]
     full = np.linalg.det(np.concatenate([rods, np.cross(arms, rods)], axis=2))
-    product = np.linalg.det(jx) * v4(jx[:, :, :3], platform.legs, (0, 1)) * 1e6 * 360 * 200
+    product = np.linalg.det(jx) * v4(jx[:, :, :3], kinematics.legs, (0, 1)) * 1e6 * 360 * 200
     np.testing.assert_allclose(np.abs(full / product), 1.0, rtol=1e-9)
 
 
@@ -263,15 +262,15 @@ def test_a_geometry_that_does_not_work_is_refused_with_the_reason(tmp_path: Path
 def test_v4_breaks_while_the_condition_number_stays_finite() -> None:
     """Both pairs from one side: V-4 is 0 where they meet in one plane, which det Jx does not show there."""
     kinematics = h4(TABLE)
-    legs = kinematics.platform.legs
-    broken = H4Platform(replace(legs, roots=np.array([1.0, -1.0, 1.0, 1.0])), kinematics.platform.joints,
-                        kinematics.workspace)
+    legs = kinematics.legs
+    loops = kinematics.platform.loops
+    broken = replace(kinematics.platform, loops=replace(loops, drives=replace(legs, roots=np.array([1.0, -1.0, 1.0, 1.0]))))
     p = np.array([[0.0, 0.0, -600.0, 0.2]])
     jx = broken.jx(p, broken.inverse(p))
     assert abs(v4(jx[:, :, :3], legs, (0, 1))[0]) < 1e-12
 
 
 def test_kinds() -> None:
-    assert isinstance(h4(TABLE), H4TableAxis) and isinstance(h4(SPINDLE), H4SpindleAxis)
+    assert isinstance(h4(TABLE).axis, TableAxis) and isinstance(h4(SPINDLE).axis, HeadAxis)
     assert machines.load(TABLE).axis_names == ("X", "Y", "Z", "U", "C")
     assert machines.load(SPINDLE).axis_names == ("X", "Y", "Z", "U", "B")

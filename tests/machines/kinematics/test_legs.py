@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import machines
-from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.legs import drives
 from machines.kinematics.legs.bounds import MovingLoops
 from machines.kinematics.legs.loops import Loops
 from machines.kinematics.legs.modes import found_modes
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from machines.loader import load_checked
@@ -121,8 +121,8 @@ def test_the_bounds_of_slides_are_those_of_any_drive() -> None:
 def test_the_platform_of_an_h4_as_data_is_the_platform_of_the_h4() -> None:
     """Four slides, three translations and the tilt about x."""
     h4 = machines.load("h4a-c-table").kinematics
-    assert isinstance(h4, H4Linear)
-    same = on_slides(h4.platform.legs, h4.platform.joints, h4.workspace, "xyza")
+    assert isinstance(h4, LegsWithAxis)
+    same = on_slides(h4.on_rods.legs, h4.platform.loops.joints, h4.workspace, "xyza")
     place, tilt = h4.workspace.random(np.random.default_rng(2), 200)
     q = h4.platform.inverse(np.column_stack([place, tilt]))
     axis = np.stack([0.0 * tilt, -np.sin(tilt), np.cos(tilt)], axis=1)
@@ -259,7 +259,7 @@ def test_the_planar_delta_of_the_note() -> None:
     ("delta", "x = [-250, 250]", "x = [-250, 2500]", "machine.workspace", "a leg does not reach x 1125"),
     ("delta", '["x", "y", "z"]', '["x", "z", "b"]', "machine.geometry", "is none of x y, x y z"),
     ("delta", '["x", "y", "z"]', '["x", "y"]', "machine.geometry", "3 legs for 2 freedoms"),
-    ("delta", '"slide"', '"arm"\narm = 300', "machine.axis-letter", "'X' is not a letter of arms"),
+    ("delta", '"slide"', '"arm"\narm = 300', "machine.workspace", "a leg does not reach x -250"),
     ("delta", '"slide"', '"screw"', "file.range", "screw"),
     ("delta", "[kinematics.workspace]", '[kinematics.carriers.W]\ndirection = [0, 0, 1]\n[kinematics.workspace]',
      "machine.geometry", "where the platform moves it already"),

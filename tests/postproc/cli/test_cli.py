@@ -223,7 +223,7 @@ def test_help_lists_commands_from_convert_to_files_and_cuts_none_short() -> None
     root = typer.main.get_command(app)
     page = run("--help").stdout
     first = re.findall(r"^  (?:│ )?([a-z]+) {2,}", page.partition("Commands:")[2], re.MULTILINE)
-    assert first[:4] == ["convert", "verify", "inspect", "trace"] and set(first) == set(root.commands)
+    assert first[:5] == ["convert", "verify", "compare", "inspect", "trace"] and set(first) == set(root.commands)
     assert "..." not in page.partition("Commands:")[2]
 
 

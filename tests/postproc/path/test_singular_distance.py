@@ -10,6 +10,7 @@ import pytest
 import machines
 import postproc
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.with_axis import LegsWithAxis
 from postproc.setup.model import load_setup
 from tests.machines.random_slides import random_slides
 from tests.postproc.joint_kit import machine
@@ -31,7 +32,7 @@ def test_distances_against_the_rates_of_the_machine(name: str) -> None:
     kin, q = machine(name).kinematics, places(name, 200)
     found = kin.singular_distance(q)
     assert (found > 0.05).all() and (found <= 2.0).all()
-    sizes = kin.legs.size if isinstance(kin, OnLegs) else 1.0  # mm per rad of arms
+    sizes = kin.legs.size if isinstance(kin, OnLegs | LegsWithAxis) else 1.0  # mm per rad of arms
     rates = kin.jacobian(q)[:, :3][:, :, [kin.axis_names.index(name) for name in kin.leg_names]] / sizes
     fastest = np.linalg.svd(rates, compute_uv=False)[:, 0]
     arm = 6.0 if any(kin.turns_tool) else 1.0

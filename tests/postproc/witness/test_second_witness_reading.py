@@ -94,17 +94,21 @@ def test_poses_of_every_machine(name: str) -> None:
     travel, speed = limits_of(table, m.axis_names)
     np.testing.assert_allclose(travel, np.stack([m.limits.lower, m.limits.upper], axis=1))
     np.testing.assert_allclose(speed, m.limits.velocity)
-    q = m.home + rng.normal(size=(50, len(m.home))) * np.where(m.rotary, 0.4, 20.0)
+    q = m.home + rng.normal(size=(50, len(m.home))) * np.where(m.rotary, np.where(m.kinematics.drives_tip, 0.1, 0.4), 20.0)
     tip, axis = m.kinematics.with_tool(length).forward(q)
+    met = np.isfinite(np.hstack([tip, axis])).all(axis=1)  # arms as they come take a platform out of its reach
+    q, tip, axis = q[met], tip[met], axis[met]
+    cranks = (np.array(m.rotary) & m.kinematics.drives_tip).any()
+    assert len(q) == 50 or (cranks and len(q) > 10)
     if isinstance(own, Chain):
-        mine = own.pose(q, m.axis_names, np.full(50, length))
+        mine = own.pose(q, m.axis_names, np.full(len(q), length))
         np.testing.assert_allclose(mine[0], tip, atol=1e-9)
         np.testing.assert_allclose(mine[1], axis, atol=1e-12)
     else:
         assert isinstance(own, Rods)
-        assert own.misfit(q, m.axis_names, tip, axis, np.full(50, length)).max() < 1e-8
-        assert own.misfit(q, m.axis_names, tip, axis, np.full(50, length + 0.05)).min() > 1e-4
-        assert own.misfit(q, m.axis_names, tip + np.array([0.02, 0.0, 0.0]), axis, np.full(50, length)).max() > 1e-4
+        assert own.misfit(q, m.axis_names, tip, axis, np.full(len(q), length)).max() < 1e-8
+        assert own.misfit(q, m.axis_names, tip, axis, np.full(len(q), length + 0.05)).min() > 1e-4
+        assert own.misfit(q, m.axis_names, tip + np.array([0.02, 0.0, 0.0]), axis, np.full(len(q), length)).max() > 1e-4
 
 
 def test_a_path_that_was_changed_after_reading_has_no_second_reading() -> None:
