@@ -91,7 +91,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     out.begin[len(moves)] = out.count
     columns = out.joined()
     give_back(len(moves))
-    path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst)
+    path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst, start.kin.open_parameters)
     diagnostics += joint_faults.planned(plan, machine, given, file)
     diagnostics += cost(modes.tcp_code, longer, file)
     return path, faults.merged(diagnostics) + faults.off_line(path.code, path.u, path.move, path.seconds,
@@ -99,7 +99,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
 
 
 def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count: int, turns: Ints,
-              worst: Floats) -> JointPath:
+              worst: Floats, names: tuple[str, ...]) -> JointPath:
     """The path of the parts of moves as that of the `count` moves themselves."""
     parts = plan.refined
     singular = np.zeros(count, dtype=bool)
@@ -108,7 +108,9 @@ def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count:
     return JointPath(**columns, begin=parts.begins(out.begin, count), singular=singular,
                      turns=np.unique(parts.origin[turns]),
                      worst_tip=float(worst[0]), worst_axis=float(worst[1]), frames=tuple(out.frames),
-                     rewinds=parts.origin[parts.rewind], events=plan.events)
+                     rewinds=parts.origin[parts.rewind], events=plan.events,
+                     opened=tuple((name, float(column.min()), float(column.max()))
+                                  for name, column in zip(names, plan.parameters.T, strict=False)))
 
 
 def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,

@@ -17,7 +17,7 @@ from postproc.control.control import Control
 from postproc.joints.plan import JointPreferences
 from postproc.joints.run_plan import RunOptions
 from postproc.path.links import Link, Pose, SafeSpace, plan_link
-from postproc.setup.model import Placement, RewindSettings, SetupFile
+from postproc.setup.model import Joints, Placement, RewindSettings, SetupFile
 from toolpaths.arrays import Floats, box_corners
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
@@ -30,6 +30,7 @@ class RetractPlan:
     space: SafeSpace
     rewind: RewindSettings = field(default_factory=RewindSettings)
     preferences: JointPreferences = field(default_factory=JointPreferences)
+    joints: Joints = field(default_factory=Joints)
 
     @classmethod
     def default(cls, space: SafeSpace) -> RetractPlan:
@@ -41,8 +42,9 @@ class RetractPlan:
         feed = None if self.rewind.feed is None else self.rewind.feed / 60.0
         slow = machine.limits.velocity[~np.array(machine.rotary)]
         speed = float(slow.min()) if len(slow) else np.inf
+        spin = self.joints.spin
         return RunOptions(self.preferences, self.rewind.allowed, feed, partial(self._away, speed, feed or speed),
-                          axis_tolerance)
+                          axis_tolerance, None if isinstance(spin, str) else spin * DEG, self.joints.singular_distance)
 
     def _away(self, rapid: float, feed: float, tip: Floats, axis: Floats) -> Floats:
         """Time (N,) s to draw back from poses (N, 3) to the sphere about what is cut, and to come down again."""
@@ -76,7 +78,7 @@ def drawing_of(setup: SetupFile, placement: Placement, space: SafeSpace, machine
                                    {index(k): v * DEG for k, v in joints.start.items()})
     if rewind.stock is not None:
         space = _with_stock(space, placement.points(box_corners(np.array(rewind.stock.low), np.array(rewind.stock.high))))
-    return RetractPlan(space, rewind, preferences), []
+    return RetractPlan(space, rewind, preferences, joints), []
 
 
 def _rotaries(machine: Machine) -> list[str]:

@@ -196,6 +196,9 @@ class RewindSettings(UserModel):
     """the tool is drawn out of this box (and of what is cut); default: to the safe plane"""
 
 
+SpinChoice = Literal["needed", "planned", "zero"]
+
+
 class Joints(UserModel):
     """Joints to be preferred where travel and rewinds leave a choice."""
 
@@ -205,6 +208,10 @@ class Joints(UserModel):
     """where a rotary axis should stand when the program begins, degrees, e.g. start = {C = 180}; default: home"""
     singular_distance: float = Field(default=0.05, gt=0.0, lt=1.0)
     """that a parallel machine keeps from its singular positions: |cos| of rod and slide, least singular value of Jx"""
+    spin: SpinChoice | Annotated[float, Field(ge=-75.0, le=75.0)] = "needed"
+    """turn of the tool about its own axis on machines that can turn it under command, which a round tool does not notice.
+    zero: none; planned: as reach, clearances, singular positions and time have it, along the whole program; needed: none
+    where the program converts so, else planned; a number: that angle, degrees"""
 
 
 class SetupFile(UserModel):

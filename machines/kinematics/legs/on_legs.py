@@ -18,7 +18,8 @@ from machines.kinematics.clearance_geometry import ClearanceGeometry
 from machines.kinematics.legs.attitudes import direction_of, tilt_of
 from machines.kinematics.legs.bounds import MovingLoops
 from machines.kinematics.legs.over_workspace import OverWorkspace
-from machines.kinematics.legs.poses import UP, PosesOfLegs
+from machines.kinematics.legs.poses import UP
+from machines.kinematics.legs.redundancy import RedundantLegs
 from machines.kinematics.legs.rods_on_slides import RodsOnSlides
 from machines.kinematics.rod_loops import RodLoop, by_parts
 from machines.kinematics.singular_distance import distance, distance_between
@@ -30,8 +31,8 @@ GOLDEN = 2.399963
 
 
 @dataclass(frozen=True, eq=False)
-class OnLegs(PosesOfLegs):
-    """A platform on legs with its rates, bounds, errors and clearances; attributes as of `PosesOfLegs`."""
+class OnLegs(RedundantLegs):
+    """A platform on legs with its rates, bounds, errors and clearances; attributes as of `RedundantLegs`."""
 
     @property
     def transmits(self) -> OverWorkspace:  # type: ignore[override]  # nothing assigns it
@@ -88,7 +89,8 @@ class OnLegs(PosesOfLegs):
         heading = GOLDEN * np.arange(len(platform), dtype=np.float64)
         axis = self._within(direction_of(self.loops.turns, platform[:, 3], heading))
         gauge = self.turn_of(axis, np.zeros(len(axis))) @ self.gauge
-        return np.asarray(self.inverse(platform[:, :3] + gauge - self.tool_length * axis, axis)[0])
+        standing = np.zeros((len(axis), len(self.carriers_at))) if self.carried_twice else None
+        return np.asarray(self.joints_with(platform[:, :3] + gauge - self.tool_length * axis, axis, 0.0, standing)[0])
 
     # ---- rates, bounds -------------------------------------------------------------------------------------
 
@@ -148,9 +150,10 @@ class OnLegs(PosesOfLegs):
         return jx / self.legs.spans(own)[:, :, None], self.legs.transmission(rods, own)
 
     def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
-        """Where the parts are at joints q (N, J): seen from the carriers, but for the place that the workspace is about."""
+        """Where the parts are at joints q (N, J): seen from the carriers, but for the place that the workspace is about,
+        which redundant carriers leave as it is."""
         place, turn = self._platform(q, near)
-        shift = np.asarray(q)[:, self.carriers_at] @ self.carriers
+        shift = np.asarray(q)[:, self.carriers_at] @ self.carriers * (not self.carried_twice)
         axis, turned = turn[:, :, 2], None if self.loops.closed_form else turn
         return ClearanceGeometry(place + shift, tilt_of(self.loops.turns, axis), self.legs.feet(q[:, self.legs_at]),
                                  self.loops.ends(place, turn), place + turn @ self.gauge, axis, turned)
