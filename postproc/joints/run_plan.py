@@ -46,6 +46,7 @@ class RunOptions:
         tolerance: rad, of the axis
         spin: rad, the turn of the tool about itself that is asked for where the machine leaves it open; None: planned
         singular_distance: that is kept
+        split: False where the platform rests on carriers that do all
     """
 
     preferences: JointPreferences
@@ -55,6 +56,7 @@ class RunOptions:
     tolerance: float
     spin: float | None = None
     singular_distance: float = 0.0
+    split: bool = True
 
 
 @dataclass(frozen=True)
@@ -214,7 +216,7 @@ def _run(part: _Part, moves: Moves, run_options: RunOptions, home: Floats) -> Po
 def _opened(machine: Machine, parts: list[_Part], moves: Moves, run_options: RunOptions) -> list[_Part]:
     """The runs with what the machine leaves open planned, cut where it changes."""
     curves = planned_parameters([_road(part, moves) for part in parts], machine, run_options.singular_distance,
-                                run_options.spin)
+                                run_options.spin, run_options.split)
     made = [replace(part, opened=own, places=tuple(curve.measure for curve in own))
             for part, own in zip(parts, curves, strict=True)]
     return [_cut(part, np.max([curve.parts() for curve in part.opened], axis=0)) for part in made]

@@ -59,13 +59,13 @@ class _Clock:
         return float(self.times[1] - self.times[0])
 
 
-def planned_split(roads: Sequence[RunRoad], machine: Machine) -> list[ParameterCurve]:
-    """The joints that carry the platform along every road."""
+def planned_split(roads: Sequence[RunRoad], machine: Machine, divided: bool = True) -> list[ParameterCurve]:
+    """The joints that carry the platform along every road; not `divided`: with the platform at rest."""
     columns = columns_of(roads[0].kin, False)
     at = np.array([machine.axis_names.index(roads[0].kin.open_parameters[k]) for k in columns])
     clocks = _road_times(roads, machine, at)
     clock = _clock(roads, clocks, columns)
-    tried = [(np.inf, clock.middle), *((stretch, _carried(clock, machine, at, stretch)) for stretch in STRETCHES)]
+    tried = [(np.inf, clock.middle), *((stretch, _carried(clock, machine, at, stretch)) for stretch in STRETCHES * divided)]
     made = [(_seconds(roads, clock, machine, columns, values), stretch, values) for stretch, values in tried
             if values is not None]
     _, stretch, values = min(made, key=lambda one: one[0])

@@ -25,7 +25,7 @@ from postproc.path.solved_runs import SolvedRun, SolvedRuns, solved_runs
 from postproc.path.zero_entry import ZeroEntry, cost, needed, zero_entry
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Floats, Ints, as_slice, taken
-from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.diagnostics import Diagnostic, has_errors, info
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
@@ -93,6 +93,8 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     give_back(len(moves))
     path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst, start.kin.open_parameters)
     diagnostics += joint_faults.planned(plan, machine, given, file)
+    if path.opened:
+        diagnostics.append(info("joints.opened", joint_faults.opened(path.opened), file=file))
     diagnostics += cost(modes.tcp_code, longer, file)
     return path, faults.merged(diagnostics) + faults.off_line(path.code, path.u, path.move, path.seconds,
                                                               given, file, rapids_as_feed)

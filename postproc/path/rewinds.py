@@ -44,7 +44,8 @@ class RetractPlan:
         speed = float(slow.min()) if len(slow) else np.inf
         spin = self.joints.spin
         return RunOptions(self.preferences, self.rewind.allowed, feed, partial(self._away, speed, feed or speed),
-                          axis_tolerance, None if isinstance(spin, str) else spin * DEG, self.joints.singular_distance)
+                          axis_tolerance, None if isinstance(spin, str) else spin * DEG, self.joints.singular_distance,
+                          self.joints.carriers == "planned")
 
     def _away(self, rapid: float, feed: float, tip: Floats, axis: Floats) -> Floats:
         """Time (N,) s to draw back from poses (N, 3) to the sphere about what is cut, and to come down again."""

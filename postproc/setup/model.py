@@ -212,6 +212,9 @@ class Joints(UserModel):
     """turn of the tool about its own axis on machines that can turn it under command, which a round tool does not notice.
     zero: none; planned: as reach, clearances, singular positions and time have it, along the whole program; needed: none
     where the program converts so, else planned; a number: that angle, degrees"""
+    carriers: Literal["planned", "rest"] = "planned"
+    """of axes that carry a platform which moves along them by itself too. planned: the path is split between both, so that
+    together they take the least time; rest: the platform rests in the middle of its workspace, but for its tilt"""
 
 
 class SetupFile(UserModel):
