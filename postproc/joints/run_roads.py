@@ -58,7 +58,8 @@ class ParameterCurve:
 
     Attributes:
         columns: which open parameters they are
-        grain: of the measure: the road is cut into parts no longer than that, so that the machine follows the curve
+        grain: of the measure: the road is not cut into parts shorter than that
+        straight: rad or mm that blocks, along which the parameters go nearly evenly, may leave the curve by
         round: True for a cubic B-spline with these control values at even nodes, which runs through its ends; False for
             straight lines between them
     """
@@ -68,20 +69,24 @@ class ParameterCurve:
     values: Floats
     columns: tuple[int, ...]
     grain: float
+    straight: float
     round: bool = False
 
-    @property
-    def varies(self) -> bool:
-        """False where the parameters stand along the whole road."""
-        low, high = np.searchsorted(self.nodes, [self.measure[0], self.measure[-1]])
-        own = self.values[max(low - 1, 0):high + 1]
-        return bool(len(own)) and bool((np.ptp(own, axis=0) > 1e-9).any())
-
     def parts(self) -> Ints:
-        """(N,) parts that each curve of the road is to be cut into."""
-        if not self.varies:
-            return np.ones(len(self.measure) - 1, dtype=np.int64)
-        return np.maximum(np.ceil(np.diff(self.measure) / self.grain - 1e-9), 1).astype(np.int64)
+        """(N,) parts that each curve of the road is to be cut into: a part of a share of its length leaves the parabola by the
+        square of that share."""
+        count = len(self.measure) - 1
+        inside = self.nodes[(self.nodes > self.measure[0]) & (self.nodes < self.measure[-1])]
+        seen = np.concatenate([inside, 0.5 * (self.measure[1:] + self.measure[:-1])])
+        if not count:
+            return np.ones(0, dtype=np.int64)
+        chords = self.at(self.measure)
+        even = np.stack([np.interp(seen, self.measure, column) for column in chords.T], axis=1)
+        off, owner = np.abs(self.at(seen) - even).max(axis=1), np.searchsorted(self.measure, seen, side="right") - 1
+        worst = np.zeros(count)
+        np.maximum.at(worst, np.clip(owner, 0, count - 1), off)
+        most = np.maximum(np.diff(self.measure) / self.grain, 1.0)
+        return np.ceil(np.clip(np.sqrt(worst / self.straight), 1.0, most) - 1e-9).astype(np.int64)
 
     def at(self, places: Floats) -> Floats:
         """(K, F) at places (K,) of the measure."""

@@ -5,7 +5,8 @@ drawn back, and any spin may follow any other at the price of the path there. Of
 leave the fewest places out of reach, then cost the least: time at the programmed feed or at the velocities of the axes,
 whichever is longer, and a price that grows where a singular position, a stop or a collision comes near, by the time that
 the tool is there (Bellman 1957, backwards from the end). The grid is made finer about what was found, and a cubic B-spline
-through the values has no corner. What comes out is a proposal: the stages that check reach and deviation bound it as any path.
+through the values has no corner. No spin, and the best one that stands, are tried next to it by the time that the joints take
+with their accelerations and jerks. What comes out is a proposal: the stages that check reach and deviation bound it as any path.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from machines import reach as clearances
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
+from postproc.joints.road_clock import RoadClock, clock_of
 from postproc.joints.run_roads import ParameterCurve, RunRoad, columns_of, rest
 from postproc.joints.spin_loop import cheapest_spins
 from toolpaths.arrays import Array, Bools, Floats
@@ -30,12 +32,16 @@ GRID = 13
 """spins looked at first"""
 FINER, NEIGHBOURS = 3, (-2, -1, 0, 1, 2)
 """times that the grid is made 3 times finer, about what was found"""
-SPINNING, MOVING = 0.5, 0.05
+SPINNING, MOVING = 1.0, 0.1
 """s: what a change of the spin costs by its square per step of the road, and seconds of the slowest axis next to the time"""
 NEAR_MM, NEAR_RAD = 5.0, 3.0 * DEG
 """margins at which a collision or a stop costs a quarter of the time there"""
 OUTSIDE = 1e6
 """s: more than any path that is in reach"""
+NEARNESS = 0.25
+"""what the prices of all that is near count next to the time"""
+STRAIGHT = 0.2 * DEG
+"""that blocks may leave the smooth spin by"""
 CHUNK, COMPILE_FROM = 512, 200_000
 
 
@@ -78,12 +84,28 @@ def planned_spins(roads: Sequence[RunRoad], others: Sequence[Sequence[ParameterC
               for road in roads]
     kins = list({id(road.kin): road.kin for road in roads}.values())
     nodes = _nodes(roads, others, places, kins, fixed)
-    spins = _planned(nodes, kins, machine, least)
-    result, at = [], 0
-    for road, own in zip(roads, places, strict=True):
-        values = spins[at:at + len(own), None]
-        at += len(own)
-        result.append(ParameterCurve(road.steps, own, values, columns_of(road.kin, True), grain, len(own) > 2))
+    column = columns_of(kins[0], True)[0]
+    cuts = np.cumsum([len(own) for own in places])[:-1]
+    tried = [[ParameterCurve(road.steps, own, values[:, None], (column,), grain, STRAIGHT, len(own) > 2)
+              for road, own, values in zip(roads, places, np.split(spins, cuts), strict=True)]
+             for spins in _tried(nodes, kins, machine, least, column).T]
+    if len(tried) == 1:
+        return tried[0]
+    values = np.stack([np.concatenate([curve.at(curve.nodes)[:, 0] for curve in some]) for some in tried], axis=1)
+    price = _looked_at(values, nodes, kins, machine, least, column)[1].sum(axis=0)
+    clock = clock_of(roads, float(machine.limits.velocity[~np.array(machine.rotary)].min(initial=1000.0)))
+    seconds = [clock.seconds(machine, _at_times(clock, others, some)) for some in tried]
+    return tried[int(np.argmin(price + np.nan_to_num(seconds, posinf=OUTSIDE)))]
+
+
+def _at_times(clock: RoadClock, others: Sequence[Sequence[ParameterCurve]], spins: Sequence[ParameterCurve]) -> Floats:
+    """(T, F) the open parameters at the times of a clock."""
+    kin = clock.roads[0].kin
+    result = np.zeros((len(clock.times), len(kin.open_parameters)))
+    for k, rows in clock.runs():
+        for curve in (*others[k], spins[k]):
+            places = np.interp(clock.times[rows], clock.of_poses[k], curve.measure)
+            result[rows, list(curve.columns)] = curve.at(places)
     return result
 
 
@@ -107,12 +129,25 @@ def _nodes(roads: Sequence[RunRoad], others: Sequence[Sequence[ParameterCurve]],
                   np.repeat([index[id(road.kin)] for road in roads], counts))
 
 
-def _planned(nodes: _Nodes, kins: list[Kinematics], machine: Machine, least: float) -> Floats:
-    """(N,) spins."""
-    column = columns_of(kins[0], True)[0]
+def _tried(nodes: _Nodes, kins: list[Kinematics], machine: Machine, least: float, column: int) -> Floats:
+    """(N, K) spins that may do: planned, the best that stands, none; only what is asked for where that is everywhere."""
+    held = np.isfinite(nodes.held)
+    if held.all():
+        return nodes.held[:, None]
     apart = float(kins[0].parameters_apart[column])
-    grid = np.tile(np.linspace(-apart, apart, GRID), (len(nodes.tip), 1))
-    spins, step = _best(grid, nodes, kins, machine, least, column), 2.0 * apart / (GRID - 1)
+    standing = np.linspace(-apart, apart, GRID)
+    grid = np.where(held[:, None], np.nan_to_num(nodes.held)[:, None], standing)
+    cost = _looked_at(grid, nodes, kins, machine, least, column)[1].sum(axis=0)
+    planned = _planned(grid, 2.0 * apart / (GRID - 1), nodes, kins, machine, least, column)
+    others = np.where(held[:, None], np.nan_to_num(nodes.held)[:, None], [standing[cost.argmin()], 0.0])
+    return np.column_stack([planned, others])
+
+
+def _planned(grid: Floats, step: float, nodes: _Nodes, kins: list[Kinematics], machine: Machine, least: float,
+             column: int) -> Floats:
+    """(N,) spins, from a grid (N, S) of that step."""
+    apart = float(kins[0].parameters_apart[column])
+    spins = _best(grid, nodes, kins, machine, least, column)
     for _ in range(FINER):
         step /= 3.0
         near = np.clip(spins[:, None] + step * np.array(NEIGHBOURS, dtype=np.float64), -apart, apart)
@@ -122,8 +157,8 @@ def _planned(nodes: _Nodes, kins: list[Kinematics], machine: Machine, least: flo
 
 def _best(grid: Floats, nodes: _Nodes, kins: list[Kinematics], machine: Machine, least: float, column: int) -> Floats:
     """(N,) the cheapest way through spins `grid` (N, S)."""
-    held = np.isfinite(nodes.held)
-    grid = np.where(held[:, None], np.where(held, nodes.held, 0.0)[:, None], grid)
+    held = np.isfinite(nodes.held)[:, None]
+    grid = np.where(held, np.nan_to_num(nodes.held)[:, None], grid)
     q, cost = _looked_at(grid, nodes, kins, machine, least, column)
     n, count = grid.shape
     value, choice = cost[-1].copy(), np.zeros((n, count), dtype=np.int64)
@@ -188,5 +223,5 @@ def _price(kin: Kinematics, q: Floats, machine: Machine, least: float) -> Floats
     away = kin.singular_distance(some)
     bad = (margin < 0.0).any(axis=1) | ~(away >= least).all(axis=1)
     price += ((least / np.maximum(np.nan_to_num(away), least)) ** 2).max(axis=1, initial=0.0)
-    result[good] = np.where(bad, 100.0 * OUTSIDE, price)
+    result[good] = np.where(bad, 100.0 * OUTSIDE, NEARNESS * price)
     return result

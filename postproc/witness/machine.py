@@ -17,7 +17,9 @@ _ALONG = {"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1), "U": (1, 0, 0), "V": (
 LIMITS = ("least", "greatest", "velocity", "acceleration", "jerk", "home")
 ROD = 1e-4
 """mm by which a rod may miss its length"""
-SPIN_STEPS = 3
+SPIN_STEPS, SPUN = 8, 1e-10
+SPINS = (0.0, 0.5, -0.5, 1.0, -1.0)
+"""rad: from where the turn of a tool about itself, which no file states, is sought in so many steps, to SPUN rad"""
 
 
 def largest_feed(table: dict[str, Any]) -> float:
@@ -150,15 +152,34 @@ class Rods:
         platform = least_turns(axis) if spins else rotations(np.eye(3)[1 - k], tilt)
         expected = axis if spins else apply(platform, np.stack([s, 0.0 * s, c], axis=1))
         above = tip + (self.gauge + length)[:, None] * axis
-        off, slope = self._legs(q, letters, above, platform)
-        for _ in range(SPIN_STEPS if spins else 0):  # between two blocks the tool turns about itself
-            spin = -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)
-            platform = platform @ rotations(np.array([0.0, 0.0, 1.0]), np.where(np.isfinite(spin), spin, 0.0))
-            off, slope = self._legs(q, letters, above, platform)
+        platform, off = self._spun(q, letters, above, platform) if spins else (
+            platform, self._legs(q, letters, above, platform)[0])
         if self.wrong and self.held.any():
             off = 0.5 * (off[::2] + off[1::2])
         aside = np.abs((above - apply(platform, self.pivot[None])) * self.held).max(axis=1)
         return np.asarray(np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0))
+
+    def _spun(self, q: Array, letters: tuple[str, ...], above: Array, level: Array) -> tuple[Array, Array]:
+        """(platform (N, 3, 3), mm by which each rod misses its length (K, N)) where the tool is turned about itself as the rods
+        have it; `level` without."""
+        best, found = level, np.full((len(self.legs), len(q)), np.inf)
+        for start in SPINS:
+            rows = np.flatnonzero(~(np.abs(found).max(axis=0) <= ROD))
+            if not len(rows):
+                break
+            platform = (level if len(level) == 1 else level[rows]) @ rotations(np.array([0.0, 0.0, 1.0]), np.full(len(rows), start))
+            for _ in range(SPIN_STEPS):
+                off, slope = self._legs(q[rows], letters, above[rows], platform)
+                spin = -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)
+                if not np.abs(spin).max() > SPUN:
+                    break
+                platform = platform @ rotations(np.array([0.0, 0.0, 1.0]), np.where(np.isfinite(spin), spin, 0.0))
+            off, _ = self._legs(q[rows], letters, above[rows], platform)
+            better = np.abs(off).max(axis=0) < np.abs(found[:, rows]).max(axis=0)
+            best = np.array(np.broadcast_to(best, (len(q), 3, 3)))
+            best[rows[better]] = np.broadcast_to(platform, (len(rows), 3, 3))[better]
+            found[:, rows[better]] = off[:, better]
+        return best, found
 
     def _legs(self, q: Array, letters: tuple[str, ...], above: Array, platform: Array) -> tuple[Array, Array]:
         """(mm by which each rod misses its length, how that changes as the platform turns about its own z) (K, N)."""
