@@ -197,12 +197,11 @@ def _looked_at(grid: Floats, nodes: _Nodes, kins: list[Kinematics], machine: Mac
     q, cost = np.full((n, count, len(machine.home)), np.nan), np.full((n, count), OUTSIDE)
     for k, kin in enumerate(kins):
         rows = np.flatnonzero(nodes.tool == k)
-        for s in range(count):
-            parameters = nodes.parameters[rows].copy()
-            parameters[:, column] = grid[rows, s]
-            found = np.stack(kin.inverse_with(nodes.tip[rows], nodes.axis[rows], np.nan_to_num(parameters)))
-            q[rows, s] = found[0]
-            cost[rows, s] = _price(kin, found[0], machine, least) * weight[rows]
+        parameters = np.repeat(np.nan_to_num(nodes.parameters[rows]), count, axis=0)
+        parameters[:, column] = grid[rows].ravel()
+        found = kin.inverse_with(*(np.repeat(x[rows], count, axis=0) for x in (nodes.tip, nodes.axis)), parameters)[0]
+        q[rows] = found.reshape(len(rows), count, -1)
+        cost[rows] = _price(kin, found, machine, least).reshape(len(rows), count) * weight[rows, None]
     return q, cost
 
 
