@@ -184,8 +184,8 @@ class LegsModel(KinematicsModel):
         if moves and (len(moves) > 3 or np.linalg.svd(np.array(moves), compute_uv=False)[-1] < 0.1):
             where = "one another" if whole else "the platform"
             yield KeyProblem("machine.geometry", ("carriers",), f"carriers {', '.join(self.carriers)} move the tool where "
-                             f"{where} move{'s' * (not whole)} it already", "a carrier adds a direction to those of the other "
-                             "carriers, and of a platform that does not move along x, y and z by itself")
+                             f"{where} move{'s' * (not whole)} it already", "a carrier adds a direction to those of the "
+                             "other carriers, and of a platform that does not move along x, y and z by itself")
 
 
 def _pair(leg: DriveModel) -> Floats | None:

@@ -18,7 +18,6 @@ from postproc.control.rollover import rollovers
 from postproc.control.word_grid import WordGrid, word_grid
 from postproc.controllers.fitted import fitted
 from postproc.controllers.model import ControllerFile
-from postproc.job.axis_letters import axis_letters
 from postproc.job.held_tools import with_held_tools
 from postproc.job.length_words import words_depend_on_length
 from postproc.job.pivots import control_kinematics
@@ -252,7 +251,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     options, found = without_splines(options, toolpath)
     records, diagnostics = job_records(toolpath, machine, controller, setup, options.setup)
     toolpath = records.toolpath
-    diagnostics += [*found, *axis_letters(machine, controller), *work_offset(controller, setup, options),
+    diagnostics += [*found, *work_offset(controller, setup, options),
                     *called_tools(controller, options.setup), *other_units(controller, options.setup),
                     *smoothing_plan(controller, setup, options, toolpath, machine)[1]]
     toolpath, found = cut_operations(toolpath, setup.output.longest)

@@ -28,7 +28,8 @@ def nearest_solution(kin: Kinematics, tip: Floats, axis: Floats, near: Floats,
                      branch: Ints | None = None) -> Floats:
     """Joints (N, J) of poses, on the branch and winding nearest to `near` (N, J).
 
-    `branch` (N,) names the branch where it is known, -1 where it is not. What a redundant machine leaves open is as in `near`.
+    `branch` (N,) names the branch where it is known, -1 where it is not. What a redundant machine leaves open is as in
+    `near`.
     """
     rotary = np.array(kin.rotary)
     branches = kin.inverse_like(tip, axis, near)

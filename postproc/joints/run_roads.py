@@ -73,8 +73,8 @@ class ParameterCurve:
     round: bool = False
 
     def parts(self) -> Ints:
-        """(N,) parts that each curve of the road is to be cut into: a part of a share of its length leaves the parabola by the
-        square of that share."""
+        """(N,) parts that each curve of the road is to be cut into: a part of a share of its length leaves the parabola by
+        the square of that share."""
         count = len(self.measure) - 1
         inside = self.nodes[(self.nodes > self.measure[0]) & (self.nodes < self.measure[-1])]
         seen = np.concatenate([inside, 0.5 * (self.measure[1:] + self.measure[:-1])])

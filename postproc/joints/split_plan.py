@@ -76,7 +76,7 @@ def _middle(clock: RoadClock, columns: tuple[int, ...]) -> Floats:
 
 def _carried(clock: RoadClock, middles: Floats, room: Floats, machine: Machine, at: Ints, stretch: float) -> Floats | None:
     """(T, M) the carriers smoothed over a stretch of time (s); None where the platform's room is too small for it."""
-    half = max(int(round(0.5 * stretch / clock.step)), 1)
+    half = max(round(0.5 * stretch / clock.step), 1)
     width, third = 2 * half + 1, max(2 * (half // 3) + 1, 1)
     result = np.empty_like(middles)
     for k, (middle, apart, joint) in enumerate(zip(middles.T, room, at, strict=True)):

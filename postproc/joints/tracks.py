@@ -25,7 +25,8 @@ def branches_of(kin: Kinematics, tip: Floats, axis: Floats, near: Floats,
     for each row of `near` (F, J). `parameters` (N, ...): what the machine leaves open, where that was planned.
     """
     rotary = np.array(kin.rotary)
-    branches = kin.inverse(tip, axis, near=near[0]) if parameters is None else kin.inverse_with(tip, axis, parameters, near[0])
+    branches = kin.inverse(tip, axis, near=near[0]) if parameters is None else kin.inverse_with(
+        tip, axis, parameters, near[0])
     family = np.stack([kin.singular(np.nan_to_num(b)) & np.isfinite(b).all(axis=1) for b in branches])
     if family.any():
         if not (np.isfinite(branches).all(axis=2) & ~family).any():

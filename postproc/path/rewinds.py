@@ -17,7 +17,8 @@ from postproc.control.control import Control
 from postproc.joints.plan import JointPreferences
 from postproc.joints.run_plan import RunOptions
 from postproc.path.links import Link, Pose, SafeSpace, plan_link
-from postproc.setup.model import Joints, Placement, RewindSettings, SetupFile
+from postproc.setup.joints import Joints
+from postproc.setup.model import Placement, RewindSettings, SetupFile
 from toolpaths.arrays import Floats, box_corners
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG

@@ -141,8 +141,8 @@ def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diag
 
 
 def _stages(result: PostResult, progress: Progress | None) -> PostResult:
-    """All stages; with --smooth passes that cannot be smoothed are taken back; a spin that is needed is planned; "auto" takes
-    the next output mode where one cannot be written or proved."""
+    """All stages; with --smooth passes that cannot be smoothed are taken back; a spin that is needed is planned; "auto"
+    takes the next output mode where one cannot be written or proved."""
     def one(begun: PostResult, left: ExcludedPasses = frozenset()) -> PostResult:
         return with_spin_needed(begun, lambda spun: with_next_modes(spun, lambda again: staged(again, progress, left)))
     return with_passes_taken_back(result, one) if result.options.smooth else one(result)

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from machines.machine import Machine
 from postproc.pipeline.result import PostResult, StageName
-from postproc.setup.model import SetupFile, SpinChoice
+from postproc.setup.joints import SpinChoice
+from postproc.setup.model import SetupFile
 from toolpaths.diagnostics import Severity, info
 
 CHANGED_BY_SPIN: tuple[StageName, ...] = ("solve", "correct", "check")

@@ -209,8 +209,8 @@ def _machine_paths(passes: list[_Placed], moves: Moves, kinematics: Callable[[in
 @dataclass(frozen=True)
 @arrays(s="N", q="N J")
 class _Near:
-    """Joints of the blocks at s, linear between their ends; `smooth` where what the machine leaves open follows them, which is to
-    have no corners: cubic, without overshoot (Fritsch and Butland 1984)."""
+    """Joints of the blocks at s, linear between their ends; `smooth` where what the machine leaves open follows them, which
+    is to have no corners: cubic, without overshoot (Fritsch and Butland 1984)."""
 
     s: Floats
     q: Floats

@@ -16,6 +16,7 @@ from postproc.base.options import OutputMode
 from postproc.setup.bodies import BodiesModel, ToolBody
 from postproc.setup.files import seen_from_here
 from postproc.setup.hooks_file import load_hooks
+from postproc.setup.joints import Joints
 from postproc.setup.orientation import OrientationLimits
 from postproc.setup.place import PlacementLimits
 from postproc.setup.places import REGISTER, PlaceOrder, PlaceSetup
@@ -197,27 +198,6 @@ class RewindSettings(UserModel):
     """of the return into a cut, mm/min; default: that of the cut"""
     stock: Stock | None = None
     """the tool is drawn out of this box (and of what is cut); default: to the safe plane"""
-
-
-SpinChoice = Literal["needed", "planned", "zero"]
-
-
-class Joints(UserModel):
-    """Joints to be preferred where travel and rewinds leave a choice."""
-
-    side: dict[Annotated[str, Field(pattern="^[ABC]$")], Literal["positive", "negative"]] = Field(default_factory=dict)
-    """of a rotary axis, e.g. side = {A = "negative"}"""
-    start: dict[Annotated[str, Field(pattern="^[ABC]$")], float] = Field(default_factory=dict)
-    """where a rotary axis should stand when the program begins, degrees, e.g. start = {C = 180}; default: home"""
-    singular_distance: float = Field(default=0.05, gt=0.0, lt=1.0)
-    """that a parallel machine keeps from its singular positions: |cos| of rod and slide, least singular value of Jx"""
-    spin: SpinChoice | Annotated[float, Field(ge=-75.0, le=75.0)] = "needed"
-    """turn of the tool about its own axis on machines that can turn it under command, which a round tool does not notice.
-    zero: none; planned: as reach, clearances, singular positions and time have it, along the whole program; needed: none
-    where the program converts so, else planned; a number: that angle, degrees"""
-    carriers: Literal["planned", "rest"] = "planned"
-    """of axes that carry a platform which moves along them by itself too. planned: the path is split between both, so that
-    together they take the least time; rest: the platform rests in the middle of its workspace, but for its tilt"""
 
 
 class SetupFile(UserModel):

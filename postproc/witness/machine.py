@@ -160,14 +160,15 @@ class Rods:
         return np.asarray(np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0))
 
     def _spun(self, q: Array, letters: tuple[str, ...], above: Array, level: Array) -> tuple[Array, Array]:
-        """(platform (N, 3, 3), mm by which each rod misses its length (K, N)) where the tool is turned about itself as the rods
-        have it; `level` without."""
+        """(platform (N, 3, 3), mm by which each rod misses its length (K, N)) where the tool is turned about itself as the
+        rods have it; `level` without."""
         best, found = level, np.full((len(self.legs), len(q)), np.inf)
         for start in SPINS:
             rows = np.flatnonzero(~(np.abs(found).max(axis=0) <= ROD))
             if not len(rows):
                 break
-            platform = (level if len(level) == 1 else level[rows]) @ rotations(np.array([0.0, 0.0, 1.0]), np.full(len(rows), start))
+            own = level if len(level) == 1 else level[rows]
+            platform = own @ rotations(np.array([0.0, 0.0, 1.0]), np.full(len(rows), start))
             for _ in range(SPIN_STEPS):
                 off, slope = self._legs(q[rows], letters, above[rows], platform)
                 spin = -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)

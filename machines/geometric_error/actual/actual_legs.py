@@ -1,8 +1,8 @@
 """A platform on legs with its errors, of any drives and freedoms: through the exact closure of its rods (`leg_frame.py`).
 
 w are the nominal tip, the turns that the platform gives the tool axis, and, of one that turns in every direction, the
-spin, which is held, as redundant carriers are. Slides that carry legs and platform take the errors of a serial machine's slides, the spindle those of
-a spindle.
+spin, which is held, as redundant carriers are. Slides that carry legs and platform take the errors of a serial machine's
+slides, the spindle those of a spindle.
 """
 
 from __future__ import annotations

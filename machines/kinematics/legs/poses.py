@@ -270,7 +270,7 @@ class PosesOfLegs(Kinematics):
     def _misfit(self, own: Floats, place: Floats, turn: Floats) -> Floats:
         """(N,) mm by which the worst rod misses its length at joints (N, K) of the legs."""
         rods = self.loops.ends(place, turn) - self.legs.feet(own)
-        return np.abs(lengths(rods) - self.legs.spans(own)).max(axis=1)
+        return np.asarray(np.abs(lengths(rods) - self.legs.spans(own)).max(axis=1), dtype=np.float64)
 
     def _from_home(self, own: Floats) -> tuple[Floats, Floats, Bools]:
         """The same by small steps from the home joints, where no larger one leads to the home mode."""

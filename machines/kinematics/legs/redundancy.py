@@ -18,7 +18,7 @@ from machines.kinematics.legs.poses import PosesOfLegs
 from toolpaths.arrays import Floats
 
 SPUN = np.deg2rad(75.0)
-"""rad: beyond it the platforms of six-axis machines come near their singular positions (a quarter turn on a Gough platform)"""
+"""rad: beyond it the platforms of six-axis machines are near singular positions (a Gough platform at a quarter turn)"""
 ACROSS = 1e-9
 """part of a carrier's direction that is none"""
 
@@ -40,9 +40,9 @@ class RedundantLegs(PosesOfLegs):
         return (*([SPIN] if self.spin_free else []), *carriers)
 
     @cached_property
-    def parameters_apart(self) -> Floats:  # type: ignore[override]  # nothing assigns it
-        """See the base class: SPUN of the spin; of carriers what leaves the platform, at rest in the middle, in its workspace,
-        whatever the others do."""
+    def parameters_apart(self) -> Floats:
+        """See the base class: SPUN of the spin; of carriers what leaves the platform, at rest in the middle, in its
+        workspace, whatever the others do."""
         spin = [SPUN] if self.spin_free else []
         if not self.carried_twice:
             return np.array(spin)

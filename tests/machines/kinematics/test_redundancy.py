@@ -1,4 +1,4 @@
-"""What a pose leaves open: the spin of platforms that turn in every direction, carriers under those that move by themselves."""
+"""What a pose leaves open: the spin of platforms that turn in every direction, carriers of those that move by themselves."""
 
 from __future__ import annotations
 
@@ -56,7 +56,8 @@ def test_forward_of_the_inverse_whatever_is_left_open(case: tuple[str, float, bo
     near = kin.pose(q, np.hstack([tip + 15.0, axis]))  # as a block before would have it
     np.testing.assert_allclose(np.hstack(near[:2]), np.hstack([tip, axis]), rtol=0, atol=2e-9)
     np.testing.assert_allclose(kin.parameters_at(q), parameters, rtol=0, atol=2e-9)
-    np.testing.assert_allclose(kin.inverse_like(tip + 1.0, axis, q), kin.inverse_with(tip + 1.0, axis, parameters), atol=1e-7)
+    np.testing.assert_allclose(kin.inverse_like(tip + 1.0, axis, q), kin.inverse_with(tip + 1.0, axis, parameters),
+                               atol=1e-7)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -67,7 +68,7 @@ def test_rates_and_bounds_where_it_changes_along_a_move(case: tuple[str, float, 
     q = kin.inverse_with(tip, axis, parameters)[0]
     np.testing.assert_allclose(kin.jacobian(q), by_samples.rates(lambda some: kin.forward(some), q, kin.rotary), atol=1e-5)
     turned = parameters + 0.05 * kin.parameters_apart
-    moved = kin.inverse_with(tip + [3.0, -2.0, 1.0], axis, turned)[0]
+    moved = kin.inverse_with(tip + np.array([3.0, -2.0, 1.0]), axis, turned)[0]
     jets = kin.jets(q, moved)
     for t in np.linspace(0.0, 1.0, 9):
         h, seen = t - 0.5, kin.forward(q + t * (moved - q))

@@ -94,7 +94,8 @@ def test_a_path_that_only_a_turned_platform_reaches_is_converted_and_proved(shor
 
 def test_what_converts_without_is_left_byte_for_byte() -> None:
     path = toolpath("RAPID", *LEVEL)
-    one, other = (good(convert(path, "hexapod", setup=setup_of(text + LENGTH))) for text in ('', '[joints]\nspin = "zero"\n'))
+    one, other = (good(convert(path, "hexapod", setup=setup_of(text + LENGTH)))
+                  for text in ('', '[joints]\nspin = "zero"\n'))
     assert one.text.split("G54\n")[1] == other.text.split("G54\n")[1] and one.path is not None and one.path.opened == ()
 
 

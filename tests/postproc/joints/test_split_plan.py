@@ -40,7 +40,7 @@ def wave(n: int = 400, far: float = 500.0) -> Floats:
 
 @pytest.mark.parametrize("lean", [0.0, 0.2])
 def test_the_platform_stays_in_its_room_and_the_carriers_in_their_travel(lean: float) -> None:
-    machine, roads = gantry(), [road(wave(), 250.0, lean), road(wave()[::-1] + [0.0, 60.0, 0.0], 250.0, lean)]
+    machine, roads = gantry(), [road(wave(), 250.0, lean), road(wave()[::-1] + np.array([0.0, 60.0, 0.0]), 250.0, lean)]
     for one, curve in zip(roads, planned_split(roads, machine), strict=True):
         at = np.linspace(curve.measure[0], curve.measure[-1], 3000)
         tip, axis = one.at(curve.measure, at)
@@ -72,8 +72,8 @@ def test_a_path_beyond_the_gantry_is_reached_by_the_platform() -> None:
 @pytest.mark.parametrize("mode", ["planned", "rest"])
 def test_programs_hold_all_joints_and_are_proved(mode: str) -> None:
     x = np.linspace(-300.0, 300.0, 60)
-    path = toolpath("RAPID", "GOTO/-300,0,30", "FEDRAT/MMPM,12000", *(f"GOTO/{a:.4f},{25 * np.sin(a / 12):.4f},0" for a in x),
-                    "RAPID", "GOTO/300,0,30")
+    path = toolpath("RAPID", "GOTO/-300,0,30", "FEDRAT/MMPM,12000",
+                    *(f"GOTO/{a:.4f},{25 * np.sin(a / 12):.4f},0" for a in x), "RAPID", "GOTO/300,0,30")
     result = good(convert(path, "macro-micro", "siemens-840d", setup=setup_of(
         f'[part]\norigin = [0, 150, -270]\n[joints]\ncarriers = "{mode}"\n[tools.1]\ngauge_length = 80\n')))
     assert result.path is not None and result.comparison is not None and result.witness is not None
