@@ -93,10 +93,6 @@ class Kinematics(ABC):
     singular_names: tuple[str, ...] = ()
     """what `singular_distance` measures; () where it measures nothing"""
 
-    open_parameters: tuple[str, ...] = ()
-    """what a tip and an axis leave open besides branches and the family of `singular`: SPIN, or letters of joints that
-    may stand anywhere; () where the joints follow from the pose"""
-
     @property
     def plane(self) -> Floats | None:
         """(3,) unit normal of the plane that the tip never leaves; None where it moves in every direction."""
@@ -119,6 +115,12 @@ class Kinematics(ABC):
         """(tip (N, 3), axis (N, 3)) of joints q (N, J); see `pose` for `near`."""
 
     # ---- redundancy ----------------------------------------------------------------------------------------
+
+    @property
+    def open_parameters(self) -> tuple[str, ...]:
+        """What a tip and an axis leave open besides branches and the family of `singular`: SPIN, or letters of joints that
+        may stand anywhere; () where the joints follow from the pose."""
+        return ()
 
     @property
     def parameters_apart(self) -> Floats:

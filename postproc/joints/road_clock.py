@@ -15,7 +15,7 @@ from toolpaths.shapes import arrays
 SHORTEST, MOST_TIMES, FEWEST = 0.01, 20_000, 8
 """s between times that are looked at, at least, and how many there may be"""
 LINK = 0.5
-"""s that drawing back and coming down takes, besides the way"""
+"""s that drawing back and coming down takes, besides the path"""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class RoadClock:
 
 
 def clock_of(roads: Sequence[RunRoad], rapid: float) -> RoadClock:
-    """Roads by time, rapids and the ways between them at `rapid` mm/s."""
+    """Roads by time, rapids and the paths between them at `rapid` mm/s."""
     of_poses = _pose_times(roads, rapid)
     low, high = float(of_poses[0][0]), float(of_poses[-1][-1])
     count = int(np.clip((high - low) / SHORTEST, FEWEST, MOST_TIMES))

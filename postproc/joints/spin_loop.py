@@ -8,7 +8,7 @@ from toolpaths.compiled import loop
 
 @loop
 def cheapest_spins(cost: Floats, edges: Floats, value: Floats, choice: Ints) -> None:
-    """Cost of the rest of the way from every spin of a row of N places, the last first.
+    """Cost of the rest of the path from every spin of a row of N places, the last first.
 
     Args:
         cost: (N, S) s that each place costs by itself

@@ -157,7 +157,7 @@ def _planned(grid: Floats, step: float, nodes: _Nodes, kins: list[Kinematics], m
 
 
 def _best(grid: Floats, nodes: _Nodes, kins: list[Kinematics], machine: Machine, least: float, column: int) -> Floats:
-    """(N,) the cheapest way through spins `grid` (N, S)."""
+    """(N,) the cheapest path through spins `grid` (N, S)."""
     held = np.isfinite(nodes.held)[:, None]
     grid = np.where(held, np.nan_to_num(nodes.held)[:, None], grid)
     q, cost = _looked_at(grid, nodes, kins, machine, least, column)

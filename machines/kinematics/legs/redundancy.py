@@ -34,7 +34,7 @@ class RedundantLegs(PosesOfLegs):
     spin_free: bool = False
 
     @cached_property
-    def open_parameters(self) -> tuple[str, ...]:  # type: ignore[override]  # nothing assigns it
+    def open_parameters(self) -> tuple[str, ...]:
         """See the base class."""
         carriers = [self.axis_names[j] for j in self.carriers_at] if self.carried_twice else []
         return (*([SPIN] if self.spin_free else []), *carriers)
