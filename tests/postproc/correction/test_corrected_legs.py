@@ -77,7 +77,7 @@ def test_a_redundant_machine_is_corrected_where_it_stands(tmp_path: Path) -> Non
     text = (ERRORS / "hexapod.toml").read_text().replace('machine = "hexapod"', "").partition("[sigma")[0]
     for old, new in zip("WVUZYX", "EQWVUZ", strict=True):
         text = text.replace(f"[legs.{old}]", f"[legs.{new}]")
-    (tmp_path / "own.toml").write_text(text + '[constants]\nEA0S = 12.0\nEC0Y = 9.0\n')
+    (tmp_path / "own.toml").write_text(text + '[location]\nEA0S = 12.0\nEC0Y = 9.0\n')
     path = toolpath("MULTAX/ON", "RAPID", f"GOTO/-20,10,5{TILTED[0]}", "FEDRAT/MMPM,1500", f"GOTO/-20,10,-2{TILTED[0]}",
                     f"GOTO/15,10,-1{TILTED[1]}", "RAPID", f"GOTO/15,10,20{TILTED[1]}")
     setup = setup_of("[part]\norigin = [700, 100, -250]\n[joints]\nspin = 20\n[tools.1]\ngauge_length = 80\n")
