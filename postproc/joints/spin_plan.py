@@ -120,7 +120,9 @@ def _nodes(roads: Sequence[RunRoad], others: Sequence[Sequence[ParameterCurve]],
             found[:, curve.columns] = curve.at(np.interp(own, road.steps, curve.measure))
         clock = np.concatenate([[0.0], np.cumsum(road.seconds)])
         seconds.append(np.diff(np.interp(own, road.steps, clock), prepend=0.0))
-        tips.append(tip), axes.append(axis), parameters.append(found)
+        tips.append(tip)
+        axes.append(axis)
+        parameters.append(found)
     counts = [len(own) for own in places]
     held = np.repeat([road.held if np.isfinite(road.held) or fixed is None else fixed for road in roads], counts)
     index = {id(kin): k for k, kin in enumerate(kins)}
@@ -200,7 +202,8 @@ def _looked_at(grid: Floats, nodes: _Nodes, kins: list[Kinematics], machine: Mac
         rows = np.flatnonzero(nodes.tool == k)
         parameters = np.repeat(np.nan_to_num(nodes.parameters[rows]), count, axis=0)
         parameters[:, column] = grid[rows].ravel()
-        found = kin.inverse_with(*(np.repeat(x[rows], count, axis=0) for x in (nodes.tip, nodes.axis)), parameters)[0]
+        tip, axis = (np.repeat(x[rows], count, axis=0) for x in (nodes.tip, nodes.axis))
+        found = kin.inverse_with(tip, axis, parameters)[0]
         q[rows] = found.reshape(len(rows), count, -1)
         cost[rows] = _price(kin, found, machine, least).reshape(len(rows), count) * weight[rows, None]
     return q, cost

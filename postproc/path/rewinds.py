@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from machines.kinematics.base import Kinematics
+from machines.kinematics.base import SPIN, Kinematics
 from machines.machine import Machine
 from postproc.control.control import Control
 from postproc.joints.plan import JointPreferences
@@ -73,6 +73,9 @@ def drawing_of(setup: SetupFile, placement: Placement, space: SafeSpace, machine
         diagnostics.append(error("setup.in_plane", f"clearance.in_plane = true: {machine.name} lifts the tool out of every "
                                  "plane", file=file, hint="take in_plane out of [clearance]: linking moves go by the safe "
                                  "planes"))
+    if not isinstance(joints.spin, str) and joints.spin and SPIN not in machine.kinematics.open_parameters:
+        diagnostics.append(error("setup.joints", f"joints.spin = {joints.spin:g}: {machine.name} cannot turn the tool about "
+                                 "its own axis", file=file, hint='take spin out of [joints], or write spin = "needed"'))
     if diagnostics:
         return RetractPlan(space), diagnostics
     index = machine.axis_names.index

@@ -86,4 +86,4 @@ def test_a_redundant_machine_is_corrected_where_it_stands(tmp_path: Path) -> Non
     assert result.compensation is not None and result.compensation.tip_before > 0.005
     assert found is not None and found.tip.max() < found.tip_bound < 1e-3
     assert result.witness is not None and not result.witness.findings and result.path is not None
-    assert dict((name, round(low, 3)) for name, low, _ in result.path.opened)["spin"] == 0.349
+    assert {name: round(low, 3) for name, low, _ in result.path.opened}["spin"] == 0.349
