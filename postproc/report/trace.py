@@ -103,8 +103,10 @@ def _turned(choice: OrientationChoice, plan: Orientation, row: int) -> dict[str,
 def _branches(result: PostResult, kin: Kinematics, moves: Moves, m: int) -> Floats:
     """Joints (B, J) of every branch at the end of a move, with what a redundant machine leaves open as it was planned."""
     tip, axis, path = moves.tip[m:m + 1], moves.axis[m:m + 1], result.nominal or result.path
-    last = np.flatnonzero((path.move == m) & (path.u == 1.0))[-1:] if path is not None and kin.open_parameters else []
-    return (kin.inverse(tip, axis) if path is None or not len(last) else kin.inverse_like(tip, axis, path.q[last]))[:, 0]
+    if path is None or not kin.open_parameters:
+        return kin.inverse(tip, axis)[:, 0]
+    last = np.flatnonzero((path.move == m) & (path.u == 1.0))[-1:]
+    return (kin.inverse_like(tip, axis, path.q[last]) if len(last) else kin.inverse(tip, axis))[:, 0]
 
 
 def _move(result: PostResult, job: Job, m: int) -> dict[str, Any]:
