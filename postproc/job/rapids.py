@@ -95,7 +95,7 @@ def _split(moves: Moves, rows: Ints, control: Control, kin: Kinematics, space: S
 
 
 def _rested(kin: Kinematics, tip: Floats, axis: Floats, near: Floats) -> Floats:
-    """Joints (K, J) with what a redundant machine leaves open as its inverse takes it, no plan being known yet; else `near`."""
+    """Joints (K, J) with what a redundant machine leaves open as its inverse takes it, for no plan is known; else `near`."""
     return kin.inverse(tip, axis, near=near)[0] if kin.open_parameters else near
 
 
