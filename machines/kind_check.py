@@ -98,7 +98,7 @@ def _round_trip(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats], what: s
     if found.shape != (kin.branches, len(q), kin.joints):
         yield _problem(f"{what} gives {found.shape}, expected (branches, N, J) = {(kin.branches, len(q), kin.joints)}")
         return
-    if kin.open_parameters and what == "inverse":
+    if kin.open_parameters:
         yield from _opened(kin, q, pose)
     good: Bools = np.asarray(np.isfinite(found).all(axis=2))
     if not good[:, 0].any():  # elsewhere the tool may stand beyond what the kind allows

@@ -5,8 +5,8 @@ drawn back, and any spin may follow any other at the price of the path there. Of
 leave the fewest places out of reach, then cost the least: time at the programmed feed or at the velocities of the axes,
 whichever is longer, and a price that grows where a singular position, a stop or a collision comes near, by the time that
 the tool is there (Bellman 1957, backwards from the end). The grid is made finer about what was found, and a cubic B-spline
-through the values has no corner. No spin, and the best one that stands, are tried next to it by the time that the joints
-take with their accelerations and jerks. What comes out is a proposal: the stages that check reach and deviation bound it as
+through the values has no corner. No spin, the best one that stands, and straight lines through the values, which reach what
+the spline rounds off, are tried next to it by the time that the joints take with their accelerations and jerks. What comes out is a proposal: the stages that check reach and deviation bound it as
 any path.
 """
 
@@ -28,7 +28,8 @@ from toolpaths.compiled import chosen
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
-MOST_NODES = 2000
+MOST_NODES, GRAIN = 2000, 0.5
+"""places that are looked at, and steps of a road between them at least"""
 GRID = 13
 """spins looked at first"""
 FINER, NEIGHBOURS = 3, (-2, -1, 0, 1, 2)
@@ -37,8 +38,8 @@ SPINNING, MOVING = 1.0, 0.1
 """s: what a change of the spin costs by its square per step of the road, and seconds of the slowest axis next to the time"""
 NEAR_MM, NEAR_RAD = 5.0, 3.0 * DEG
 """margins at which a collision or a stop costs a quarter of the time there"""
-OUTSIDE = 1e6
-"""s: more than any path that is in reach"""
+OUTSIDE, TIGHT = 1e6, 100.0
+"""s: more than any path that is in reach; what less than those margins costs, for between the places there may be none"""
 NEARNESS = 0.25
 """what the prices of all that is near count next to the time"""
 STRAIGHT = 0.2 * DEG
@@ -80,16 +81,17 @@ def planned_spins(roads: Sequence[RunRoad], others: Sequence[Sequence[ParameterC
         fixed: rad, the one spin that is asked for; None: planned
     """
     total = sum(float(road.steps[-1]) for road in roads)
-    grain = max(1.0, total / MOST_NODES)
+    grain = max(GRAIN, total / MOST_NODES)
     places = [np.linspace(0.0, road.steps[-1], max(int(np.ceil(road.steps[-1] / grain)), 1) + 1 if len(road.curves) else 1)
               for road in roads]
     kins = list({id(road.kin): road.kin for road in roads}.values())
     nodes = _nodes(roads, others, places, kins, fixed)
     column = columns_of(kins[0], True)[0]
     cuts = np.cumsum([len(own) for own in places])[:-1]
-    tried = [[ParameterCurve(road.steps, own, values[:, None], (column,), grain, STRAIGHT, len(own) > 2)
-              for road, own, values in zip(roads, places, np.split(spins, cuts), strict=True)]
-             for spins in _tried(nodes, kins, machine, least, column).T]
+    spins = list(_tried(nodes, kins, machine, least, column).T)
+    tried = [[ParameterCurve(road.steps, own, values[:, None], (column,), grain, STRAIGHT, rounded and len(own) > 2)
+              for road, own, values in zip(roads, places, np.split(some, cuts), strict=True)]
+             for some, rounded in [*((some, True) for some in spins), *((some, False) for some in spins[:len(spins) > 1])]]
     if len(tried) == 1:
         return tried[0]
     values = np.stack([np.concatenate([curve.at(curve.nodes)[:, 0] for curve in some]) for some in tried], axis=1)
@@ -226,5 +228,6 @@ def _price(kin: Kinematics, q: Floats, machine: Machine, least: float) -> Floats
     away = kin.singular_distance(some)
     bad = (margin < 0.0).any(axis=1) | ~(away >= least).all(axis=1)
     price += ((least / np.maximum(np.nan_to_num(away), least)) ** 2).max(axis=1, initial=0.0)
-    result[good] = np.where(bad, 100.0 * OUTSIDE, NEARNESS * price)
+    tight = TIGHT * np.maximum(1.0 - margin, 0.0).max(axis=1) ** 2
+    result[good] = np.where(bad, 100.0 * OUTSIDE, NEARNESS * price + tight)
     return result

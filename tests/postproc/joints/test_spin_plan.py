@@ -92,6 +92,21 @@ def test_a_path_that_only_a_turned_platform_reaches_is_converted_and_proved(shor
     assert (q >= limits.lower).all() and (q <= limits.upper).all()
 
 
+def test_a_path_that_needs_another_spin_at_its_end_than_at_its_beginning(short_legs: Machine) -> None:
+    """From 12 to 35 degrees here, from -12 to -35 there, in one run: it turns under way, with planned feeds."""
+    first, last = "0.20167,-0.45442,0.86766", "0.20167,0.45442,0.86766"
+    path = toolpath("MULTAX/ON", "RAPID", f"GOTO/-139,-24,-80,{first}", "FEDRAT/MMPM,1000",
+                    f"GOTO/-139.88,-23.71,-94.74,{first}", "GOTO/-130,-12,-94.74,0.18,-0.24,0.954", "GOTO/-130,0,-94.74,0.17,0,0.98544",
+                    "GOTO/-130,12,-94.74,0.18,0.24,0.954", f"GOTO/-139.88,23.71,-94.74,{last}", "RAPID", "GOTO/-139,24,-80")
+    setup = setup_of(f"[joints]\nspin = \"planned\"\n[clearance]\nmargin = 5\n{LENGTH}")
+    result = good(postproc.convert(path, short_legs, setup=setup, options=postproc.Options(feed="planned")))
+    assert result.path is not None and result.comparison is not None and result.witness is not None
+    low, high = np.degrees(result.path.opened[0][1:])
+    assert low < -10.0 and high > 12.0
+    assert result.comparison.tip_bound < 0.01 and result.comparison.bounded_cuts == result.comparison.cuts
+    assert not result.witness.findings
+
+
 def test_what_converts_without_is_left_byte_for_byte() -> None:
     path = toolpath("RAPID", *LEVEL)
     one, other = (good(convert(path, "hexapod", setup=setup_of(text + LENGTH)))
