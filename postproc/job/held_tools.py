@@ -15,7 +15,7 @@ from toolpaths.toolpath import Toolpath
 
 def with_held_tools(moves: Moves, toolpath: Toolpath, machine: Machine, setup: SetupFile) -> Moves:
     """The moves in the table frame, those of tools that are not round at a spin of 0 where the file asks for none."""
-    numbers = {int(number) for number, tool in setup.tools.items() if not tool.round}
+    numbers = {int(number) for number, tool in setup.tools.items() if tool.keeps_spin}
     held = [k for k, tool in enumerate(toolpath.tools) if tool.number in numbers]
     if not held or SPIN not in machine.kinematics.with_free_spin().open_parameters:
         return moves

@@ -6,8 +6,8 @@ leave the fewest places out of reach, then cost the least: time at the programme
 whichever is longer, and a price that grows where a singular position, a stop or a collision comes near, by the time that
 the tool is there (Bellman 1957, backwards from the end). The grid is made finer about what was found, and a cubic B-spline
 through the values has no corner. No spin, the best one that stands, and straight lines through the values, which reach what
-the spline rounds off, are tried next to it by the time that the joints take with their accelerations and jerks. What comes out is a proposal: the stages that check reach and deviation bound it as
-any path.
+the spline rounds off, are tried next to it by the time that the joints take with their accelerations and jerks. What comes
+out is a proposal: the stages that check reach and deviation bound it as any path.
 """
 
 from __future__ import annotations

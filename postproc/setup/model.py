@@ -90,8 +90,8 @@ class ToolSetup(ToolBody):
     words are the path of the tool's centre. Default: wear, radius where contour = true"""
     contour: bool = False
     """true: under CUTCOM the CL file holds the contour, not the path of the tool's centre"""
-    round: bool = True
-    """false: its turn about its own axis matters (a probe, a tool with one edge and a spindle that is held): where the
+    keeps_spin: bool = False
+    """true: its turn about its own axis matters (a probe, a tool with one edge and a spindle that is held): where the
     machine could turn it so, it stays at 0"""
     tip_acceleration: float | None = Field(default=None, gt=0.0)
     """largest acceleration of the tip along its path on the part, mm/s2; kept by --feed planned; default: no limit"""

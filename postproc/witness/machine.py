@@ -162,24 +162,18 @@ class Rods:
     def _spun(self, q: Array, letters: tuple[str, ...], above: Array, level: Array) -> tuple[Array, Array]:
         """(platform (N, 3, 3), mm by which each rod misses its length (K, N)) where the tool is turned about itself as the
         rods have it; `level` without."""
-        best, found = level, np.full((len(self.legs), len(q)), np.inf)
+        best, found, z = level, np.full((len(self.legs), len(q)), np.inf), np.array([0.0, 0.0, 1.0])
         for start in SPINS:
-            rows = np.flatnonzero(~(np.abs(found).max(axis=0) <= ROD))
-            if not len(rows):
-                break
-            own = level if len(level) == 1 else level[rows]
-            platform = own @ rotations(np.array([0.0, 0.0, 1.0]), np.full(len(rows), start))
+            platform, spin = level, np.full(len(q), start)
             for _ in range(SPIN_STEPS):
-                off, slope = self._legs(q[rows], letters, above[rows], platform)
-                spin = -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)
-                if not np.abs(spin).max() > SPUN:
+                platform = platform @ rotations(z, np.where(np.isfinite(spin), spin, 0.0))
+                off, slope = self._legs(q, letters, above, platform)
+                if not np.abs(spin := -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)).max(initial=0.0) > SPUN:
                     break
-                platform = platform @ rotations(np.array([0.0, 0.0, 1.0]), np.where(np.isfinite(spin), spin, 0.0))
-            off, _ = self._legs(q[rows], letters, above[rows], platform)
-            better = np.abs(off).max(axis=0) < np.abs(found[:, rows]).max(axis=0)
-            best = np.array(np.broadcast_to(best, (len(q), 3, 3)))
-            best[rows[better]] = np.broadcast_to(platform, (len(rows), 3, 3))[better]
-            found[:, rows[better]] = off[:, better]
+            better = np.abs(off).max(axis=0) < np.abs(found).max(axis=0)
+            best, found = np.where(better[:, None, None], platform, best), np.where(better, off, found)
+            if (np.abs(found).max(axis=0) <= ROD).all():
+                break
         return best, found
 
     def _legs(self, q: Array, letters: tuple[str, ...], above: Array, platform: Array) -> tuple[Array, Array]:

@@ -43,8 +43,8 @@ def leaning() -> Toolpath:
     return toolpath(*lines)
 
 
-def with_spin(machine: Machine, text: str, tool: str = "") -> PostResult:
-    return postproc.convert(leaning(), machine, setup=setup_of(f"[joints]\nspin = {text}\n{LENGTH}{tool}"))
+def with_spin(machine: Machine, text: str) -> PostResult:
+    return postproc.convert(leaning(), machine, setup=setup_of(f"[joints]\nspin = {text}\n{LENGTH}"))
 
 
 @pytest.mark.parametrize("loop", [cheapest_spins, compiled(cheapest_spins)])
@@ -96,7 +96,8 @@ def test_a_path_that_needs_another_spin_at_its_end_than_at_its_beginning(short_l
     """From 12 to 35 degrees here, from -12 to -35 there, in one run: it turns under way, with planned feeds."""
     first, last = "0.20167,-0.45442,0.86766", "0.20167,0.45442,0.86766"
     path = toolpath("MULTAX/ON", "RAPID", f"GOTO/-139,-24,-80,{first}", "FEDRAT/MMPM,1000",
-                    f"GOTO/-139.88,-23.71,-94.74,{first}", "GOTO/-130,-12,-94.74,0.18,-0.24,0.954", "GOTO/-130,0,-94.74,0.17,0,0.98544",
+                    f"GOTO/-139.88,-23.71,-94.74,{first}", "GOTO/-130,-12,-94.74,0.18,-0.24,0.954",
+                    "GOTO/-130,0,-94.74,0.17,0,0.98544",
                     "GOTO/-130,12,-94.74,0.18,0.24,0.954", f"GOTO/-139.88,23.71,-94.74,{last}", "RAPID", "GOTO/-139,24,-80")
     setup = setup_of(f"[joints]\nspin = \"planned\"\n[clearance]\nmargin = 5\n{LENGTH}")
     result = good(postproc.convert(path, short_legs, setup=setup, options=postproc.Options(feed="planned")))
@@ -124,11 +125,9 @@ def test_the_spin_that_is_asked_for(spin: str) -> None:
     assert np.abs(found).max() < 75.0 and (spin != "25" or np.abs(found - 25.0).max() < 0.5)
 
 
-def test_a_tool_that_is_not_round_is_not_turned(short_legs: Machine) -> None:
-    result = with_spin(short_legs, '"needed"', "round = false\n")
-    assert not result.ok and "travel.exceeded" in codes(result.diagnostics)
+def test_a_tool_that_keeps_its_spin_is_not_turned() -> None:
     free = good(convert(toolpath("RAPID", *LEVEL), "hexapod",
-                        setup=setup_of(f'[joints]\nspin = 25\n{LENGTH}round = false\n')))
+                        setup=setup_of(f'[joints]\nspin = 25\n{LENGTH}keeps_spin = true\n')))
     assert free.path is not None and free.path.opened[0][1:] == (0.0, 0.0)
 
 
