@@ -12,6 +12,6 @@ def axis_letters(machine: Machine, controller: ControllerFile) -> list[Diagnosti
     missing = [letter for letter in machine.axis_names if letter not in controller.axes]
     if not missing:
         return []
-    return [error("control.axis_letters", f"{machine.name} has an axis {', '.join(missing)}, for which this control has no "
+    return [error("write.axis_letters", f"{machine.name} has an axis {', '.join(missing)}, for which this control has no "
                   "word", file=machine.file, hint=f"letters of its axes: {' '.join(controller.axes)}; name the axis so in "
                   "the machine file, or take a controller that has the letter")]

@@ -35,7 +35,7 @@ def with_spin_needed(result: PostResult, staged: Callable[[PostResult], PostResu
     if not made.ok:
         return first
     why = next(d for d in first.diagnostics if d.severity is Severity.ERROR)
-    return made.with_found([info("spin.needed", f"the tool is turned about its own axis, without that: {why.message}",
+    return made.with_found([info("joints.spin_needed", f"the tool is turned about its own axis, without that: {why.message}",
                                  file=result.toolpath.file, lines=list(why.lines))])
 
 

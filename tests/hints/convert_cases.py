@@ -166,7 +166,7 @@ _PATH = [
 ]
 _OUTPUT = [
     convert(
-        "control.axis_letters",
+        "write.axis_letters",
         START + CUT,
         "take a controller that has the letter",
         Edit(COMMAND, "linuxcnc", "siemens-840d"),

@@ -87,4 +87,4 @@ def test_programs_hold_all_joints_and_are_proved(mode: str) -> None:
 
 def test_a_control_without_words_for_so_many_axes_says_so() -> None:
     result = convert(toolpath("RAPID", "GOTO/0,0,0"), "macro-micro", setup=setup_of("[tools.1]\ngauge_length = 80\n"))
-    assert not result.ok and "control.axis_letters" in codes(result.diagnostics)
+    assert not result.ok and "write.axis_letters" in codes(result.diagnostics)

@@ -14,8 +14,8 @@ ROOT = Path(__file__).parents[3]
 ROOM = ROOT / "postproc" / "witness"
 ALLOWED = {"numpy", "numba", *sys.stdlib_module_names}
 MOST_LINES = 4220
-"""400 of them for the forms that are no APT text (`other_forms`), 100 for platforms on legs and paths offset back, 20 for tools
-turned about themselves"""
+"""400 of them for the forms that are no APT text (`other_forms`), 100 for platforms on legs and paths offset back, 20 for
+tools turned about themselves"""
 
 
 def imported(tree: ast.AST) -> Iterator[str]:
