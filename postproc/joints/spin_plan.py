@@ -44,6 +44,8 @@ NEARNESS = 0.25
 """what the prices of all that is near count next to the time"""
 STRAIGHT = 0.2 * DEG
 """that blocks may leave the smooth spin by"""
+SAME = 1e-5
+"""mm, rad and direction cosines: what is nearer is round-off"""
 CHUNK, COMPILE_FROM = 512, 200_000
 
 
@@ -207,12 +209,13 @@ def _looked_at(grid: Floats, nodes: _Nodes, kins: list[Kinematics], machine: Mac
         tip, axis = (np.repeat(x[rows], count, axis=0) for x in (nodes.tip, nodes.axis))
         found = kin.inverse_with(tip, axis, parameters)[0]
         q[rows] = found.reshape(len(rows), count, -1)
-        cost[rows] = _price(kin, found, machine, least).reshape(len(rows), count) * weight[rows, None]
+        cost[rows] = _price(kin, found, (tip, axis), machine, least).reshape(len(rows), count) * weight[rows, None]
     return q, cost
 
 
-def _price(kin: Kinematics, q: Floats, machine: Machine, least: float) -> Floats:
-    """(N,) what a second at joints q (N, J) costs: OUTSIDE where they are out of reach, else from 0 in the open up."""
+def _price(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats], machine: Machine, least: float) -> Floats:
+    """(N,) what a second at joints q (N, J) costs: OUTSIDE where they are out of reach, or where the machine would not have
+    its tool at `pose` (another assembly mode), else from 0 in the open up."""
     result = np.full(len(q), 100.0 * OUTSIDE)
     good = np.flatnonzero(np.isfinite(q).all(axis=1))
     if not len(good):
@@ -220,13 +223,16 @@ def _price(kin: Kinematics, q: Floats, machine: Machine, least: float) -> Floats
     some = q[good]
     margin = np.hstack([some - machine.limits.lower, machine.limits.upper - some]) / np.where(
         np.tile(machine.rotary, 2), NEAR_RAD, NEAR_MM)
-    if clearances.is_checked(kin):
+    bad = ~(np.abs(np.hstack(kin.forward(some)) - np.hstack(pose)[good]) <= SAME).all(axis=1)
+    if kin.workspace is not None:
         found = clearances.reach(kin, some)
-        margin = np.hstack([margin, found.values / np.where(found.angular, NEAR_RAD, NEAR_MM)])
+        declared = len("xyz") + int(kin.workspace.tilt[0] < kin.workspace.tilt[1])  # box and tilt: no spin leaves them
+        bad |= ~(found.values[:, :declared] >= -SAME).all(axis=1)
+        margin = np.hstack([margin, (found.values / np.where(found.angular, NEAR_RAD, NEAR_MM))[:, declared:]])
     margin = np.nan_to_num(margin, nan=-1.0)
     price = (1.0 / (1.0 + np.maximum(margin, 0.0)) ** 2).max(axis=1)
     away = kin.singular_distance(some)
-    bad = (margin < 0.0).any(axis=1) | ~(away >= least).all(axis=1)
+    bad |= (margin < 0.0).any(axis=1) | ~(away >= least).all(axis=1)
     price += ((least / np.maximum(np.nan_to_num(away), least)) ** 2).max(axis=1, initial=0.0)
     tight = TIGHT * np.maximum(1.0 - margin, 0.0).max(axis=1) ** 2
     result[good] = np.where(bad, 100.0 * OUTSIDE, NEARNESS * price + tight)
