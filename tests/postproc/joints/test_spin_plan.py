@@ -23,7 +23,8 @@ from toolpaths.compiled import compiled
 from toolpaths.toolpath import Toolpath
 
 LEANING = ["MULTAX/ON", "RAPID", "GOTO/-139,-24,-80,0.20167,-0.45442,0.86766", "GOTO/-139.88,-23.71,-94.74",
-           "GOTO/-130,-23.71,-94.74", "GOTO/-130,-15,-94.74,0.18,-0.44,0.8797", "RAPID", "GOTO/-130,-15,-80"]
+           "GOTO/-130,-23.71,-94.74", "GOTO/-130,-15,-94.74,0.18,-0.44,0.8797", "GOTO/-139.88,-15,-94.74",
+           "GOTO/-139.88,-23.71,-94.74,0.20167,-0.45442,0.86766", "RAPID", "GOTO/-139,-24,-80"]
 """where legs with less travel than the catalogue's reach only with the tool turned about itself"""
 LEVEL = ["GOTO/0,0,-170", "FEDRAT/MMPM,900", "GOTO/10,0,-180", "GOTO/30,20,-180"]
 LENGTH = "[tools.1]\ngauge_length = 60\n"
