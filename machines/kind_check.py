@@ -98,6 +98,8 @@ def _round_trip(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats], what: s
     if found.shape != (kin.branches, len(q), kin.joints):
         yield _problem(f"{what} gives {found.shape}, expected (branches, N, J) = {(kin.branches, len(q), kin.joints)}")
         return
+    if kin.open_parameters:
+        yield from _opened(kin, q, pose)
     good: Bools = np.asarray(np.isfinite(found).all(axis=2))
     if not good[:, 0].any():  # elsewhere the tool may stand beyond what the kind allows
         yield _problem(f"{what} finds no joints for the pose that forward gives at home")
@@ -108,6 +110,21 @@ def _round_trip(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats], what: s
         if not off <= NEAR:
             yield _problem(f"forward of {what} is {off:.3g} mm or rad off the pose that was asked for")
             return
+
+
+def _opened(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats]) -> Iterator[KeyProblem]:
+    """Of a redundant kind: what joints q (N, J) leave open, and the inverse that takes it."""
+    parameters, count = kin.parameters_at(q), len(kin.open_parameters)
+    if parameters.shape != (len(q), count) or np.shape(kin.parameters_apart) != (count,):
+        yield _problem(f"parameters_at gives {parameters.shape} and parameters_apart {np.shape(kin.parameters_apart)}, "
+                       f"expected ({len(q)}, {count}) and ({count},)")
+        return
+    found = kin.inverse_with(*pose, parameters, q)[0]
+    rows = np.isfinite(found).all(axis=1)
+    again = np.hstack([*kin.forward(found[rows], np.hstack(pose)[rows]), kin.parameters_at(found[rows])])
+    off = np.abs(again - np.hstack([*pose, parameters])[rows]).max(initial=0.0)
+    if not off <= NEAR:
+        yield _problem(f"joints of inverse_with are {off:.3g} mm or rad off the pose and the parameters that were asked for")
 
 
 def _rates(kin: Kinematics, q: Floats, axis: Floats) -> Iterator[KeyProblem]:

@@ -108,7 +108,8 @@ class LegsModel(KinematicsModel):
         drives = [leg.drive for leg in self.drives.values()]
         kinds = " and ".join(f"{drives.count(d)} legs {'of changing length' if d == 'length' else f'on {d}s'}"
                              for d in dict.fromkeys(drives))
-        carried = f", carried along {' '.join(self.carriers)}" if self.carriers else ""
+        redundant = ", which it moves along by itself too" if {"x", "y", "z"} <= set(self.freedoms) else ""
+        carried = f", carried along {' '.join(self.carriers)}{redundant}" if self.carriers else ""
         where = "" if self.rotary is None else f", {self.rotary.place}"
         return f"{kinds}, platform free in {' '.join(self.freedoms)} (Gruebler {self.gruebler}){carried}{where}"
 
@@ -242,17 +243,24 @@ class LegsModel(KinematicsModel):
         if len(self.drives) != len(own):
             yield KeyProblem("machine.geometry", ("legs",), f"{len(self.drives)} legs for {len(own)} freedoms",
                              "write one [kinematics.legs.LETTER] table per freedom")
-        moves = [np.eye(3)[i] for i in range(3) if "xyz"[i] in own] + [np.array(c.direction) for c in self.carriers.values()]
-        if len(moves) > 3 or np.linalg.svd(np.array(moves), compute_uv=False)[-1] < 0.1:
-            yield KeyProblem("machine.geometry", ("carriers",), f"carriers {', '.join(self.carriers)} move the tool "
-                             "where the platform moves it already",
-                             "a carrier adds a direction that the platform does not have")
+        yield from self._carrier_problems(own)
         low, high = self.workspace.tilt
         least, most = (0.0, 0.0) if own in ("xy", "xyz") else (0.0 if own.endswith("abc") else -90.0, 90.0)
         if not (low == high == 0.0 or (least <= low <= 0.0 <= high < most and low > -90.0)):
             yield KeyProblem("machine.geometry", ("workspace", "tilt"), f"{[low, high]} degrees cannot be the tilt of "
                              f"this platform, free in {' '.join(own)}", "write tilt = [0, largest] with a b c, [lower, "
                              "upper] about one axis with a, b or c, less than 90 degrees; none without turns")
+
+    def _carrier_problems(self, own: str) -> Iterator[KeyProblem]:
+        """Carriers add what the platform lacks; under one that moves along x, y and z they are redundant, all of them."""
+        carriers = [np.array(c.direction) for c in self.carriers.values()]
+        whole = set("xyz") <= set(own)
+        moves = carriers if whole else [np.eye(3)[i] for i in range(3) if "xyz"[i] in own] + carriers
+        if moves and (len(moves) > 3 or np.linalg.svd(np.array(moves), compute_uv=False)[-1] < 0.1):
+            where = "one another" if whole else "the platform"
+            yield KeyProblem("machine.geometry", ("carriers",), f"carriers {', '.join(self.carriers)} move the tool where "
+                             f"{where} move{'s' * (not whole)} it already", "a carrier adds a direction to those of the "
+                             "other carriers, and of a platform that does not move along x, y and z by itself")
 
 
 def _pair(leg: DriveModel) -> Floats | None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from postproc.base.neighbours import foreign
-
 if TYPE_CHECKING:
     from postproc.base.options import Options
     from postproc.base.version import VERSION
@@ -29,6 +27,8 @@ def __getattr__(name: str) -> Any:
     """The public calls, imported on first use so that the command line starts at once."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    if other := foreign():
+    from postproc.base import neighbours
+
+    if other := neighbours.foreign():
         raise ImportError(other)
     return getattr(import_module(_HOME[name]), name)

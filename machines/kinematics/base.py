@@ -28,6 +28,8 @@ from toolpaths.arrays import Bools, Floats, Ints, read_only
 
 ErrorForm = TypeVar("ErrorForm", covariant=True)
 UP = read_only([0.0, 0.0, 1.0])
+SPIN = "spin"
+"""the open parameter that is the turn of the tool about its own axis, rad as in `Kinematics.pose`"""
 
 
 class PlatformPlaces(Protocol):
@@ -111,6 +113,35 @@ class Kinematics(ABC):
     @abstractmethod
     def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
         """(tip (N, 3), axis (N, 3)) of joints q (N, J); see `pose` for `near`."""
+
+    # ---- redundancy ----------------------------------------------------------------------------------------
+
+    @property
+    def open_parameters(self) -> tuple[str, ...]:
+        """What a tip and an axis leave open besides branches and the family of `singular`: SPIN, or letters of joints that
+        may stand anywhere; () where the joints follow from the pose."""
+        return ()
+
+    @property
+    def parameters_apart(self) -> Floats:
+        """(F,) how far each open parameter may be from what `inverse` takes for it, rad or mm."""
+        return np.zeros(len(self.open_parameters))
+
+    def parameters_at(self, q: Floats) -> Floats:
+        """The open parameters (N, F) at joints q (N, J)."""
+        return np.zeros((len(q), 0))
+
+    def inverse_with(self, tip: Floats, axis: Floats, parameters: Floats, near: Floats | None = None) -> Floats:
+        """As `inverse`, with the open parameters (N, F) as they are given; `inverse` itself takes them as it likes."""
+        return self.inverse(tip, axis, near=near)
+
+    def inverse_like(self, tip: Floats, axis: Floats, near: Floats) -> Floats:
+        """As `inverse`, with the open parameters that joints `near` (N, J) have."""
+        return self.inverse_with(tip, axis, self.parameters_at(near) if self.open_parameters else near[:, :0], near)
+
+    def with_free_spin(self) -> Self:
+        """The same machine with the turn of the tool about itself among the open parameters; as it is where it has none."""
+        return self
 
     # ---- poses ---------------------------------------------------------------------------------------------
 

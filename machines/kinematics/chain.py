@@ -11,7 +11,7 @@ import numpy.typing as npt
 from toolpaths.arrays import Floats, read_only
 from toolpaths.shapes import arrays
 
-LINEAR, ROTARY = "XYZUVWPQR", "ABC"
+LINEAR, ROTARY = "XYZUVWPQRE", "ABC"
 """letters of axes by what they are (ISO 841)"""
 
 

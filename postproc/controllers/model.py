@@ -186,6 +186,8 @@ class ControllerFile(UserModel):
     """one line for people"""
     writer: WriterName = "iso"
     """class that adds what data cannot say"""
+    axes: Annotated[str, Field(pattern="^[A-Z]+$")] = "XYZUVWABC"
+    """letters that words of axes may have"""
     sources: tuple[str, ...] = ()
     """documents that the rules come from"""
     format: Format = Format()

@@ -18,6 +18,7 @@ from postproc.control.rollover import rollovers
 from postproc.control.word_grid import WordGrid, word_grid
 from postproc.controllers.fitted import fitted
 from postproc.controllers.model import ControllerFile
+from postproc.job.held_tools import with_held_tools
 from postproc.job.length_words import words_depend_on_length
 from postproc.job.pivots import control_kinematics
 from postproc.job.places import Place, at_all, modes_at, places_of
@@ -270,7 +271,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     found = [d for d in found if not (errors and d.code == "feed.no_speed")]  # follows from the speed that is missing
     diagnostics += [*found, *_default_feed(toolpath, setup)]
     moves, found = limited_feeds(moves, toolpath, machine.largest_feed)
-    moves, diagnostics = moves.placed(placement), diagnostics + found
+    moves, diagnostics = with_held_tools(moves.placed(placement), toolpath, machine, setup), diagnostics + found
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     origin = placement.points(np.array([frame.origin]))[0]
     largest = controller.arcs.largest_radius if controller.arcs.enabled else 0.0

@@ -83,8 +83,8 @@ def _split(moves: Moves, rows: Ints, control: Control, kin: Kinematics, space: S
     """(rows that leave their line and have a safe path, height (K,) along their axis at which it goes across)."""
     home = np.tile(control.machine.home, (len(rows), 1))
     axis, begin, end = moves.axis[rows], moves.tip[rows - 1], moves.tip[rows]
-    q0 = nearest_solution(kin, begin, axis, home)
-    q1 = nearest_solution(kin, end, axis, q0)
+    q0 = nearest_solution(kin, begin, axis, _rested(kin, begin, axis, home))
+    q1 = nearest_solution(kin, end, axis, _rested(kin, end, axis, q0))
     known = np.asarray(np.isfinite(np.concatenate([q0, q1], axis=1)).all(axis=1))
     leaves = np.asarray(known & kin.singular(np.where(known[:, None], q0, control.machine.home)))
     sure = np.flatnonzero(known & ~leaves)
@@ -92,6 +92,11 @@ def _split(moves: Moves, rows: Ints, control: Control, kin: Kinematics, space: S
     k = np.flatnonzero(leaves)
     level = _levels(kin, control.machine, space, (begin[k], end[k], axis[k], q0[k]))
     return rows[k[np.isfinite(level)]], level[np.isfinite(level)]
+
+
+def _rested(kin: Kinematics, tip: Floats, axis: Floats, near: Floats) -> Floats:
+    """Joints (K, J) with what a redundant machine leaves open as its inverse takes it, for no plan is known; else `near`."""
+    return kin.inverse(tip, axis, near=near)[0] if kin.open_parameters else near
 
 
 def _levels(kin: Kinematics, machine: Machine, space: SafeSpace, rapids: tuple[Floats, Floats, Floats, Floats]) -> Floats:

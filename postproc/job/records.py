@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from machines.machine import Machine
 from postproc.controllers.model import ControllerFile
+from postproc.job.axis_letters import axis_letters
 from postproc.reference.cutcom_of_tools import CutcomOfTool, tools_under_cutcom, with_compensation
 from postproc.reference.length_registers import by_rule, own_registers
 from postproc.reference.records import checked_records, plain_records
@@ -31,7 +32,8 @@ def job_records(toolpath: Toolpath, machine: Machine, controller: ControllerFile
                 file: str) -> tuple[JobRecords, list[Diagnostic]]:
     """The records of a job, and what cannot be carried out; `file` is the set-up's."""
     toolpath, diagnostics = numbered(toolpath, setup, file)
-    diagnostics += [*other_machine(setup, machine.name, file), *assumed_values(setup, file)]
+    diagnostics += [*other_machine(setup, machine.name, file), *assumed_values(setup, file),
+                    *axis_letters(machine, controller)]
     cutcom = tools_under_cutcom(toolpath, setup)
     toolpath, found = with_compensation(toolpath, setup)
     diagnostics += found

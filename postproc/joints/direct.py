@@ -34,11 +34,13 @@ def direct(runs: Sequence[PoseRun], limits: Limits) -> list[Floats] | None:
 def _joints(kin: Kinematics, runs: Sequence[PoseRun], limits: Limits) -> Floats | None:
     """Joints (N, J) of runs one behind the other; None where one is outside, or where a direction is singular."""
     tip, axis = (np.concatenate(x) if len(x) > 1 else x[0] for x in ([run.tip for run in runs], [run.axis for run in runs]))
-    return joints_inside(kin, tip, axis, limits)
+    given = [run.parameters for run in runs if run.parameters is not None]
+    return joints_inside(kin, tip, axis, limits, np.concatenate(given) if given else None)
 
 
-def joints_inside(kin: Kinematics, tip: Floats, axis: Floats, limits: Limits) -> Floats | None:
+def joints_inside(kin: Kinematics, tip: Floats, axis: Floats, limits: Limits,
+                  parameters: Floats | None = None) -> Floats | None:
     """Joints (N, J) of poses (N, 3) on a machine whose inverse has one branch; None where one is outside or singular."""
-    q: Floats = kin.inverse(tip, axis)[0]
+    q: Floats = (kin.inverse(tip, axis) if parameters is None else kin.inverse_with(tip, axis, parameters))[0]
     inside = (q >= limits.lower - TRAVEL_SLACK) & (q <= limits.upper + TRAVEL_SLACK)
     return q if bool(inside.all()) and not bool(kin.singular(q).any()) else None

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from machines.kinematics.base import SPIN
 from machines.machine import Machine
 from postproc.joints.plan import RejectedStart, Rewind
 from postproc.joints.run_plan import RunPlan
@@ -20,6 +23,14 @@ _REASONS = ((BAD, "exceed axis travel"), (REWINDS, "need more rewinds"), (CUTS, 
 def planned(plan: RunPlan, machine: Machine, moves: Moves, file: str) -> list[Diagnostic]:
     """Everything about a plan; `moves` are those of the CL file."""
     return [*_rewinds(plan, machine, moves, file), *_events(plan, machine, moves, file), *_choices(plan, moves, file)]
+
+
+def opened(parameters: Sequence[tuple[str, float, float]]) -> str:
+    """What became of open parameters (name, least, greatest; rad or mm), in words."""
+    turned = [f"the tool is turned about its own axis by {low / DEG:.3f} to {high / DEG:.3f} degrees"
+              for name, low, high in parameters if name == SPIN]
+    carried = [f"{name} {low:.3f} to {high:.3f}" for name, low, high in parameters if name != SPIN]
+    return ", ".join([*turned, *([f"the platform is carried by {', '.join(carried)} mm"] if carried else [])])
 
 
 def _rewinds(plan: RunPlan, machine: Machine, moves: Moves, file: str) -> list[Diagnostic]:

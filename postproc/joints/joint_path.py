@@ -28,10 +28,11 @@ def nearest_solution(kin: Kinematics, tip: Floats, axis: Floats, near: Floats,
                      branch: Ints | None = None) -> Floats:
     """Joints (N, J) of poses, on the branch and winding nearest to `near` (N, J).
 
-    `branch` (N,) names the branch where it is known, -1 where it is not.
+    `branch` (N,) names the branch where it is known, -1 where it is not. What a redundant machine leaves open is as in
+    `near`.
     """
     rotary = np.array(kin.rotary)
-    branches = kin.inverse(tip, axis, near=near)
+    branches = kin.inverse_like(tip, axis, near)
     far = np.stack([distance(near, b, rotary) for b in branches])
     chosen = far.argmin(axis=0)
     if branch is not None:
@@ -44,5 +45,5 @@ def nearest_solution(kin: Kinematics, tip: Floats, axis: Floats, near: Floats,
 def branch_of(kin: Kinematics, tip: Floats, axis: Floats, q: Floats) -> Ints:
     """(N,) the branch that joints q (N, J) of poses are on; -1 where the tool lies along a rotary axis."""
     rotary = np.array(kin.rotary)
-    far = np.stack([distance(q, b, rotary) for b in kin.inverse(tip, axis, near=q)])
+    far = np.stack([distance(q, b, rotary) for b in kin.inverse_like(tip, axis, q)])
     return np.where(kin.singular(np.nan_to_num(q)), -1, far.argmin(axis=0))

@@ -23,7 +23,7 @@ _MANY = 1 << 30
 
 
 @dataclass(frozen=True)
-@arrays(tip="N 3", axis="N 3", rest="N", away="N", held="J")
+@arrays(tip="N 3", axis="N 3", rest="N", away="N", held="J", parameters="N F")
 class PoseRun:
     """Poses that the tool goes through without retracting.
 
@@ -33,6 +33,7 @@ class PoseRun:
         rest: (N,) True where the tool does not cut, so that it may be drawn back; None: it cuts everywhere
         away: (N,) s that drawing back there and coming down again takes; None: nothing
         held: (J,) where a rotary joint must stand that the tool lies along along the whole path; None: where it is best
+        parameters: (N, F) what the machine leaves open; None: as its inverse takes them
     """
 
     kin: Kinematics
@@ -41,6 +42,7 @@ class PoseRun:
     rest: Bools | None = None
     away: Floats | None = None
     held: Floats | None = None
+    parameters: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ def lattice_of(run: PoseRun, limits: Limits, near: Floats) -> Lattice:
     Such a run has a branch for each row of `near`.
     """
     rotary = np.array(run.kin.rotary)
-    branches, family = branches_of(run.kin, run.tip, run.axis, near)
+    branches, family = branches_of(run.kin, run.tip, run.axis, near, run.parameters)
     leads, free = following(run.kin, run.tip, run.axis, branches, family)
     values = branches.copy()
     for j in np.flatnonzero(rotary):

@@ -13,8 +13,10 @@ from postproc.base.group_rows import groups
 from postproc.joints.direct import joints_inside
 from postproc.joints.joint_path import reachable_axes
 from postproc.joints.lattice import PoseRun
+from postproc.joints.open_parameters import planned_parameters
 from postproc.joints.plan import JointPreferences, RunSolution, plan_runs
 from postproc.joints.refined_moves import Refined, cut, with_rewinds
+from postproc.joints.run_roads import ParameterCurve, RunRoad, together
 from postproc.joints.singular_detours import Led, SingularPassage, lead_past, whole
 from postproc.joints.spin import held_joints
 from postproc.reference.moves import Moves
@@ -42,6 +44,9 @@ class RunOptions:
         feed: mm/s of the return into the cut; None: that of the cut
         away: (tips (N, 3), axes (N, 3)) -> s (N,) that drawing back and coming down takes
         tolerance: rad, of the axis
+        spin: rad, the turn of the tool about itself that is asked for where the machine leaves it open; None: planned
+        singular_distance: that is kept
+        split: False where the platform rests on carriers that do all
     """
 
     preferences: JointPreferences
@@ -49,10 +54,13 @@ class RunOptions:
     feed: float | None
     away: Callable[[Floats, Floats], Floats]
     tolerance: float
+    spin: float | None = None
+    singular_distance: float = 0.0
+    split: bool = True
 
 
 @dataclass(frozen=True)
-@arrays(q="R J", singular="R", moved="R", left="R")
+@arrays(q="R J", singular="R", moved="R", left="R", parameters="R F")
 class RunPlan:
     """All runs: parts of moves, and at each part's end joints (R, J), family (R,), what the axis was moved by (R,).
 
@@ -60,6 +68,7 @@ class RunPlan:
         left: (R,) rad of the axis tolerance that linearising may use
         events: passages by singular directions, with the moves (first, last) of each
         solutions: of the runs of the CL file, in order, without their joints, which are in `q`
+        parameters: (R, F) what the machine leaves open, as it was planned
     """
 
     refined: Refined
@@ -69,12 +78,16 @@ class RunPlan:
     left: Floats
     events: tuple[tuple[int, int, SingularPassage], ...]
     solutions: tuple[RunSolution, ...]
+    parameters: Floats
 
 
 @dataclass(frozen=True)
 @arrays(rows="N", axis="N 3", moved="N", _tip="N 3")
 class _Part:
-    """One run while it is planned: its rows of Moves, the axes they are given, the curves after its first pose."""
+    """One run while it is planned: its rows of Moves, the axes they are given, the curves after its first pose.
+
+    `opened` are the curves of what the machine leaves open, `places` where the poses are in the measure of each.
+    """
 
     kin: Kinematics
     rows: Ints
@@ -96,6 +109,13 @@ class _Part:
 
     _tip: Floats
     """(N, 3) as given"""
+    opened: tuple[ParameterCurve, ...] = ()
+    places: tuple[Floats, ...] = ()
+
+    @property
+    def parameters(self) -> Floats | None:
+        """(N, F) at the poses; None where the machine leaves nothing open."""
+        return together(self.opened, len(self.kin.open_parameters), self.places) if self.opened else None
 
 
 def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves: Moves, run_options: RunOptions,
@@ -108,6 +128,8 @@ def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves:
         return plan
     for first, last in zip(starts.tolist(), [*starts[1:].tolist(), len(moves)], strict=True):
         parts.append(_part(machine, tools[int(moves.tool[first])], moves, first, last, given, run_options))
+    if parts and parts[0].kin.open_parameters:
+        parts = _opened(machine, parts, moves, run_options)
     runs = [_run(part, moves, run_options, machine.home) for part in parts]
     found = plan_runs(runs, machine.limits, machine.home, run_options.preferences,
                       run_options.may_rewind, progress)
@@ -122,7 +144,8 @@ def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves:
 def _without_choice(machine: Machine, tools: dict[int, Kinematics], moves: Moves, starts: Ints,
                     given: tuple[Floats, Floats], tolerance: float) -> RunPlan | None:
     """The same where `direct` has all runs, so that there may be a great many of them: of each tool at once."""
-    if not len(starts) or starts[0] or any(any(kin.rotary) or kin.branches != 1 for kin in tools.values()):
+    if not len(starts) or starts[0] or any(any(kin.rotary) or kin.branches != 1 or kin.open_parameters
+                                           for kin in tools.values()):
         return None
     axis, moved = given
     lengths = np.diff(np.append(starts, len(moves)))
@@ -139,7 +162,7 @@ def _without_choice(machine: Machine, tools: dict[int, Kinematics], moves: Moves
                   shared(axis) if moved.any() else moves.axis)
     left = np.repeat(tolerance - np.maximum.reduceat(moved, starts), lengths)
     return RunPlan(refined, q, singular, shared(moved), shared(left), (),
-                   (RunSolution(q[:0], singular[:0]),) * len(starts))
+                   (RunSolution(q[:0], singular[:0]),) * len(starts), np.zeros((n, 0)))
 
 
 def _reached(tools: dict[int, Kinematics], moves: Moves, starts: Ints,
@@ -187,13 +210,36 @@ def _run(part: _Part, moves: Moves, run_options: RunOptions, home: Floats) -> Po
     rest = rapid | np.append(rapid[1:], True)
     spin = float(moves.spin[part.rows[0]])
     held = held_joints(part.kin, tip[0], axis[0], spin, home) if np.isfinite(spin) else None
-    return PoseRun(part.kin, tip, axis, rest, run_options.away(tip, axis), held)
+    return PoseRun(part.kin, tip, axis, rest, run_options.away(tip, axis), held, part.parameters)
+
+
+def _opened(machine: Machine, parts: list[_Part], moves: Moves, run_options: RunOptions) -> list[_Part]:
+    """The runs with what the machine leaves open planned, cut where it changes."""
+    curves = planned_parameters([_road(part, moves) for part in parts], machine, run_options.singular_distance,
+                                run_options.spin, run_options.split)
+    made = [replace(part, opened=own, places=tuple(curve.measure for curve in own))
+            for part, own in zip(parts, curves, strict=True)]
+    return [_cut(part, np.max([curve.parts() for curve in part.opened], axis=0)) for part in made]
+
+
+def _road(part: _Part, moves: Moves) -> RunRoad:
+    rows, led, asked = part.rows[1:][part.led.parent], part.led, moves.spin[part.rows]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        time = np.where(moves.seconds[rows] > 0.0, moves.seconds[rows] * (led.u1 - led.u0),
+                        led.curves.length() / moves.feed[rows])
+    time = np.where((moves.kind[rows] == Kind.RAPID) | ~(time > 0.0) | ~np.isfinite(time), 0.0, time)
+    asked = asked[np.isfinite(asked)]
+    return RunRoad(part.kin, part.first[0], led.curves, time, float(asked[0]) if len(asked) else np.nan)
 
 
 def _finer(part: _Part, solution: RunSolution) -> _Part:
     """The run with moves that turn a rotary axis far cut into parts, so that a rewind may stand between their ends."""
     step = np.abs(np.diff(solution.q[:, np.array(part.kin.rotary)], axis=0)).max(axis=1, initial=0.0)
-    count = np.maximum(np.ceil(np.nan_to_num(step) / _COARSE), 1).astype(np.int64)
+    return _cut(part, np.maximum(np.ceil(np.nan_to_num(step) / _COARSE), 1).astype(np.int64))
+
+
+def _cut(part: _Part, count: Ints) -> _Part:
+    """The run with its curves cut into `count` (N,) even parts each."""
     if not (count > 1).any():
         return part
     led, index = part.led, np.repeat(np.arange(len(count)), count)
@@ -206,7 +252,8 @@ def _finer(part: _Part, solution: RunSolution) -> _Part:
     u0, u1 = led.u0[index], led.u1[index]
     end = np.where(high == 1.0, u1, u0 + high * (u1 - u0))
     finer = Led(curves, led.parent[index], u0 + low * (u1 - u0), end, led.events)
-    return _Part(part.kin, part.rows, part.axis, part.moved, finer, part._tip)
+    places = tuple(np.append(at[:1], at[index] + high * (at[index + 1] - at[index])) for at in part.places)
+    return replace(part, led=finer, places=places)
 
 
 def _together(moves: Moves, parts: list[_Part], found: list[RunSolution], run_options: RunOptions) -> RunPlan:
@@ -224,12 +271,16 @@ def _together(moves: Moves, parts: list[_Part], found: list[RunSolution], run_op
     q, singular = np.concatenate([s.q for s in found]), np.concatenate([s.singular for s in found])
     moved = shared(np.concatenate([p.moved[k] for p, k in zip(parts, owner, strict=True)]))
     left = shared(np.repeat([_left(p, run_options) for p in parts], np.diff(begin)))
+    given = [part.parameters for part in parts]
+    parameters = np.concatenate([np.zeros((len(part.led.curves) + 1, 0)) if some is None else some
+                                 for part, some in zip(parts, given, strict=True)])
     if rewinds:
+        parameters = np.insert(parameters, rows + 1, parameters[rows], axis=0)
         q = np.insert(q, rows + 1, np.stack([r.after for _, r in rewinds]), axis=0)
         singular, moved, left = (np.insert(x, rows + 1, x[rows]) for x in (singular, moved, left))
     events = tuple((int(p.rows[1 + e.first]), int(p.rows[1 + e.last]), e) for p in parts for e in p.led.events)
     solutions = tuple(replace(s, q=q[:0], singular=singular[:0]) for s in found)
-    return RunPlan(refined, q, singular, moved, left, events, solutions)
+    return RunPlan(refined, q, singular, moved, left, events, solutions, parameters)
 
 
 def _joined(moves: Moves, parts: list[_Part]) -> tuple[Floats, Floats]:

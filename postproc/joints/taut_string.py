@@ -5,6 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.compiled import chosen, loop
+
+COMPILE_FROM = 10_000
+"""gates"""
 
 
 def taut_string(at: Floats, low: Floats, high: Floats) -> Floats:
@@ -18,14 +22,16 @@ def taut_string(at: Floats, low: Floats, high: Floats) -> Floats:
     result = np.empty(len(at))
     corner, value = 0, float(low[0])
     result[0] = value
+    next_bend = chosen(_next_bend, len(at), COMPILE_FROM)
     while corner < len(at) - 1:
-        bend, slope = _next_bend(at, low, high, corner, value)
+        bend, slope = next_bend(at, low, high, corner, value)
         rows = np.arange(corner + 1, bend + 1)
         result[rows] = value + slope * (at[rows] - at[corner])
         corner, value = bend, float(result[bend])
     return np.clip(result, low, high)
 
 
+@loop
 def _next_bend(at: Floats, low: Floats, high: Floats, corner: int, value: float) -> tuple[int, float]:
     """(gate where the string bends next or ends, slope on the path there) from gate `corner`."""
     steepest, flattest = np.inf, -np.inf

@@ -16,15 +16,17 @@ _CROSSING = 1e-3
 _LEAST_STEP = 1e-10
 
 
-def branches_of(kin: Kinematics, tip: Floats, axis: Floats, near: Floats) -> tuple[Floats, Bools]:
+def branches_of(kin: Kinematics, tip: Floats, axis: Floats, near: Floats,
+                parameters: Floats | None = None) -> tuple[Floats, Bools]:
     """(joints (B, N, J) of every branch, family (B, N)) of poses (N, 3), (N, 3), rotaries in (-pi, pi].
 
     Where the tool lies along a rotary axis the free joint is carried on from the rows before, at the
     beginning of the run from the first other row. Where it does so along the whole path there is one branch
-    for each row of `near` (F, J).
+    for each row of `near` (F, J). `parameters` (N, ...): what the machine leaves open, where that was planned.
     """
     rotary = np.array(kin.rotary)
-    branches = kin.inverse(tip, axis, near=near[0])
+    branches = kin.inverse(tip, axis, near=near[0]) if parameters is None else kin.inverse_with(
+        tip, axis, parameters, near[0])
     family = np.stack([kin.singular(np.nan_to_num(b)) & np.isfinite(b).all(axis=1) for b in branches])
     if family.any():
         if not (np.isfinite(branches).all(axis=2) & ~family).any():

@@ -25,7 +25,7 @@ from postproc.path.solved_runs import SolvedRun, SolvedRuns, solved_runs
 from postproc.path.zero_entry import ZeroEntry, cost, needed, zero_entry
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Floats, Ints, as_slice, taken
-from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.diagnostics import Diagnostic, has_errors, info
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
@@ -91,15 +91,17 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     out.begin[len(moves)] = out.count
     columns = out.joined()
     give_back(len(moves))
-    path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst)
+    path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst, start.kin.open_parameters)
     diagnostics += joint_faults.planned(plan, machine, given, file)
+    if path.opened:
+        diagnostics.append(info("joints.opened", joint_faults.opened(path.opened), file=file))
     diagnostics += cost(modes.tcp_code, longer, file)
     return path, faults.merged(diagnostics) + faults.off_line(path.code, path.u, path.move, path.seconds,
                                                               given, file, rapids_as_feed)
 
 
 def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count: int, turns: Ints,
-              worst: Floats) -> JointPath:
+              worst: Floats, names: tuple[str, ...]) -> JointPath:
     """The path of the parts of moves as that of the `count` moves themselves."""
     parts = plan.refined
     singular = np.zeros(count, dtype=bool)
@@ -108,7 +110,9 @@ def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count:
     return JointPath(**columns, begin=parts.begins(out.begin, count), singular=singular,
                      turns=np.unique(parts.origin[turns]),
                      worst_tip=float(worst[0]), worst_axis=float(worst[1]), frames=tuple(out.frames),
-                     rewinds=parts.origin[parts.rewind], events=plan.events)
+                     rewinds=parts.origin[parts.rewind], events=plan.events,
+                     opened=tuple((name, float(column.min()), float(column.max()))
+                                  for name, column in zip(names, plan.parameters.T, strict=False)))
 
 
 def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,

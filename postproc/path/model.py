@@ -36,6 +36,7 @@ class JointPath:
         worst_tip, worst_axis: bound of the deviation between points, mm and rad
         rewinds (W,): moves before or in which the tool is drawn back to unwind an axis
         events: passages by singular directions: first and last move, and what was done
+        opened: what the machine leaves open, as it was planned: name, least and greatest, rad or mm
     """
 
     q: Floats
@@ -57,6 +58,7 @@ class JointPath:
     frames: tuple[WordFrame, ...]
     rewinds: Ints
     events: tuple[tuple[int, int, SingularPassage], ...]
+    opened: tuple[tuple[str, float, float], ...] = ()
 
     def __len__(self) -> int:
         return len(self.q)

@@ -11,12 +11,13 @@ from functools import partial
 
 import numpy as np
 
-from machines.kinematics.base import Kinematics
+from machines.kinematics.base import SPIN, Kinematics
 from machines.machine import Machine
 from postproc.control.control import Control
 from postproc.joints.plan import JointPreferences
 from postproc.joints.run_plan import RunOptions
 from postproc.path.links import Link, Pose, SafeSpace, plan_link
+from postproc.setup.joints import Joints
 from postproc.setup.model import Placement, RewindSettings, SetupFile
 from toolpaths.arrays import Floats, box_corners
 from toolpaths.diagnostics import Diagnostic, error
@@ -30,6 +31,7 @@ class RetractPlan:
     space: SafeSpace
     rewind: RewindSettings = field(default_factory=RewindSettings)
     preferences: JointPreferences = field(default_factory=JointPreferences)
+    joints: Joints = field(default_factory=Joints)
 
     @classmethod
     def default(cls, space: SafeSpace) -> RetractPlan:
@@ -41,8 +43,10 @@ class RetractPlan:
         feed = None if self.rewind.feed is None else self.rewind.feed / 60.0
         slow = machine.limits.velocity[~np.array(machine.rotary)]
         speed = float(slow.min()) if len(slow) else np.inf
+        spin = self.joints.spin
         return RunOptions(self.preferences, self.rewind.allowed, feed, partial(self._away, speed, feed or speed),
-                          axis_tolerance)
+                          axis_tolerance, None if isinstance(spin, str) else spin * DEG, self.joints.singular_distance,
+                          self.joints.carriers == "planned")
 
     def _away(self, rapid: float, feed: float, tip: Floats, axis: Floats) -> Floats:
         """Time (N,) s to draw back from poses (N, 3) to the sphere about what is cut, and to come down again."""
@@ -69,6 +73,9 @@ def drawing_of(setup: SetupFile, placement: Placement, space: SafeSpace, machine
         diagnostics.append(error("setup.in_plane", f"clearance.in_plane = true: {machine.name} lifts the tool out of every "
                                  "plane", file=file, hint="take in_plane out of [clearance]: linking moves go by the safe "
                                  "planes"))
+    if not isinstance(joints.spin, str) and joints.spin and SPIN not in machine.kinematics.open_parameters:
+        diagnostics.append(error("setup.joints", f"joints.spin = {joints.spin:g}: {machine.name} cannot turn the tool about "
+                                 "its own axis", file=file, hint='take spin out of [joints], or write spin = "needed"'))
     if diagnostics:
         return RetractPlan(space), diagnostics
     index = machine.axis_names.index
@@ -76,7 +83,7 @@ def drawing_of(setup: SetupFile, placement: Placement, space: SafeSpace, machine
                                    {index(k): v * DEG for k, v in joints.start.items()})
     if rewind.stock is not None:
         space = _with_stock(space, placement.points(box_corners(np.array(rewind.stock.low), np.array(rewind.stock.high))))
-    return RetractPlan(space, rewind, preferences), []
+    return RetractPlan(space, rewind, preferences, joints), []
 
 
 def _rotaries(machine: Machine) -> list[str]:

@@ -15,6 +15,7 @@ from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.job.job import prepare, with_shop
+from postproc.pipeline.free_spin import with_spin_needed
 from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
@@ -140,10 +141,10 @@ def _reading(path: Toolpath, diagnostics: list[Diagnostic] | None) -> tuple[Diag
 
 
 def _stages(result: PostResult, progress: Progress | None) -> PostResult:
-    """All stages; with --smooth passes that cannot be smoothed are taken back; "auto" takes the next output
-    mode where one cannot be written or proved."""
+    """All stages; with --smooth passes that cannot be smoothed are taken back; a spin that is needed is planned; "auto"
+    takes the next output mode where one cannot be written or proved."""
     def one(begun: PostResult, left: ExcludedPasses = frozenset()) -> PostResult:
-        return with_next_modes(begun, lambda again: staged(again, progress, left))
+        return with_spin_needed(begun, lambda spun: with_next_modes(spun, lambda again: staged(again, progress, left)))
     return with_passes_taken_back(result, one) if result.options.smooth else one(result)
 
 

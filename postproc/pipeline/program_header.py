@@ -12,6 +12,7 @@ from postproc.compile.program import Program
 from postproc.control.control import MODE_NAMES
 from postproc.control.modes import table_axes
 from postproc.job.job import Job
+from postproc.joints.faults import opened
 from postproc.pipeline.cutcom_header import cutcom_lines
 from postproc.pipeline.pivot_header import pivot_lines
 from postproc.pipeline.stage_values import CompiledStage
@@ -37,6 +38,7 @@ def header_lines(made: CompiledStage) -> list[str]:
     if made.motion is not None:
         header.append(feeds_line())
     header += [f"T{number}: {what}, of the set-up" for number, what in job.stated]
+    header += [opened(made.path.opened)] * bool(made.path.opened)
     header += [*_tip_frame(made), *_corrections(made), *_orientations(made), *pivot_lines(job, made.program),
                *_tools(job), *cutcom_lines(job, made.program)]
     if made.toolpath.name:

@@ -23,6 +23,7 @@ from postproc.path.rewinds import drawing_of
 from postproc.path.singular import check_singular
 from postproc.path.travel import check_travel
 from postproc.path.turn_steps import with_short_turns
+from postproc.pipeline.free_spin import spun_machine
 from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.program_header import header_lines
 from postproc.pipeline.program_lines import cl_lines
@@ -110,7 +111,8 @@ def _recorded(result: PostResult, made: BegunStage, found: DiagnosticList) -> Po
 def prepared(begun: BegunStage, progress: Progress | None) -> tuple[BegunStage | PreparedStage, DiagnosticList]:
     """Records, tools, cycles, output modes and linking moves of the path, as the machine and the control take them."""
     options = begun.options
-    job, found = prepare(begun.toolpath, begun.machine, begun.controller, begun.setup, options, begun.refused)
+    job, found = prepare(begun.toolpath, spun_machine(begun.machine, begun.setup), begun.controller, begun.setup, options,
+                         begun.refused)
     found = [*found, *_bad_meshes(begun.setup, options.setup)]
     if job is None:
         return begun, found

@@ -181,7 +181,8 @@ def _placed(path: JointPath, written: _Written, found: Smooth) -> _Placed:
     stretches, first = [], []
     for low, high in pairwise(cuts.tolist()):
         own = np.flatnonzero((ends > low) & (begin < high))
-        near = _Near(np.append(begin[own[:1]], ends[own]), path.q[np.append(block[own[:1]] - 1, block[own])])
+        near = _Near(np.append(begin[own[:1]], ends[own]), path.q[np.append(block[own[:1]] - 1, block[own])],
+                     bool(path.opened))
         stretches.append(PathStretch(found, low, high, near))
         first.append(int(block[own[0]]))
     return _Placed(written, found, begin, ends, tuple(stretches), tuple(first))
@@ -208,10 +209,17 @@ def _machine_paths(passes: list[_Placed], moves: Moves, kinematics: Callable[[in
 @dataclass(frozen=True)
 @arrays(s="N", q="N J")
 class _Near:
-    """Joints of the blocks at s, linear between their ends."""
+    """Joints of the blocks at s, linear between their ends; `smooth` where what the machine leaves open follows them, which
+    is to have no corners: cubic, without overshoot (Fritsch and Butland 1984)."""
 
     s: Floats
     q: Floats
+    smooth: bool
 
     def __call__(self, s: Floats) -> Floats:
+        places, rows = np.unique(self.s, return_index=True)
+        if self.smooth and len(places) > 2:
+            from scipy.interpolate import PchipInterpolator
+
+            return np.asarray(PchipInterpolator(places, self.q[rows])(np.clip(s, places[0], places[-1])))
         return np.stack([np.interp(s, self.s, column) for column in self.q.T], axis=1)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from machines.kinematics.base import Kinematics
 from postproc.base.options import Orientation
 from postproc.control.word_arcs import PLANE_AXIS
 from postproc.job.job import Job
@@ -17,6 +18,7 @@ from postproc.readback.comparison.compare import Comparison
 from postproc.readback.text.canonical import in_files
 from postproc.reference.coolant import coolant_states, label
 from postproc.reference.events import spindle_states
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints, finite
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import check_input
@@ -98,10 +100,19 @@ def _turned(choice: OrientationChoice, plan: Orientation, row: int) -> dict[str,
             "reference_time_s": finite(before.seconds)}
 
 
+def _branches(result: PostResult, kin: Kinematics, moves: Moves, m: int) -> Floats:
+    """Joints (B, J) of every branch at the end of a move, with what a redundant machine leaves open as it was planned."""
+    tip, axis, path = moves.tip[m:m + 1], moves.axis[m:m + 1], result.nominal or result.path
+    if path is None or not kin.open_parameters:
+        return kin.inverse(tip, axis)[:, 0]
+    last = np.flatnonzero((path.move == m) & (path.u == 1.0))[-1:]
+    return (kin.inverse_like(tip, axis, path.q[last]) if len(last) else kin.inverse(tip, axis))[:, 0]
+
+
 def _move(result: PostResult, job: Job, m: int) -> dict[str, Any]:
     moves, unit = job.moves, job.control.unit
     kin = job.kinematics(int(moves.tool[m]))
-    branches = kin.inverse(moves.tip[m:m + 1], moves.axis[m:m + 1])[:, 0] * unit
+    branches = _branches(result, kin, job.moves, m) * unit
     entry: dict[str, Any] = {
         "table_frame": {"tip_mm": moves.tip[m].tolist(), "axis": moves.axis[m].tolist()},
         "linked": bool(moves.link[m]), "feed_mm_per_min": finite(moves.feed[m] * 60.0),

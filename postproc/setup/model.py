@@ -16,6 +16,7 @@ from postproc.base.options import OutputMode
 from postproc.setup.bodies import BodiesModel, ToolBody
 from postproc.setup.files import seen_from_here
 from postproc.setup.hooks_file import load_hooks
+from postproc.setup.joints import Joints
 from postproc.setup.orientation import OrientationLimits
 from postproc.setup.place import PlacementLimits
 from postproc.setup.places import REGISTER, PlaceOrder, PlaceSetup
@@ -89,6 +90,9 @@ class ToolSetup(ToolBody):
     words are the path of the tool's centre. Default: wear, radius where contour = true"""
     contour: bool = False
     """true: under CUTCOM the CL file holds the contour, not the path of the tool's centre"""
+    keeps_spin: bool = False
+    """true: its turn about its own axis matters (a probe, a tool with one edge and a spindle that is held): where the
+    machine could turn it so, it stays at 0"""
     tip_acceleration: float | None = Field(default=None, gt=0.0)
     """largest acceleration of the tip along its path on the part, mm/s2; kept by --feed planned; default: no limit"""
     tip_jerk: float | None = Field(default=None, gt=0.0)
@@ -194,17 +198,6 @@ class RewindSettings(UserModel):
     """of the return into a cut, mm/min; default: that of the cut"""
     stock: Stock | None = None
     """the tool is drawn out of this box (and of what is cut); default: to the safe plane"""
-
-
-class Joints(UserModel):
-    """Joints to be preferred where travel and rewinds leave a choice."""
-
-    side: dict[Annotated[str, Field(pattern="^[ABC]$")], Literal["positive", "negative"]] = Field(default_factory=dict)
-    """of a rotary axis, e.g. side = {A = "negative"}"""
-    start: dict[Annotated[str, Field(pattern="^[ABC]$")], float] = Field(default_factory=dict)
-    """where a rotary axis should stand when the program begins, degrees, e.g. start = {C = 180}; default: home"""
-    singular_distance: float = Field(default=0.05, gt=0.0, lt=1.0)
-    """that a parallel machine keeps from its singular positions: |cos| of rod and slide, least singular value of Jx"""
 
 
 class SetupFile(UserModel):

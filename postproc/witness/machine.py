@@ -18,7 +18,9 @@ LIMITS = ("least", "greatest", "velocity", "acceleration", "jerk", "home")
 _UP = np.array([0.0, 0.0, 1.0])
 ROD = 1e-4
 """mm by which a rod may miss its length"""
-SPIN_STEPS = 5
+SPIN_STEPS, SPUN = 8, 1e-10
+SPINS = (0.0, 0.5, -0.5, 1.0, -1.0)
+"""rad: from where the turn of a tool about itself, which no file states, is sought in so many steps, to SPUN rad"""
 
 
 def largest_feed(table: dict[str, Any]) -> float:
@@ -152,11 +154,10 @@ class Rods:
         if self.wrong and self.turns != "c":
             platform = _between(np.broadcast_to(apply(platform, tool), axis.shape), axis) @ platform
         expected, gauge, reach = apply(platform, tool), tip + length[:, None] * axis, apply(head, self.reach[None])
-        off, slope = self._legs(q, letters, gauge, platform, reach, axis)
-        for _ in range(SPIN_STEPS if self.wrong or "c" in self.turns else 0):  # the tool turns about itself between blocks
-            spin = -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)
-            platform = _spun(axis, np.where(np.isfinite(spin), spin, 0.0)) @ platform
-            off, slope = self._legs(q, letters, gauge, platform, reach, axis)
+        if self.wrong or "c" in self.turns:  # the tool turns about itself between blocks
+            platform, off = self._spun(q, letters, gauge, platform, reach, axis)
+        else:
+            off, _ = self._legs(q, letters, gauge, platform, reach, axis)
         if self.wrong and self.held.any():
             off = 0.5 * (off[::2] + off[1::2])
         aside = np.abs((gauge - apply(platform, reach + self.pivot)) * self.held).max(axis=1)
@@ -169,6 +170,24 @@ class Rods:
         k, sign = int(self.turns != "b"), 1.0 if self.turns == "b" else -1.0
         tilt = np.arctan2(sign * axis[:, k], axis[:, 2]) * (self.turns in ("a", "b"))
         return np.broadcast_to(rotations(np.eye(3)[1 - k], tilt), (len(axis), 3, 3))
+
+    def _spun(self, q: Array, letters: tuple[str, ...], gauge: Array, level: Array, reach: Array,
+              axis: Array) -> tuple[Array, Array]:
+        """(platform (N, 3, 3), mm by which each rod misses its length (K, N)) where the tool is turned about itself as the
+        rods have it; `level` without."""
+        best, found = level, np.full((len(self.legs), len(q)), np.inf)
+        for start in SPINS:
+            platform, spin = level, np.full(len(q), start)
+            for _ in range(SPIN_STEPS):
+                platform = _spun(axis, np.where(np.isfinite(spin), spin, 0.0)) @ platform
+                off, slope = self._legs(q, letters, gauge, platform, reach, axis)
+                if not np.abs(spin := -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)).max(initial=0.0) > SPUN:
+                    break
+            better = np.abs(off).max(axis=0) < np.abs(found).max(axis=0)
+            best, found = np.where(better[:, None, None], platform, best), np.where(better, off, found)
+            if (np.abs(found).max(axis=0) <= ROD).all():
+                break
+        return best, found
 
     def _legs(self, q: Array, letters: tuple[str, ...], gauge: Array, platform: Array, reach: Array,
               axis: Array) -> tuple[Array, Array]:

@@ -166,6 +166,14 @@ _PATH = [
 ]
 _OUTPUT = [
     convert(
+        "write.axis_letters",
+        START + CUT,
+        "take a controller that has the letter",
+        Edit(COMMAND, "linuxcnc", "siemens-840d"),
+        machine="macro-micro",
+        setup=LENGTH + "[part]\norigin = [0.0, 0.0, -250.0]\n",
+    ),
+    convert(
         "output.mode",
         START + OVER,
         "have: (axes)",

@@ -32,7 +32,8 @@ MADE = {"bicubic.cls": ("mill-3axis", "planar-delta-z"), "blade.cls": ("linuxcnc
         "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
         "inch_plate.apt": ("rotary-delta", "triaglide", "delta-cone", "delta-coplanar", "delta-hybrid",
                            "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact", "delta-star"),
-        "indexed_4axis.cls": ("mill-4axis",), "pocket.cls": ("uranesx", "linuxcnc-lineardelta", "tilting-arms-c-table", "three-arms-three-slides"),
+        "indexed_4axis.cls": ("mill-4axis",),
+        "pocket.cls": ("uranesx", "linuxcnc-lineardelta", "tilting-arms-c-table", "three-arms-three-slides"),
         "test_part.cls": ("delta-parallel-x",),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
 """machines on which each sample is made: every sample, and every machine whose letters LinuxCNC's interpreter has"""

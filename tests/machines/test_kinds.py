@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import machines
 from machines import kinds
 from machines.kind_check import contract_faults
+from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.taylor import TaylorVector
 from samples.my_machine import Scissors
 from tests.machines.own_kinds import OWN, SAMPLE, Polar, Tilting, own_machine
@@ -38,6 +40,24 @@ def test_an_unknown_kind_lists_what_is_registered(tmp_path, monkeypatch) -> None
     assert machines.load(tmp_path / "m.toml").structure == "scissors"
     misspelt = only(tmp_path, GOOD.replace('"scissors"', '"scisors"'))
     assert f"{', '.join(kinds.BUILT_IN)}, scissors" in misspelt.message and "did you mean 'scissors'?" in misspelt.hint
+
+
+@dataclass(frozen=True, eq=False)
+class Halved(OnLegs):
+    """A redundant machine that says half of where its carriers stand."""
+
+    def parameters_at(self, q: np.ndarray) -> np.ndarray:
+        return 0.5 * super().parameters_at(q)
+
+
+def test_a_redundant_kind_keeps_what_it_leaves_open() -> None:
+    machine = machines.load("macro-micro")
+    own = machine.kinematics
+    places = machine.home + 40.0
+    assert list(contract_faults(own, machine.limits, places)) == []
+    lying = Halved(**{one.name: getattr(own, one.name) for one in fields(own)})
+    faults = [one.message for one in contract_faults(lying, machine.limits, places)]
+    assert any("off the pose and the parameters" in one for one in faults), faults
 
 
 def test_the_schema_has_the_registered_kinds(monkeypatch) -> None:

@@ -1,8 +1,8 @@
 """A platform on legs with its errors, of any drives and freedoms: through the exact closure of its rods (`leg_frame.py`).
 
 w are the nominal tip, the turns that the platform gives the tool axis, and, of one that turns about z, the spin, which is
-held. Slides that carry legs and platform take the errors of a serial machine's slides, the spindle those of
-a spindle.
+held, as redundant carriers are. Slides that carry legs and platform take the errors of a serial machine's slides, the
+spindle those of a spindle.
 """
 
 from __future__ import annotations
@@ -50,8 +50,9 @@ class ActualLegs(Actual):
 
     @property
     def held(self) -> int:
-        """The spin, of a platform that turns about z."""
-        return int("c" in self.kinematics.loops.turns)
+        """The spin, of a platform that turns about z, and carriers that are redundant."""
+        return int("c" in self.kinematics.loops.turns) + (
+            len(self.kinematics.carriers) if self.kinematics.carried_twice else 0)
 
     @cached_property
     def frame(self) -> LegFrame:
@@ -78,7 +79,9 @@ class ActualLegs(Actual):
         flat = np.hypot(axis[:, 0], axis[:, 1])
         grow = np.where(flat > 0.0, np.arctan2(flat, axis[:, 2]) / np.where(flat > 0.0, flat, 1.0), 1.0)
         turned = np.column_stack([-axis[:, 1] * grow, axis[:, 0] * grow])
-        return np.column_stack([tip, turned[:, self._about], spin[:, None][:, : self.held]])
+        kin, spins = self.kinematics, spin[:, None][:, : int(self.turns == 2)]
+        carried = q[:, kin.carriers_at] if kin.carried_twice else q[:, :0]
+        return np.column_stack([tip, turned[:, self._about], spins, carried])
 
     @property
     def _about(self) -> list[int]:
@@ -96,11 +99,13 @@ class ActualLegs(Actual):
         """Nominal (tip (N, 3), axis (N, 3), spin (N,))."""
         vector, share, cos = self._turn(w)
         axis = np.column_stack([share * vector[:, 1], -share * vector[:, 0], cos])
-        return w[:, :3], axis, w[:, 3 + self.turns] if self.held else np.zeros(len(w))
+        return w[:, :3], axis, w[:, 3 + self.turns] if self.turns == 2 else np.zeros(len(w))
 
     def joints(self, w: Floats) -> Floats:
         """See the base class."""
-        return np.asarray(self.kinematics.inverse(*self._pose(w))[0])
+        kin = self.kinematics
+        carried = w[:, w.shape[1] - len(kin.carriers):] if kin.carried_twice else None
+        return np.asarray(kin.joints_with(*self._pose(w), carried)[0])
 
     def rates(self, w: Floats) -> Floats:
         """See the base class: the turns move the axis about the tip."""

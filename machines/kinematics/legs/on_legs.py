@@ -18,7 +18,8 @@ from machines.kinematics.clearance_geometry import ClearanceGeometry
 from machines.kinematics.legs.attitudes import attitude, tilt_of
 from machines.kinematics.legs.bounds import MovingLoops, PlatformJets
 from machines.kinematics.legs.over_workspace import OverWorkspace
-from machines.kinematics.legs.poses import UP, PosesOfLegs
+from machines.kinematics.legs.poses import UP
+from machines.kinematics.legs.redundancy import RedundantLegs
 from machines.kinematics.legs.rods_on_slides import RodsOnSlides
 from machines.kinematics.rod_loops import RodLoop, by_parts
 from machines.kinematics.singular_distance import distance, distance_between
@@ -30,8 +31,8 @@ GOLDEN = 2.399963
 
 
 @dataclass(frozen=True, eq=False)
-class OnLegs(PosesOfLegs):
-    """A platform on legs with its rates, bounds, errors and clearances; attributes as of `PosesOfLegs`."""
+class OnLegs(RedundantLegs):
+    """A platform on legs with its rates, bounds, errors and clearances; attributes as of `RedundantLegs`."""
 
     @property
     def transmits(self) -> OverWorkspace:  # type: ignore[override]  # nothing assigns it
@@ -90,7 +91,8 @@ class OnLegs(PosesOfLegs):
         axis, spin = attitude(self.loops.turns, platform[:, 3], heading)
         axis = self._within(axis)
         gauge = self.turn_of(axis, spin) @ self.gauge
-        return np.asarray(self.inverse(platform[:, :3] + gauge - self.tool_length * axis, axis, spin)[0])
+        standing = np.zeros((len(axis), len(self.carriers_at))) if self.carried_twice else None
+        return np.asarray(self.joints_with(platform[:, :3] + gauge - self.tool_length * axis, axis, spin, standing)[0])
 
     # ---- rates, bounds -------------------------------------------------------------------------------------
 
@@ -154,9 +156,10 @@ class OnLegs(PosesOfLegs):
         return jx / self.legs.spans(own)[:, :, None], self.legs.transmission(rods, own)
 
     def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
-        """Where the parts are at joints q (N, J): seen from the carriers, but for the place that the workspace is about."""
+        """Where the parts are at joints q (N, J): seen from the carriers, but for the place that the workspace is about,
+        which redundant carriers leave as it is."""
         place, turn = self._platform(q, near)
-        shift = np.asarray(q)[:, self.carriers_at] @ self.carriers
+        shift = np.asarray(q)[:, self.carriers_at] @ self.carriers * (not self.carried_twice)
         axis, turned = turn[:, :, 2], None if self.loops.closed_form else turn
         tilt = self.one_turn.turn_of(turn) if self.loops.turns == "c" and self.one_turn else tilt_of(self.loops.turns, axis)
         return ClearanceGeometry(place + shift, tilt, self.legs.feet(q[:, self.legs_at]),

@@ -20,7 +20,7 @@ from machines.kinematics.legs.one_turn import OneTurn
 from machines.kinematics.singular_distance import NAMES
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.rotations import angle_between, cross, unit
+from toolpaths.rotations import angle_between, cross, lengths, unit
 from toolpaths.shapes import arrays
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -28,6 +28,9 @@ ASIDE = 1e-9
 """mm that a point may lie off what the slides and the platform can reach"""
 PARTS = 16
 """of the path from the home joints, where one Newton does not find the home mode"""
+SPINS = np.deg2rad([0.0, -20.0, 20.0, -40.0, 40.0, -60.0, 60.0, -80.0, 80.0])
+FAR = 40.0
+"""mm that a rod misses its length by: the platform may have another spin than was thought"""
 PlatformPose = tuple[Floats, Floats]
 """C (N, 3) mm and R (N, 3, 3)"""
 
@@ -97,27 +100,31 @@ class PosesOfLegs(Kinematics):
     def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0,
                 near: Floats | None = None) -> Floats:
         """Joints (B, N, J); NaN where a leg does not reach or the platform cannot take the direction."""
+        return self.joints_with(tip, axis, spin, None)
+
+    def joints_with(self, tip: Floats, axis: Floats, spin: float | Floats, given: Floats | None) -> Floats:
+        """The same with the carriers at `given` (N, M) where they are redundant; None: with the platform at rest."""
         tip, axis = as_points(tip, 3, "tip"), as_points(axis, 3, "axis")
         spin = np.broadcast_to(np.asarray(spin, dtype=np.float64), len(tip))
         roots = self.legs.root_choices() if self.all_roots else self.legs.roots[None]
         q = np.empty((len(roots), len(tip), self.joints))
         for part in blocks(len(tip)):
-            ends, carried = self._ends(tip[part], axis[part], spin[part])
+            ends, carried = self._ends(tip[part], axis[part], spin[part], None if given is None else given[part])
             for k, choice in enumerate(roots):
                 q[k, part][:, self.legs_at] = self.legs.solve(ends, choice)
             q[:, part][:, :, self.carriers_at] = np.where(np.isnan(q[:, part][:, :, self.legs_at[:1]]), np.nan, carried)
         return q
 
-    def _ends(self, tip: Floats, axis: Floats, spin: Floats) -> tuple[Floats, Floats]:
+    def _ends(self, tip: Floats, axis: Floats, spin: Floats, given: Floats | None) -> tuple[Floats, Floats]:
         """(platform joints (N, K, 3), travel of the carriers (N, M)) of a tip, axis and spin; NaN where there are none."""
         if self.loops.closed_form:
             up = (np.hypot(axis[:, 0], axis[:, 1]) <= ROUND_OFF * axis[:, 2]) & (axis[:, 2] > 0.0) & (spin == 0.0)
             tip = np.where(up[:, None], tip, np.nan)
-            place, carried = self._split(tip + (self.tool_length * UP - self.gauge))
+            place, carried = self._split(tip + (self.tool_length * UP - self.gauge), given)
             return place[:, None, :] + self.loops.joints, carried
         axis = unit(axis)
         turn = self.turn_of(axis, spin)
-        place, carried = self._split(tip + self.tool_length * axis - turn @ self.gauge)
+        place, carried = self._split(tip + self.tool_length * axis - turn @ self.gauge, given)
         return self.loops.ends(place, turn), carried
 
     def turn_of(self, axis: Floats, spin: Floats) -> Floats:
@@ -132,16 +139,27 @@ class PosesOfLegs(Kinematics):
         """The nearest directions (N, 3) that the platform can take; those that it can take to the last bit."""
         return nearest_directions(self.loops.turns, self.workspace.tilt, axis)
 
-    def _split(self, point: Floats) -> tuple[Floats, Floats]:
-        """(C (N, 3), travel of the carriers (N, M)) that add up to a point (N, 3); NaN where none do."""
+    def _split(self, point: Floats, given: Floats | None = None) -> tuple[Floats, Floats]:
+        """(C (N, 3), travel of the carriers (N, M)) that add up to a point (N, 3); NaN where none do.
+
+        Redundant carriers stand where they are `given`, else where they bring the platform to rest in the middle of its
+        workspace."""
         moves = self._moves
         if moves.shape == (3, 3) and not len(self.carriers):
             return point, np.empty((len(point), 0))
+        if self.carried_twice:
+            carried = (point - self.workspace.middle) @ np.linalg.pinv(self.carriers) if given is None else given
+            return point - carried @ self.carriers, carried
         parts = point @ np.linalg.pinv(moves).T
         off = np.abs(parts @ moves.T - point).max(axis=1, initial=0.0)
         free = moves.shape[1] - len(self.carriers)
         place = np.where((off <= ASIDE)[:, None], parts[:, :free] @ moves[:, :free].T, np.nan)
         return place, parts[:, free:]
+
+    @cached_property
+    def carried_twice(self) -> bool:
+        """True where carriers move the tool where the platform moves it too: how a path is split between them is free."""
+        return bool(len(self.carriers)) and bool(self.loops.basis[:3].any(axis=1).all())
 
     @cached_property
     def _moves(self) -> Floats:
@@ -250,10 +268,29 @@ class PosesOfLegs(Kinematics):
         return in_order(np.hstack(self.forward(q)), found)
 
     def _near(self, pose: Floats, q: Floats) -> PlatformPose:
+        """C and R from which Newton starts: of a platform that turns in every direction with the spin of SPINS whose rods
+        come nearest to their lengths, where those of none are far off."""
         axis = self._within(unit(pose[:, 3:]))
-        turn = self.turn_of(axis, np.zeros(len(axis)))
-        place = pose[:, :3] + self.tool_length * axis - turn @ self.gauge - q[:, self.carriers_at] @ self.carriers
+        tip = pose[:, :3] - q[:, self.carriers_at] @ self.carriers
+        place, turn = self._spun(tip, axis, np.zeros(len(axis)))
+        if self.loops.turns == "abc":
+            own = q[:, self.legs_at]
+            far = np.flatnonzero(self._misfit(own, place, turn) > FAR)
+            if len(far):
+                tried = [self._spun(tip[far], axis[far], np.full(len(far), spin)) for spin in SPINS]
+                best = np.argmin([self._misfit(own[far], *one) for one in tried], axis=0)
+                place[far], turn[far] = (np.stack(each)[best, np.arange(len(far))] for each in zip(*tried, strict=True))
         return place * self.loops.basis[:3].any(axis=1), turn
+
+    def _spun(self, tip: Floats, axis: Floats, spin: Floats) -> PlatformPose:
+        """(C, R) of a tip (N, 3) seen from the carriers, an axis (N, 3) that the platform can take, and a spin (N,)."""
+        turn = self.turn_of(axis, spin)
+        return tip + self.tool_length * axis - turn @ self.gauge, turn
+
+    def _misfit(self, own: Floats, place: Floats, turn: Floats) -> Floats:
+        """(N,) mm by which the worst rod misses its length at joints (N, K) of the legs."""
+        rods = self.loops.ends(place, turn) - self.legs.feet(own)
+        return np.asarray(np.abs(lengths(rods) - self.legs.spans(own)).max(axis=1), dtype=np.float64)
 
     def _from_home(self, own: Floats) -> tuple[Floats, Floats, Bools]:
         """The same by small steps from the home joints, where no larger one leads to the home mode."""

@@ -261,8 +261,8 @@ def test_the_planar_delta_of_the_note() -> None:
     ("delta", '["x", "y", "z"]', '["x", "y"]', "machine.geometry", "3 legs for 2 freedoms"),
     ("delta", '"slide"', '"arm"\narm = 300', "machine.workspace", "a leg does not reach x -250"),
     ("delta", '"slide"', '"screw"', "file.range", "screw"),
-    ("delta", "[kinematics.workspace]", '[kinematics.carriers.W]\ndirection = [0, 0, 1]\n[kinematics.workspace]',
-     "machine.geometry", "where the platform moves it already"),
+    ("delta", "[kinematics.workspace]", '[kinematics.carriers.V]\ndirection = [0, 0, 1]\n[kinematics.carriers.W]\n'
+     "direction = [0, 0, -1]\n[kinematics.workspace]", "machine.geometry", "where one another move it already"),
     ("delta", "[kinematics.workspace]", "[kinematics.workspace]\ntilt = [5, 9]", "machine.geometry", "cannot be the tilt"),
     ("delta", "[kinematics.workspace]", "[kinematics.workspace]\ntilt = [0, 20]", "machine.geometry", "none without turns"),
     ("delta", "pair = 200", "pair = 200\nangles = [0, 90]", "machine.geometry", "angles: 2 values for 3 letters"),

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import postproc
+from postproc.base import neighbours
 from postproc.base.neighbours import foreign
 
 ROOT = Path(__file__).parents[3]
@@ -31,6 +32,6 @@ def test_another_one_is_named(name: str, package: bool, tmp_path: Path) -> None:
 
 
 def test_from_python_it_is_an_import_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(postproc, "foreign", lambda: "another package")
+    monkeypatch.setattr(neighbours, "foreign", lambda: "another package")
     with pytest.raises(ImportError, match="another package"):
         _ = postproc.Options

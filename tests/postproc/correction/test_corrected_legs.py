@@ -93,3 +93,20 @@ def test_the_rods_of_the_second_witness_are_those_of_the_model(name: str, tmp_pa
     assert rods.misfit(q, machine.axis_names, tip, axis, length).max() < 2e-6
     for way in (0.005 * np.eye(3)):
         assert rods.misfit(q, machine.axis_names, tip + way, axis, length).min() > 1e-4
+
+
+def test_a_redundant_machine_is_corrected_where_it_stands(tmp_path: Path) -> None:
+    """Legs and gantry with errors, the tool turned about itself: carriers and spin stay as the plan has them."""
+    text = (ERRORS / "hexapod.toml").read_text().replace('machine = "hexapod"', "").partition("[sigma")[0]
+    for old, new in zip("WVUZYX", "EQWVUZ", strict=True):
+        text = text.replace(f"[legs.{old}]", f"[legs.{new}]")
+    (tmp_path / "own.toml").write_text(text + '[location]\nEA0S = 12.0\nEC0Y = 9.0\n')
+    path = toolpath("MULTAX/ON", "RAPID", f"GOTO/-20,10,5{TILTED[0]}", "FEDRAT/MMPM,1500", f"GOTO/-20,10,-2{TILTED[0]}",
+                    f"GOTO/15,10,-1{TILTED[1]}", "RAPID", f"GOTO/15,10,20{TILTED[1]}")
+    setup = setup_of("[part]\norigin = [700, 100, -250]\n[joints]\nspin = 20\n[tools.1]\ngauge_length = 80\n")
+    result = good(convert(path, "macro-micro", "siemens-840d", setup=setup, error_model=str(tmp_path / "own.toml")))
+    found = after_formatting(result)
+    assert result.compensation is not None and result.compensation.tip_before > 0.005
+    assert found is not None and found.tip.max() < found.tip_bound < 1e-3
+    assert result.witness is not None and not result.witness.findings and result.path is not None
+    assert {name: round(low, 3) for name, low, _ in result.path.opened}["spin"] == 0.349

@@ -12,7 +12,8 @@ import machines
 import postproc
 from machines.machine import Machine
 from postproc.pipeline.result import PostResult
-from postproc.setup.model import Joints, SetupFile
+from postproc.setup.joints import Joints
+from postproc.setup.model import SetupFile
 from tests.postproc.joint_kit import DEG, machine, tilted
 from tests.postproc.kit import goto, tool_setup, toolpath
 

@@ -3,9 +3,9 @@
 Sources of the marks: POF by a file printed in icax.org thread 344624
 (`0: product( hyperMILL`, `12: beg part`); Part 21 by steptools.com/stds/stepnc/2005_eastec/stage2.stp (ISO-10303-21;
 INTEGRATED_CNC_SCHEMA, MACHINING_WORKPLAN). OpenToolpath by the page of its standard (opentoolpath.github.io, "Byte-Accurate
-Container": an archive whose first entry is `mimetype`, of 32 bytes at byte 30, uncompressed); its grammar is not published: the
-repository of that page keeps specification and samples private (tools/check_site.py) and says that no decision on form, units
-or orientation has been adopted (development/DECISIONS.md, DP-101 to DP-203, both commit 31229cdf). Archives
+Container": an archive whose first entry is `mimetype`, of 32 bytes at byte 30, uncompressed); its grammar is not published:
+the repository of that page keeps specification and samples private (tools/check_site.py) and says that no decision on form,
+units or orientation has been adopted (development/DECISIONS.md, DP-101 to DP-203, both commit 31229cdf). Archives
 and compound files by the first bytes of PKZIP and OLE. IGES by its version 5.3, 2.2.4 (lines of 80 columns, S for the start
 section and G for the next in column 73, then the number of the line); STL by 3D Systems' StereoLithography Interface
 Specification (solid, facet normal; binary: 80 bytes, a count, 50 bytes each); DXF by Autodesk's DXF Reference (group code 0
