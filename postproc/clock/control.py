@@ -23,6 +23,8 @@ SLOWEST = 1e-3
 """mm/s or rad/s: least speed to which few blocks read ahead hold the axes"""
 ALIKE, STEP = 0.02, 1e-3
 """steps of the logarithm of speeds that taking up blocks allows, and of feeds along the path of all axes"""
+EVEN = 1e-9
+"""blocks: parts of a block that are one in the arithmetic of their sum"""
 NO_MOTION = 1e-12
 """mm or rad, against division by 0"""
 
@@ -114,7 +116,8 @@ def _feed(commanded: CommandedPath, path: BlendedPath, settings: ControlSettings
     k = np.arange(n)
     if settings.block_time > 0.0:
         low, high = np.maximum(k - AVERAGED // 2, 0), np.minimum(k + AVERAGED // 2 + 1, n)
-        held = (path.ends[high] - path.ends[low]) / (high - low) / settings.block_time
+        taken = np.append(0.0, np.cumsum(np.broadcast_to(commanded.part, n)))
+        held = (path.ends[high] - path.ends[low]) / (taken[high] - taken[low]) / settings.block_time
         speed = np.where(held < speed, _stepped(held), speed)
     held = _seen(commanded, path, settings)
     speed = np.where(held < speed, _stepped(held), speed)
@@ -125,7 +128,8 @@ def _seen(commanded: CommandedPath, path: BlendedPath, settings: ControlSettings
     """(N,) speed from which the axes come to rest, at constant jerk, within the blocks read ahead of each block's end;
     inf where they rest before."""
     n = len(commanded.length)
-    last = np.minimum(np.arange(n) + settings.buffer, n)
+    read = np.cumsum(np.broadcast_to(commanded.part, n))
+    last = np.minimum(np.searchsorted(read, read - commanded.part + settings.buffer + EVEN, side="right"), n)
     room = np.maximum(path.ends[last] - path.ends[1:], 0.5 * np.diff(path.ends))
     slope = np.abs(np.diff(commanded.points, axis=0)) / np.maximum(np.diff(path.ends), NO_MOTION)[:, None]
     width = min(settings.buffer, n)

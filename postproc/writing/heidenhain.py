@@ -103,6 +103,21 @@ class KlartextWriter(Writer):
         yield "CC" + "".join(f" {'XYZ'[i]}{centre[i]}" for i in range(3) if i != third)
         yield f"C{text} {sense}{feed}"
 
+    def cubic(self, block: int) -> str:
+        """SPL with the end and K3, K2, K1 of each axis: K3 t3 + K2 t2 + K1 t + end, t from 1 to 0."""
+        p, unit, places = self.program, self.controller.unit, self.controller.splines.decimals
+        ends, terms = "", ""
+        for letter, (second, third) in zip("XYZ", (p.curves[p.curve[block]] / unit).tolist(), strict=True):
+            column = p.letters.index(letter)
+            if not p.write[block, column]:
+                continue
+            begin, end = self.stated(column, np.array([block - 1, block])).tolist()
+            cubic, square = (float(f"{v:.{places}e}") for v in (-third, second + 3.0 * third))
+            ends += f" {letter}{self.number_text(np.array([end]), int(p.decimals[column]))[0]}"
+            for n, value in ((3, cubic), (2, square), (1, begin - end - cubic - square)):
+                terms += f" K{n}{letter}{exponential(value, places)}"
+        return f"SPL{ends}{terms}{self.feeds(block, block + 1)[0]}"
+
     def climbing(self, k: int, start: Floats, end: Floats, rest: str) -> Iterator[str]:
         """CC and CP of block k from `start` to `end` (3,), by the last decimals that end nearest, from where the tool is."""
         p, f = self.program, self.controller.format
@@ -175,6 +190,12 @@ class KlartextWriter(Writer):
             self.called = abs(self.speed)
             yield f"TOOL CALL S{self.plain(self.called)}"
         yield start
+
+
+def exponential(value: float, places: int) -> str:
+    """A number with the sign, mantissa and three digits of exponent of SPL blocks."""
+    mantissa, power = f"{round(value, places + 2) + 0.0:+.{places}e}".split("e")
+    return f"{mantissa}E{int(power):+04d}"
 
 
 def sweep(start: Floats, end: Floats, ccw: bool) -> float:

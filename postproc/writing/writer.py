@@ -181,7 +181,9 @@ class Writer(WriterState, ABC):
         """Blocks between preamble and ending: stretches of plain motion at once, all else one by one."""
         p = self.program
         switch = np.flatnonzero(np.diff(p.skip)) + 1
-        stops = sorted({*p.commands, *(h.first for h in p.holes), *(h.last + 1 for h in p.holes), *switch.tolist(), len(p)})
+        curves = set(np.flatnonzero(p.curve >= 0).tolist())
+        stops = sorted({*p.commands, *(h.first for h in p.holes), *(h.last + 1 for h in p.holes), *switch.tolist(), *curves,
+                        len(p)})
         holes = {h.first: h for h in p.holes}
         at = 0
         for stop in stops:
@@ -196,6 +198,10 @@ class Writer(WriterState, ABC):
                 yield from self.hole(holes[stop])
                 self.in_cycle = True
                 at = holes[stop].last + 1
+            elif stop in curves:
+                yield from self.end_cycle()
+                yield self.cubic(stop)
+                at = stop + 1
         yield from self.end_cycle()
 
     def end_cycle(self) -> Iterator[str]:
@@ -245,6 +251,10 @@ class Writer(WriterState, ABC):
     @abstractmethod
     def blocks(self, at: int, stop: int) -> Iterator[str]:
         """Motion blocks at..stop."""
+
+    def cubic(self, block: int) -> str:
+        """A block that runs a cubic."""
+        raise ValueError(f"no text for the cubic of block {block}")
 
     @abstractmethod
     def hole(self, hole: Hole) -> Iterator[str]:
