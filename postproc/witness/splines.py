@@ -12,7 +12,7 @@ from postproc.witness.text import Array
 
 CHORD = 2e-4
 """mm that the chords are from the curve"""
-_AT_ONCE, _LOOKS = 200, 64
+_AT_ONCE, _LOOKS, _NEAR = 100, 64, 0.5
 _REMARK = re.compile(rb";[^\n]*")
 _PO = re.compile(rb"PO\s*\[\s*([XYZ])\s*\]\s*=\s*\(([^()]*)\)|\b([XYZ])\s*=\s*PO\s*\(([^()]*)\)")
 _PL = re.compile(rb"\bPL\s*=\s*([\d.]+)")
@@ -55,7 +55,11 @@ def length_of(points: Array) -> float:
 
 def _chords(tip: Array, points: Array) -> tuple[Array, Array]:
     """(K, P - 1) mm from tips to each chord, and how far along each they are (0 to 1)."""
-    begin, travel = points[:-1], np.diff(points, axis=0)
+    return _to_chords(tip, points[:-1], np.diff(points, axis=0))
+
+
+def _to_chords(tip: Array, begin: Array, travel: Array) -> tuple[Array, Array]:
+    """The same of chords by their begins and travels (P, 3)."""
     offset = tip[:, None] - begin
     share = np.clip((offset * travel).sum(axis=2) / np.maximum((travel * travel).sum(axis=1), 1e-30), 0.0, 1.0)
     rest = offset - share[:, :, None] * travel
@@ -64,9 +68,14 @@ def _chords(tip: Array, points: Array) -> tuple[Array, Array]:
 
 def off_chords(tip: Array, points: Array) -> Array:
     """(K,) mm by which tips are off chords, less what may stand in the place of a spline."""
-    away = np.empty(len(tip))
+    away, low, high = np.empty(len(tip)), np.minimum(points[:-1], points[1:]), np.maximum(points[:-1], points[1:])
     for first in range(0, len(tip), _AT_ONCE):
-        away[first:first + _AT_ONCE] = _chords(tip[first:first + _AT_ONCE], points)[0].min(axis=1)
+        some = tip[first:first + _AT_ONCE]
+        near = ((high >= some.min(axis=0) - _NEAR) & (low <= some.max(axis=0) + _NEAR)).all(axis=1)
+        here = _to_chords(some, points[:-1][near], np.diff(points, axis=0)[near])[0].min(axis=1, initial=np.inf)
+        far = here > _NEAR  # a chord that is nearer than that is among those looked at
+        here[far] = _chords(some[far], points)[0].min(axis=1)
+        away[first:first + _AT_ONCE] = here
     return np.maximum(away - CHORD, 0.0)
 
 

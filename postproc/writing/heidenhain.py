@@ -15,6 +15,8 @@ from postproc.writing.writer import CHUNK, SKIP, Writer
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
+LARGEST = 9.99999
+"""above it a coefficient of SPL is written with an exponent"""
 LONGEST_DWELL = 3600.0
 """s that one cycle 9 can rest"""
 
@@ -112,10 +114,10 @@ class KlartextWriter(Writer):
             if not p.write[block, column]:
                 continue
             begin, end = self.stated(column, np.array([block - 1, block])).tolist()
-            cubic, square = (float(f"{v:.{places}e}") for v in (-third, second + 3.0 * third))
+            cubic, square = (float(spline_number(v, places)) for v in (-third, second + 3.0 * third))
             ends += f" {letter}{self.number_text(np.array([end]), int(p.decimals[column]))[0]}"
             for n, value in ((3, cubic), (2, square), (1, begin - end - cubic - square)):
-                terms += f" K{n}{letter}{exponential(value, places)}"
+                terms += f" K{n}{letter}{spline_number(value, places)}"
         return f"SPL{ends}{terms}{self.feeds(block, block + 1)[0]}"
 
     def climbing(self, k: int, start: Floats, end: Floats, rest: str) -> Iterator[str]:
@@ -192,10 +194,11 @@ class KlartextWriter(Writer):
         yield start
 
 
-def exponential(value: float, places: int) -> str:
-    """A number with the sign, mantissa and three digits of exponent of SPL blocks."""
-    mantissa, power = f"{round(value, places + 2) + 0.0:+.{places}e}".split("e")
-    return f"{mantissa}E{int(power):+04d}"
+def spline_number(value: float, places: int) -> str:
+    """A coefficient of SPL: plain below 10, else with an exponent, no zeros behind."""
+    mantissa, _, power = (f"{value:+.{places}f}" if abs(value) < LARGEST else f"{value:+.{places}e}").partition("e")
+    short = mantissa.rstrip("0").rstrip(".")
+    return ("+0" if float(short) == 0.0 else short) + (f"E{int(power):+d}" if power else "")
 
 
 def sweep(start: Floats, end: Floats, ccw: bool) -> float:

@@ -297,6 +297,7 @@ _REST = 0.005
 """mm that are no peck of their own"""
 SPEED_DIGITS = 3
 """decimals of a speed from 1 to 10; one less each time that it is ten times as great"""
+_SWITCH = re.compile(r"M\d+")
 _ZEROS = re.compile(r"0+ ")
 _MINUS_ZERO = re.compile(r"-0(?=\.?0* )")
 
@@ -320,3 +321,11 @@ def clean(controller: ControllerFile, text: str) -> str:
 def plain_name(text: str) -> str:
     """A name as any block can hold it: letters, digits, blanks and - . _ alone."""
     return "".join(c if c.isascii() and (c.isalnum() or c in " -._") else "_" for c in text.strip())
+
+
+def without_off(block: str, off: set[str]) -> str:
+    """A block of the ending without what is off already, where it holds nothing but M codes."""
+    words = block.split()
+    if not all(_SWITCH.fullmatch(word) for word in words):
+        return block
+    return " ".join(word for word in words if word not in off)

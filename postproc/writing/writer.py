@@ -18,12 +18,11 @@ from postproc.control.rollover import HALF
 from postproc.controllers.output_modes import Mode
 from postproc.controllers.texts import blocks_of
 from postproc.reference.coolant import COMMANDS
-from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name
+from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name, without_off
 from toolpaths.arrays import Ints
 
 _LABEL = re.compile(r"%|[NO]\d")
 """blocks that carry a number of their own"""
-_SWITCH = re.compile(r"M\d+")
 _HUNDRED = re.compile(r"N\d+")
 """number of an operation"""
 SKIP = "/"
@@ -121,7 +120,7 @@ class Writer(WriterState, ABC):
         off = {codes.spindle_stop} if self.turning is False else set()
         off |= {codes.coolant_off} if self.cooling is False else set()
         left = [code for code in self.coolant_off() if self.flowing and code != codes.coolant_off]
-        return left + [kept for block in (*program.path_tolerance_off, *program.ending) if (kept := _without(block, off))]
+        return left + [kept for block in (*program.path_tolerance_off, *program.ending) if (kept := without_off(block, off))]
 
     def start(self) -> Iterator[str]:
         """Safe start: modes that the program uses off, then the preamble."""
@@ -399,11 +398,3 @@ class Writer(WriterState, ABC):
         self.length_off = self.controller.tools.length_with_z
         if not self.length_off and self.length_offsets and self.controller.codes.length_offset:
             yield self.controller.codes.length_offset.format(register=register)
-
-
-def _without(block: str, off: set[str]) -> str:
-    """A block of the ending without what is off already, where it holds nothing but M codes."""
-    words = block.split()
-    if not all(_SWITCH.fullmatch(word) for word in words):
-        return block
-    return " ".join(word for word in words if word not in off)

@@ -245,7 +245,7 @@ class KlartextRun:
         curve, wrong = cubic_of({k: v * unit if len(k) == 3 or k in "XYZ" else v for k, v in s.keys.items()}, {
             a: None if (here := self.track.at(b, a)) is None else here * unit for a in "XYZ"})
         if wrong:
-            self.fault("gcode.curve", b, f"SPL {wrong} is not executed", "state end and K3, K2, K1 of each axis that moves")
+            self.fault("gcode.curve", b, f"SPL {wrong} is not executed", "state end, K3, K2 and K1 of each axis that moves")
             return
         self.new += [(b, "G", 1.0), (b, CURVE, float(len(self.curves))), *((b, k, s.keys[k]) for k in "FM" if k in s.keys)]
         self.curves.append(curve)
