@@ -124,11 +124,9 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     faults, sides = check_sides(w, c, case)
     found += faults
     found += _misfits(poses)
-    faults, turned = check_turning(case, executed)
-    found += faults
+    (faults, turned), (others, curves) = check_turning(case, executed), check_curves(case, executed)
+    found += [*faults, *others]
     feeding = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
-    faults, curves = check_curves(case, executed)
-    found += faults
     faults, clamped = check_clamps(case, executed, w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
     found += faults
     if case.limits is not None:

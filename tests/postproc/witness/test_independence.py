@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[3]
 ROOM = ROOT / "postproc" / "witness"
 ALLOWED = {"numpy", "numba", *sys.stdlib_module_names}
-MOST_LINES = 4260
+MOST_LINES = 4270
 """400 of them for the forms that are no APT text (`other_forms`), 100 for platforms on legs and paths offset back, 50 for
 polynomials"""
 
