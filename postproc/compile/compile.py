@@ -52,7 +52,7 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
     write = cubics.written(write, words, control.xyz, job.grid.grain.min()) if len(cubics.last) else write
     keep = (write.any(axis=1) | (path.code == ARC)) & ~contour.dropped & ~cubics.dropped
     new = np.concatenate([[0], np.cumsum(keep)])
-    sections = sections_of(path, new)
+    sections = sections_of(job, moves, path, new)
     kept_holes = tuple(Hole(int(new[h.first]), int(new[h.last + 1]) - 1, h.cycle, h.plane_level, h.bottom, h.retract,
                             h.initial, h.key, int(new[h.drill])) for h in holes)
     line = moves.line[path.move[keep]]

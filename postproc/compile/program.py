@@ -64,6 +64,8 @@ class Section:
         angles: the printed angles in degrees, in the order of the controller's convention
         rotary: words (degrees) where the rotary axes stand on entering, by letter
         place: number of the place whose work offset is in force
+        out: Z of a plane, mm, at which the spindle stands just below home without a tool length, above where the section
+            ends; NaN where the tool does not go home from there along Z of the plane
     """
 
     first: int
@@ -72,6 +74,7 @@ class Section:
     angles: tuple[float, ...] = ()
     rotary: tuple[tuple[str, float], ...] = ()
     place: int = 0
+    out: float = float("nan")
 
 
 @dataclass(frozen=True)
