@@ -123,7 +123,7 @@ class Job:
         return self.gauge_length(index) if self.setup.output.tool_call else 0.0
 
     def number_of(self, index: int) -> int:
-        """Number of the tool of that index; -1 without one. Where none is called that of the one tool, 0 without a number."""
+        """Number of the tool of that index; -1 without one. Where none is called that of the one tool, else 0."""
         return self.toolpath.tools[index].number if index >= 0 else -1
 
     def length_of(self, number: int) -> float:

@@ -16,7 +16,7 @@ from postproc.base.progress import Progress
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.job.job import prepare, with_shop
 from postproc.pipeline.hooks import refused_hooks
-from postproc.pipeline.native_splines import asked_splines, held_splines, with_cubics
+from postproc.pipeline.native_splines import as_arcs, asked_splines, held_splines, with_cubics
 from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
@@ -60,8 +60,17 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
     require_call(path, options)
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     found = _reading(path, diagnostics)
-    path = with_cubics(path, options) if asked_splines(path, machine, spec, options) else path
-    start, done = _oriented(_begun(path, machine, controller, spec, setup, options, found), progress)
+    native = with_cubics(path, options) if asked_splines(path, machine, spec, options) else path
+    made = _converted(_begun(native, machine, controller, spec, setup, options, found), progress)
+    if made.ok or native is path:
+        return made
+    other = _converted(_begun(path, machine, controller, spec, setup, options, found), progress)
+    return other.with_found([as_arcs(path, made.diagnostics)]) if other.ok else other
+
+
+def _converted(start: PostResult, progress: Progress | None) -> PostResult:
+    """All that follows on the beginning of a conversion."""
+    start, done = _oriented(start, progress)
     return start if not start.ok else done or _stages(start, progress)
 
 

@@ -7,6 +7,7 @@ from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile
 from toolpaths.cl.curves import SPLINE_SHARE
 from toolpaths.cl.read import read_bytes
+from toolpaths.diagnostics import Diagnostic, Severity, warning
 from toolpaths.toolpath import Toolpath
 
 _SHIFTED = ("CUTCOM",)
@@ -36,3 +37,10 @@ def with_cubics(path: Toolpath, options: Options) -> Toolpath:
     read = read_bytes(source.data, file=path.file, units=source.units or None, dialect=source.dialect or None,
                       allow_unknown=options.allow_unknown, tolerance=path.spline_slack / SPLINE_SHARE, cubics=True)
     return read.toolpath if len(read.toolpath.faults) == len(path.faults) else path
+
+
+def as_arcs(path: Toolpath, found: tuple[Diagnostic, ...]) -> Diagnostic:
+    """A warning that splines are arcs and chords after all, since `found` stands against them as blocks of the control."""
+    why = next((d.message for d in found if d.severity is Severity.ERROR), "")
+    return warning("splines.as_arcs", "splines are written as arcs and chords; as blocks of the control they were refused: "
+                   f"{why}; nothing is to be done: the program is proved", file=path.file)

@@ -19,7 +19,7 @@ SPLINE_SHARE = 0.25
 """of the tolerance, else; what they may be off is no part of what the program may be off them (`Toolpath.spline_slack`)"""
 _DEGREE = 3
 _MOST_CHORDS = 10000
-_LEAST_CHORDS = 4
+_LEAST_CHORDS, _TURNS = 4, 1.2
 _LEAST_PLACES = 16
 """of a span, that arcs are compared at"""
 _STANDS = 1e-6
@@ -180,8 +180,7 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
     curve = np.array([start, *control])
     chord = b.spline_slack / b.scale
     b.splines += 1
-    if b.cubics:
-        _add_cubics(b, curve, inner, chord)
+    if b.cubics and _add_cubics(b, curve, inner, chord):
         return
     chords = spline_points(curve, inner, chord)
     arcs = spline_arcs(curve, inner, chord, b.splines - 1)
@@ -195,13 +194,19 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
     b.add_point(control[-1])
 
 
-def _add_cubics(b: ToolpathBuilder, curve: Floats, inner: Floats, chord: float) -> None:
-    """The spline piece by piece, each by chords at equal steps of its parameter, as many as a power of two."""
+def _add_cubics(b: ToolpathBuilder, curve: Floats, inner: Floats, chord: float) -> bool:
+    """The spline piece by piece, each by chords at equal steps of its parameter, as many as a power of two; False, and
+    nothing is added, where it turns back between two knots: there steps of its parameter stand nearly still."""
     points, last = cubic_points(curve, inner, chord)
+    along = np.diff(points, axis=0, prepend=curve[:1])
+    turn = np.arctan2(np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1), (along[:-1] * along[1:]).sum(axis=1))
+    if (turn[~last[:-1]] > _TURNS).any():
+        return False
     for point, ends in zip(points[:-1].tolist(), last[:-1].tolist(), strict=True):
         b.add_point((point[0], point[1], point[2]), role=Role.SPLINE if ends else Role.CUBIC)
     x, y, z = curve[-1].tolist()
     b.add_point((x, y, z))
+    return True
 
 
 def _gather(b: ToolpathBuilder) -> tuple[list[float], list[Triple]]:

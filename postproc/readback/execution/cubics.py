@@ -12,7 +12,7 @@ from toolpaths.diagnostics import Diagnostic, error
 
 CHORD = 1e-4
 """mm that the chords are off the curve at most; they are as many as a power of two, at equal steps of the parameter"""
-MOST = 2**16
+LEAST, MOST = 4, 2**16
 _DEGREES = np.arange(2.0, 6.0)
 
 
@@ -28,8 +28,8 @@ def with_curves(rows: MotionRows, start: Floats, curve: Floats, curves: Floats, 
     terms = curves[curve[runs].astype(np.int64)]
     bend = np.linalg.norm((np.abs(terms) * (_DEGREES * (_DEGREES - 1.0))).sum(axis=2), axis=1)
     chords = np.ones(len(rows.block), dtype=np.int64)
-    exact = np.sqrt(np.maximum(bend, CHORD) / (8.0 * CHORD))
-    chords[runs] = np.minimum(2 ** np.ceil(np.log2(np.maximum(exact, 1.0))).astype(np.int64), MOST)
+    exact = np.sqrt(bend / (8.0 * CHORD))
+    chords[runs] = np.clip(2 ** np.ceil(np.log2(np.maximum(exact, 1.0))).astype(np.int64), LEAST, MOST)
     index = np.repeat(np.arange(len(chords)), chords)
     spread = type(rows)(**{f.name: getattr(rows, f.name)[index] for f in fields(rows)})
     place = np.full(len(chords), -1)

@@ -195,3 +195,22 @@ def test_spl_as_its_page_has_it() -> None:
 def test_other_polynomials_are_refused(body: str) -> None:
     head = "G17 G710 G90 G94 G40 G64\nG54\nG0 X0 Y0 Z0\nG1 X0 F600\n"
     assert "gcode.curve" in faults(SIEMENS, head + body + "M30\n")
+
+
+CUSP = FILE.replace("RAPID\nGOTO/12,-9,50", "NURBS/\nKNOT/1.0\nCNTRL/32,11,-3\nCNTRL/12.0,11,-3\nCNTRL/32,-9.0001,-3\n"
+                    "RAPID\nGOTO/32,-9.0001,50")
+
+
+def test_a_spline_that_turns_back_stays_arcs() -> None:
+    """Where steps of its parameter stand nearly still its chords are no moves to be compared with; the others are blocks."""
+    made = converted(SIEMENS, text=CUSP)
+    assert made.ok and len(BLOCK[SIEMENS].findall(made.text)) == len(KNOTS)
+
+
+def test_what_is_refused_as_blocks_is_written_as_arcs(monkeypatch: pytest.MonkeyPatch) -> None:
+    from postproc.writing.siemens import SiemensWriter
+
+    cubic = SiemensWriter.cubic
+    monkeypatch.setattr(SiemensWriter, "cubic", lambda self, block: cubic(self, block).replace("PO[X]=(", "PO[X]=(1"))
+    made = converted.__wrapped__(SIEMENS)
+    assert made.ok and "splines.as_arcs" in {d.code for d in made.diagnostics} and not BLOCK[SIEMENS].search(made.text)
