@@ -33,4 +33,4 @@ def test_every_key_of_a_control_is_listed() -> None:
     from machines.models import ControlModel
 
     listed = set(re.findall(r"`([a-z_]+)`", "".join(row[0] for row in OPTIONS)))
-    assert set(ControlModel.model_fields) - {"module", "splines"} <= listed
+    assert set(ControlModel.model_fields) - {"module"} <= listed

@@ -37,6 +37,9 @@ class Role(IntEnum):
     """GOHOME with a point."""
     SPLINE = 4
     """On a spline between its ends: the program does not command it."""
+    CUBIC = 5
+    """Inside a piece of a spline, which is one cubic from the point before the first of them to the one behind the last, at
+    equal steps of its parameter; the program does not command it."""
 
 
 class FeedMode(IntEnum):

@@ -21,6 +21,8 @@ AVERAGED = 10
 """blocks over which the time of taking up blocks is averaged"""
 SLOWEST = 1e-3
 """mm/s or rad/s: least speed to which few blocks read ahead hold the axes"""
+EVEN = 1e-9
+"""blocks: parts of a block that are one in the arithmetic of their sum"""
 NO_MOTION = 1e-12
 """mm or rad, against division by 0"""
 FIRST, FIRST_AT_REST, GROWTH = 0.02, 1e-5, 0.25
@@ -106,7 +108,8 @@ def block_speeds(commanded: CommandedPath, path: BlendedPath, settings: ControlS
     if settings.block_time > 0.0:
         n, k = len(along), np.arange(len(along))
         low, high = np.maximum(k - AVERAGED // 2, 0), np.minimum(k + AVERAGED // 2 + 1, n)
-        speed = np.minimum(speed, (path.ends[high] - path.ends[low]) / (high - low) / settings.block_time)
+        taken = np.append(0.0, np.cumsum(np.broadcast_to(commanded.part, n)))
+        speed = np.minimum(speed, (path.ends[high] - path.ends[low]) / (taken[high] - taken[low]) / settings.block_time)
     return np.where(moving, np.minimum(speed, _seen(commanded, path, settings)), np.inf)
 
 
@@ -118,7 +121,8 @@ def _seen(commanded: CommandedPath, path: BlendedPath, settings: ControlSettings
     v/a + a/j over v (v/a + a/j)/2: solved for v.
     """
     n = len(commanded.length)
-    last = np.minimum(np.arange(n) + settings.buffer, n)
+    read = np.cumsum(np.broadcast_to(commanded.part, n))
+    last = np.minimum(np.searchsorted(read, read - commanded.part + settings.buffer + EVEN, side="right"), n)
     room = np.maximum(path.ends[last] - path.ends[1:], 0.5 * np.diff(path.ends))
     slope = np.abs(np.diff(commanded.points, axis=0)) / np.maximum(np.diff(path.ends), NO_MOTION)[:, None]
     width = min(settings.buffer, n)

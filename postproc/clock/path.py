@@ -53,6 +53,7 @@ class CommandedPath:
         length (N,): path of each block that the feed refers to, > 0 where the axes move; speed (N,): largest along it
         tolerance (V,): mm that the path may leave each point, 0 for none; stop (V,): the axes rest there
         weight (A,): mm that a unit of each axis counts in deviations
+        part (N,): of a block of the program that each is, 1 where it is all of one
     """
 
     points: Floats
@@ -61,6 +62,7 @@ class CommandedPath:
     tolerance: Floats
     stop: Bools
     weight: Floats
+    part: Floats | float = 1.0
 
 
 @dataclass(frozen=True)

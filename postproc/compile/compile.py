@@ -11,6 +11,7 @@ from postproc.compile.canned import holes_of
 from postproc.compile.clamps import with_clamps
 from postproc.compile.commands import commands_of
 from postproc.compile.contour_words import contour_words
+from postproc.compile.cubic_blocks import cubic_blocks
 from postproc.compile.cycle_refusals import as_moves, not_native
 from postproc.compile.feed import Feeds, PlannedTimes, plan_feeds
 from postproc.compile.hooks import with_hooks
@@ -45,11 +46,13 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
     commands, diagnostics = commands_of(toolpath, moves, path, controller, native, job.setup.output.apart,
                                         job.setup.output.tool_call, job.setup.output.stop_between_tools, job.cutcom)
     contour, commands, refused = contour_words(job, moves, path, words, commands)
+    cubics = cubic_blocks(job, moves, path, words, feeds, commands, skip if apart is None else skip | apart)
     end = np.where(path.home[:, None], job.grid.trimmed(path.q * control.unit), contour.words.end)
     write = without_standing(contour.words.write, end, control.rolls)
-    keep = (write.any(axis=1) | (path.code == ARC)) & ~contour.dropped
+    write = cubics.written(write, words, control.xyz, job.grid.grain.min()) if len(cubics.last) else write
+    keep = (write.any(axis=1) | (path.code == ARC)) & ~contour.dropped & ~cubics.dropped
     new = np.concatenate([[0], np.cumsum(keep)])
-    sections = sections_of(path, new)
+    sections = sections_of(job, moves, path, new)
     kept_holes = tuple(Hole(int(new[h.first]), int(new[h.last + 1]) - 1, h.cycle, h.plane_level, h.bottom, h.retract,
                             h.initial, h.key, int(new[h.drill])) for h in holes)
     line = moves.line[path.move[keep]]
@@ -58,8 +61,8 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
     program = Program(control.machine.axis_names, end[keep], write[keep], path.code[keep], feeds.feed[keep],
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], contour.center[keep], path.home[keep],
                       np.isnan(path.u[keep]), moves.row[path.move[keep]], line,
-                      placed, kept_holes, job.grid.places, sections, skip[keep], control.rolls,
-                      control.machine.home * control.unit)
+                      placed, kept_holes, job.grid.places, sections, skip[keep], cubics.numbers()[keep], cubics.curves,
+                      control.rolls, control.machine.home * control.unit)
     found += [*refused, *long_turns(program, toolpath.file)]
     program = with_smoothing(program, job.smoothing, toolpath)
     program = with_clamps(program, control.machine, controller.plane_turns)

@@ -64,6 +64,8 @@ class Section:
         angles: the printed angles in degrees, in the order of the controller's convention
         rotary: words (degrees) where the rotary axes stand on entering, by letter
         place: number of the place whose work offset is in force
+        out: Z of a plane, mm, at which the spindle stands just below home without a tool length, above where the section
+            ends; NaN where the tool does not go home from there along Z of the plane
     """
 
     first: int
@@ -72,6 +74,7 @@ class Section:
     angles: tuple[float, ...] = ()
     rotary: tuple[tuple[str, float], ...] = ()
     place: int = 0
+    out: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,7 @@ class Hole:
 
 @dataclass(frozen=True)
 @arrays(begins="_", words="K J", write="K J", code="int8: K", feed="K", mode="int8: K", plane="int8: K", ccw="K",
-        center="K 3", home="K", link="K", row="K", line="K", decimals="J", skip="K")
+        center="K 3", home="K", link="K", row="K", line="K", decimals="J", skip="K", curve="K", curves="C 3 2")
 class Program:
     """K blocks with the commands before them.
 
@@ -115,6 +118,9 @@ class Program:
         holes: by running number
         decimals (J,): of the words
         skip (K,): True for blocks that the block switch leaves out ("/")
+        curve (K,): number of the cubic that a block runs, -1 for none
+        curves (C, 3, 2): its second and third coefficient in X, Y, Z, mm, the parameter going from 0 to 1; the first follows
+            from begin and end of the block
         rolls: modulo axes by column; `words` count their turns, the text does not
         begins (J,): words of the machine's home
         sections: in order, the first begins at block 0 in the law that the control starts with
@@ -138,12 +144,16 @@ class Program:
     decimals: Ints
     sections: tuple[Section, ...] = (Section(0, "axes"),)
     skip: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    curve: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    curves: Floats = field(default_factory=lambda: np.zeros((0, 3, 2)))
     rolls: dict[int, Rollover] = field(default_factory=dict)
     begins: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         if not len(self.skip):
             object.__setattr__(self, "skip", np.zeros(len(self), dtype=bool))
+        if not len(self.curve):
+            object.__setattr__(self, "curve", np.full(len(self), -1))
 
     def before(self, axis: int) -> Floats:
         """(K,) degrees where a modulo axis stands before each block: as the block before has stated it last."""

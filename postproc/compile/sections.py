@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise, takewhile
 
 import numpy as np
 
 from postproc.compile.program import Command, Commands, Section
+from postproc.compile.word_rows import block_tools, unrounded_words
+from postproc.job.job import Job
 from postproc.path.model import JointPath
+from postproc.reference.moves import Moves
 from toolpaths.arrays import Ints
 
 _BELONG_BEFORE = frozenset({"CUTTER_COMPENSATION_OFF", "DWELL"})
 """commands that stand before a mode is left"""
 
 
-def sections_of(path: JointPath, new: Ints) -> tuple[Section, ...]:
-    """The sections of a path, `new` (K + 1,) giving the number of each block among those that are written."""
+BELOW_HOME = 1.0
+"""mm"""
+
+
+def sections_of(job: Job, moves: Moves, path: JointPath, new: Ints) -> tuple[Section, ...]:
+    """The sections of a path along `moves`, `new` (K + 1,) giving the number of each block among those that are written."""
     first = np.concatenate([[0], np.flatnonzero(np.diff(path.frame)) + 1])
     at = new[first]
     kept = np.flatnonzero(np.append(at[1:], new[-1]) > at)
@@ -25,7 +33,27 @@ def sections_of(path: JointPath, new: Ints) -> tuple[Section, ...]:
         control, last = frame.control, result[-1] if result else None
         if last is None or (last.plane, last.law, last.place) != (control.plane, control.law, control.place):
             result.append(Section(int(at[k]), control.law, control.plane, frame.angles, frame.rotary, control.place))
+        if control.law == "tilted":
+            end = int(first[k + 1]) - 1 if k + 1 < len(first) else len(path) - 1
+            result[-1] = replace(result[-1], out=_out(job, moves, path, end))
     return tuple(result)
+
+
+def _out(job: Job, moves: Moves, path: JointPath, end: int) -> float:
+    """`Section.out` of a section that ends with block `end`."""
+    machine, letters = job.control.machine, job.control.machine.axis_names
+    axis = machine.retract_axis
+    if axis < 0 or end + 1 >= len(path) or not path.home[end + 1] or not path.state[end + 1, axis]:
+        return float("nan")
+    up = np.stack([path.q[end], path.q[end]])
+    up[1, axis] = machine.home[axis] - BELOW_HOME * np.sign(machine.home[axis] - path.q[end, axis])
+    tool, z = block_tools(path, moves), letters.index("Z")
+    below, above = unrounded_words(path, up, np.array([end, end]), tool, job.kinematics, job.offset_length)
+    travel = np.abs(above - below)
+    travel[z] -= abs(up[1, axis] - up[0, axis])
+    if not above[z] > below[z] or np.abs(travel).max() > float(job.grid.grain.min()):
+        return float("nan")
+    return float(above[z]) + job.offset_length(int(tool[end]))
 
 
 def with_sections(commands: Commands, sections: tuple[Section, ...], line: Ints) -> Commands:

@@ -40,11 +40,12 @@ def word_rows(path: JointPath, moves: Moves, control: Control, kinematics: Calla
     begins = np.flatnonzero(np.diff(path.frame)) + 1
     tool = block_tools(path, moves)
     rounds = grid if made_up else None
-    unrounded = _words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
+    unrounded = unrounded_words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
     end = grid.rounded(_snapped(grid.rounded(unrounded), path, control, grid.grain, exact))
     end = _flat(grid.rounded(_held(end, path, control, tool, grid.places, bidirectional)), path, control)
     start = np.concatenate([end[:1], end[:-1]])
-    start[begins] = grid.rounded(_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds))
+    before = unrounded_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds)
+    start[begins] = grid.rounded(before)
     return WordRows(end, start, _written(end, start, np.union1d(begins, again), path, control))
 
 
@@ -55,8 +56,8 @@ def block_tools(path: JointPath, moves: Moves) -> Ints:
     return np.asarray(np.where(leaving, before, moves.tool[path.move]))
 
 
-def _words(path: JointPath, q: Floats, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
-           lengths: Callable[[int], float], rounds: WordGrid | None) -> Floats:
+def unrounded_words(path: JointPath, q: Floats, rows: Ints, tool: Ints, kinematics: Callable[[int], Kinematics],
+                    lengths: Callable[[int], float], rounds: WordGrid | None = None) -> Floats:
     """Unrounded words of joints q (K, J) under the law and with the tool of the blocks `rows` (K,).
 
     With `rounds` rotary words are rounded first where words are machine coordinates, and the slides are

@@ -32,7 +32,8 @@ def fitted(controller: ControllerFile, options: ControlOptions) -> ControllerFil
 
 def _fitted_modes(modes: Modes, options: ControlOptions) -> Modes:
     """The modes that the control has; the frame of the tip as the machine file confirms it."""
-    tcp, tilted = (mode and mode.model_copy(update={"relies_on": options.unconfirmed(mode.relies_on)})
+    tcp, tilted = (mode and mode.model_copy(update={"relies_on": options.unconfirmed(mode.relies_on),
+                                                    "alone": "".join(options.unconfirmed((mode.alone,)))})
                    for mode in (modes.tcp, modes.tilted))
     if tcp is not None and options.tip_frame:
         tcp = tcp.model_copy(update={"frame": options.tip_frame})

@@ -62,6 +62,15 @@ class ArcRules(UserModel):
     not confirm it"""
 
 
+class SplineRules(UserModel):
+    """Cubics that the controller runs as one block, where the machine file says that the option is fitted."""
+
+    word: str = ""
+    """by which a program is known to hold such blocks; empty: the controller has none"""
+    decimals: int = Field(default=6, ge=4, le=9)
+    """of coefficients, mm or inches; where they have an exponent, of the mantissa"""
+
+
 class FeedRules(UserModel):
     """Rules of the feed word."""
 
@@ -205,6 +214,7 @@ class ControllerFile(UserModel):
     subprogram_files: SubprogramFormat = SubprogramFormat(place="files")
     """the same in files of their own, which the set-up may ask for"""
     arcs: ArcRules = ArcRules()
+    splines: SplineRules = SplineRules()
     cycles: Cycles = Cycles()
     feed: FeedRules = FeedRules()
     cutter_compensation: CutterCompensation = CutterCompensation()

@@ -29,6 +29,8 @@ class Mode(UserModel):
     is the name of the work offset"""
     length: LengthState = "any"
     """how the length register must stand where the mode is entered, and where its `leave` blocks begin"""
+    alone: str = ""
+    """a setting that it needs where the length register is switched off in a block of its own, not on the path to home"""
     arcs: bool = True
     """arcs may stand in it while the rotary axes stand still"""
     arc_planes: tuple[Literal[17, 18, 19], ...] = (17, 18, 19)
@@ -72,6 +74,9 @@ class TiltedMode(Mode):
     turns_axes: bool = True
     """the control may turn rotary axes where the plane is stated, if only by what its angles are rounded by:
     axes whose clamps the program works are free there"""
+    by_home: bool = False
+    """links that turn rotary axes from or to a plane go by home, where the length is cancelled, unless the set-up says where
+    the tool waits ([clearance] index)"""
     tables_only: bool = False
     """only for machines whose rotary axes all carry the part"""
 

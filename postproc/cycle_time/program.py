@@ -13,7 +13,7 @@ from postproc.cycle_time.blocks import Axes, Cause, CornerMode, MotionBlocks, Pa
 from postproc.cycle_time.shape import NOTHING, shape
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import arc_sweeps, coordinates, positions
-from postproc.readback.text.canonical import LOADED, OFFSET, REGISTER, REST, SMOOTH, Canonical
+from postproc.readback.text.canonical import CURVE, LOADED, OFFSET, REGISTER, REST, SMOOTH, Canonical
 from postproc.readback.text.clamps import closing, opening
 from postproc.readback.text.modal import columns, fill_values, modal_state
 from postproc.readback.text.words import Words
@@ -68,18 +68,31 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     arc = motion.code == 2
     normal, sweep, center = _arcs(motion, control, arc, start)
     path, tolerance, chain = _path_modes(words, blends_unstated)
-    path = np.where(motion.hole, CornerMode.EXACT, path[block])
+    pieces, inside = _of_curves(code, motion)
+    path = np.where(motion.hole, CornerMode.EXACT, np.where(inside, CornerMode.BLEND, path[block]))
     pauses = _pauses(words, block, code.line, motion, machine)
     blocks = MotionBlocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc, center, normal, sweep,
                           np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names,
                           pauses,
-                           origin.cl_line, origin.move, _tip_lengths(motion, control), row=np.arange(len(motion)),
+                           origin.cl_line, origin.move, _tip_lengths(motion, control), pieces, np.arange(len(motion)),
                            tool=np.asarray(motion.tool[:len(motion)]))
     turned = np.where(np.isnan(motion.pitch), override, 1.0)
     blocks = replace(blocks, speed=_clamped(_speeds(motion, blocks, by_radius) * turned, blocks, machine))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
     blocks = _unrolled(blocks, motion, control, unit) if (motion.frame > 0).any() else blocks.take(moving)
     return replace(blocks, pauses=_with_indexing(blocks, machine))
+
+
+def _of_curves(code: Canonical, motion: Motion) -> tuple[Ints, Bools]:
+    """(of how many rows (E,) the block of each row consists, where that is a polynomial, else 1; rows (E,) that do not end
+    it)."""
+    every = len(motion)
+    if not len(code.curves):
+        return repeated(1, every), repeated(False, every)
+    curved = np.isin(motion.block, code.words.pick(CURVE)[0])
+    first = np.searchsorted(motion.block, motion.block)
+    count = np.searchsorted(motion.block, motion.block, side="right") - first
+    return np.where(curved, count, 1), curved & (np.arange(every) < first + count - 1)
 
 
 def _block_of(code: Canonical, motion: Motion) -> Ints:
@@ -138,7 +151,8 @@ def _unrolled(blocks: MotionBlocks, motion: Motion, control: Control, unit: Floa
     start = np.concatenate([blocks.start[:1], end[:-1]])
     pauses = replace(blocks.pauses, block=np.where(blocks.pauses.block >= 0, np.searchsorted(
         row, blocks.pauses.block, side="right") - 1, -1))
-    wide = replace(wide, start=start, end=end, arc=wide.arc & ~bent[row], pauses=pauses, pieces=count[row],
+    wide = replace(wide, start=start, end=end, arc=wide.arc & ~bent[row], pauses=pauses,
+                   pieces=count[row] if wide.pieces is None else count[row] * wide.pieces,
                    given=wide.given / count[row] if wide.given is not None else None)
     return wide.take((np.abs(end - start) > NOTHING).any(axis=1) | wide.arc)
 

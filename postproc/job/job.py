@@ -19,6 +19,7 @@ from postproc.control.word_grid import WordGrid, word_grid
 from postproc.controllers.fitted import fitted
 from postproc.controllers.model import ControllerFile
 from postproc.job.held_tools import with_held_tools
+from postproc.job.index_moves import indexed, plane_changes
 from postproc.job.length_words import words_depend_on_length
 from postproc.job.pivots import control_kinematics
 from postproc.job.places import Place, at_all, modes_at, places_of
@@ -43,7 +44,6 @@ from postproc.setup.model import Placement, SetupFile, work_frame
 from postproc.setup.system import upside_down
 from toolpaths.arrays import Floats, Ints, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
-from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Frame, Kind, Role, Toolpath
 from toolpaths.units import DEG
 
@@ -60,8 +60,7 @@ OF_SETUP = frozenset({"tool.number", "tool.same_number", "tool.length", "feed.mi
 class Job:
     """One CL file on one machine, ready to be solved or compared with.
 
-    `commanded` are the moves of the CL file in the table frame, `moves` those that the program is to have: with rapids split
-    where the control would not keep them on their line.
+    `commanded`: moves of the CL file in the table frame; `moves`: those of the program, with rapids split that leave their line.
     """
 
     toolpath: Toolpath
@@ -124,8 +123,7 @@ class Job:
         return self.gauge_length(index) if self.setup.output.tool_call else 0.0
 
     def number_of(self, index: int) -> int:
-        """Number of the tool of that index; -1 without one. Where the program calls none it is that of the
-        one tool, 0 where that has no number."""
+        """Number of the tool of that index; -1 without one. Where none is called that of the one tool, else 0."""
         return self.toolpath.tools[index].number if index >= 0 else -1
 
     def length_of(self, number: int) -> float:
@@ -166,19 +164,21 @@ class Job:
         restart = self.operation_starts() if self.setup.output.apart else []
         if self.repeats is not None and self.setup.clearance.between == "home":
             restart = [*restart, *np.searchsorted(self.moves.row, self.repeats.begins).tolist()]
-        return frozenset({0, *first.tolist(), *restart, *(self.indexed() if self.index_at_home else [])})
+        return frozenset({0, *first.tolist(), *restart, *self.indexed_at_home()})
 
     @property
     def index_at_home(self) -> bool:
         """True where the retract axis stands at home while a link turns rotary axes."""
         return (self.setup.clearance.index or self.controller.links.index) == "home" and self.machine.retract_axis >= 0
 
-    def indexed(self) -> list[int]:
-        """The linked moves that begin with another tool axis than the move before has ended with."""
-        rows = np.flatnonzero(self.moves.link)
-        rows = rows[rows > 0]
-        turned = angle_between(self.moves.axis[rows - 1], self.moves.axis[rows]) > self.axis_tolerance
-        return [int(k) for k in rows[turned]]
+    def indexed_at_home(self) -> list[int]:
+        """The linked moves with another tool axis that go by home: all, or from and to planes ([modes.tilted] by_home)."""
+        if self.index_at_home:
+            return indexed(self.moves, self.axis_tolerance)
+        mode = self.controller.modes.tilted
+        if self.setup.clearance.index or not (mode and mode.by_home and self.machine.retract_axis >= 0):
+            return []
+        return plane_changes(self.moves, self.operation, self.modes, self.axis_tolerance)
 
     @cached_property
     def rounding(self) -> Rounding:

@@ -17,6 +17,7 @@ from postproc.controllers.model import ControllerFile, load_controller
 from postproc.job.job import prepare, with_shop
 from postproc.pipeline.free_spin import with_spin_needed
 from postproc.pipeline.hooks import refused_hooks
+from postproc.pipeline.native_splines import as_arcs, asked_splines, held_splines, with_cubics
 from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
@@ -59,7 +60,17 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
     """
     require_call(path, options)
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
-    start = _begun(path, machine, controller, spec, setup, options, _reading(path, diagnostics))
+    found = _reading(path, diagnostics)
+    native = with_cubics(path, options) if asked_splines(path, machine, spec, options) else path
+    made = _converted(_begun(native, machine, controller, spec, setup, options, found), progress)
+    if made.ok or native is path:
+        return made
+    other = _converted(_begun(path, machine, controller, spec, setup, options, found), progress)
+    return other.with_found([as_arcs(path, made.diagnostics)]) if other.ok else other
+
+
+def _converted(start: PostResult, progress: Progress | None) -> PostResult:
+    """All that follows on the beginning of a conversion."""
     start, done = _oriented(start, progress)
     return start if not start.ok else done or _stages(start, progress)
 
@@ -172,6 +183,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
                          hashlib.sha256(data).hexdigest())
     if other := other_axes(data, options, str(gcode)):
         return replace(begun, diagnostics=(*other, *known))
+    path = with_cubics(path, options) if held_splines(data, spec) else path
     start, _ = _oriented(_begun(path, machine, controller, spec, setup, options, known), progress)
     path, found = start.toolpath, list(start.diagnostics)
     if has_errors(found):

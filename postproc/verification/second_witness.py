@@ -146,7 +146,7 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
     if source is None:
         return Testimony((), (NotCompared("all", "the path is not as it was read from a file"),)), []
     found, said = list[Diagnostic](), list[Testimony]()
-    unread = _unread_text(job, program)
+    unread = _unread_text(job, program, bool(len(comparison.executed[0].curves)))
     program = b"" if unread else program
     executed, shops = executed_of(comparison, comparison.poses, job), at_places(setup)
     for k, place in enumerate(job.places):
@@ -169,17 +169,19 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
                         file=job.toolpath.file, lines=[f.line] if f.line else [], count=f.count,
                         hint="do not run this program") for f in said[-1].findings]
     heard = together(said)
+    if len(comparison.executed[0].curves) and not unread and all(one.what != "curves" for one in heard.compared):
+        unread = [NotCompared("text", "polynomials: the program is not one text in the order in which it runs")]
     found += [error("verify.not_compared", f"the second witness has not compared {one.why}", file=job.toolpath.file,
                     hint="leave --require-proof out, where the read-back alone is enough")
               for one in unread if options.require_proof]
     return replace(heard, not_compared=(*heard.not_compared, *unread)), [*found, *_order(setup, comparison, job)]
 
 
-def _unread_text(job: Job, program: bytes | str) -> list[NotCompared]:
-    """What this witness would read of the text itself, clamps and turns of modulo axes, where variables, loops or calls of
-    the program are executed: words in it are not what they are on the control."""
+def _unread_text(job: Job, program: bytes | str, curves: bool) -> list[NotCompared]:
+    """What this witness would read of the text itself, clamps, polynomials, turns of modulo axes, where variables, loops or
+    calls of the program are executed: words in it are not what they are on the control."""
     what = [name for name, some in (("turns of modulo axes", bool(job.control.rolls)),
-                                    ("clamps", bool(job.machine.clamp_codes))) if some]
+                                    ("clamps", bool(job.machine.clamp_codes)), ("polynomials", curves)) if some]
     reader = reader_for(job.controller, job.machine.axis_names)
     if not what or not program or not reader.in_macros(as_bytes(program)):
         return []
@@ -214,13 +216,13 @@ def _rows_at(comparison: Comparison, job: Job, place: int) -> Ints:
 def _case(source: ClSource, setup: SetupFile, options: Options, job: Job, comparison: Comparison, program: bytes | str,
           place: int) -> Case:
     """What the witness is given of a program at one place."""
-    control, words = job.control_at(place), job.controller.codes
+    control, words, curves = job.control_at(place), job.controller.codes, len(comparison.executed[0].curves) > 0
     errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})
     return Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
                 *errors, "{register}" in words.length_offset, "{register}" in words.compensation_left,
                 sum(bit for bit, code in ((1, words.flood), (2, words.mist), (4, words.through), (8, words.air)) if code),
-                program=as_bytes(program) if control.rolls or job.machine.clamp_codes else b"",
+                program=as_bytes(program) if control.rolls or job.machine.clamp_codes or curves else b"",
                 clamps={a: (c.clamp, c.unclamp) for a, c in job.machine.clamp_codes.items()} if program else {},
                 modulo={job.machine.axis_names[j]: roll.rule for j, roll in control.rolls.items()},
                 origin=control.origin, limits=limits_as_used(job.machine), work_offset=offset_joints(control),

@@ -136,7 +136,7 @@ FindingCode = Literal["position", "path", "kind", "clearance", "arc", "hole", "f
                       "spindle", "coolant", "compensation", "rest", "limits", "offset", "turning", "clamp", "errors", "rods"]
 """what is found to differ; `witness.` with it is the code of the error"""
 Aspect = Literal["positions", "arcs", "holes", "feeds", "length registers", "tools", "spindle states", "coolant states",
-                 "cutter compensation", "rests and stops", "work offset", "turns of modulo axes", "clamps"]
+                 "cutter compensation", "rests and stops", "work offset", "turns of modulo axes", "clamps", "curves"]
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.rests import check_rests
 from postproc.witness.sides import check_sides
+from postproc.witness.splines import check_curves
 from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities, tools_of, with_spindle
 from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
 from postproc.witness.text import Array
@@ -123,8 +124,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     faults, sides = check_sides(w, c, case)
     found += faults
     found += _misfits(poses)
-    faults, turned = check_turning(case, executed)
-    found += faults
+    (faults, turned), (others, curves) = check_turning(case, executed), check_curves(case, executed)
+    found += [*faults, *others]
     feeding = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
     faults, clamped = check_clamps(case, executed, w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
     found += faults
@@ -137,7 +138,7 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     counts: dict[Aspect, int] = {
         "positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()), "holes": holes, "feeds": feeds,
         **states, "cutter compensation": sides, "rests and stops": rests, "work offset": zeros,
-        "turns of modulo axes": turned, "clamps": clamped}
+        "turns of modulo axes": turned, "clamps": clamped, "curves": curves}
     return found, worst, counts, [*silent, *[PASSED] * flat]
 
 

@@ -1,14 +1,25 @@
-"""Splines of the CL file (NURBS of NX: clamped cubics from where the tool stands) as dense chords, and what is off them."""
+"""Splines of the CL file (NURBS of NX: clamped cubics from where the tool stands) as dense chords, and what is off them;
+polynomials in the text of a program, against the blocks that were executed for them."""
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
+from postproc.witness.evidence import Case, ExecutedBlocks, Finding
 from postproc.witness.text import Array
 
 CHORD = 2e-4
 """mm that the chords are from the curve"""
-_AT_ONCE, _LOOKS = 200, 64
+_AT_ONCE, _LOOKS, _NEAR = 100, 64, 0.5
+_REMARK = re.compile(rb";[^\n]*")
+_PO = re.compile(rb"PO\s*\[\s*([XYZ])\s*\]\s*=\s*\(([^()]*)\)|\b([XYZ])\s*=\s*PO\s*\(([^()]*)\)")
+_PL = re.compile(rb"\bPL\s*=\s*([\d.]+)")
+_SPL = re.compile(rb"K([123])([XYZ])\s*([-+]?[\d.]+(?:\s?E[-+]?\d+)?)")
+_INCH, _MM = re.compile(rb"\bG700?(?!\d)|BEGIN PGM[^\n]*INCH"), re.compile(rb"\bG710?(?!\d)|BEGIN PGM[^\n]*MM")
+ROUNDED = 2e-4
+"""mm that words and coefficients of a polynomial may be rounded by"""
 
 
 def points_of(control: Array, knots: list[float]) -> Array:
@@ -44,7 +55,11 @@ def length_of(points: Array) -> float:
 
 def _chords(tip: Array, points: Array) -> tuple[Array, Array]:
     """(K, P - 1) mm from tips to each chord, and how far along each they are (0 to 1)."""
-    begin, travel = points[:-1], np.diff(points, axis=0)
+    return _to_chords(tip, points[:-1], np.diff(points, axis=0))
+
+
+def _to_chords(tip: Array, begin: Array, travel: Array) -> tuple[Array, Array]:
+    """The same of chords by their begins and travels (P, 3)."""
     offset = tip[:, None] - begin
     share = np.clip((offset * travel).sum(axis=2) / np.maximum((travel * travel).sum(axis=1), 1e-30), 0.0, 1.0)
     rest = offset - share[:, :, None] * travel
@@ -53,9 +68,14 @@ def _chords(tip: Array, points: Array) -> tuple[Array, Array]:
 
 def off_chords(tip: Array, points: Array) -> Array:
     """(K,) mm by which tips are off chords, less what may stand in the place of a spline."""
-    away = np.empty(len(tip))
+    away, low, high = np.empty(len(tip)), np.minimum(points[:-1], points[1:]), np.maximum(points[:-1], points[1:])
     for first in range(0, len(tip), _AT_ONCE):
-        away[first:first + _AT_ONCE] = _chords(tip[first:first + _AT_ONCE], points)[0].min(axis=1)
+        some = tip[first:first + _AT_ONCE]
+        near = ((high >= some.min(axis=0) - _NEAR) & (low <= some.max(axis=0) + _NEAR)).all(axis=1)
+        here = _to_chords(some, points[:-1][near], np.diff(points, axis=0)[near])[0].min(axis=1, initial=np.inf)
+        far = here > _NEAR  # a chord that is nearer than that is among those looked at
+        here[far] = _chords(some[far], points)[0].min(axis=1)
+        away[first:first + _AT_ONCE] = here
     return np.maximum(away - CHORD, 0.0)
 
 
@@ -71,3 +91,44 @@ def goes_back(tip: Array, points: Array, tolerance: float) -> bool:
             return True
         at = max(at, float(ahead.min())) if len(ahead) else at
     return False
+
+
+def check_curves(case: Case, executed: ExecutedBlocks) -> tuple[list[Finding], int]:
+    """Polynomials of the text (POLY of SINUMERIK, SPL of a TNC) that the blocks executed for them do not follow; how many
+    were compared. Both start and end where the blocks do, so that what is compared is how they bow between."""
+    text = _REMARK.sub(b"", case.program.upper())
+    if (b"PO" not in text and b"SPL" not in text) or (np.diff(executed.line) < 0).any():
+        return [], 0
+    inch = _INCH.search(text) is not None
+    if inch and _MM.search(text):
+        return [], 0
+    columns, worst, count = [executed.letters.index(a) for a in "XYZ" if a in executed.letters], (0.0, 0), 0
+    for number, block in enumerate(text.split(b"\n"), 1):
+        bow = _bow(block) if b"PO" in block or b"SPL" in block else None
+        first, last = np.searchsorted(executed.line, [number, number + 1])
+        if bow is None or last <= first or len(columns) < 3:
+            continue
+        places = np.cumsum(executed.steps(np.arange(first, last))[:, columns], axis=0)
+        p = np.arange(1.0, last - first + 1.0)[:, None] / (last - first)
+        powers = sum(term * (p ** n - p) for n, term in enumerate(bow, 2))
+        off = np.abs(places - places[-1] * p - powers * (25.4 if inch else 1.0)).max()
+        worst, count = max(worst, (float(off), number)), count + 1
+    if worst[0] <= ROUNDED:
+        return [], count
+    said = f"the blocks of a polynomial are {worst[0]:.4f} mm off what its coefficients say"
+    return [Finding("path", said, 0, worst[1])], count
+
+
+def _bow(block: bytes) -> Array | None:
+    """(4, 3) second to fifth coefficients of a block in X, Y, Z, its parameter from 0 to 1; None where it has none."""
+    result = np.zeros((4, 3))
+    length = float(found[1]) if (found := _PL.search(block)) else 1.0
+    terms = [(m[1] or m[3], (m[2] or m[4]).split(b",")) for m in _PO.finditer(block)]
+    for axis, values in terms:
+        for n, value in enumerate(values[1:]):
+            result[n, b"XYZ".index(axis)] = float(value.replace(b"EX", b"e")) * length ** (n + 2)
+    parts = {(int(m[1]), b"XYZ".index(m[2])): float(m[3].replace(b" ", b"")) for m in _SPL.finditer(block)}
+    for (n, axis), value in parts.items():  # t = 1 - p
+        result[0, axis] += value if n == 2 else 3.0 * value if n == 3 else 0.0
+        result[1, axis] -= value if n == 3 else 0.0
+    return result if terms or parts else None

@@ -15,6 +15,8 @@ from postproc.writing.writer import CHUNK, SKIP, Writer
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
+LARGEST = 9.99999
+"""above it a coefficient of SPL is written with an exponent"""
 LONGEST_DWELL = 3600.0
 """s that one cycle 9 can rest"""
 
@@ -103,6 +105,21 @@ class KlartextWriter(Writer):
         yield "CC" + "".join(f" {'XYZ'[i]}{centre[i]}" for i in range(3) if i != third)
         yield f"C{text} {sense}{feed}"
 
+    def cubic(self, block: int) -> str:
+        """SPL with the end and K3, K2, K1 of each axis: K3 t3 + K2 t2 + K1 t + end, t from 1 to 0."""
+        p, unit, places = self.program, self.controller.unit, self.controller.splines.decimals
+        ends, terms = "", ""
+        for letter, (second, third) in zip("XYZ", (p.curves[p.curve[block]] / unit).tolist(), strict=True):
+            column = p.letters.index(letter)
+            if not p.write[block, column]:
+                continue
+            begin, end = self.stated(column, np.array([block - 1, block])).tolist()
+            cubic, square = (float(spline_number(v, places)) for v in (-third, second + 3.0 * third))
+            ends += f" {letter}{self.number_text(np.array([end]), int(p.decimals[column]))[0]}"
+            for n, value in ((3, cubic), (2, square), (1, begin - end - cubic - square)):
+                terms += f" K{n}{letter}{spline_number(value, places)}"
+        return f"SPL{ends}{terms}{self.feeds(block, block + 1)[0]}"
+
     def climbing(self, k: int, start: Floats, end: Floats, rest: str) -> Iterator[str]:
         """CC and CP of block k from `start` to `end` (3,), by the last decimals that end nearest, from where the tool is."""
         p, f = self.program, self.controller.format
@@ -175,6 +192,13 @@ class KlartextWriter(Writer):
             self.called = abs(self.speed)
             yield f"TOOL CALL S{self.plain(self.called)}"
         yield start
+
+
+def spline_number(value: float, places: int) -> str:
+    """A coefficient of SPL: plain below 10, else with an exponent, no zeros behind."""
+    mantissa, _, power = (f"{value:+.{places}f}" if abs(value) < LARGEST else f"{value:+.{places}e}").partition("e")
+    short = mantissa.rstrip("0").rstrip(".")
+    return ("+0" if float(short) == 0.0 else short) + (f"E{int(power):+d}" if power else "")
 
 
 def sweep(start: Floats, end: Floats, ccw: bool) -> float:

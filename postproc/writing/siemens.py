@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from postproc.compile.program import Hole
+from postproc.compile.program import PER_MINUTE, Hole
 from postproc.writing.iso import IsoWriter
 
 
@@ -23,6 +23,21 @@ class SiemensWriter(IsoWriter):
         """CYCLE832: its third parameter must be given, and is 1 on machines without rotary axes."""
         self.axis_smoothing = self.axis_smoothing or 1.0
         return super().smoothed(mm, blocks)
+
+    def cubic(self, block: int) -> str:
+        """POLY PO[X]=(end,a2,a3) ...: the parameter goes from 0 to 1, as without PL."""
+        p, rules, words = self.program, self.controller, list[str]()
+        if self.mode != PER_MINUTE:
+            words.append(rules.codes.per_minute)
+            self.mode, self.feed = PER_MINUTE, ""
+        words += ["POLY"] if self.motion != "POLY" else []
+        self.motion = "POLY"
+        for letter, terms in zip("XYZ", p.curves[p.curve[block]] / rules.unit, strict=True):
+            column = p.letters.index(letter)
+            if p.write[block, column]:
+                end, = self.number_text(self.stated(column, np.array([block])), int(p.decimals[column]))
+                words.append(f"PO[{letter}]=({','.join([end, *self.number_text(terms, rules.splines.decimals)])})")
+        return " ".join(words) + self.feeds(block, block + 1)[0]
 
     def hole(self, hole: Hole) -> Iterator[str]:
         """MCALL where anything but the place of the hole changes, then the place at rapid."""

@@ -84,6 +84,8 @@ class WriterState:
         needed = [text.replace("{work_offset}", self.offset_names) for mode in modes
                   for text in (mode.option, *mode.relies_on) if text]
         p, rules = self.program, self.controller
+        alone = any(s.law == "tilted" and math.isnan(s.out) for s in p.sections)
+        needed += [mode.alone for mode in modes if alone and mode.alone]
         arcs = np.flatnonzero(p.code == ARC)
         third = [p.letters.index("ZYX"[plane - 17]) for plane in p.plane[arcs].tolist()]
         rising = p.words[arcs, third] != p.words[arcs - 1, third]
@@ -260,7 +262,11 @@ class WriterState:
         if mode is None:
             return
         holds = any("{register}" in block for block in mode.enter)
-        if not holds:
+        if not holds and not math.isnan(section.out) and mode.length == "off" and self.register and not self.length_off:
+            codes, (height,) = self.controller.codes, self.lengths(np.array([section.out]))
+            yield self.space.join((codes.traverse, codes.length_cancel, f"Z{height}"))
+            self.length_off = True
+        elif not holds:
             yield from self._length(mode.length)
         for block in mode.leave:
             yield block.format(**self.section_values(section))
@@ -297,6 +303,7 @@ _REST = 0.005
 """mm that are no peck of their own"""
 SPEED_DIGITS = 3
 """decimals of a speed from 1 to 10; one less each time that it is ten times as great"""
+_SWITCH = re.compile(r"M\d+")
 _ZEROS = re.compile(r"0+ ")
 _MINUS_ZERO = re.compile(r"-0(?=\.?0* )")
 
@@ -320,3 +327,11 @@ def clean(controller: ControllerFile, text: str) -> str:
 def plain_name(text: str) -> str:
     """A name as any block can hold it: letters, digits, blanks and - . _ alone."""
     return "".join(c if c.isascii() and (c.isalnum() or c in " -._") else "_" for c in text.strip())
+
+
+def without_off(block: str, off: set[str]) -> str:
+    """A block of the ending without what is off already, where it holds nothing but M codes."""
+    words = block.split()
+    if not all(_SWITCH.fullmatch(word) for word in words):
+        return block
+    return " ".join(word for word in words if word not in off)

@@ -18,12 +18,11 @@ from postproc.control.rollover import HALF
 from postproc.controllers.output_modes import Mode
 from postproc.controllers.texts import blocks_of
 from postproc.reference.coolant import COMMANDS
-from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name
+from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name, without_off
 from toolpaths.arrays import Ints
 
 _LABEL = re.compile(r"%|[NO]\d")
 """blocks that carry a number of their own"""
-_SWITCH = re.compile(r"M\d+")
 _HUNDRED = re.compile(r"N\d+")
 """number of an operation"""
 SKIP = "/"
@@ -121,7 +120,7 @@ class Writer(WriterState, ABC):
         off = {codes.spindle_stop} if self.turning is False else set()
         off |= {codes.coolant_off} if self.cooling is False else set()
         left = [code for code in self.coolant_off() if self.flowing and code != codes.coolant_off]
-        return left + [kept for block in (*program.path_tolerance_off, *program.ending) if (kept := _without(block, off))]
+        return left + [kept for block in (*program.path_tolerance_off, *program.ending) if (kept := without_off(block, off))]
 
     def start(self) -> Iterator[str]:
         """Safe start: modes that the program uses off, then the preamble."""
@@ -181,7 +180,9 @@ class Writer(WriterState, ABC):
         """Blocks between preamble and ending: stretches of plain motion at once, all else one by one."""
         p = self.program
         switch = np.flatnonzero(np.diff(p.skip)) + 1
-        stops = sorted({*p.commands, *(h.first for h in p.holes), *(h.last + 1 for h in p.holes), *switch.tolist(), len(p)})
+        curves = set(np.flatnonzero(p.curve >= 0).tolist())
+        stops = sorted({*p.commands, *(h.first for h in p.holes), *(h.last + 1 for h in p.holes), *switch.tolist(), *curves,
+                        len(p)})
         holes = {h.first: h for h in p.holes}
         at = 0
         for stop in stops:
@@ -196,6 +197,10 @@ class Writer(WriterState, ABC):
                 yield from self.hole(holes[stop])
                 self.in_cycle = True
                 at = holes[stop].last + 1
+            elif stop in curves:
+                yield from self.end_cycle()
+                yield self.cubic(stop)
+                at = stop + 1
         yield from self.end_cycle()
 
     def end_cycle(self) -> Iterator[str]:
@@ -245,6 +250,10 @@ class Writer(WriterState, ABC):
     @abstractmethod
     def blocks(self, at: int, stop: int) -> Iterator[str]:
         """Motion blocks at..stop."""
+
+    def cubic(self, block: int) -> str:
+        """A block that runs a cubic."""
+        raise ValueError(f"no text for the cubic of block {block}")
 
     @abstractmethod
     def hole(self, hole: Hole) -> Iterator[str]:
@@ -389,11 +398,3 @@ class Writer(WriterState, ABC):
         self.length_off = self.controller.tools.length_with_z
         if not self.length_off and self.length_offsets and self.controller.codes.length_offset:
             yield self.controller.codes.length_offset.format(register=register)
-
-
-def _without(block: str, off: set[str]) -> str:
-    """A block of the ending without what is off already, where it holds nothing but M codes."""
-    words = block.split()
-    if not all(_SWITCH.fullmatch(word) for word in words):
-        return block
-    return " ".join(word for word in words if word not in off)

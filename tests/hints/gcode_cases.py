@@ -140,6 +140,9 @@ _ISO = [
     of("gcode.arc", HAAS, "", "G2 X9. Y2. I5. J0. F100.\n", "G2 X9. Y2. I4. J0. F100.\n", "correct its centre"),
 ]
 _KLARTEXT = [
+    of("gcode.curve", SIEMENS, "", "POLY PO[X]=(2,1) PO[]=(2,1) F100\n", "G1 X2 F100\n", "as lines or arcs"),
+    of("gcode.curve", HEIDENHAIN, "", "SPL X+9 K3X+1 K2X+1 F100\n", r"SPL X+9 K3X+1 K2X+1 \1X-10 F100\n",
+       "K3, K2 and (K1) of each"),
     of("gcode.arc", HEIDENHAIN, "", "CR X+9 Y+9 F100\n", r"CR X+9 Y+9 \1+9 DR+ F100\n", "(R)\\+ up to half a turn"),
     of("gcode.pole", HEIDENHAIN, "", "C X+9 Y+9 DR+ F100\n", "CC X+5 Y+2\nC X+9 Y+2 DR+ F100\n", "CC before it"),
     of("gcode.pole", HEIDENHAIN, "", "LP PR+9 PA+0 F100\n", "CC X+5 Y+2\nLP PR+9 PA+0 F100\n", "CC X Y"),

@@ -409,6 +409,8 @@ CASES: dict[str, Case] = {
     "fast planned": Case(FAST, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "round planned": Case(ROUND, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "plane spline": Case(CURVE, "mill-3axis", "linuxcnc", TURNED),
+    **{f"curves {name}": Case(CURVE, str(Path(__file__).with_name("curves_bought.toml")), SIX[name], TURNED)
+       for name in ("siemens", "heidenhain")},
     "loose": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"tolerance": 0.5}),
     "whole circle": Case(HELIX.replace("GOTO/-40,30,-8\n", ""), "mill-3axis", "linuxcnc"),
     "kept spindle": Case(FACES.replace("SPINDL/RPM,2000,CLW\n", ""), "trunnion-bc", "linuxcnc"),

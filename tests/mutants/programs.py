@@ -21,7 +21,8 @@ from tests.postproc.mutation_kit import Effect, Mutant, mutants
 SEED = 19
 PROGRAMS = (*(f"{kind} {c}" for c in SIX for kind in (
     "flat", "laws", "axes", "helix", "five", "faces", "rests", "side", "spline", "inches", "again", "homing")),
-            *(f"{kind} {c}" for c in ("fanuc", "siemens", "heidenhain", "haas") for kind in ("cycles", "tip")))
+            *(f"{kind} {c}" for c in ("fanuc", "siemens", "heidenhain", "haas") for kind in ("cycles", "tip")),
+            "curves siemens", "curves heidenhain")
 EACH = 26
 """changes of each program"""
 SAME = {"same": "the same motion, states and times", "near": "ends within the tolerance, the rest the same",

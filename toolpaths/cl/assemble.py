@@ -252,7 +252,7 @@ def _kinds(b: ToolpathBuilder, n: int) -> tuple[Array, Array, Array]:
     role = np.full(n, Role.POINT, np.int8)
     rows = np.array(list(b.roles), np.int64)
     if (rows >= n).any():
-        b.log.error("cl.data-comment", "$$-> SPLINE counts more points than follow",
+        b.log.error("cl.data-comment", "$$-> SPLINE or CUBIC counts more points than follow",
                     hint="write the file again: its end is missing, or correct the count")
     inside = rows < n
     role[rows[inside]] = np.array(list(b.roles.values()), np.int8)[inside]

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats
 from toolpaths.cl.biarcs import DENSER, FLAT, biarcs, plane_of
 from toolpaths.cl.build import ToolpathBuilder, Triple
 from toolpaths.cl.text.statements import COMMENT, TEXT, Statement, Word, words_of
@@ -19,6 +19,7 @@ SPLINE_SHARE = 0.25
 """of the tolerance, else; what they may be off is no part of what the program may be off them (`Toolpath.spline_slack`)"""
 _DEGREE = 3
 _MOST_CHORDS = 10000
+_LEAST_CHORDS, _TURNS = 4, 1.2
 _LEAST_PLACES = 16
 """of a span, that arcs are compared at"""
 _STANDS = 1e-6
@@ -178,9 +179,11 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
         return
     curve = np.array([start, *control])
     chord = b.spline_slack / b.scale
-    chords = spline_points(curve, inner, chord)
-    arcs = spline_arcs(curve, inner, chord, b.splines)
     b.splines += 1
+    if b.cubics and _add_cubics(b, curve, inner, chord):
+        return
+    chords = spline_points(curve, inner, chord)
+    arcs = spline_arcs(curve, inner, chord, b.splines - 1)
     pieces = arcs if 0 < len(arcs) < len(chords) else [(x, y, z, ()) for x, y, z in chords.tolist()]
     for n, (x, y, z, arc) in enumerate(pieces, 1):
         if arc:
@@ -189,6 +192,21 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
         if n < len(pieces):
             b.add_point((x, y, z), role=Role.SPLINE)
     b.add_point(control[-1])
+
+
+def _add_cubics(b: ToolpathBuilder, curve: Floats, inner: Floats, chord: float) -> bool:
+    """The spline piece by piece, each by chords at equal steps of its parameter, as many as a power of two; False, and
+    nothing is added, where it turns back between two knots: there steps of its parameter stand nearly still."""
+    points, last = cubic_points(curve, inner, chord)
+    along = np.diff(points, axis=0, prepend=curve[:1])
+    turn = np.arctan2(np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1), (along[:-1] * along[1:]).sum(axis=1))
+    if (turn[~last[:-1]] > _TURNS).any():
+        return False
+    for point, ends in zip(points[:-1].tolist(), last[:-1].tolist(), strict=True):
+        b.add_point((point[0], point[1], point[2]), role=Role.SPLINE if ends else Role.CUBIC)
+    x, y, z = curve[-1].tolist()
+    b.add_point((x, y, z))
+    return True
 
 
 def _gather(b: ToolpathBuilder) -> tuple[list[float], list[Triple]]:
@@ -256,6 +274,18 @@ def spline_points(control: Floats, inner: Floats, chord: float) -> Floats:
     """
     knots = _knots(inner)
     return de_boor(control, knots, _places(control, knots, chord), _DEGREE)
+
+
+def cubic_points(control: Floats, inner: Floats, chord: float) -> tuple[Floats, Bools]:
+    """Points (M, 3) as of `spline_points`, of chords of equal steps between knots, their numbers powers of two; which (M,)
+    are at a knot. Pieces that bend have four chords at least, so that their points show that they are cubics."""
+    knots = _knots(inner)
+    at = _places(control, knots, chord)
+    breaks = np.unique(knots)
+    counts = np.diff(np.searchsorted(at, breaks, side="right"))
+    counts = np.where(counts > 1, np.maximum(2 ** np.ceil(np.log2(np.maximum(counts, 1))).astype(int), _LEAST_CHORDS), 1)
+    at = np.concatenate([np.linspace(a, c, n + 1)[1:] for a, c, n in zip(breaks, breaks[1:], counts, strict=False)])
+    return de_boor(control, knots, at, _DEGREE), np.isin(at, breaks)
 
 
 def _knots(inner: Floats) -> Floats:

@@ -126,7 +126,7 @@ def _stand_about_axis(b: ToolpathBuilder, value: bool) -> None:
 
 HANDLERS.update({"DEFSUB": defsub, "CALSUB": calsub, "ENDSUB": structure.nothing})
 _SAYING = {**dict.fromkeys((w.removeprefix(DATA_COMMENT) for w in HANDLERS if w.startswith(DATA_COMMENT)), 0),
-           "CSYS": 12, "CUTTER": 1, "FEATNO": 1, "USE": 2, "SPLINE": 1}
+           "CSYS": 12, "CUTTER": 1, "FEATNO": 1, "USE": 2, "SPLINE": 1, "CUBIC": 1}
 """`$$->` remarks that say something, with the count of their numbers; 0: lists of our own writer"""
 _FIRST = re.compile(r"[^A-Z]*([A-Z]+)(?![A-Z])")
 VOCABULARY = frozenset(HANDLERS) | UNSUPPORTED_MOTION

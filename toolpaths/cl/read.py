@@ -68,7 +68,7 @@ def read_file(path: str | Path, *, units: LengthUnit | None = None, dialect: Dia
 
 def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = None, dialect: DialectName | None = None,
                allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None,
-               tolerance: float = 0.0) -> ReadResult:
+               tolerance: float = 0.0, cubics: bool = False) -> ReadResult:
     """Read the text of a CL file.
 
     Args:
@@ -78,6 +78,8 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         allow_unknown: words that may be left out although they look like motion
         progress: called with (bytes read, bytes in all)
         tolerance: mm of the program; a share of it may go to arcs and chords in the place of splines
+        cubics: splines by chords at equal steps between their knots (`Role.CUBIC`), so that they can be written as what they
+            are; else by as few arcs or chords as the tolerance allows
 
     Raises:
         ValueError: for a dialect or unit that does not exist (wrong use; faults of the file are diagnostics).
@@ -101,7 +103,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         found, evidence = (DIALECTS[dialect], "given") if dialect else detect(program)
     del plain
     b = ToolpathBuilder(program, points, found, _units(program, units, log), log, allow_unknown,
-                        SPLINE_SHARE * tolerance or SPLINE_CHORD)
+                        SPLINE_SHARE * tolerance or SPLINE_CHORD, cubics)
     run(b, 0, len(program.statements))
     b.finish_rows()
     open_paths(b)

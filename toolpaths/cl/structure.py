@@ -251,15 +251,16 @@ def _tool(found: dict[str, object]) -> Tool:
 
 
 def own_spline(b: ToolpathBuilder, s: Statement) -> None:
-    """$$-> SPLINE / n: the next n points lie on a spline between its ends."""
+    """$$-> SPLINE / n: the next n points lie on a spline between its ends; $$-> CUBIC / n: inside one piece of it."""
+    word = s.major.removeprefix("$$->")
     count = s.numbers[0] if s.numbers else -1.0
     if b.declared is None:
         return
     if not 0 <= count <= len(b.points) + len(b.program.lines):
-        b.log.error("cl.data-comment", f"$$-> SPLINE / {s.body}: it takes a count of points", b.line,
-                    "write for example $$-> SPLINE / 12")
+        b.log.error("cl.data-comment", f"$$-> {word} / {s.body}: it takes a count of points", b.line,
+                    f"write for example $$-> {word} / 12")
         return
-    b.roles.update(dict.fromkeys(range(b.row, b.row + int(count)), Role.SPLINE))
+    b.roles.update(dict.fromkeys(range(b.row, b.row + int(count)), Role[word]))
 
 
 def own_use(b: ToolpathBuilder, s: Statement) -> None:
@@ -281,7 +282,8 @@ HANDLERS: dict[str, Callable[[ToolpathBuilder, Statement], None]] = {
     "PPRINT": text_event, "INSERT": text_event, "REMARK": nothing, "LPRINT": nothing, "PPLABEL": nothing,
     "LETTER": nothing, "UNITS": nothing, "UNIT": nothing, "MULTAX": multax, "FINI": fini, "SET": mode,
     "$$->TOOLPATH": own_header, "$$->FRAME": own_item, "$$->TOOL": own_item, "$$->OPERATION": own_item,
-    "$$->USE": own_use, "$$->SPLINE": own_spline, **dict.fromkeys(EVENTS, plain_event), "SPINDL": spindl, "DWELL": dwell,
+    "$$->USE": own_use, "$$->SPLINE": own_spline, "$$->CUBIC": own_spline, **dict.fromkeys(EVENTS, plain_event),
+    "SPINDL": spindl, "DWELL": dwell,
     "STOP": stop, "OPSTOP": stop, "DELETE": opskip, "SELECTL": selctl, "OP_NAME": named_operation,
     "MODE": mode, "CSI_TOOL_PATH": named_operation, "OPNAME": named_operation, "APPLY": apply,
     "OPFEATSTART": solidworks_feature, "TRNTYP": turn_type, "MACHIN": machin,

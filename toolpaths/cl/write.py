@@ -131,9 +131,10 @@ def _before(p: Toolpath) -> dict[int, list[str]]:
     for row, lines in _feeds(p):
         add(row, *lines)
     _cycles(p, add)
-    spline = np.append(p.role == Role.SPLINE, False)
-    for row in np.flatnonzero(spline & ~np.roll(spline, 1)).tolist():
-        add(row, f"$$-> SPLINE / {int(np.argmin(spline[row:]))}")
+    for role in (Role.SPLINE, Role.CUBIC):
+        spline = np.append(p.role == role, False)
+        for row in np.flatnonzero(spline & ~np.roll(spline, 1)).tolist():
+            add(row, f"$$-> {role.name} / {int(np.argmin(spline[row:]))}")
     for row in np.flatnonzero((p.kind == Kind.RAPID) & (p.role == Role.POINT)).tolist():
         add(row, "RAPID")
     for row in np.flatnonzero(p.arc >= 0).tolist():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from machines.machine import ClampCodes
+from postproc.job.index_moves import indexed
 from postproc.job.job import Job
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.tool_changes import correction
@@ -104,7 +105,7 @@ def check_index(motion: Motion, job: Job, home: Floats, owner: Ints, faults: Fau
         return []
     moves = job.moves.without_pecks()
     first = np.zeros(len(moves) + 1, dtype=bool)
-    first[np.searchsorted(moves.row, job.moves.row[job.indexed()])] = True
+    first[np.searchsorted(moves.row, job.moves.row[indexed(job.moves, job.axis_tolerance)])] = True
     linking = first[np.clip(owner, 0, len(moves))] & ~cutting_rows(motion, job, owner)
     rotary = np.flatnonzero(np.array(job.machine.rotary))
     before = np.concatenate([motion.start[None], motion.end[:-1]])

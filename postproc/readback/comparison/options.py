@@ -9,7 +9,7 @@ from postproc.job.job import Job
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import coordinates
-from postproc.readback.text.canonical import LAW, SMOOTH, Canonical, in_files
+from postproc.readback.text.canonical import CURVE, LAW, SMOOTH, Canonical, in_files
 from postproc.readback.text.modal import codes
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic
@@ -20,7 +20,8 @@ M29 = (29.0,)
 
 
 def check_options(code: Canonical, motion: Motion, job: Job, faults: Faults) -> list[Diagnostic]:
-    """Modes, smoothing, rigid taps and helices of a program for a control that has them not."""
+    """Modes, smoothing, rigid taps, helices of a program for a control that has them not, cubics for one that is not known
+    to have them."""
     options = job.machine.options
     names = np.array([one.name for one in code.laws] + [""])
     at, law = code.words.pick(LAW)
@@ -30,13 +31,15 @@ def check_options(code: Canonical, motion: Motion, job: Job, faults: Faults) -> 
         "smoothing": _smoothed(code) if not job.controller.program.exact_path else np.zeros(0, dtype=np.int64),
         "rigid_tapping": codes(code.words, "M", M29)[0] if job.controller.cycles.floating else np.zeros(0, dtype=np.int64)}
     lines = {name: in_files(code.line[blocks], code.files) for name, blocks in used.items() if len(blocks)}
+    lines["splines"] = in_files(code.line[code.words.pick(CURVE)[0]], code.files)
     helices = np.flatnonzero((motion.code == 2) & (np.abs(_rise(motion, job)) > RISES))
     if len(helices):
         lines["helical"] = motion.line[helices]
     return [faults.error("verify.option", f"the program uses an option that the control does not have by the machine "
                          f"file: {name} = false", 0, int(found[0]), len(found), "convert again, or state the option under "
                          "[control] of the machine file where it is fitted")
-            for name, found in lines.items() if options.absent(name)]
+            for name, found in lines.items() if len(found) and (options.absent(name) or (
+                name == "splines" and not options.confirmed(name)))]
 
 
 def _smoothed(code: Canonical) -> Ints:

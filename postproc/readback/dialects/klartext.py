@@ -19,6 +19,7 @@ from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.base import M_CODES, Reader
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.klartext_run import KlartextRun
+from postproc.readback.dialects.klartext_splines import spline_statement
 from postproc.readback.text.canonical import (
     STATEMENT,
     Canonical,
@@ -60,7 +61,7 @@ class KlartextReader(Reader):
     turn_codes = True
     statements = frozenset({*_CONTOURS, "BLK FORM", "TOOL DEF", "BEGIN PGM", "END PGM", "TOOL CALL", "CYCL DEF", "CYCL CALL",
                             "LBL", "CALL LBL", "CALL PGM", "PLANE SPATIAL", "PLANE RESET", "FUNCTION TCPM",
-                            "FUNCTION RESET TCPM", "STOP"})
+                            "FUNCTION RESET TCPM", "STOP", "SPL"})
     m_codes = (*M_CODES, 13.0, 14.0, 91.0, 99.0, 126.0, 127.0, 128.0, 129.0)
     letters = "GMFSR?"
     sides: ClassVar[dict[int, str]] = {40: "off (R0)", 41: "left (RL)", 42: "right (RR)"}
@@ -209,6 +210,8 @@ def _moved(d: Diagnostic, rows: Ints) -> Diagnostic:
 def _named(body: str) -> DialectStatement | None:
     """Blocks that begin with a name; None where it is none of these."""
     keys = {f"Q{n}": float(v) for n, v in _QWORD.findall(body)}
+    if re.match(r"SPL(?![A-Z])", body):
+        return spline_statement(body)
     if match := re.fullmatch(r"(BEGIN|END) PGM (\S+)\s*(MM|INCH)?", body):
         return DialectStatement(f"{match[1]} PGM", (match[2], match[3]))
     if match := re.fullmatch(rf"TOOL CALL(?: (\d+))?(?: ([XYZ]))?((?: (?:S|F|DL|DR|DR2) ?=? ?{_NUMBER})*)", body):

@@ -10,9 +10,11 @@ import numpy as np
 from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.klartext_cycles import FEED_PARTS, drill_of
+from postproc.readback.dialects.klartext_splines import cubic_of
 from postproc.readback.dialects.track import AxisPositions
 from postproc.readback.text.canonical import (
     CALL,
+    CURVE,
     LAW,
     LOADED,
     OFFSET,
@@ -31,7 +33,7 @@ from postproc.readback.text.canonical import (
 )
 from postproc.readback.text.euler_angles import turned
 from postproc.readback.text.modal import GROUPS, codes, fill, number_of
-from toolpaths.arrays import Ints
+from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import MM_PER_INCH
 
@@ -53,6 +55,7 @@ class KlartextRun:
         self.found: list[Diagnostic] = []
         self.laws: list[WordMeaning] = []
         self.drills: list[Drill] = []
+        self.curves: list[Floats] = []
         self.pole: dict[str, float] = {}
         self.track = AxisPositions(text.words)
         self.state: InterpolationMode = "axes"
@@ -85,13 +88,13 @@ class KlartextRun:
                                                                                                 129)))
         self.new += [(1, "G", 20.0)] if self.inch else []
         return Canonical(added(words, self.new, drop), self.line, tuple(self.laws), tuple(self.drills),
-                         feed_parts=FEED_PARTS if self.inch else 1.0)
+                         feed_parts=FEED_PARTS if self.inch else 1.0, curves=np.array(self.curves).reshape(-1, 3, 4))
 
     def one(self, b: int, s: DialectStatement) -> None:
         """One statement of block b."""
         steps = {"CC": self.centre, "C": self.circle, "CR": self.radius, "CP": self.polar_arc, "LP": self.polar_line,
                  "TOOL CALL": self.tool, "CYCL DEF": self.define, "CYCL CALL": self.call, "M99": self.call,
-                 "CYCL CALL POS": self.call, "PLANE SPATIAL": self.plane, "FUNCTION TCPM": self.tcpm}
+                 "CYCL CALL POS": self.call, "SPL": self.spline, "PLANE SPATIAL": self.plane, "FUNCTION TCPM": self.tcpm}
         if s.name in steps:
             steps[s.name](b, s)
         elif s.name == "M91":
@@ -235,6 +238,18 @@ class KlartextRun:
         r = s.keys.get("PR", now[0] + s.keys.get("IPR", 0.0))
         angle = math.radians(s.keys.get("PA", now[1] + s.keys.get("IPA", 0.0)))
         self.states(b, {"X": self.pole["X"] + r * math.cos(angle), "Y": self.pole["Y"] + r * math.sin(angle), **rest})
+
+    def spline(self, b: int, s: DialectStatement) -> None:
+        """SPL: a cubic to its end; its begin must be where the tool stands."""
+        unit = MM_PER_INCH if self.inch else 1.0
+        curve, wrong = cubic_of({k: v * unit if len(k) == 3 or k in "XYZ" else v for k, v in s.keys.items()}, {
+            a: None if (here := self.track.at(b, a)) is None else here * unit for a in "XYZ"})
+        if wrong:
+            self.fault("gcode.curve", b, f"SPL {wrong} is not executed", "state end, K3, K2 and K1 of each axis that moves")
+            return
+        self.new += [(b, "G", 1.0), (b, CURVE, float(len(self.curves))), *((b, k, s.keys[k]) for k in "FM" if k in s.keys)]
+        self.curves.append(curve)
+        self.states(b, {a: s.keys[a] for a in "XYZ" if a in s.keys})
 
     # ---- tools and cycles ----------------------------------------------------------------------------------
 

@@ -1,6 +1,6 @@
 """Siemens SINUMERIK 840D sl, milling.
 
-From the programming manuals Fundamentals, Job Planning and Cycles: X=IC(), X=AC(), CR=, I=AC(), TURN=; G54 to
+From the programming manuals Fundamentals, Job Planning and Cycles: X=IC(), X=AC(), POLY, CR=, I=AC(), TURN=; G54 to
 G57, G505 to G599; T, M6 and D; SUPA; G4 F; MCALL with CYCLE81 to CYCLE86; TRAORI with ORIAXES, left by
 TRAFOOF; SD42940 as a statement of its own; CYCLE800 with turns
 about X, Y, Z as _MODE orders them; CYCLE832; subprograms by their names or L numbers, M17, RET.
@@ -19,6 +19,7 @@ from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.base import M_CODES, Reader, as_bytes
 from postproc.readback.dialects.iso import New, relative_words
 from postproc.readback.dialects.siemens_cycles import CYCLES
+from postproc.readback.dialects.siemens_polynomials import NAMES, terms_apart
 from postproc.readback.dialects.siemens_run import LENGTH_AXIS, ROUNDED, ROUNDED_RAPID, SiemensRun
 from postproc.readback.text.canonical import (
     LOADED,
@@ -58,7 +59,7 @@ PASSIVE = frozenset({"MSG", "SOFT", "BRISK", "FFWON", "FFWOF", "CFTCP", "CFC", "
 _KEYS = {"CR": "R", "TURN": TURNS, "ADIS": ROUNDED, "ADISPOS": ROUNDED_RAPID}
 DIRECTIONS = {"DC": SHORTEST, "ACP": POSITIVE, "ACN": NEGATIVE}
 """of modulo axes"""
-KNOWN = PASSIVE.union(CYCLES, ("SUPA", "TRAORI", "TRAFOOF", "ORIAXES", "CYCLE800", "CYCLE832", "MCALL", "RET", "CALL",
+KNOWN = PASSIVE.union(CYCLES, NAMES, ("SUPA", "TRAORI", "TRAFOOF", "ORIAXES", "CYCLE800", "CYCLE832", "MCALL", "RET", "CALL",
                          LENGTH_AXIS))
 
 
@@ -162,7 +163,8 @@ class SiemensReader(Reader):
         found += self._feeds_apart(words, line, file)
         value[units] = np.where(np.isin(value[units], (70, 700)), 20.0, 21.0)
         drop |= (letter == ord(STATEMENT)) | np.isin(letter, [ord(a) for a in (*"LP", ROUNDED, ROUNDED_RAPID)])
-        return Canonical(added(Words(letter, value, words.line, words.lines), new, drop), line, laws, drills), found
+        return Canonical(added(Words(letter, value, words.line, words.lines), new, drop), line, laws, drills,
+                         curves=run.polynomials.stacked()), found
 
     def _feeds_apart(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
         """F while G70 holds: it leaves feeds in the basic system, mm or inches as MD10240 has it (S1, 3.1.6)."""
@@ -219,7 +221,7 @@ def _apart(text: bytes) -> tuple[bytes, list[tuple[int, str]]]:
 
 def _parse(row: str, line: int, new: New, statements: list[DialectStatement], file: str) -> list[Diagnostic]:
     """The words and statements of one block."""
-    at = 0
+    at, row = 0, terms_apart(row, line, new, statements)
     while at < len(row.rstrip()):
         match = _TOKEN.match(row, at)
         if match is None or not _token(match, line, new, statements):

@@ -7,6 +7,7 @@ import numpy as np
 from postproc.control.control import InterpolationMode
 from postproc.readback.dialects.iso import New
 from postproc.readback.dialects.siemens_cycles import CYCLES, drill_of
+from postproc.readback.dialects.siemens_polynomials import Polynomials
 from postproc.readback.text.canonical import (
     CALL,
     LAW,
@@ -48,6 +49,7 @@ class SiemensRun:
         self.drills: list[Drill] = []
         self.state: InterpolationMode = "axes"
         self.called, self.oriented = -1, False
+        self.polynomials = Polynomials(words)
 
     def fault(self, code: str, b: int, message: str, hint: str) -> None:
         """An ERROR at a block."""
@@ -91,6 +93,9 @@ class SiemensRun:
         modal: list[tuple[int, int]] = []
         for b, all_here in sorted(blocks.items()):
             names = [s.name for s in all_here]
+            wrong = self.polynomials.block(b, all_here, self.unit(b), self.new)
+            if wrong:
+                self.fault("gcode.curve", b, f"{wrong} is not executed", "write such a curve as lines or arcs")
             if "MCALL" in names:
                 modal.append((b, -1))
             for s in all_here:

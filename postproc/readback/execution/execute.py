@@ -9,11 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.readback.execution import frames
+from postproc.readback.execution.cubics import refused_curves
 from postproc.readback.execution.frames import AXES, ExecutionFrame, FrameTable
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.execution.rows import BlockSection, MotionRows
 from postproc.readback.execution.sections import run_section
-from postproc.readback.text.canonical import CALL, LAW, REST, TURNS, Canonical, WordMeaning, in_files, placed
+from postproc.readback.text.canonical import CALL, CURVE, LAW, REST, TURNS, Canonical, WordMeaning, in_files, placed
 from postproc.readback.text.modal import Modal, columns, fill, fill_values, modal_state, number_of
 from postproc.readback.text.words import Words
 from postproc.reference.coolant import FLOOD, MIST
@@ -105,6 +106,8 @@ def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets,
     section = _blocks(words, modal, letters, offsets)
     rests = columns(words, REST)[:, 0]
     found: list[Diagnostic] = _cancelled(words, modal, section, code.line, file)
+    linear = np.isin(list(letters), list("XYZ"))
+    found += refused_curves(section, modal.inverse, modal.compensation != 40, linear, code.line, file)
     parts, used, position = [], [AXES], offsets.home
     begun = set(words.pick(LAW)[0].tolist())
     for first, last, law, register in _stretches(words, modal, code.laws, bool(offsets.others)):
@@ -152,7 +155,8 @@ def _blocks(words: Words, modal: Modal, letters: tuple[str, ...], offsets: Offse
                         columns(words, letters), steps,
                         rest, length, columns(words, "ijk"), columns(words, "IJK"), columns(words, "ZRQPIJK"),
                         columns(words, ("z", "r", TURNS)), columns(words, "L")[:, 0], columns(words, CALL)[:, 0],
-                        offsets.shifts(modal.tool, modal.compensation) if offsets.radii else repeated(0.0, n + 1))
+                        offsets.shifts(modal.tool, modal.compensation) if offsets.radii else repeated(0.0, n + 1),
+                        columns(words, CURVE)[:, 0])
 
 
 def _cancelled(words: Words, modal: Modal, section: BlockSection, line: Ints, file: str) -> list[Diagnostic]:

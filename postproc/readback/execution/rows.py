@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 @arrays(motion="int16: N", plane="int8: N", machine="N", level="int8: N", inch="N", offset="N", columns="N J",
         steps="N J", rest="N", length="N", relative="N 3", absolute="N 3", extra="N 7", deep="N 3", repeats="N", call="N",
-        radius="N")
+        radius="N", curve="N")
 class BlockSection:
     """Blocks `first` and on (N), as their words and modal state have them.
 
@@ -27,6 +27,7 @@ class BlockSection:
     arcs from the start and in coordinates, `extra` (N, 7) the words Z, R, Q, P, I, J, K of a cycle, `deep`
     (N, 3) z, r and turns, `repeats` and `call` (N,) as stated; NaN where a block states none. `offset` (N,): register of
     the work offset; `radius` (N,): mm by which the control shifts the words to the left, negative to the right.
+    `curve` (N,): number of the cubic that a block runs, NaN for none.
     """
 
     first: int
@@ -47,6 +48,7 @@ class BlockSection:
     repeats: Floats
     call: Floats
     radius: Floats
+    curve: Floats
 
     def cut(self, first: int, last: int) -> BlockSection:
         """Blocks first to before last."""

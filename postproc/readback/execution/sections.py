@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.control.word_arcs import PLANE_AXIS
 from postproc.readback.execution.arcs import centres, whole_turns
+from postproc.readback.execution.cubics import with_curves
 from postproc.readback.execution.drilling import spell_holes
 from postproc.readback.execution.frames import ExecutionFrame
 from postproc.readback.execution.rows import BlockSection, MotionRows, SectionState
@@ -75,6 +76,8 @@ def _rows(section: BlockSection, frame: ExecutionFrame, number: int, start: Floa
     if spelt:
         rows = _with_legs(rows, line, spelt)
     rows = _with_arcs(rows, state, line, code.line, file, found)
+    if len(code.curves):
+        rows = with_curves(rows, start, section.curve[rows.block - section.first], code.curves, offsets.xyz)
     if (shift := section.radius[rows.block - section.first]).any():
         rows, faults = with_radius(rows, start, shift, _held(section, rows, moving, code), offsets.xyz, offsets.corners)
         found += [error("gcode.compensation", f"cutter compensation by the radius: {said}", file=file,

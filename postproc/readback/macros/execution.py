@@ -39,6 +39,8 @@ _NEEDED = {
 _CONTINUED = re.compile(rb"~[ \t]*\n")
 _COMMENT, _STRING = re.compile(rb";[^\n]*"), re.compile(rb'(?<!T=)"[^"\n]*"')
 _SIGNS = re.compile(rb"=[ \t]*[-+]*[ \t]*(?:[A-Z_$(\[]|[\d.]+[ \t]*[-+*/])")
+_POLYNOMIAL = re.compile(rb"(?:\bPO[ \t]*\[[ \t]*[A-Z]?[ \t]*\][ \t]*=|=[ \t]*PO)[ \t]*\([-+.,\dEX \t]*\)")
+"""polynomials of numbers, which the dialect reads by itself"""
 _PARAMETERS = re.compile(rb"R\d+[ \t]*=")
 _WORDS = (b"DEF", b"IF", b"GOTO", b"FOR", b"WHILE", b"REPEAT", b"LOOP", b"CASE", b"EXT", b"TRANS", b"ROT", b"SCALE",
           b"MIRROR", b"HOLES", b"CYCLE801", b"SETAL", b"G53", b"G153", b"G20", b"G21", b"PROC", b"MCALL", b'"')
@@ -66,6 +68,7 @@ def needed(data: bytes, language: MacroLanguage, passive: tuple[str, ...] = ()) 
     if language == "siemens":
         bare = _COMMENT.sub(b"", text) if b";" in text else text
         bare = _STRING.sub(b"", bare) if b'"' in bare else bare
+        bare = _POLYNOMIAL.sub(b" ", bare) if b"PO" in bare else bare
         likely = any(word in bare for word in _WORDS) or _SIGNS.search(bare) or _PARAMETERS.search(bare)
         return bool(likely) and form.search(bare) is not None
     if not form.search(text):
@@ -89,6 +92,10 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
         text, found = (text, []) if language == "siemens" else numbered(text, name)
         made, more = rows.get(language, word_rows)(text, name)
         return made, [*found, *more]
+    if language == "siemens" and (curve := _POLYNOMIAL.search(data.upper())):
+        fault = MacroFault("gcode.curve", "a polynomial (POLY, PO) in a program with variables, jumps or frames is not "
+                           "executed", "write such a curve as lines or arcs, or the program without them")
+        return None, [fault.at(file, data.count(b"\n", 0, curve.start()) + 1)]
     sources = ProgramFiles(data, file, others, cleaned)
     run = _run(language, sources, held)
     try:

@@ -40,6 +40,8 @@ CALL = "*"
 """index into Canonical.drills: at the end of this block"""
 TURNS = "~"
 """full turns of an arc, more than the one to its end"""
+CURVE = "%"
+"""index into Canonical.curves: the block runs this cubic (or curve of a degree up to 5) to its end"""
 STATEMENT = "?"
 """index into Text.statements: what is not letters with numbers"""
 
@@ -123,11 +125,12 @@ class Drill:
 
 
 @dataclass(frozen=True)
-@arrays(line="B")
+@arrays(line="B", curves="C 3 4")
 class Canonical:
     """B blocks in the order in which the control runs them; words count blocks from 1.
 
     `line` (B + 1,) is the line that a block stands in; lines of further files count on from those before.
+    `curves` (C, 3, 4): second to fifth coefficient in X, Y, Z, mm, the parameter going from 0 to 1.
     `files`: their names, and the lines that stand before each; empty for one file. `feed_parts`: what an inch
     per minute is in units of F. `feed_kept`: F counts in the units before its block, and keeps them.
     """
@@ -139,6 +142,7 @@ class Canonical:
     files: Files = ()
     feed_parts: float = 1.0
     feed_kept: bool = False
+    curves: Floats = field(default_factory=lambda: np.zeros((0, 3, 4)))
 
     def without(self, letters: tuple[str, ...]) -> Canonical:
         """The same without the words of some letters."""

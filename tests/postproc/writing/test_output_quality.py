@@ -173,6 +173,9 @@ def test_a_plane_is_stated_at_home_on_travel_from_home(index: str) -> None:
         above = "G43" in block or (above and "G53 G0 Z250." not in block)
     planes = sum(block.startswith("G68.2") for block in blocks)
     assert planes > 3 and cancelled == (0 if index == "home" else 2)
+    alone = [blocks[k - 1] for k, block in enumerate(blocks) if block == "G69" and k and blocks[k - 1] == "G49"]
+    assert len(alone) == (1 if index == "home" else 2)  # that of the safe start
+    assert ("5006#6 TOS" in result.text) == (index == "plane" or "G43.4" in result.text)
 
 
 def test_haas_indexes_at_home_unless_the_set_up_says_otherwise() -> None:
@@ -182,4 +185,4 @@ def test_haas_indexes_at_home_unless_the_set_up_says_otherwise() -> None:
     warned = verdict(haas, indexing("haas-ngc", "plane", "auto").text, Severity.WARNING)
     assert "verify.index" in warned and not verdict(haas, indexing("haas-ngc", "plane", "auto").text)
     fanuc = postproc.convert(indexed(), machines.load("mikron-ucp710"), "fanuc-30i", SETUP, Options())
-    assert strip(fanuc.text) == strip(indexing("fanuc-30i", "plane", "auto").text)
+    assert strip(fanuc.text) == strip(indexing("fanuc-30i", "home", "auto").text)

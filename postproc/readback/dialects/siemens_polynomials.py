@@ -1,0 +1,85 @@
+"""Polynomial interpolation of SINUMERIK: POLY, PO[X]=(end, a2, a3), X=PO(end, a2 ... a5), PL= (Job Planning, POLY).
+
+f(p) = a0 + a1 p + a2 p2 + ... for p from 0 to PL, 1 where a block does not state it; a0 is where the block before has ended,
+a1 what leads to the end. Axes without coefficients go straight. G0 to G3 end it.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from postproc.readback.dialects.iso import New
+from postproc.readback.text.canonical import CURVE, STATEMENT, DialectStatement
+from postproc.readback.text.modal import codes
+from postproc.readback.text.words import Words
+from toolpaths.arrays import Floats
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?"
+_TERMS = re.compile(rf"(?<![A-Z0-9_$])(?:PO\s*\[\s*(?P<of>[A-Z]?)\s*\]\s*=\s*\((?P<terms>[^()]*)\)"
+                    rf"|(?P<axis>[A-Z])\s*=\s*PO\s*\((?P<more>[^()]*)\)|PL\s*=\s*(?P<range>{_NUMBER}))")
+_MOTION = (0, 1, 2, 3)
+NAMES = ("POLY", "PO", "PL")
+MOST = 5
+"""degree"""
+
+
+def terms_apart(row: str, line: int, new: New, statements: list[DialectStatement]) -> str:
+    """The block without its polynomials, which become statements, and words of their ends."""
+    def cut(match: re.Match[str]) -> str:
+        axis, text = match["of"] or match["axis"] or "", match["terms"] if match["terms"] is not None else match["more"]
+        if match["range"] is not None:
+            made = DialectStatement("PL", (_value(match["range"]),))
+        else:
+            made = DialectStatement("PO", (axis, *(_value(part.strip()) for part in text.split(","))))
+            if axis and made.number(1) == made.number(1):
+                new.append((line, axis, made.number(1)))
+        new.append((line, STATEMENT, float(len(statements))))
+        statements.append(made)
+        return " "
+    return _TERMS.sub(cut, row) if "PO" in row or "PL" in row else row
+
+
+def _value(text: str) -> float:
+    """A number with or without EX; NaN for what is none."""
+    return float(text.replace("EX", "e")) if re.fullmatch(_NUMBER, text) else float("nan")
+
+
+class Polynomials:
+    """The polynomials of a program in running order: where POLY is in force, and the coefficients of each block."""
+
+    def __init__(self, words: Words) -> None:
+        self.ended = codes(words, "G", _MOTION)[0]
+        self.begun = -1
+        self.curves: list[Floats] = []
+
+    def stacked(self) -> Floats:
+        """(C, 3, 4) coefficients."""
+        return np.array(self.curves).reshape(-1, 3, MOST - 1)
+
+    def block(self, b: int, here: list[DialectStatement], unit: float, new: New) -> str:
+        """Words of block b, `unit` mm in a unit of length; what is wrong with it, "" for nothing."""
+        if any(s.name == "POLY" for s in here):
+            self.begun = b
+            new.append((b, "G", 1.0))
+        terms = [s for s in here if s.name == "PO"]
+        if not terms:
+            return ""
+        if self.begun < 0 or np.searchsorted(self.ended, self.begun) < np.searchsorted(self.ended, b, side="right"):
+            return "PO without POLY in force"
+        length = next((s.number(0) for s in here if s.name == "PL"), 1.0)
+        axes = [str(s.args[0]) for s in terms]
+        if "" in axes:
+            return "a denominator polynomial, PO[]"
+        if not set(axes) <= set("XYZ") or len(set(axes)) < len(axes):
+            return "PO of another axis than X, Y, Z, or of one twice"
+        curve = np.zeros((3, MOST - 1))
+        for s in terms:
+            values = [v for v in s.args[1:] if isinstance(v, float)]
+            if len(values) > MOST or any(v != v for v in values) or not length > 0.0:
+                return "PO with other values than its end and up to four coefficients, or PL that is not above 0"
+            curve["XYZ".index(str(s.args[0])), :len(values) - 1] = values[1:]
+        new.append((b, CURVE, float(len(self.curves))))
+        self.curves.append(curve * length ** np.arange(2.0, MOST + 1.0) * unit)
+        return ""
