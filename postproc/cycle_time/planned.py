@@ -31,7 +31,7 @@ def planned_times(result: PostResult, blocks: MotionBlocks, model: CycleTimeMode
     source = source_of(job, moves, result.nominal or path, planned_correction(job, result.compensation, path),
                        override * model.override)
     kept = result.motion if source.override == 1.0 else None
-    motion = kept or PlannedMotion(source, np.zeros(0))
+    motion = kept or PlannedMotion(source)
     try:
         spans = [(int(one.move.min()), int(one.move.max()), made.seconds)
                  for one, made in zip(motion.passes, motion.plans, strict=True)]

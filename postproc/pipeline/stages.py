@@ -186,8 +186,12 @@ def checked(made: CorrectedStage, progress: Progress | None) -> tuple[CheckedSta
 def planned(made: CheckedStage, progress: Progress | None) -> tuple[PlannedStage, DiagnosticList]:
     """What the passes allow under the limits of the axes, with --feed planned."""
     correction = planned_correction(made.job, made.compensation, made.path)
-    motion, found = plan_motion(made.job, made.moves, made.nominal or made.path, correction)
-    return handed_on(PlannedStage, made, motion=motion), found
+    job = made.job
+    motion, found = plan_motion(job, made.moves, made.nominal or made.path, correction)
+    if motion is None or made.nominal is not None or not job.controller.feed.limited_jerk:
+        return handed_on(PlannedStage, made, motion=motion), found
+    motion = motion.with_points(job.machine.home, job.control.unit)
+    return handed_on(PlannedStage, made, motion=motion, path=motion.source.path), found
 
 
 def plan_motion(job: Job, moves: Moves, path: JointPath,
@@ -195,7 +199,7 @@ def plan_motion(job: Job, moves: Moves, path: JointPath,
     """The motion of a path within the limits of axes and tools; None without --feed planned."""
     if job.options.feed != "planned":
         return None, limits_not_kept(job)
-    return planned_motion(source_of(job, moves, path, correction))
+    return planned_motion(source_of(job, moves, path, correction, limited_jerk=job.controller.feed.limited_jerk))
 
 
 def compiled(made: PlannedStage, progress: Progress | None) -> tuple[CompiledStage, DiagnosticList]:
