@@ -39,6 +39,7 @@ from postproc.cli.options import (
     MachineName,
     MaxBlocks,
     MaxTilt,
+    ModelOfControl,
     Orient,
     ProofOf,
     ProofOption,
@@ -130,7 +131,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
             error_model: Errors = "", beyond: Beyond = False, residuals: ResidualFiles = None,
             check_program: CheckProgram = None, page: PageFile = None,
-            require_proof: RequireProof = False, proof: ProofOption = False, json: Json = "") -> None:
+            require_proof: RequireProof = False, proof: ProofOption = False, model: ModelOfControl = "",
+            json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
                       output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth, error_model=error_model,
@@ -145,7 +147,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                         **{f"--residuals {name}": str(name) for name in fields}},
                        inputs := {"the CL file": str(file), "the set-up": setup, "the hooks": hooks,
                                   "the error model": error_model, **own_files(machine, controller)})
-    from postproc.cycle_time.conversion import estimate_of
+    from postproc.cycle_time.conversion import estimate_of, program_clock
     from postproc.pipeline.convert import convert as run
     from postproc.proof import command
     from postproc.report import summary
@@ -156,10 +158,10 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         known = command.hashed(machine, controller, options) if proof or page else None
         m, spec = machine_of(machine), controller_of(controller)
         path, found = read_cl(file, options, progress, options.tolerance)
-        result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
+        result = run(path, m, spec, options=options, diagnostics=found, progress=progress, clock=program_clock(model))
         noted, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
-        time = estimate_of(result)  # all before a file is written
+        time = estimate_of(result, model)  # all before a file is written
         values, text = summary.as_dict(result, str(output), time), summary.as_text(result, str(output), time)
         more = [] if result.ok else _offers(result, path, machine, controller)
         outputs |= pages(page, path, result, known, output.name, time)
@@ -198,7 +200,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            allow_unknown: Allow = None,
            error_model: ErrorsOfProgram = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
            require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTableOption = "",
-           max_blocks: MaxBlocks = None,
+           max_blocks: MaxBlocks = None, model: ModelOfControl = "",
            json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
@@ -210,6 +212,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
                                          "the proof file": proof or f"{gcode}.proof.json",
                                          **own_files(machine, controller)})
     from postproc.base.header_words import HEADER, read_header
+    from postproc.cycle_time.conversion import program_clock
     from postproc.pipeline.convert import verify as run
     from postproc.proof import command
     from postproc.report import summary
@@ -221,7 +224,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
         no_cl_file(gcode)
         path, found = read_cl(file, options, progress, stated or tolerance)
         result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress,
-                     tool_table=tool_table)
+                     tool_table=tool_table, clock=program_clock(model))
         kept, more = command.compared_with(result, machine, controller, proof)
     text = summary.verify_text(result) + (f"\n{kept.line()}" if kept else "")
     found = [*result.diagnostics, *more]
@@ -235,7 +238,7 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
           tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
           units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
           error_model: Errors = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-          json: Json = "") -> None:
+          model: ModelOfControl = "", json: Json = "") -> None:
     """Show one point of a CL file through every stage, from its record to its blocks and back."""
     only_with_errors(beyond, error_model)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
@@ -243,13 +246,14 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
                       max_tilt=max_tilt)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup, "the hooks": hooks,
                                          "the error model": error_model, **own_files(machine, controller)})
+    from postproc.cycle_time.conversion import program_clock
     from postproc.pipeline.convert import convert as run
     from postproc.report.trace import as_text, trace_line
 
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
         path, found = read_cl(file, options, progress, options.tolerance)
-        result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
+        result = run(path, m, spec, options=options, diagnostics=found, progress=progress, clock=program_clock(model))
         stages, more = trace_line(result, line)
     report((*result.diagnostics, *more), json, stages, as_text(stages))
 

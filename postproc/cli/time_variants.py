@@ -136,13 +136,15 @@ def _timed(file: Path, machine: Machine, change: WhatIf, setup: str, asked: Aske
         return Timed(file, machine, setup, change, blocks, planner, None, tuple(found),
                      tuple(one for one in others if one is not None))
     import toolpaths
+    from postproc.cycle_time.conversion import program_clock
     from postproc.pipeline.convert import convert
 
     path, found = toolpaths.read_bytes(
         data, file=str(file), units=options.units or None, dialect=options.dialect or None, tolerance=options.tolerance
     )
     del data
-    result = convert(path, machine, asked.controller, options=options, diagnostics=found, progress=progress)
+    result = convert(path, machine, asked.controller, options=options, diagnostics=found, progress=progress,
+                     clock=program_clock(asked.model))
     if not result.ok:
         return Timed(file, machine, setup, change, None, planner, None, result.diagnostics)
     blocks, times, found = from_conversion(result, override), None, []

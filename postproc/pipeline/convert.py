@@ -15,6 +15,7 @@ from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.job.job import prepare, with_shop
+from postproc.pipeline.feeds_by_clock import ProgramClock, with_compared_feeds
 from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
@@ -43,7 +44,8 @@ from toolpaths.toolpath import Toolpath
 
 def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str | FilePath = "linuxcnc",
             setup: SetupFile | str | FilePath | None = None, options: Options | None = None,
-            diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None) -> PostResult:
+            diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None,
+            clock: ProgramClock | None = None) -> PostResult:
     """A Toolpath as G-code for a machine and a controller, read back and compared with the path.
 
     Args:
@@ -52,6 +54,8 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
         setup: one that is loaded, or its path; default: the file that the options name, else the default set-up
         diagnostics: what reading the path found; an ERROR among them, or among the path's own faults, stops
             the conversion
+        clock: the time of programs on the control, by which tool axes are chosen and planned feeds compared
+            (`cycle_time.conversion.program_clock`); without it tool axes are chosen by the plan alone
 
     Raises:
         DiagnosticError: where path or options are none, or machine, controller or set-up cannot be loaded.
@@ -59,8 +63,8 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
     require_call(path, options)
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     start = _begun(path, machine, controller, spec, setup, options, _reading(path, diagnostics))
-    start, done = _oriented(start, progress)
-    return start if not start.ok else done or _stages(start, progress)
+    start, done = _oriented(start, progress, clock)
+    return start if not start.ok else done or with_compared_feeds(start, lambda begun: _stages(begun, progress), clock)
 
 
 def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup: SetupFile | str | FilePath | None,
@@ -86,7 +90,8 @@ def _begun(path: Toolpath, machine: Machine, controller: str | FilePath, spec: C
                       source=path.source, asked=setup)
 
 
-def _oriented(start: PostResult, progress: Progress | None) -> tuple[PostResult, PostResult | None]:
+def _oriented(start: PostResult, progress: Progress | None,
+              clock: ProgramClock | None) -> tuple[PostResult, PostResult | None]:
     """With the tool axes that --orient asks for, where the path can be read at all; its program where that is known."""
     if start.options.orient == "keep" or not start.ok:
         return start, None
@@ -96,14 +101,15 @@ def _oriented(start: PostResult, progress: Progress | None) -> tuple[PostResult,
     from postproc.orientation.report.figures_of_choice import slower
     from postproc.pipeline.oriented import oriented, written
 
-    start, program = oriented(start, _stages, progress)
+    start, program = oriented(start, _stages, progress, clock)
     if start.choice is not None:
         start = start.with_found(slower(start.choice, start.options.orient))
     return start, written(start, program)
 
 
 def choose_axes(path: Toolpath, machine: Machine, controller: str | FilePath, options: Options,
-                diagnostics: list[Diagnostic], progress: Progress | None = None) -> PostResult:
+                diagnostics: list[Diagnostic], progress: Progress | None = None,
+                clock: ProgramClock | None = None) -> PostResult:
     """The tool axes of a path as `options.orient` has them, in `choice` (None where an ERROR stands against
     them), proved by the program for a controller; arguments and errors as of `convert`."""
     from postproc.pipeline.oriented import oriented
@@ -112,7 +118,7 @@ def choose_axes(path: Toolpath, machine: Machine, controller: str | FilePath, op
     spec, machine, setup, options = _loaded(controller, machine, None, options)
     start = _begun(path, machine, controller, spec, setup, options, _reading(path, diagnostics))
     start = start.with_found(one_part(start.setup.places, "the choice of tool axes", options.setup))
-    return oriented(start, _stages, progress)[0] if start.ok else start
+    return oriented(start, _stages, progress, clock)[0] if start.ok else start
 
 
 def require_call(path: object, options: object = None, others: type | UnionType = Toolpath) -> None:
@@ -150,11 +156,13 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
 def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FilePath,
            controller: str | FilePath = "linuxcnc", setup: SetupFile | str | FilePath | None = None,
            options: Options | None = None, diagnostics: list[Diagnostic] | None = None,
-           progress: Progress | None = None, tool_table: str | FilePath = "") -> VerifyResult:
+           progress: Progress | None = None, tool_table: str | FilePath = "",
+           clock: ProgramClock | None = None) -> VerifyResult:
     """A G-code file against a Toolpath on a machine; the arguments that `convert` has too are as there.
 
     Args:
         tool_table: file of the control's tool table: the program is verified with these lengths of tools
+        clock: by which tool axes were chosen, as of `convert`
 
     Raises:
         DiagnosticError: where machine, controller, set-up or tool table cannot be loaded, or the G-code file
@@ -171,7 +179,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
                          hashlib.sha256(data).hexdigest())
     if other := other_axes(data, options, str(gcode)):
         return replace(begun, diagnostics=(*other, *known))
-    start, _ = _oriented(_begun(path, machine, controller, spec, setup, options, known), progress)
+    start, _ = _oriented(_begun(path, machine, controller, spec, setup, options, known), progress, clock)
     path, found = start.toolpath, list(start.diagnostics)
     if has_errors(found):
         return replace(begun, diagnostics=tuple(found))

@@ -134,8 +134,8 @@ class PlannedMotion:
 
     @cached_property
     def needed(self) -> Floats:
-        """(K,) least seconds of each block of the Path, 0 where nothing is planned: at the highest speed that the plan has in
-        it, and at which a constant feed keeps the limits of the tool; of a control that limits no jerk and makes its ramps
+        """(K,) least seconds of each block of the Path, 0 where nothing is planned: at the highest speed that the plan has
+        in it, and at which a constant feed keeps the limits of the tool; of a control that limits no jerk and makes its ramps
         itself, at which a constant feed keeps all limits.
 
         Raises:

@@ -1,9 +1,9 @@
 """The feed of each block that carries the plan: the highest planned speed of the block, and points where it spans too much.
 
-A control that plans its own ramps takes F as the largest speed of a block. Under the highest planned speeds its least time is
-the plan's, whatever the blocks' length; under mean speeds it is longer, as every ramp has to stay below the steps (13 % for
-blocks of 7 ms, 3 % for 4 ms; `python tests/benchmarks/bench_planned_words.py`). So that the words are also near the means,
-blocks are cut where the planned speed changes by more than `SPREAD` in them, into parts of `LEAST` seconds or more.
+A control that plans its own ramps takes F as the largest speed of a block. Under the highest planned speeds its least time
+is the plan's, whatever the blocks' length; under mean speeds it is longer, as every ramp has to stay below the steps (13 %
+for blocks of 7 ms, 3 % for 4 ms). So that the words are near the means too, blocks are cut where the planned speed changes
+by more than `SPREAD` in them, into parts of `LEAST` seconds or more.
 """
 
 from __future__ import annotations

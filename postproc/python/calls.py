@@ -15,6 +15,7 @@ from machines.machine import Machine
 from postproc.base.given import is_number, wrong
 from postproc.base.options import Options
 from postproc.controllers.model import load_controller
+from postproc.cycle_time.conversion import program_clock
 from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.model import load_model, model_name
 from postproc.cycle_time.source import from_conversion, from_gcode, read_file
@@ -53,7 +54,7 @@ def time(source: Toolpath | FileName, machine: Machine | FileName, controller: F
     planner = read_value(load_model(model or model_name(str(controller), spec.writer))).of_machine(m)
     times = None
     if isinstance(source, Toolpath):
-        result = convert(source, m, controller, setup, options)
+        result = convert(source, m, controller, setup, options, clock=program_clock(model))
         require(result.diagnostics)
         blocks = from_conversion(result, override)
         if planner.kind == "ideal":
@@ -81,7 +82,7 @@ def orient(path: Toolpath, machine: Machine | FileName, controller: FileName = "
         DiagnosticError: carries all that was found.
     """
     options = options or Options(orient="auto")
-    result = choose_axes(path, _machine(machine), controller, options, [])
+    result = choose_axes(path, _machine(machine), controller, options, [], clock=program_clock())
     return read_value((result.choice, result.diagnostics))
 
 
