@@ -71,3 +71,43 @@ class FeedTimes:
         if self.kept:
             return [said, "planned feeds take longer on this control, which makes its ramps itself: feeds are as programmed"]
         return [said, *(["planning changes nothing that counts here"] if self.unchanged else [])]
+
+
+@dataclass(frozen=True)
+class OptimisedStep:
+    """A choice that was taken, with the time of the program before and with it, s."""
+
+    what: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class Optimised:
+    """What `--optimise` came to: choices taken in order, time without it and with it, number of choices tried."""
+
+    steps: tuple[OptimisedStep, ...]
+    before: ProgramTime
+    after: ProgramTime
+    tried: int
+
+    @property
+    def closed(self) -> float | None:
+        """Percent of the time above the bound of the program without it that is saved; None where it is at the bound."""
+        gap = self.before.seconds - self.before.bound
+        return 100.0 * (self.before.seconds - self.after.seconds) / gap if gap > 0.0 else None
+
+    def as_dict(self) -> dict[str, object]:
+        """As JSON."""
+        return {"before_s": self.before.seconds, "after_s": self.after.seconds, "lower_bound_s": self.before.bound,
+                "closed_percent": self.closed, "model": self.after.model, "tried": self.tried,
+                "steps": [{"choice": one.what, "before_s": one.before, "after_s": one.after} for one in self.steps]}
+
+    def lines(self) -> list[str]:
+        """For people."""
+        if not self.steps:
+            return [f"optimised: none of {self.tried} other choices is faster on this control ({self.after.model})"]
+        gained = "; ".join(f"{one.what} {one.before - one.after:.2f} s" for one in self.steps)
+        part = "" if self.closed is None else f", {self.closed:.0f} % of what lay above its lower bound"
+        return [f"optimised on this control ({self.after.model}): {self.before.seconds:.2f} s to {self.after.seconds:.2f} s"
+                f"{part}; gained by {gained}; {self.tried} choices tried"]

@@ -92,6 +92,8 @@ FeedOption = Annotated[FeedSource, word_option("--feed", FeedSource, "programmed
                                                "where an axis or a tool would exceed its limits")]
 MergeFeeds = Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="merge neighbouring "
                                            "F words that differ by up to PERCENT")]
+Optimise = Annotated[bool, typer.Option("--optimise", help="choose output modes, shares of the tolerance and feed mode for "
+                                        "the least time on the control; what is gained by what is printed")]
 SmoothOption = Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the tolerance")]
 ResidualFiles = Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="errors at each CL point "
                                                           "before and after correction: .csv, or drawn: .png, .svg; may "
@@ -125,7 +127,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="G-code file to write")],
             feed_mode: FeedModeOption = "auto", output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-            feed: FeedOption = "programmed", merge_feeds: MergeFeeds = 0.0, smooth: SmoothOption = False,
+            optimise: Optimise = False, feed: FeedOption = "programmed", merge_feeds: MergeFeeds = 0.0, smooth: SmoothOption = False,
             setup: Setup = "", hooks: HooksFile = "", tolerance: ToleranceOption = 0.01,
             axis_tolerance: AxisToleranceOption = 0.05,
             units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
@@ -137,7 +139,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
                       output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth, error_model=error_model,
                       hooks=hooks, error_beyond=beyond, orient=orient, max_tilt=max_tilt, name=output.stem,
-                      require_proof=require_proof)
+                      optimise=optimise, require_proof=require_proof)
     only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
     if page is not None:

@@ -10,6 +10,7 @@ from postproc.base.memory import give_back
 from postproc.base.program_time import ProgramTime
 from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.model import CycleTimeModel, load_model, model_name
+from postproc.cycle_time.phases import summed
 from postproc.cycle_time.report import as_dict, clock
 from postproc.cycle_time.source import from_conversion
 from postproc.pipeline.feeds_by_clock import ProgramClock
@@ -39,7 +40,7 @@ def program_clock(model: str = "") -> ProgramClock:
             return ProgramTime(0.0, (0.0, 0.0), 0.0, planner.kind, np.zeros(rows))
         found = estimate(blocks, result.machine, planner, with_band=band and len(blocks) <= BAND_UP_TO)
         known = blocks.move >= 0
-        moves = np.bincount(blocks.move[known], weights=found.timed.seconds[known], minlength=rows)
+        moves = summed(found.timed.seconds[known], blocks.move[known], rows)
         return ProgramTime(found.seconds, found.band, found.lower_bound, f"model {planner.kind}", moves)
     return clock
 

@@ -54,10 +54,14 @@ def fastest(made: Proved, convert: Convert, clock: ProgramClock) -> Proved:
             break
     keep = first.plans["keep"].states
     best = min(known.values(), key=lambda one: (one.time.seconds, one.plan.states != keep))
-    times = {name: clock(known[states].made.program, band=True)
-             for name, states in (("keep", keep), ("auto", best.plan.states)) if states in known}
+    times: dict[Orientation, ProgramTime] = {name: clock(known[states].made.program, band=True)
+                                             for name, states in _both(keep, best.plan.states) if states in known}
     choice = replace(first, plans=first.plans | {"auto": best.plan}, programs=times, proof=best.made.choice.proof)
     return Proved(choice, best.made.program)
+
+
+def _both(keep: tuple[int, ...], auto: tuple[int, ...]) -> tuple[tuple[Orientation, tuple[int, ...]], ...]:
+    return ("keep", keep), ("auto", auto)
 
 
 def _write(choice: OrientationChoice, plan: OrientationPlan, convert: Convert, clock: ProgramClock,

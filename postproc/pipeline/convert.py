@@ -11,6 +11,7 @@ from types import UnionType
 from machines.loader import load as load_machine
 from machines.machine import Machine
 from postproc.base.given import wrong
+from postproc.base.header_words import read_header
 from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.controllers.model import ControllerFile, load_controller
@@ -18,6 +19,7 @@ from postproc.job.job import prepare, with_shop
 from postproc.pipeline.feeds_by_clock import ProgramClock, with_compared_feeds
 from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.next_modes import with_next_modes
+from postproc.pipeline.optimised import optimised
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
 from postproc.pipeline.stages import staged
@@ -64,7 +66,13 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     start = _begun(path, machine, controller, spec, setup, options, _reading(path, diagnostics))
     start, done = _oriented(start, progress, clock)
-    return start if not start.ok else done or with_compared_feeds(start, lambda begun: _stages(begun, progress), clock)
+    if not start.ok or done is not None:
+        return done or start
+
+    def stages(begun: PostResult) -> PostResult:
+        return _stages(begun, progress)
+    return optimised(start, stages, clock) if clock is not None and start.options.optimise else (
+        with_compared_feeds(start, stages, clock))
 
 
 def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup: SetupFile | str | FilePath | None,
@@ -183,6 +191,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     path, found = start.toolpath, list(start.diagnostics)
     if has_errors(found):
         return replace(begun, diagnostics=tuple(found))
+    options = replace(options, smoothing=options.smoothing or read_header(data).smoothing)
     job, more = prepare(path, machine, spec, start.setup, options)
     found += [*more, *(refused_hooks(job) if job is not None else [])]
     if job is None or has_errors(found):

@@ -50,6 +50,7 @@ def as_dict(result: PostResult, output: str, estimate: Estimate | None = None) -
         "linearising_bound": _bound(result),
         "feed_reduced_blocks": int(result.feeds.slowed.sum()) if result.feeds is not None else 0,
         "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
+        "optimised": result.optimised.as_dict() if result.optimised else None,
         "feed_times": result.feed_times.as_dict() if result.feed_times else None,
         "tolerance_shares": result.shares or {},
         "output_modes": output_modes(result),
@@ -255,6 +256,7 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None) -
         from postproc.cycle_time.conversion import text
 
         lines.append(text(estimate))
+    lines += result.optimised.lines() if result.optimised else []
     lines += result.feed_times.lines() if result.feed_times else []
     lines.append("axes: " + ", ".join(f"{k} {_places(lo)} to {_places(hi)}" for k, (lo, hi) in d["axis_extents"].items()))
     if d["geometric_errors"] is not None and d["geometric_errors"]["corrected_by"] == "control":
