@@ -15,7 +15,7 @@ import numpy as np
 
 from postproc.base.options import FeedModeChoice, OutputMode
 from postproc.base.program_time import Optimised, OptimisedStep, ProgramTime
-from postproc.pipeline.feeds_by_clock import Made, ProgramClock
+from postproc.pipeline.feeds_by_clock import Made, ProgramClock, with_compared_feeds
 from postproc.pipeline.result import PostResult
 
 _Change = Callable[[PostResult], PostResult]
@@ -52,7 +52,8 @@ def optimised(start: PostResult, stages: Made, clock: ProgramClock) -> PostResul
     for mode in get_args(FeedModeChoice):
         search.to(f"feed mode {mode}", _options(feed_mode=mode))
     best = search.best
-    return replace(best.made, optimised=Optimised(tuple(search.steps), search.first, best.time, search.tried))
+    made = with_compared_feeds(best.start, stages, clock) if best.start.options.feed == "planned" else best.made
+    return replace(made, optimised=Optimised(tuple(search.steps), search.first, best.time, search.tried))
 
 
 def _options(**changed: Any) -> _Change:
