@@ -127,7 +127,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="G-code file to write")],
             feed_mode: FeedModeOption = "auto", output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-            optimise: Optimise = False, feed: FeedOption = "programmed", merge_feeds: MergeFeeds = 0.0, smooth: SmoothOption = False,
+            optimise: Optimise = False, feed: FeedOption = "programmed", merge_feeds: MergeFeeds = 0.0,
+            smooth: SmoothOption = False,
             setup: Setup = "", hooks: HooksFile = "", tolerance: ToleranceOption = 0.01,
             axis_tolerance: AxisToleranceOption = 0.05,
             units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
@@ -160,7 +161,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         known = command.hashed(machine, controller, options) if proof or page else None
         m, spec = machine_of(machine), controller_of(controller)
         path, found = read_cl(file, options, progress, options.tolerance)
-        result = run(path, m, spec, options=options, diagnostics=found, progress=progress, clock=program_clock(model))
+        result = run(path, m, spec, options=options, diagnostics=found, progress=progress,
+                     clock=program_clock(model))
         noted, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
         time = estimate_of(result, model)  # all before a file is written

@@ -135,8 +135,8 @@ class PlannedMotion:
     @cached_property
     def needed(self) -> Floats:
         """(K,) least seconds of each block of the Path, 0 where nothing is planned: at the highest speed that the plan has
-        in it, and at which a constant feed keeps the limits of the tool; of a control that limits no jerk and makes its ramps
-        itself, at which a constant feed keeps all limits.
+        in it, and at which a constant feed keeps the limits of the tool; of a control that limits no jerk and makes its
+        ramps itself, at which a constant feed keeps all limits.
 
         Raises:
             DiagnosticError: as `passes` and `plans`.
@@ -282,13 +282,18 @@ def _worst(made: Plan) -> float:
     return float(made.usage().worst) if np.isfinite(made.limits.jerk).all() else 0.0
 
 
+def pass_feed(one: PassGeometry, moves: Moves) -> PassFeed:
+    """The largest speed along a pass as the moves ask for it."""
+    return PassFeed(one, one.smooth.s, moves.feed[one.move], moves.seconds[one.move] * one.share)
+
+
 def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits,
               options: PlannerOptions | None = None) -> Plan:
     """The motion of least time along a pass, from rest to rest, stopping where its geometry does.
 
     Of second order where the machine states no jerk for some axis.
     """
-    feed = PassFeed(one, one.smooth.s, moves.feed[one.move], moves.seconds[one.move] * one.share)
+    feed = pass_feed(one, moves)
     run = plan if np.isfinite(limits.jerk).all() else plan_second_order
     made = [run(path, limits, feed, options=options) for path in one.paths]
     return replace(made[0], pieces=tuple(piece for each in made for piece in each.pieces),

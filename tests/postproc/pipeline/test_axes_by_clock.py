@@ -48,7 +48,8 @@ def test_the_choice_obeys_the_clock(own: bool) -> None:
         moves = np.ones(len(result.job.moves) if result.job else 0)
         return ProgramTime(seconds, (seconds, seconds), 10.0, "clock of the test", moves)
 
-    made = convert(path, machine("mikron-ucp710"), "linuxcnc", options=Options(orient="auto"), diagnostics=found, clock=clock)
+    made = convert(path, machine("mikron-ucp710"), "linuxcnc", options=Options(orient="auto"), diagnostics=found,
+                   clock=clock)
     assert made.ok and made.choice is not None
     assert (made.choice.plans["auto"].states == made.choice.plans["keep"].states) is own
     assert made.choice.gain == (0.0 if own else 50.0)

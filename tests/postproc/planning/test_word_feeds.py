@@ -52,7 +52,8 @@ def executed(result: PostResult, strict: bool = True) -> tuple[float, float, flo
         speed = (one.ends - one.begin)[rows] / result.feeds.seconds[one.block[rows]]
         edges = np.append(one.begin[rows], one.ends[rows[-1]])
         for path in one.paths:
-            run = plan(path, result.motion.source.bounds_of(one), StepFeed(edges, speed), options=PlannerOptions(strict=strict))
+            run = plan(path, result.motion.source.bounds_of(one), StepFeed(edges, speed),
+                       options=PlannerOptions(strict=strict))
             seconds, worst = seconds + run.seconds, max(worst, run.usage().worst)
         planned += made.seconds
     return seconds, worst, planned
