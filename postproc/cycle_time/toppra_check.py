@@ -110,8 +110,8 @@ def _toppra() -> tuple[Any, Any]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            import toppra
-            import toppra.algorithm
+            import toppra  # type: ignore[import-untyped]
+            import toppra.algorithm  # type: ignore[import-untyped]
             from toppra import constraint
     except ImportError as fault:
         raise DiagnosticError([error("time.toppra", f"toppra cannot be imported: {fault}; pip install toppra")]) from fault

@@ -19,7 +19,7 @@ from toolpaths.arrays import Bools, Floats, Ints
 
 SPREAD = 0.1
 """of its speed by which the plan may change in a block before it is cut"""
-LEAST = 0.008
+LEAST = 0.02
 """s that parts of a block take in the plan, about"""
 SLOWEST = 1e-9
 """mm/s of the path: less is rest"""
