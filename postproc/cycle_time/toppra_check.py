@@ -1,7 +1,8 @@
 """`time --check toppra`: the planned passes held against toppra's least time under velocity, acceleration and feed.
 
 toppra (Pham and Pham, IEEE T-RO 34 (2018)) knows no jerk, so that no plan may be faster; how much longer the plan is says
-what jerk costs. It gets the same paths on the same grids as the own second-order plan, each in units in which speeds are about 1.
+what jerk costs. It gets the same paths on the same grids as the own second-order plan, each in units in which speeds are
+about 1.
 """
 
 from __future__ import annotations
@@ -84,12 +85,12 @@ def least_seconds(path: MachinePath, limits: JointLimits, feed: AllowedFeed, s: 
     cap = np.minimum(feed(s), np.min(limits.velocity / np.maximum(np.abs(at.dq), STILL), axis=1))
     unit = float(np.median(cap))
 
-    class Path(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc, name-defined]
-        dof, path_interval, waypoints = path.joints, np.array([s[0], s[-1]]) / unit, None
+    def derivative(_: object, x: Any, order: int = 0) -> Any:
+        found = path.derivatives(np.clip(np.atleast_1d(x) * unit, s[0], s[-1]))[order] * unit**order
+        return found[0] if np.ndim(x) == 0 else found
 
-        def __call__(self, x: Any, order: int = 0) -> Any:
-            found = path.derivatives(np.clip(np.atleast_1d(x) * unit, s[0], s[-1]))[order] * unit**order
-            return found[0] if np.ndim(x) == 0 else found
+    made = type("Path", (toppra.interpolator.AbstractGeometricPath,), {
+        "dof": path.joints, "path_interval": np.array([s[0], s[-1]]) / unit, "waypoints": None, "__call__": derivative})
 
     def velocity(x: float) -> Floats:
         place = np.clip(np.atleast_1d(x) * unit, s[0], s[-1])
@@ -100,7 +101,7 @@ def least_seconds(path: MachinePath, limits: JointLimits, feed: AllowedFeed, s: 
     rows = [constraint.JointVelocityConstraintVarying(velocity),
             constraint.JointAccelerationConstraint(np.stack((-limits.acceleration, limits.acceleration), axis=1),
                                                    discretization_scheme=both)]
-    speed = toppra.algorithm.TOPPRA(rows, Path(), gridpoints=s / unit, solver_wrapper="seidel").compute_parameterization(
+    speed = toppra.algorithm.TOPPRA(rows, made(), gridpoints=s / unit, solver_wrapper="seidel").compute_parameterization(
         0.0, 0.0, return_data=True)[1]
     return float(least_time(s / unit, speed**2))
 
@@ -110,8 +111,8 @@ def _toppra() -> tuple[Any, Any]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            import toppra  # type: ignore[import-untyped]
-            import toppra.algorithm  # type: ignore[import-untyped]
+            import toppra
+            import toppra.algorithm
             from toppra import constraint
     except ImportError as fault:
         raise DiagnosticError([error("time.toppra", f"toppra cannot be imported: {fault}; pip install toppra")]) from fault

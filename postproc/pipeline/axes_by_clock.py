@@ -7,7 +7,6 @@ longer the control takes, and the plans are chosen again, until nothing new is c
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,14 +16,12 @@ from postproc.base.program_time import ProgramTime
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan, StateTable, plans_of
 from postproc.pipeline.feeds_by_clock import ProgramClock
-from postproc.pipeline.proved_axes import Proved
-from postproc.pipeline.result import PostResult
+from postproc.pipeline.proved_axes import Convert, Proved
 from toolpaths.arrays import Floats
 
 TURNS = 4
 """plans chosen again by the times of programs"""
 NAMED: tuple[Orientation, ...] = ("keep", "whole-part", "per-pass")
-Convert = Callable[[OrientationChoice], PostResult]
 
 
 @dataclass(frozen=True)

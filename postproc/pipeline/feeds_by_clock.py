@@ -18,11 +18,11 @@ class ProgramClock(Protocol):
     def __call__(self, result: PostResult, band: bool = False) -> ProgramTime: ...
 
 
-Made = Callable[[PostResult], PostResult]
+StagedWhole = Callable[[PostResult], PostResult]
 """A conversion through all stages"""
 
 
-def with_compared_feeds(start: PostResult, stages: Made, clock: ProgramClock | None) -> PostResult:
+def with_compared_feeds(start: PostResult, stages: StagedWhole, clock: ProgramClock | None) -> PostResult:
     """The program with planned feeds, and what they do; the programmed feeds where the control makes its ramps itself and
     planned ones take longer. Other conversions as they are."""
     made = stages(start)

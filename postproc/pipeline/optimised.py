@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, get_args
+from functools import partial
+from typing import get_args
 
 import numpy as np
 
-from postproc.base.options import FeedModeChoice, OutputMode
+from postproc.base.options import FeedModeChoice, Options, OutputMode
 from postproc.base.program_time import Optimised, OptimisedStep, ProgramTime
-from postproc.pipeline.feeds_by_clock import Made, ProgramClock, with_compared_feeds
+from postproc.pipeline.feeds_by_clock import ProgramClock, StagedWhole, with_compared_feeds
 from postproc.pipeline.result import PostResult
 
 _Change = Callable[[PostResult], PostResult]
@@ -38,7 +39,7 @@ class _Best:
     time: ProgramTime
 
 
-def optimised(start: PostResult, stages: Made, clock: ProgramClock) -> PostResult:
+def optimised(start: PostResult, stages: StagedWhole, clock: ProgramClock) -> PostResult:
     """The conversion of `start` with the choices that make its program the fastest; as it is where none is faster."""
     made = stages(start)
     if not made.ok:
@@ -48,22 +49,23 @@ def optimised(start: PostResult, stages: Made, clock: ProgramClock) -> PostResul
     search.smoothing()
     for moved in (True, False):
         if moved != search.best.start.options.smooth:
-            search.to("points moved inside the tolerance" if moved else "points unmoved", _options(smooth=moved))
+            search.to("points moved inside the tolerance" if moved else "points unmoved",
+                      _options(partial(replace, smooth=moved)))
     for mode in get_args(FeedModeChoice):
-        search.to(f"feed mode {mode}", _options(feed_mode=mode))
+        search.to(f"feed mode {mode}", _options(partial(replace, feed_mode=mode)))
     best = search.best
     made = with_compared_feeds(best.start, stages, clock) if best.start.options.feed == "planned" else best.made
     return replace(made, optimised=Optimised(tuple(search.steps), search.first, best.time, search.tried))
 
 
-def _options(**changed: Any) -> _Change:
-    return lambda begun: replace(begun, options=replace(begun.options, **changed))
+def _options(change: Callable[[Options], Options]) -> _Change:
+    return lambda begun: replace(begun, options=change(begun.options))
 
 
 class _Search:
     """The fastest so far, and how it was come to."""
 
-    def __init__(self, best: _Best, stages: Made, clock: ProgramClock) -> None:
+    def __init__(self, best: _Best, stages: StagedWhole, clock: ProgramClock) -> None:
         self.best, self.stages, self.clock = best, stages, clock
         self.first, self.tried, self.steps = best.time, 0, list[OptimisedStep]()
 
@@ -113,7 +115,8 @@ class _Search:
                 known[share] = self._smoothed(share, tolerance)
 
     def _smoothed(self, share: float, tolerance: float) -> float:
-        return self.to(f"{share:.0%} of the tolerance to the control's smoothing", _options(smoothing=share * tolerance))
+        return self.to(f"{share:.0%} of the tolerance to the control's smoothing",
+                       _options(partial(replace, smoothing=share * tolerance)))
 
 
 def _has(start: PostResult, mode: OutputMode) -> bool:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
-from postproc.base.options import Options
+from postproc.base.options import FeedSource, Options
 from postproc.cycle_time.conversion import program_clock
 from postproc.pipeline.convert import convert
 from postproc.pipeline.result import PostResult
@@ -19,10 +20,10 @@ from tests.postproc.planning.test_planned_feed import wave
 from toolpaths.units import DEG
 
 
-def made(feed: str, count: int, rate: int) -> PostResult:
+def made(feed: FeedSource, count: int, rate: int) -> PostResult:
     lines = wave(count)
     path = toolpath("RAPID", lines[0], f"FEDRAT/MMPM,{rate}", *lines[1:])
-    result = convert(path, machine("mikron-ucp710"), "linuxcnc", options=Options(feed=feed),  # type: ignore[arg-type]
+    result = convert(path, machine("mikron-ucp710"), "linuxcnc", options=Options(feed=feed),
                      clock=program_clock())
     assert result.ok, [str(d) for d in result.diagnostics]
     return result
@@ -32,7 +33,7 @@ def made(feed: str, count: int, rate: int) -> PostResult:
 def test_planned_words_keep_the_limits_and_the_time(recorded: Callable[..., Run], tmp_path: Path, count: int,
                                                     rate: int) -> None:
     seconds = {}
-    for feed in ("programmed", "planned"):
+    for feed in get_args(FeedSource):
         result = made(feed, count, rate)
         (tmp_path / "p.ngc").write_text(result.text)
         run = recorded(result.machine, tmp_path / "p.ngc", {1: (0.0, 6.0)})

@@ -66,8 +66,8 @@ def control_line(choice: OrientationChoice) -> str:
     if keep is None:
         return said + "; with the axes of the CL file no program is written"
     gained = "nothing gained" if not choice.gain else f"{choice.gain:.1f} % gained"
-    doubt = ", within the model's doubt" if 0.0 < keep.seconds - auto.seconds < auto.uncertainty else ""
-    return f"{said}, with the axes of the CL file {_with_band(keep)}: {gained}{doubt}"
+    noted = ", within the model's uncertainty" if 0.0 < keep.seconds - auto.seconds < auto.uncertainty else ""
+    return f"{said}, with the axes of the CL file {_with_band(keep)}: {gained}{noted}"
 
 
 def _with_band(one: ProgramTime) -> str:

@@ -49,7 +49,8 @@ def test_without_toppra_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_command_line(tmp_path: Path) -> None:
-    got = CliRunner().invoke(app, ["time", str(SAMPLES / "pocket.cls"), "-m", "mill-3axis", "--check", "toppra", "--json", "-"])
+    got = CliRunner().invoke(app, ["time", str(SAMPLES / "pocket.cls"), "-m", "mill-3axis", "--check", "toppra", "--json",
+                                   "-"])
     assert got.exit_code == 0, got.stderr
     figures = json.loads(got.stdout)["check"]
     assert 0.0 < figures["toppra_s"] <= figures["plan_s"]

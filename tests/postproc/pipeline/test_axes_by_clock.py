@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import toolpaths
-from postproc.base.options import Options
+from postproc.base.options import Options, Orientation
 from postproc.base.program_time import ProgramTime
 from postproc.cycle_time.conversion import program_clock
 from postproc.orientation.report.figures_of_choice import control_line
@@ -19,16 +19,15 @@ from tests.postproc.orientation.test_orientation_program import strips
 SETUP = load_setup(SAMPLES / "tools.setup.toml")[0]
 
 
-def oriented(controller: str, clock: object, orient: str = "auto") -> PostResult:
-    made = convert(strips(), machine("mikron-ucp710"), controller, SETUP, Options(orient=orient),  # type: ignore[arg-type]
-                   clock=clock)  # type: ignore[arg-type]
+def oriented(controller: str, orient: Orientation) -> PostResult:
+    made = convert(strips(), machine("mikron-ucp710"), controller, SETUP, Options(orient=orient), clock=program_clock())
     assert made.ok, [str(d) for d in made.diagnostics]
     return made
 
 
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i"])
 def test_auto_is_never_slower_than_keep(controller: str) -> None:
-    auto, keep = (oriented(controller, program_clock(), orient) for orient in ("auto", "keep"))
+    auto, keep = oriented(controller, "auto"), oriented(controller, "keep")
     assert auto.choice is not None
     times = auto.choice.programs
     assert program_clock()(auto).seconds <= program_clock()(keep).seconds
