@@ -15,6 +15,7 @@ from postproc.setup.model import SetupFile
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Toolpath
 
+
 def convert(path: Toolpath, machine: Machine | str | Path, controller: str | Path = "linuxcnc",
             setup: SetupFile | str | Path | None = None, options: Options | None = None,
             diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None, *, model: str = "") -> PostResult:
