@@ -31,7 +31,7 @@ from postproc.setup.system import standing
 from postproc.verification.neighbour_files import NeighbourFiles, unfinished
 from postproc.verification.read_back import other_axes, other_setup, read_back
 from postproc.verification.second_witness import second_witness
-from postproc.verification.stated_numbers import check_header
+from postproc.verification.stated_numbers import check_header, stated_smoothing
 from postproc.verification.tool_table import (
     MeasuredLength,
     measured_lengths,
@@ -209,7 +209,8 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         begun = replace(begun, measured=_with_allowed(begun.measured, comparison, has_errors(more), lambda: read_back(
             data, replace(job, setup=at_gauge), path.file, progress, str(gcode), NeighbourFiles(gcode), margins=True)))
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more,
-             *check_header(data, replace(job, setup=at_gauge), str(gcode))]
+             *check_header(data, replace(job, setup=at_gauge), str(gcode)),
+             *([] if comparison is None else stated_smoothing(comparison, job, str(gcode)))]
     said = None
     if comparison is not None and not has_errors(found):
         said, more = second_witness(start.source, asked, options, job, comparison, data)

@@ -54,7 +54,7 @@ from postproc.verification.planned_words import check_planned
 from postproc.verification.proof_text import with_statement
 from postproc.verification.read_back import read_back
 from postproc.verification.second_witness import second_witness
-from postproc.verification.stated_numbers import check_header
+from postproc.verification.stated_numbers import check_header, stated_smoothing
 from postproc.writing.unwritable import floating_taps, unwritable
 from postproc.writing.writers import writer_for
 from toolpaths.diagnostics import Diagnostic, error, has_errors
@@ -255,6 +255,7 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
                                   of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.program,
                                                                                       made.controller), margins=True)
     found = [*found, *check_header(made.text, job, "")]
+    found += [] if comparison is None else stated_smoothing(comparison, job, "")
     if comparison is not None and made.motion is not None and not has_errors(found):
         found = [*found, *check_planned(made.path, made.moves, on_written(made.compensation, made.motion.needed),
                                         made.options.merge_feeds, comparison, job)]

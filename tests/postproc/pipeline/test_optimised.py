@@ -60,6 +60,19 @@ def test_a_share_of_the_tolerance_that_gains_is_stated_and_verified(tmp_path: Pa
     assert (stated > 0.003) == ("verify.smoothing" in {d.code for d in found.diagnostics})
 
 
+def test_a_header_that_gives_the_control_what_the_path_has_used_is_refused(tmp_path: Path) -> None:
+    """0.005 mm are linearised, 0.003 the control's: with 0.007 in header and blocks both leave the tolerance of 0.01."""
+    plain = made("linuxcnc")
+    assert plain.ok and plain.comparison is not None and plain.comparison.tip_bound > 0.0025
+    text = plain.text.replace("G64 P0.002 Q0.001", "G64 P0.006 Q0.001").replace("(feed mode auto)", (
+        "(feed mode auto)\n(control's smoothing 0.007 mm)"))
+    assert "P0.006 " in text and "smoothing 0.007 mm" in text
+    program = tmp_path / "p.ngc"
+    program.write_text(text)
+    found = verify(program, swing(), machine("mikron-ucp710"), "linuxcnc")
+    assert "verify.smoothing" in {d.code for d in found.diagnostics} and not found.ok
+
+
 def test_what_is_slower_is_not_taken() -> None:
     """A clock that finds every change slower: the program is the one without --optimise."""
     plain = made("linuxcnc")
