@@ -34,7 +34,7 @@ def with_compared_feeds(start: PostResult, stages: StagedWhole, clock: ProgramCl
     planned, programmed = clock(made, band=True), clock(plain, band=True)
     kept = not start.controller.feed.limited_jerk and planned.seconds > programmed.seconds
     times = FeedTimes(programmed, planned, _stated(plain), _stated(made), made.motion.seconds, kept)
-    return replace(plain if kept else made, feed_times=times)
+    return replace(plain if kept else made, motion=made.motion, feed_times=times)
 
 
 def _stated(made: PostResult) -> float:

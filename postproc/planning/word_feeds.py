@@ -21,6 +21,8 @@ SPREAD = 0.1
 """of its speed by which the plan may change in a block before it is cut"""
 LEAST = 0.02
 """s that parts of a block take in the plan, about"""
+NEAR = 2e-3
+"""by which words are above the plan's highest speeds: a plan that is at the programmed feed leaves that word as it is"""
 SLOWEST = 1e-9
 """mm/s of the path: less is rest"""
 Planned = Sequence[tuple[PassGeometry, Plan]]
@@ -41,7 +43,8 @@ def word_seconds(planned: Planned, count: int) -> Floats:
         rows = np.flatnonzero(one.ends > one.begin)
         if len(rows):
             cuts = np.append(one.begin[rows], one.ends[rows[-1]])
-            np.maximum.at(seconds, one.block[rows], np.diff(cuts) / np.maximum(made.blocks(cuts).highest, SLOWEST))
+            fastest = (1.0 + NEAR) * np.maximum(made.blocks(cuts).highest, SLOWEST)
+            np.maximum.at(seconds, one.block[rows], np.diff(cuts) / fastest)
     return seconds
 
 
