@@ -42,7 +42,8 @@ Setups = Annotated[list[str] | None, typer.Option(
 Drawing = Annotated[Path | None, typer.Option(
     "--figure", metavar="FILE", help="drawing of speed and programmed feed along the path, of what limits: .png or .svg")]
 HeldAgainst = Annotated[Literal["toppra"] | None, typer.Option(
-    "--check", help="hold the planned passes of a CL file against toppra's least time under velocity and acceleration")]
+    "--check", metavar="{toppra}", help="hold the planned passes of a CL file against toppra's least time under "
+    "velocity and acceleration")]
 Tables = Annotated[str, typer.Option("--csv", metavar="TABLES.csv", help="the tables by tool, operation and cause")]
 
 
