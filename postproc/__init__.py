@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from postproc.base.options import Options
     from postproc.base.version import VERSION
-    from postproc.pipeline.convert import convert, verify
     from postproc.pipeline.result import PostResult, VerifyResult
     from postproc.python.calls import analyse, calibrate, orient, place, time
+    from postproc.python.conversion import convert, verify
     from toolpaths.diagnostics import DiagnosticError
     from toolpaths.toolpath import Toolpath
 
 _HOME = {"DiagnosticError": "toolpaths.diagnostics", "Options": "postproc.base.options",
          "PostResult": "postproc.pipeline.result", "Toolpath": "toolpaths.toolpath", "VERSION": "postproc.base.version",
-         "VerifyResult": "postproc.pipeline.result", "convert": "postproc.pipeline.convert",
-         "verify": "postproc.pipeline.convert",
+         "VerifyResult": "postproc.pipeline.result",
+         **dict.fromkeys(("convert", "verify"), "postproc.python.conversion"),
          **dict.fromkeys(("analyse", "calibrate", "orient", "place", "time"), "postproc.python.calls")}
 __all__ = ["VERSION", "DiagnosticError", "Options", "PostResult", "Toolpath", "VerifyResult", "analyse", "calibrate",
            "convert", "orient", "place", "time", "verify"]

@@ -28,7 +28,7 @@ LISTED = {
     "CorrectedCommands.axis_residual": "likewise",
     "PlannedMotion.trajectories": "samples of what is planned, for users of the package (postproc/README.md)",
     "StretchSpeeds.lowest": "a result of `Plan.blocks`, in the example of feedrate/README.md",
-    "StretchSpeeds.highest": "likewise", "__getattr__": "called by Python",
+    "__getattr__": "called by Python",
     "Argument.get_usage_pieces": "called by typer", "Argument.display_type_rich": "likewise",
     "Option._get_number_range_help_str": "likewise", "Group.list_commands": "likewise",
     "declared": "what a class declares of its arrays: tests/toolpaths/test_shapes.py looks at every dataclass",

@@ -38,6 +38,7 @@ BORDERS = {
     "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,
     **{f"postproc/page/{name}.py": FIGURES for name in (
         "columns", "document", "drawings", "run", "skeleton", "solids", "tools", "what_if")},
+    "postproc/base/program_time.py": FIGURES, "postproc/cycle_time/toppra_check.py": FIGURES,
     "postproc/report/summary.py": FIGURES, "postproc/report/trace.py": FIGURES, "postproc/report/unwinding.py": FIGURES,
     "postproc/placement/report.py": FIGURES, "postproc/cycle_time/report.py": FIGURES,
     "postproc/cycle_time/conversion.py": FIGURES, "postproc/cycle_time/shares.py": FIGURES,
@@ -199,7 +200,7 @@ def test_stages_hand_on_what_the_result_holds() -> None:
     assert set(handed) - set(held) == {"left", "drawing"}
     for name in held.keys() & handed.keys():
         assert held[name].removesuffix(" | None") == handed[name].removesuffix(" | None"), name
-    assert set(held) - set(handed) == {"reached"}
+    assert set(held) - set(handed) == {"reached", "optimised", "feed_times"}
 
 
 def test_a_type_that_is_passed_over_has_its_reason() -> None:

@@ -81,6 +81,11 @@ def feed_line(source: str, merged: float) -> str:
     return f"feed {source}, merged within {100.0 * merged:g} %"
 
 
+def smoothing_line(mm: float) -> str:
+    """What the control's own smoothing may take, where that is not as the controller file has it."""
+    return f"control's smoothing {mm:.6g} mm"
+
+
 def feeds_line() -> str:
     """The place of the fingerprint of planned feeds (`with_feeds_mark`)."""
     return f"{FEEDS} {UNKNOWN}"
@@ -115,6 +120,7 @@ class ProgramHeader:
         planned: True where its feeds were planned
         feeds: fingerprint of its F words, "" where none is stated
         hooks: name of the file of the shop's own blocks, "" where none is named
+        smoothing: mm that the control's own smoothing may take, 0 where it is as the controller file has it
     """
 
     ours: bool
@@ -127,6 +133,7 @@ class ProgramHeader:
     planned: bool
     feeds: str
     hooks: str = ""
+    smoothing: float = 0.0
 
 
 _GAP = rb"(?:[ \t]+|[ \t]*\)?[ \t]*\n[ \t]*(?:N?\d+[ \t]*)?[(;][ \t]*)"
@@ -156,6 +163,7 @@ _HOOKS = re.compile(_BEGINS + _spaced(HOOKS) + _GAP + rb"([^\n]*)")
 _SETUP = re.compile(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
 _OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
 _TOLERANCE = re.compile(rb"(?im)^[ \t(;\dN]*tolerance (\d[\d.e-]*) mm,")
+_SMOOTHING = re.compile(rb"(?im)^[ \t(;\dN]*control.{0,3}s smoothing (\d[\d.e-]*) mm")
 _PLANNED = re.compile(rb"(?im)^[ \t(;\d]*feed planned")
 _FEEDS = re.compile(rb"(?im)^[^\n]*" + FEEDS.encode("ascii") + rb" ([0-9a-f]{8})\b")
 _PLACE = re.compile(f"(?i){FEEDS} {UNKNOWN}")
@@ -168,7 +176,7 @@ def read_header(data: bytes) -> ProgramHeader:
     by_control = _BY_CONTROL.search(header) or _BY_CONTROL_FOLDED.search(header)
     named = _CORRECTED.search(header) or (None if by_control else _CORRECTED_FOLDED.search(header))
     hooks = _HOOKS.search(header)
-    tolerance = _TOLERANCE.search(header)
+    tolerance, smoothing = _TOLERANCE.search(header), _SMOOTHING.search(header)
     marks = [found[1].decode("ascii").lower() if (found := mark.search(header)) else "" for mark in (_MODEL, _FEEDS)]
     return ProgramHeader(
         ours=_OURS.search(header) is not None, by_control=by_control is not None,
@@ -176,7 +184,8 @@ def read_header(data: bytes) -> ProgramHeader:
         axes=AxesNamed(*(text.decode("ascii", "replace").lower() for text in axes.groups())) if axes else None,
         setup=_named(setup) if setup else None, tolerance=float(tolerance[1]) if tolerance else 0.0,
         planned=_PLANNED.search(header) is not None, feeds=marks[1],
-        hooks=hooks[1].decode("utf-8", "replace").strip().removesuffix(")") if hooks else "")
+        hooks=hooks[1].decode("utf-8", "replace").strip().removesuffix(")") if hooks else "",
+        smoothing=float(smoothing[1]) if smoothing else 0.0)
 
 
 def _unfolded(name: bytes) -> str:

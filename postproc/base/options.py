@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from postproc.base.given import faults_of
-from postproc.base.header_words import chosen_axes, feed_line, hooks_line, setup_line
+from postproc.base.header_words import chosen_axes, feed_line, hooks_line, setup_line, smoothing_line
 from toolpaths.choices import GivenDialect, GivenUnit
 from toolpaths.diagnostics import DiagnosticError
 
@@ -49,6 +49,11 @@ class Options:
     error_beyond: bool = False
     """True: errors at the ends of their measured ranges count beyond them too"""
 
+    optimise: bool = False
+    """output modes, shares of the tolerance and feed mode chosen for the least time on the control"""
+    smoothing: float = 0.0
+    """mm of the tolerance that the control's own smoothing may take, where its blocks state it; 0: as the controller file"""
+
     require_proof: bool = False
     """True: programs whose deviation is not bounded in every block, or whose clamps or turns of modulo axes the second
     witness has not compared, are refused"""
@@ -76,6 +81,10 @@ class Options:
             lines.append(chosen_axes(self.orient, self.max_tilt))
         if self.smooth:
             lines.append("points smoothed")
+        if self.optimise:
+            lines.append("optimised for the time on the control")
+        if self.smoothing:
+            lines.append(smoothing_line(self.smoothing))
         if self.error_model:
             beyond = ", beyond its range too" if self.error_beyond else ""
             lines.append(f"error model {Path(self.error_model).name}{beyond}")

@@ -47,6 +47,7 @@ from postproc.cli.options import (
     MachineName,
     MaxBlocks,
     MaxTilt,
+    ModelOfControl,
     Orient,
     ProofOf,
     ProofOption,
@@ -102,6 +103,8 @@ FeedOption = Annotated[FeedSource, word_option("--feed", FeedSource, "programmed
                                                "where an axis or a tool would exceed its limits")]
 MergeFeeds = Annotated[float, typer.Option("--merge-feeds", metavar="PERCENT", min=0.0, max=50.0, help="merge neighbouring "
                                            "F words that differ by up to PERCENT")]
+Optimise = Annotated[bool, typer.Option("--optimise", help="choose output modes, shares of the tolerance and feed mode for "
+                                        "the least time on the control; what is gained by what is printed")]
 SmoothOption = Annotated[bool, typer.Option("--smooth", help="move points onto smooth curves inside the tolerance")]
 ResidualFiles = Annotated[list[Path] | None, typer.Option("--residuals", metavar="FILE", help="errors at each CL point "
                                                           "before and after correction: .csv, or drawn: .png, .svg; may "
@@ -136,18 +139,20 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             output: Annotated[Path, typer.Option("-o", "--output", metavar="OUT", help="G-code file to write")],
             feed_mode: FeedModeOption = "auto", output_mode: OutputModeOption = "auto",
             orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-            feed: FeedOption = "programmed", merge_feeds: MergeFeeds = 0.0, smooth: SmoothOption = False,
+            optimise: Optimise = False, feed: FeedOption = "programmed", merge_feeds: MergeFeeds = 0.0,
+            smooth: SmoothOption = False,
             setup: Setup = "", hooks: HooksFile = "", tolerance: ToleranceOption = 0.01,
             axis_tolerance: AxisToleranceOption = 0.05,
             units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
             error_model: Errors = "", beyond: Beyond = False, residuals: ResidualFiles = None,
             check_program: CheckProgram = None, page: PageFile = None,
-            require_proof: RequireProof = False, proof: ProofOption = False, json: Json = "") -> None:
+            require_proof: RequireProof = False, proof: ProofOption = False, model: ModelOfControl = "",
+            json: Json = "") -> None:
     """Convert a CL file to G-code, read it back and prove it; nothing is written where a proof fails."""
     options = replace(_options(tolerance, axis_tolerance, feed_mode, setup, units, dialect, allow_unknown),
                       output=output_mode, feed=feed, merge_feeds=merge_feeds / 100.0, smooth=smooth, error_model=error_model,
                       hooks=hooks, error_beyond=beyond, orient=orient, max_tilt=max_tilt, name=output.stem,
-                      require_proof=require_proof)
+                      optimise=optimise, require_proof=require_proof)
     only_with_errors(beyond, error_model)
     fields = _residual_files(residuals or [], error_model)
     if page is not None:
@@ -157,7 +162,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                         **{f"--residuals {name}": str(name) for name in fields}},
                        inputs := {"the CL file": str(file), "the set-up": setup, "the hooks": hooks,
                                   "the error model": error_model, **own_files(machine, controller)})
-    from postproc.cycle_time.conversion import estimate_of
+    from postproc.cycle_time.conversion import estimate_of, program_clock
     from postproc.pipeline.convert import convert as run
     from postproc.proof import command
     from postproc.report import summary
@@ -168,10 +173,11 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         known = command.hashed(machine, controller, options) if proof or page else None
         m, spec = machine_of(machine), controller_of(controller)
         path, found = read_cl(file, options, progress, options.tolerance)
-        result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
+        result = run(path, m, spec, options=options, diagnostics=found, progress=progress,
+                     clock=program_clock(model))
         noted, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
-        time = estimate_of(result)  # all before a file is written
+        time = estimate_of(result, model)  # all before a file is written
         values, text = summary.as_dict(result, str(output), time), summary.as_text(result, str(output), time)
         more = [] if result.ok else _offers(result, path, machine, controller)
         outputs |= pages(page, path, result, known, output.name, time)
@@ -210,7 +216,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
            allow_unknown: Allow = None,
            error_model: ErrorsOfProgram = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
            require_proof: RequireProof = False, proof: ProofOf = "", tool_table: ToolTableOption = "",
-           max_blocks: MaxBlocks = None,
+           max_blocks: MaxBlocks = None, model: ModelOfControl = "",
            json: Json = "") -> None:
     """Read a G-code file back and compare its motion with a CL file."""
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
@@ -222,6 +228,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
                                          "the proof file": proof or f"{gcode}.proof.json",
                                          **own_files(machine, controller)})
     from postproc.base.header_words import HEADER, read_header
+    from postproc.cycle_time.conversion import program_clock
     from postproc.pipeline.convert import verify as run
     from postproc.proof import command
     from postproc.report import summary
@@ -233,7 +240,7 @@ def verify(gcode: Annotated[Path, typer.Argument(metavar="GCODE", help="G-code f
         no_cl_file(gcode)
         path, found = read_cl(file, options, progress, stated or tolerance)
         result = run(gcode, path, m, spec, options=options, diagnostics=found, progress=progress,
-                     tool_table=tool_table)
+                     tool_table=tool_table, clock=program_clock(model))
         kept, more = command.compared_with(result, machine, controller, proof)
     text = summary.verify_text(result) + (f"\n{kept.line()}" if kept else "")
     found = [*result.diagnostics, *more]
@@ -247,7 +254,7 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
           tolerance: ToleranceOption = 0.01, axis_tolerance: AxisToleranceOption = 0.05,
           units: UnitsOption = "", dialect: DialectOption = "", allow_unknown: Allow = None,
           error_model: Errors = "", beyond: Beyond = False, orient: Orient = "keep", max_tilt: MaxTilt = 60.0,
-          json: Json = "") -> None:
+          model: ModelOfControl = "", json: Json = "") -> None:
     """Show one point of a CL file through every stage, from its record to its blocks and back."""
     only_with_errors(beyond, error_model)
     options = replace(_options(tolerance, axis_tolerance, "auto", setup, units, dialect, allow_unknown),
@@ -255,13 +262,14 @@ def trace(file: ClFile, line: Annotated[int, typer.Option("--line", metavar="L",
                       max_tilt=max_tilt)
     refuse_overwriting({"--json": json}, {"the CL file": str(file), "the set-up": setup, "the hooks": hooks,
                                          "the error model": error_model, **own_files(machine, controller)})
+    from postproc.cycle_time.conversion import program_clock
     from postproc.pipeline.convert import convert as run
     from postproc.report.trace import as_text, trace_line
 
     with shown_errors(json), progress_bar() as progress:
         m, spec = machine_of(machine), controller_of(controller)
         path, found = read_cl(file, options, progress, options.tolerance)
-        result = run(path, m, spec, options=options, diagnostics=found, progress=progress)
+        result = run(path, m, spec, options=options, diagnostics=found, progress=progress, clock=program_clock(model))
         stages, more = trace_line(result, line)
     report((*result.diagnostics, *more), json, stages, as_text(stages))
 

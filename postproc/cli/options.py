@@ -120,6 +120,10 @@ def ending_of(file: Path, endings: Any, option: str, wrong: str) -> Any:
         need("matplotlib", "drawings need")
     return ending
 
+ModelOfControl = Annotated[str, typer.Option("--model", metavar="MODEL", help="cycle-time model of the control that choices "
+                                             "and times go by: a name, or a file of time --calibrate; default: the "
+                                             "controller's")]
+
 
 def only_with_errors(beyond: bool, error_model: str) -> None:
     """Wrong use of --error-model-beyond without an error model."""

@@ -26,6 +26,7 @@ from postproc.cli.options import (
     DialectOption,
     MachineName,
     MaxTilt,
+    ModelOfControl,
     ToleranceOption,
     UnitsOption,
     figure_ending,
@@ -52,7 +53,7 @@ MOST = 6
 def orient(file: ClFile,
            machine: MachineName,
            controller: Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER",
-                                                   help="controller for which the plan is proved")] = "linuxcnc",
+                                                   help="controller that the choice is for")] = "linuxcnc",
            max_tilt: MaxTilt = 60.0,
            plan: Annotated[Orientation, word_option("--orient", Orientation, "plan whose passes are shown")] = "auto",
            passes: Annotated[list[int] | None, typer.Option("--pass", metavar="N", min=0, help="show this pass in full "
@@ -67,6 +68,7 @@ def orient(file: ClFile,
            units: UnitsOption = "",
            dialect: DialectOption = "",
            allow_unknown: Allow = None,
+           model: ModelOfControl = "",
            json: Json = "") -> None:
     """Choose the tool orientation of 3+2 passes for the least planned time, and say why."""
     ending = figure_ending(figure)
@@ -83,7 +85,7 @@ def orient(file: ClFile,
     text = ""
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
-        choice, found = _chosen(file, machine_of(machine), controller_of(controller), options, progress)
+        choice, found = _chosen(file, machine_of(machine), controller_of(controller), options, progress, model)
         if choice is not None:
             from postproc.orientation.report.figures_of_choice import as_dict
             from postproc.orientation.report.text import as_text
@@ -105,12 +107,14 @@ def _check(passes: list[int]) -> None:
 
 
 def _chosen(file: Path, machine: Machine, controller: str, options: Options,
-            progress: Progress) -> tuple[OrientationChoice | None, list[Diagnostic]]:
+            progress: Progress, model: str) -> tuple[OrientationChoice | None, list[Diagnostic]]:
     """The choice for a file; None where a diagnostic is an ERROR."""
+    from postproc.cycle_time.conversion import program_clock
     from postproc.pipeline.convert import choose_axes
 
     path, found = read_cl(file, options, progress)
-    result = choose_axes(path, machine, controller, options, [*found, *_errors(options, machine)], progress)
+    result = choose_axes(path, machine, controller, options, [*found, *_errors(options, machine)], progress,
+                         program_clock(model))
     return result.choice, list(result.diagnostics)
 
 

@@ -16,6 +16,7 @@ from postproc.cli.options import (
     DialectOption,
     MachineName,
     MaxTilt,
+    ModelOfControl,
     Orient,
     ToleranceOption,
     UnitsOption,
@@ -59,7 +60,7 @@ def place(file: ClFile,
           allow_unknown: Allow = None,
           figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="map of the places, .png or "
                                                       ".svg")] = None,
-          json: Json = "") -> None:
+          model: ModelOfControl = "", json: Json = "") -> None:
     """Place and turn the part on the table for the least planned time, inside the limits of the set-up."""
     ending = figure_ending(figure)
     _check(setup)
@@ -78,7 +79,7 @@ def place(file: ClFile,
     text = ""
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
-        choice, found = _chosen(file, machine_of(machine), controller, options, progress)
+        choice, found = _chosen(file, machine_of(machine), controller, options, progress, model)
         if choice is not None:
             if figure is not None and ending is not None:
                 from postproc.placement.figure import placement_figure
@@ -104,7 +105,7 @@ def _check(setup: Path) -> None:
 
 
 def _chosen(file: Path, machine: Machine, controller: str, options: Options,
-            progress: Progress) -> tuple[PlacementChoice | None, list[Diagnostic]]:
+            progress: Progress, model: str) -> tuple[PlacementChoice | None, list[Diagnostic]]:
     """The choice for a file; None where a diagnostic is an ERROR."""
     from postproc.placement.place import place as run
     from postproc.setup.model import load_setup
@@ -115,5 +116,5 @@ def _chosen(file: Path, machine: Machine, controller: str, options: Options,
     found = [*found, *(d for d in path.faults if d not in found)]
     if has_errors(found):
         return None, found
-    choice, more = run(path, machine, settings, options, controller, progress)
+    choice, more = run(path, machine, settings, options, controller, progress, model)
     return choice, found + more

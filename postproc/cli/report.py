@@ -147,14 +147,14 @@ def _figure_files(folder: Path | None, runs: int) -> dict[str, str]:
 def _run(path: Toolpath, machine: str, controller: str, options: Options, read: list[Diagnostic],
          progress: Progress) -> Run:
     """One combination, converted and timed."""
-    from postproc.cycle_time.conversion import estimate_of
+    from postproc.cycle_time.conversion import estimate_of, program_clock
     from postproc.page.run import Run
     from postproc.pipeline.convert import convert
     from postproc.proof.command import hashed
 
     known = hashed(machine, controller, options)
     result = convert(path, machine_of(machine), controller_of(controller), options=options, diagnostics=list(read),
-                     progress=progress)
+                     progress=progress, clock=program_clock())
     return Run(result, estimate_of(result), known or {}, f"{options.name}.nc")
 
 

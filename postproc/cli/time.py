@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -41,6 +41,9 @@ Setups = Annotated[list[str] | None, typer.Option(
     "--with-setup", metavar="S.toml", help="side by side: with this set-up too")]
 Drawing = Annotated[Path | None, typer.Option(
     "--figure", metavar="FILE", help="drawing of speed and programmed feed along the path, of what limits: .png or .svg")]
+HeldAgainst = Annotated[Literal["toppra"] | None, typer.Option(
+    "--check", metavar="{toppra}", help="hold the planned passes of a CL file against toppra's least time under "
+    "velocity and acceleration")]
 Tables = Annotated[str, typer.Option("--csv", metavar="TABLES.csv", help="the tables by tool, operation and cause")]
 
 
@@ -69,6 +72,7 @@ def time(files: TimedFiles,
                                                   "geometric errors of the machine corrected")] = "",
          beyond: Beyond = False,
          max_blocks: MaxBlocks = None,
+         check: HeldAgainst = None,
          json: Json = "") -> None:
     """Estimate how long programs take, with a band, and where the time goes; several side by side."""
     logs, ending = calibrate or [], figure_ending(figure)
@@ -86,7 +90,7 @@ def time(files: TimedFiles,
     options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model, hooks=hooks,
                       error_beyond=beyond)
     asked = Asked(tuple(files), (machine, *(with_machine or [])), controller, model, (setup, *(with_setup or [])),
-                  tuple(what_if or ()), tuple(logs), output, override, options, csv, figure, ending)
+                  tuple(what_if or ()), tuple(logs), output, override, options, csv, figure, check is not None, ending)
     with shown_errors(json), progress_bar() as progress:
         values, text, outputs, found = answer(asked, progress)
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)

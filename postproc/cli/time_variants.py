@@ -28,10 +28,11 @@ from postproc.time_study import side_by_side
 from postproc.time_study.tables import TimeTables, as_csv, tables
 from postproc.time_study.tables import as_text as tables_text
 from postproc.time_study.what_if import AS_IS, WhatIf, machine_with, model_with, parsed
-from toolpaths.diagnostics import Diagnostic, read_value
+from toolpaths.diagnostics import Diagnostic, error, read_value
 from toolpaths.input_files import there_is
 
 if TYPE_CHECKING:
+    from postproc.cycle_time.toppra_check import ToppraCheck
     from toolpaths.choices import FigureEnding
 
 GAUGE_LENGTHS = (60.0, 240.0)
@@ -54,6 +55,7 @@ class Asked:
     options: Options
     csv: str
     figure: Path | None
+    check: bool
     ending: FigureEnding | None
 
 
@@ -69,6 +71,7 @@ class Timed:
     model: CycleTimeModel
     times: BlockTimes | None
     found: tuple[Diagnostic, ...]
+    check: ToppraCheck | None = None
     otherwise: tuple[MotionBlocks, ...] = ()
     """the same program with other gauge lengths, where the set-up does not state them"""
 
@@ -108,6 +111,8 @@ def answer(asked: Asked, progress: Progress) -> TimeAnswer:
     made, variants = [tables(e, shares(e)) for e in estimates], _variants(all_timed, estimates)
     if len(all_timed) == 1:
         table, words = _alone(asked, all_timed[0], estimates[0], made[0])
+        if (checked := all_timed[0].check) is not None:
+            table, words = table | {"check": checked.as_dict()}, f"{words}\n{checked.line()}"
     else:
         table, words = _several(variants, made)
     found += side_by_side.without_effect(variants)
@@ -133,16 +138,21 @@ def _timed(file: Path, machine: Machine, change: WhatIf, setup: str, asked: Aske
         blocks, found = from_gcode(data, machine, spec, shop, str(file), near, override)
         lengths = GAUGE_LENGTHS if any(d.code == "time.length" for d in found) else ()
         others = [from_gcode(data, machine, spec, shop, str(file), near, override, length)[0] for length in lengths]
-        return Timed(file, machine, setup, change, blocks, planner, None, tuple(found),
+        if asked.check:
+            found = [*found, error("time.check", "a program has no plan to check: name the CL file that it was made from",
+                                   file=str(file))]
+        return Timed(file, machine, setup, change, blocks, planner, None, tuple(found), None,
                      tuple(one for one in others if one is not None))
     import toolpaths
+    from postproc.cycle_time.conversion import program_clock
     from postproc.pipeline.convert import convert
 
     path, found = toolpaths.read_bytes(
         data, file=str(file), units=options.units or None, dialect=options.dialect or None, tolerance=options.tolerance
     )
     del data
-    result = convert(path, machine, asked.controller, options=options, diagnostics=found, progress=progress)
+    result = convert(path, machine, asked.controller, options=options, diagnostics=found, progress=progress,
+                     clock=program_clock(asked.model))
     if not result.ok:
         return Timed(file, machine, setup, change, None, planner, None, result.diagnostics)
     blocks, times, found = from_conversion(result, override), None, []
@@ -150,7 +160,13 @@ def _timed(file: Path, machine: Machine, change: WhatIf, setup: str, asked: Aske
         from postproc.cycle_time.planned import planned_times
 
         times, found = planned_times(result, blocks, planner, override)
-    return Timed(file, machine, setup, change, blocks, planner, times, (*result.diagnostics, *found))
+    held = None
+    if asked.check:
+        from postproc.cycle_time.toppra_check import check
+
+        held, more = check(result)
+        found = [*found, *more]
+    return Timed(file, machine, setup, change, blocks, planner, times, (*result.diagnostics, *found), held)
 
 
 def _estimated(one: Timed, blocks: MotionBlocks) -> Estimate:

@@ -87,6 +87,9 @@ class FeedRules(UserModel):
     alike, or the geometry axes before all others"""
     arc_inverse: Literal["length", "radius", "refuse"] = "length"
     """inverse time in arcs: speed by length, speed by radius, or not allowed"""
+    limited_jerk: bool = True
+    """the control limits the jerk of the axes: planned feeds are speeds of the plan, its ramps point by point; false: it
+    makes its ramps by itself, and planned feeds are those that keep all limits while they are constant"""
     kept_by_units: bool = False
     """F counts in the units that hold before its block, and a change of units leaves the feed as it is; else F counts in
     the units of the block that moves"""

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from postproc.base.memory import give_back
+from postproc.base.program_time import ProgramTime
 from postproc.cycle_time.estimate import Estimate, estimate
-from postproc.cycle_time.model import load_model, model_name
+from postproc.cycle_time.model import CycleTimeModel, load_model, model_name
+from postproc.cycle_time.phases import summed
 from postproc.cycle_time.report import as_dict, clock
 from postproc.cycle_time.source import from_conversion
+from postproc.pipeline.feeds_by_clock import ProgramClock
 from postproc.pipeline.result import PostResult
 from toolpaths.diagnostics import read_value
 
@@ -16,16 +21,40 @@ BAND_UP_TO = 20_000
 """blocks up to which a conversion also gives the band, which takes some ten estimates"""
 
 
-def estimate_of(result: PostResult) -> Estimate | None:
-    """The estimate under the model of the controller; None where nothing is written."""
+def model_of(result: PostResult, model: str = "") -> CycleTimeModel:
+    """The model of a conversion's controller, or the one of that name or file, as formulas.
+
+    Raises:
+        DiagnosticError: where the file is none.
+    """
+    return read_value(load_model(model or model_name(result.controller_name, result.controller.writer))).quick()
+
+
+def program_clock(model: str = "") -> ProgramClock:
+    """The clock of choices: the time of a written program under the model of its controller, or under `model`."""
+    def clock(result: PostResult, band: bool = False) -> ProgramTime:
+        planner = model_of(result, model)
+        blocks = from_conversion(result)
+        rows = len(result.comparison.moves) if result.comparison is not None else 0
+        if not len(blocks) or blocks.move is None:
+            return ProgramTime(0.0, (0.0, 0.0), 0.0, planner.kind, np.zeros(rows))
+        found = estimate(blocks, result.machine, planner, with_band=band and len(blocks) <= BAND_UP_TO)
+        known = blocks.move >= 0
+        moves = summed(found.timed.seconds[known], blocks.move[known], rows)
+        return ProgramTime(found.seconds, found.band, found.lower_bound, f"model {planner.kind}", moves)
+    return clock
+
+
+def estimate_of(result: PostResult, model: str = "") -> Estimate | None:
+    """The estimate under the model of the controller, or under `model`; None where nothing is written."""
     if not result.ok:
         return None
-    model = read_value(load_model(model_name(result.controller_name, result.controller.writer))).quick()
+    planner = model_of(result, model)
     rows = len(result.path) if result.path is not None else 0
     give_back(rows)
     blocks = from_conversion(result)
     give_back(rows)
-    return estimate(blocks, result.machine, model, with_band=len(blocks) <= BAND_UP_TO) if len(blocks) else None
+    return estimate(blocks, result.machine, planner, with_band=len(blocks) <= BAND_UP_TO) if len(blocks) else None
 
 
 def figures(e: Estimate | None) -> dict[str, Any]:

@@ -23,21 +23,29 @@ def planned_times(result: PostResult, blocks: MotionBlocks, model: CycleTimeMode
                   override: float = 1.0) -> tuple[BlockTimes, list[Diagnostic]]:
     """Times of a conversion's blocks, which were made with this `override`; a warning where no pass could be
     planned, so that all times are the model's."""
-    times = lookahead(blocks, model)
-    job, path = result.job, result.path
-    if job is None or path is None or blocks.move is None:
+    times, motion = lookahead(blocks, model), motion_of(result, override * model.override)
+    if motion is None or blocks.move is None:
         return times, []
-    moves = result.moves or job.moves
-    source = source_of(job, moves, result.nominal or path, planned_correction(job, result.compensation, path),
-                       override * model.override)
-    motion = PlannedMotion(source, np.zeros(0), strict=bool(np.isfinite(source.bounds.jerk).all()) and not source.tools)
+    moves, file = motion.source.moves, result.toolpath.file
     try:
         spans = [(int(one.move.min()), int(one.move.max()), made.seconds)
                  for one, made in zip(motion.passes, motion.plans, strict=True)]
     except DiagnosticError as fault:
         return times, [warning("time.plan", f"the motion cannot be planned, times of passes are the model's: {fault}",
-                               file=job.toolpath.file, hint=f"{REPORT}; --model lookahead needs no plan")]
-    return with_seconds(times, _of_passes(blocks, blocks.move, times, spans)), _unsolved(motion, moves, job.toolpath.file)
+                               file=file, hint=f"{REPORT}; --model lookahead needs no plan")]
+    return with_seconds(times, _of_passes(blocks, blocks.move, times, spans)), _unsolved(motion, moves, file)
+
+
+def motion_of(result: PostResult, override: float = 1.0) -> PlannedMotion | None:
+    """The planned motion of a conversion's passes at a feed override; None where it has no path."""
+    job, path = result.job, result.path
+    if job is None or path is None:
+        return None
+    if result.motion is not None and override == 1.0:
+        return result.motion
+    source = source_of(job, result.moves or job.moves, result.nominal or path,
+                       planned_correction(job, result.compensation, path), override)
+    return PlannedMotion(source, strict=bool(np.isfinite(source.bounds.jerk).all()) and not source.tools)
 
 
 def _unsolved(motion: PlannedMotion, moves: Moves, file: str) -> list[Diagnostic]:

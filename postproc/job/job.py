@@ -60,7 +60,7 @@ OF_SETUP = frozenset({"tool.number", "tool.same_number", "tool.length", "feed.mi
 class Job:
     """One CL file on one machine, ready to be solved or compared with.
 
-    `commanded`: moves of the CL file in the table frame; `moves`: those of the program, with rapids split that leave their line.
+    `commanded`: moves of the CL file in the table frame; `moves`: with rapids split that would leave their line.
     """
 
     toolpath: Toolpath

@@ -44,6 +44,8 @@ class SmoothingPlan:
         return np.array([one.mm for one in self.used] or [self.default.mm])
 
 
+MOST = 0.8
+"""of the tolerance that the control's smoothing may take"""
 NOT_FITTED = ("by the machine file the control has no smoothing (smoothing = false under [control])",
               "take it out of the set-up, or state smoothing = true in the machine file where it is fitted")
 
@@ -70,6 +72,8 @@ def smoothing_plan(controller: ControllerFile, setup: SetupFile, options: Option
 
 def _usual(controller: ControllerFile, options: Options) -> float:
     fixed = controller.kinematics.smoothing_fixed
+    if fixed is None and options.smoothing and any("{tolerance}" in block for block in controller.program.path_tolerance):
+        return min(options.smoothing, MOST * options.tolerance)
     return controller.kinematics.smoothing_share * options.tolerance if fixed is None else fixed
 
 

@@ -11,14 +11,17 @@ from types import UnionType
 from machines.loader import load as load_machine
 from machines.machine import Machine
 from postproc.base.given import wrong
+from postproc.base.header_words import read_header
 from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.job.job import prepare, with_shop
+from postproc.pipeline.feeds_by_clock import ProgramClock, with_compared_feeds
 from postproc.pipeline.free_spin import with_spin_needed
 from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.native_splines import as_arcs, asked_splines, held_splines, with_cubics
 from postproc.pipeline.next_modes import with_next_modes
+from postproc.pipeline.optimised import optimised
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
 from postproc.pipeline.stages import staged
@@ -30,7 +33,7 @@ from postproc.setup.system import standing
 from postproc.verification.neighbour_files import NeighbourFiles, unfinished
 from postproc.verification.read_back import other_axes, other_setup, read_back
 from postproc.verification.second_witness import second_witness
-from postproc.verification.stated_numbers import check_header
+from postproc.verification.stated_numbers import check_header, stated_smoothing
 from postproc.verification.tool_table import (
     MeasuredLength,
     measured_lengths,
@@ -45,7 +48,8 @@ from toolpaths.toolpath import Toolpath
 
 def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str | FilePath = "linuxcnc",
             setup: SetupFile | str | FilePath | None = None, options: Options | None = None,
-            diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None) -> PostResult:
+            diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None,
+            clock: ProgramClock | None = None) -> PostResult:
     """A Toolpath as G-code for a machine and a controller, read back and compared with the path.
 
     Args:
@@ -54,6 +58,8 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
         setup: one that is loaded, or its path; default: the file that the options name, else the default set-up
         diagnostics: what reading the path found; an ERROR among them, or among the path's own faults, stops
             the conversion
+        clock: the time of programs on the control, by which tool axes are chosen and planned feeds compared
+            (`cycle_time.conversion.program_clock`); without it tool axes are chosen by the plan alone
 
     Raises:
         DiagnosticError: where path or options are none, or machine, controller or set-up cannot be loaded.
@@ -62,17 +68,23 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     found = _reading(path, diagnostics)
     native = with_cubics(path, options) if asked_splines(path, machine, spec, options) else path
-    made = _converted(_begun(native, machine, controller, spec, setup, options, found), progress)
+    made = _converted(_begun(native, machine, controller, spec, setup, options, found), progress, clock)
     if made.ok or native is path:
         return made
-    other = _converted(_begun(path, machine, controller, spec, setup, options, found), progress)
+    other = _converted(_begun(path, machine, controller, spec, setup, options, found), progress, clock)
     return other.with_found([as_arcs(path, made.diagnostics)]) if other.ok else other
 
 
-def _converted(start: PostResult, progress: Progress | None) -> PostResult:
+def _converted(start: PostResult, progress: Progress | None, clock: ProgramClock | None) -> PostResult:
     """All that follows on the beginning of a conversion."""
-    start, done = _oriented(start, progress)
-    return start if not start.ok else done or _stages(start, progress)
+    start, done = _oriented(start, progress, clock)
+    if not start.ok or done is not None:
+        return done or start
+
+    def stages(begun: PostResult) -> PostResult:
+        return _stages(begun, progress)
+    return optimised(start, stages, clock) if clock is not None and start.options.optimise else (
+        with_compared_feeds(start, stages, clock))
 
 
 def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup: SetupFile | str | FilePath | None,
@@ -98,7 +110,8 @@ def _begun(path: Toolpath, machine: Machine, controller: str | FilePath, spec: C
                       source=path.source, asked=setup)
 
 
-def _oriented(start: PostResult, progress: Progress | None) -> tuple[PostResult, PostResult | None]:
+def _oriented(start: PostResult, progress: Progress | None,
+              clock: ProgramClock | None) -> tuple[PostResult, PostResult | None]:
     """With the tool axes that --orient asks for, where the path can be read at all; its program where that is known."""
     if start.options.orient == "keep" or not start.ok:
         return start, None
@@ -108,14 +121,15 @@ def _oriented(start: PostResult, progress: Progress | None) -> tuple[PostResult,
     from postproc.orientation.report.figures_of_choice import slower
     from postproc.pipeline.oriented import oriented, written
 
-    start, program = oriented(start, _stages, progress)
+    start, program = oriented(start, _stages, progress, clock)
     if start.choice is not None:
         start = start.with_found(slower(start.choice, start.options.orient))
     return start, written(start, program)
 
 
 def choose_axes(path: Toolpath, machine: Machine, controller: str | FilePath, options: Options,
-                diagnostics: list[Diagnostic], progress: Progress | None = None) -> PostResult:
+                diagnostics: list[Diagnostic], progress: Progress | None = None,
+                clock: ProgramClock | None = None) -> PostResult:
     """The tool axes of a path as `options.orient` has them, in `choice` (None where an ERROR stands against
     them), proved by the program for a controller; arguments and errors as of `convert`."""
     from postproc.pipeline.oriented import oriented
@@ -124,7 +138,7 @@ def choose_axes(path: Toolpath, machine: Machine, controller: str | FilePath, op
     spec, machine, setup, options = _loaded(controller, machine, None, options)
     start = _begun(path, machine, controller, spec, setup, options, _reading(path, diagnostics))
     start = start.with_found(one_part(start.setup.places, "the choice of tool axes", options.setup))
-    return oriented(start, _stages, progress)[0] if start.ok else start
+    return oriented(start, _stages, progress, clock)[0] if start.ok else start
 
 
 def require_call(path: object, options: object = None, others: type | UnionType = Toolpath) -> None:
@@ -162,11 +176,13 @@ def _stages(result: PostResult, progress: Progress | None) -> PostResult:
 def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FilePath,
            controller: str | FilePath = "linuxcnc", setup: SetupFile | str | FilePath | None = None,
            options: Options | None = None, diagnostics: list[Diagnostic] | None = None,
-           progress: Progress | None = None, tool_table: str | FilePath = "") -> VerifyResult:
+           progress: Progress | None = None, tool_table: str | FilePath = "",
+           clock: ProgramClock | None = None) -> VerifyResult:
     """A G-code file against a Toolpath on a machine; the arguments that `convert` has too are as there.
 
     Args:
         tool_table: file of the control's tool table: the program is verified with these lengths of tools
+        clock: by which tool axes were chosen, as of `convert`
 
     Raises:
         DiagnosticError: where machine, controller, set-up or tool table cannot be loaded, or the G-code file
@@ -184,10 +200,11 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     if other := other_axes(data, options, str(gcode)):
         return replace(begun, diagnostics=(*other, *known))
     path = with_cubics(path, options) if held_splines(data, spec) else path
-    start, _ = _oriented(_begun(path, machine, controller, spec, setup, options, known), progress)
+    start, _ = _oriented(_begun(path, machine, controller, spec, setup, options, known), progress, clock)
     path, found = start.toolpath, list(start.diagnostics)
     if has_errors(found):
         return replace(begun, diagnostics=tuple(found))
+    options = replace(options, smoothing=options.smoothing or read_header(data).smoothing)
     job, more = prepare(path, machine, spec, start.setup, options)
     found += [*more, *(refused_hooks(job) if job is not None else [])]
     if job is None or has_errors(found):
@@ -205,7 +222,8 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         begun = replace(begun, measured=_with_allowed(begun.measured, comparison, has_errors(more), lambda: read_back(
             data, replace(job, setup=at_gauge), path.file, progress, str(gcode), NeighbourFiles(gcode), margins=True)))
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more,
-             *check_header(data, replace(job, setup=at_gauge), str(gcode))]
+             *check_header(data, replace(job, setup=at_gauge), str(gcode)),
+             *([] if comparison is None else stated_smoothing(comparison, job, str(gcode)))]
     said = None
     if comparison is not None and not has_errors(found):
         said, more = second_witness(start.source, asked, options, job, comparison, data)

@@ -9,19 +9,22 @@ from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import bettered, planned_choice, unsolved
+from postproc.pipeline.axes_by_clock import fastest
+from postproc.pipeline.feeds_by_clock import ProgramClock
 from postproc.pipeline.proved_axes import proved
 from postproc.pipeline.result import PostResult
 
 Stages = Callable[[PostResult, Progress | None], PostResult]
 
 
-def oriented(start: PostResult, stages: Stages,
-             progress: Progress | None = None) -> tuple[PostResult, PostResult | None]:
+def oriented(start: PostResult, stages: Stages, progress: Progress | None = None,
+             clock: ProgramClock | None = None) -> tuple[PostResult, PostResult | None]:
     """`start`, a conversion before its first stage, with the tool axes of the plan `orient` of its options;
     the program that proved the plan, written or refused, None where there is no choice.
 
     The plan is proved by `stages` (from a path to its program) with what convert, verify and trace all know:
     feeds, output mode, smoothing and geometric errors are left out, so that the three choose the same axes.
+    With a `clock`, `auto` is the plan whose program is the fastest on the control.
     """
     plan, options = start.options.orient, common(start.options)
 
@@ -36,6 +39,8 @@ def oriented(start: PostResult, stages: Stages,
     if choice is None:
         return start.with_found(found), None
     made, more = proved(choice, plan, program_of)
+    if clock is not None and plan == "auto":
+        made = fastest(made, program_of, clock)
     choice, found = bettered(made.choice), [*found, *more, *unsolved(made.choice, plan)]
     return replace(start.with_found(found), toolpath=choice.toolpath(plan), choice=choice), made.program
 
@@ -44,7 +49,8 @@ def common(options: Options) -> Options:
     """The options by which tool axes are chosen and proved."""
     plain = Options()
     return replace(options, feed_mode=plain.feed_mode, output=plain.output, feed=plain.feed, merge_feeds=plain.merge_feeds,
-                   smooth=plain.smooth, error_model=plain.error_model, error_beyond=plain.error_beyond)
+                   optimise=plain.optimise, smoothing=plain.smoothing, smooth=plain.smooth, error_model=plain.error_model,
+                   error_beyond=plain.error_beyond)
 
 
 def written(start: PostResult, program: PostResult | None) -> PostResult | None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.base.program_time import FeedTimes, Optimised
 from postproc.compile.feed import Feeds
 from postproc.compile.program import Program
 from postproc.control.modes import Refused
@@ -68,6 +69,10 @@ class PostResult:
     """what the second witness says"""
     after_formatting: AfterFormatting | None = None
     """what is left of geometric errors at the CL points; None where none are corrected"""
+    optimised: Optimised | None = None
+    """what --optimise came to"""
+    feed_times: FeedTimes | None = None
+    """what planned feeds do on the control, where they were asked for and its clock is known"""
     refused: Refused = frozenset()
     """(operation, mode) that "auto" has passed over"""
     reached: StageName | Literal[""] = ""

@@ -55,7 +55,7 @@ from postproc.verification.planned_words import check_planned
 from postproc.verification.proof_text import with_statement
 from postproc.verification.read_back import read_back
 from postproc.verification.second_witness import second_witness
-from postproc.verification.stated_numbers import check_header
+from postproc.verification.stated_numbers import check_header, stated_smoothing
 from postproc.writing.unwritable import floating_taps, unwritable
 from postproc.writing.writers import writer_for
 from toolpaths.diagnostics import Diagnostic, error, has_errors
@@ -188,8 +188,12 @@ def checked(made: CorrectedStage, progress: Progress | None) -> tuple[CheckedSta
 def planned(made: CheckedStage, progress: Progress | None) -> tuple[PlannedStage, DiagnosticList]:
     """What the passes allow under the limits of the axes, with --feed planned."""
     correction = planned_correction(made.job, made.compensation, made.path)
-    motion, found = plan_motion(made.job, made.moves, made.nominal or made.path, correction)
-    return handed_on(PlannedStage, made, motion=motion), found
+    job = made.job
+    motion, found = plan_motion(job, made.moves, made.nominal or made.path, correction)
+    if motion is None or made.nominal is not None or not job.controller.feed.limited_jerk:
+        return handed_on(PlannedStage, made, motion=motion), found
+    motion = motion.with_points(job.machine.home, job.control.unit)
+    return handed_on(PlannedStage, made, motion=motion, path=motion.source.path), found
 
 
 def plan_motion(job: Job, moves: Moves, path: JointPath,
@@ -197,7 +201,7 @@ def plan_motion(job: Job, moves: Moves, path: JointPath,
     """The motion of a path within the limits of axes and tools; None without --feed planned."""
     if job.options.feed != "planned":
         return None, limits_not_kept(job)
-    return planned_motion(source_of(job, moves, path, correction))
+    return planned_motion(source_of(job, moves, path, correction, limited_jerk=job.controller.feed.limited_jerk))
 
 
 def compiled(made: PlannedStage, progress: Progress | None) -> tuple[CompiledStage, DiagnosticList]:
@@ -253,6 +257,7 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
                                   of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.program,
                                                                                       made.controller), margins=True)
     found = [*found, *check_header(made.text, job, "")]
+    found += [] if comparison is None else stated_smoothing(comparison, job, "")
     if comparison is not None and made.motion is not None and not has_errors(found):
         found = [*found, *check_planned(made.path, made.moves, on_written(made.compensation, made.motion.needed),
                                         made.options.merge_feeds, comparison, job)]

@@ -10,12 +10,15 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.base.program_time import ProgramTime
 from postproc.base.progress import Progress
 from postproc.controllers.model import load_controller
+from postproc.cycle_time.conversion import program_clock
 from postproc.job.job import prepare
 from postproc.orientation.candidates.ranking import load_compiler
 from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.path.links import safe_space
+from postproc.pipeline.feeds_by_clock import ProgramClock
 from postproc.placement.bodies import adjacent
 from postproc.placement.oriented_times import OrientedTimer
 from postproc.placement.place_times import TimedPlace, Timer
@@ -35,6 +38,8 @@ _PROOFS = 6
 """places that are converted before giving up"""
 _LIFT = 1e-3
 """mm"""
+_FEW, _NEAR = 2, 1.05
+"""places besides the best whose programs are timed, and how much longer they may take by their plans"""
 _APART = (10.0, 5.0 * DEG)
 """mm, rad from a place whose conversion failed to the next that is tried"""
 
@@ -60,7 +65,9 @@ class PlacementChoice:
     refused: int
     known: tuple[TimedPlace, ...]
     program: tuple[float, float]
-    """seconds of the program at [part] and at the best place; NaN where it cannot be written"""
+    """seconds of the program on the control at [part] and at the best place; NaN where it cannot be written"""
+    times: tuple[ProgramTime | None, ProgramTime | None]
+    """the same with model and band"""
 
     @property
     def part(self) -> PartPlacement:
@@ -69,12 +76,15 @@ class PlacementChoice:
 
 
 def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options | None = None,
-          controller: str | Path = "linuxcnc",
-          progress: Progress | None = None) -> tuple[PlacementChoice | None, list[Diagnostic]]:
-    """The place of least planned time inside [placement] of the set-up; None where a diagnostic is an ERROR.
+          controller: str | Path = "linuxcnc", progress: Progress | None = None,
+          model: str = "") -> tuple[PlacementChoice | None, list[Diagnostic]]:
+    """The place of least time inside [placement] of the set-up; None where a diagnostic is an ERROR.
 
-    The place is converted for the controller and read back before it is taken, and only where that program
-    takes less time than the one at [part] does, links included.
+    Places are found by their planned time. The best few of them are converted for the controller and read back, and the one
+    whose program takes the least time on the control is taken, links included, where [part] does not take less.
+
+    Args:
+        model: cycle-time model of the control, a name or a file; default: the controller's
     """
     options = options or Options()
     setup, stands = standing(setup, toolpath, options.setup)
@@ -107,18 +117,20 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
                              file=options.setup))
     if result.best is None:
         return None, [*found, _nowhere(result, timer, options)]
-    proof = _Proof(toolpath, machine, setup, options, controller, space, progress)
+    proof = _Proof(toolpath, machine, setup, options, controller, space, progress, program_clock(model))
     best, more = _proved(proof, timer, result.best, result.now)
     if best is None:
         return None, [*found, *more]
+    best = _fastest(proof, timer, best)
     program = proof.seconds(result.now), proof.seconds(best)
     if best is not result.now and space.holds(result.now.place) and program[1] >= program[0]:
         more.append(info("place.kept", f"at the best place found the program takes {program[1]:.3f} s, where [part] has the "
                          f"part {program[0]:.3f} s: the part stays there", file=options.setup))
         best, program = result.now, (program[0], program[0])
+    times = proof.time(result.now), proof.time(best)
     more += _lifted(space, best, options.setup)
     return PlacementChoice(work, space, result, best, timer.planned, timer.looked, timer.pruned, timer.refused,
-                           tuple(timer.known()), program), [*found, *more]
+                           tuple(timer.known()), program, times), [*found, *more]
 
 
 def _lifted(space: Space, best: TimedPlace, file: str) -> list[Diagnostic]:
@@ -188,27 +200,43 @@ class _Proof:
     """Conversions at places, each made once; only their seconds and what stood against them is kept."""
 
     def __init__(self, toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options, controller: str | Path,
-                 space: Space, progress: Progress | None) -> None:
+                 space: Space, progress: Progress | None, clock: ProgramClock) -> None:
         self.toolpath, self.machine, self.setup, self.options = toolpath, machine, setup, options
         self.controller, self.space, self.progress = controller, space, progress
-        self.done: dict[int, tuple[float, Diagnostic | None]] = {}
+        self.clock, self.done = clock, dict[int, tuple[ProgramTime | None, Diagnostic | None]]()
 
-    def of(self, one: TimedPlace) -> tuple[float, Diagnostic | None]:
-        """Seconds of the program there (NaN where none is written), and the worst that stands against it."""
+    def of(self, one: TimedPlace) -> tuple[ProgramTime | None, Diagnostic | None]:
+        """The time of the program there (None where none is written), and the worst that stands against it."""
         from postproc.pipeline.convert import convert
-        from postproc.placement.program import program_seconds
 
         if id(one) not in self.done:
             here = self.setup.model_copy(update={"part": self.space.part(one.place)})
             result = convert(self.toolpath, self.machine, self.controller, here, self.options,
-                             progress=self.progress)
+                             progress=self.progress, clock=self.clock)
             why = None if result.ok else max(result.diagnostics, key=lambda d: d.severity)
-            self.done[id(one)] = program_seconds(result), why
+            self.done[id(one)] = self.clock(result, band=True) if result.ok else None, why
         return self.done[id(one)]
 
+    def time(self, one: TimedPlace) -> ProgramTime | None:
+        """Of the program there; None where the part cannot stand there."""
+        return None if one.refused else self.of(one)[0]
+
     def seconds(self, one: TimedPlace) -> float:
-        """Of the program there; NaN where the part cannot stand there."""
-        return np.nan if one.refused else self.of(one)[0]
+        """The same in s; NaN where there is none."""
+        made = self.time(one)
+        return np.nan if made is None else made.seconds
+
+
+def _fastest(proof: _Proof, timer: Timer, best: TimedPlace) -> TimedPlace:
+    """The place whose program takes the least time on the control: `best`, or one of the next best that are apart."""
+    tried = [best]
+    for one in _candidates(timer, best)[1:]:
+        if len(tried) > _FEW or one.seconds > _NEAR * best.seconds:
+            break
+        apart = min(float((np.abs(one.place - other.place) / np.repeat(_APART, ANGLES)).max()) for other in tried)
+        if apart >= 1.0 and proof.of(one)[1] is None:
+            tried.append(one)
+    return min(tried, key=proof.seconds)
 
 
 def _proved(proof: _Proof, timer: Timer, best: TimedPlace,

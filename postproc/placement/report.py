@@ -26,12 +26,21 @@ def as_dict(choice: PlacementChoice) -> dict[str, Any]:
                      "y_axis": list(choice.part.y_axis)},
             "gain": finite(_gain(choice)),
             "program_s": dict(zip(("now", "best"), map(finite, choice.program), strict=True)),
+            "on_the_control": _on_the_control(choice),
             "attitudes": choice.found.attitudes, "places_screened": choice.found.screened,
             "places_looked_at": choice.looked, "places_refused": choice.refused, "places_pruned": choice.pruned,
             "cuts_planned": choice.planned,
             "turned": [_degrees(one.place[ANGLES:]) | {"time_s": finite(one.seconds)} for one in _turned(choice)],
             "without_place": [_degrees(angles) | {"lacks_mm": finite(-margin), "reason": str(why)}
                               for angles, margin, why in choice.found.lacks]}
+
+
+def _on_the_control(choice: PlacementChoice) -> dict[str, Any] | None:
+    """Model and bands of the programs' times; None where the best place has none."""
+    now, best = choice.times
+    if best is None:
+        return None
+    return {"model": best.model, "best_band_s": list(best.band), "now_band_s": None if now is None else list(now.band)}
 
 
 def _place(choice: PlacementChoice, one: TimedPlace) -> dict[str, Any]:
@@ -69,7 +78,10 @@ def as_text(choice: PlacementChoice) -> str:
         lines.append(f"planned time saved: {100.0 * gain:.2f} %")
     if all(map(math.isfinite, choice.program)):
         before, after = choice.program
-        lines.append(f"the program, links included: {before:.3f} s at [part], {after:.3f} s as placed")
+        known = _on_the_control(choice)
+        where = "" if known is None else f" on the control ({known['model']}, 95 % {known['best_band_s'][0]:.2f} to " \
+                                         f"{known['best_band_s'][1]:.2f} s)"
+        lines.append(f"the program, links included: {before:.3f} s at [part], {after:.3f} s as placed{where}")
     lines.append("margin of travel: " + ", ".join(_margins(choice)))
     if choice.best.limiting:
         worst = max(choice.best.limiting, key=lambda name: choice.best.limiting[name])

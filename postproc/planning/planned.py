@@ -18,11 +18,13 @@ from postproc.feedrate.motion import Plan
 from postproc.feedrate.plan import PlannerOptions, plan, plan_second_order
 from postproc.feedrate.shares import LimitShares
 from postproc.feedrate.trajectory import JointTrajectory
-from postproc.path.model import JointPath
+from postproc.path.added_points import cut_at
+from postproc.path.model import FEED, JointPath
 from postproc.planning.pass_geometry import PassGeometry, pass_geometry
 from postproc.planning.planned_errors import PlannedCorrection
 from postproc.planning.sampled_limits import worst_ratio
 from postproc.planning.steady_feed import CORNER, steady_seconds
+from postproc.planning.word_feeds import points_between, with_points, word_seconds
 from postproc.reference.moves import Moves
 from postproc.setup.model import ToolSetup
 from toolpaths.arrays import Floats, Ints
@@ -35,6 +37,8 @@ from toolpaths.units import DEG
 ORDERS: tuple[MotionOrder, ...] = get_args(MotionOrder)
 BEYOND = 0.002
 """share of a limit that round-off of derivatives may take; `steady_feed.ROUNDING` keeps half of it free"""
+SHORTEST = 0.005
+"""mm or degrees that a part of a block goes at least, in the axis that goes farthest: 50 steps of the usual words"""
 
 
 def joint_limits(limits: Limits) -> JointLimits:
@@ -93,39 +97,64 @@ STANDS = 1e-9
 
 
 @dataclass(frozen=True)
-@arrays(needed="K")
 class PlannedMotion:
     """What is planned of a program: its passes, from rest to rest each.
 
     Attributes:
         source: what the passes are made from
-        needed (K,): least seconds of each block of the Path at a constant feed that keeps the limits, 0 where none binds
-        strict: no sample of a plan exceeds a limit; else those between its knots may, jerks by some tenths
+        strict: no sample of the plans exceeds a limit; else those between its knots may, jerks by some tenths
+        made: the passes with their corners blended and their plans; None: made when they are first asked for
     """
 
     source: Source
-    needed: Floats
     strict: bool = False
+    made: tuple[tuple[PassGeometry, Plan], ...] | None = None
 
     @cached_property
     def passes(self) -> tuple[PassGeometry, ...]:
-        """The passes with their corners blended; made when they are first asked for.
+        """The passes with their corners blended.
 
         Raises:
             DiagnosticError: where the smoothed path leaves the reach of the machine.
         """
+        if self.made is not None:
+            return tuple(one for one, _ in self.made)
         found, diagnostics = self.source.geometry()
         require(diagnostics)
         return tuple(found)
 
     @cached_property
     def plans(self) -> tuple[Plan, ...]:
-        """One for each pass; made when they are first asked for.
+        """One for each pass.
 
         Raises:
             DiagnosticError: where no motion keeps the limits.
         """
-        return tuple(self._plan(one) for one in self.passes)
+        return tuple(plan for _, plan in self.made) if self.made is not None else tuple(map(self._plan, self.passes))
+
+    @cached_property
+    def needed(self) -> Floats:
+        """(K,) least seconds of each block of the Path, 0 where nothing is planned: at the highest speed that the plan has
+        in it, and at which a constant feed keeps the limits of the tool; of a control that limits no jerk and makes its
+        ramps itself, at which a constant feed keeps all limits.
+
+        Raises:
+            DiagnosticError: as `passes` and `plans`.
+        """
+        steady = self._steady[1]
+        if not self.source.limited_jerk:
+            return steady
+        return np.fmax(steady, word_seconds(tuple(zip(self.passes, self.plans, strict=True)), len(self.source.path)))
+
+    @cached_property
+    def _steady(self) -> tuple[tuple[PassGeometry, ...], Floats]:
+        """The passes stopping at corners, and (K,) s of each block at a constant feed that keeps `Source.steady`."""
+        count = len(self.source.path)
+        if self.source.limited_jerk and not self.source.tools:
+            return (), np.zeros(count)
+        found, diagnostics = self.source.geometry(CORNER)
+        require(diagnostics)
+        return tuple(found), steady_seconds([(one, self.source.steady(one)) for one in found], count)
 
     def _plan(self, one: PassGeometry) -> Plan:
         try:
@@ -135,6 +164,19 @@ class PlannedMotion:
             lines = self.source.moves.line[one.move[[0, -1]]].tolist()
             raise DiagnosticError([error("plan.failed", f"no motion could be planned: {fault}", file=self.source.file,
                                          lines=lines, hint=f"{REPORT}; --feed programmed needs no plan")]) from fault
+
+    def with_points(self, home: Floats, unit: Floats) -> PlannedMotion:
+        """The same motion on blocks of which none spans too much change of speed; arcs stay whole.
+
+        Args:
+            home: (J,) joints before the first block; unit (J,): mm or degrees of a unit of each joint
+        """
+        path, made = self.source.path, tuple(zip(self.passes, self.plans, strict=True))
+        before = np.concatenate([home[None], path.q[:-1]])
+        added = points_between(made, path.code == FEED, (np.abs(path.q - before) * unit).max(axis=1, initial=0.0), SHORTEST)
+        cut = cut_at(path, self.source.moves, self.source.kinematics, home, *added)
+        return replace(self, source=replace(self.source, path=cut),
+                       made=tuple((with_points(one, added, len(path)), plan) for one, plan in made))
 
     @property
     def seconds(self) -> float:
@@ -167,7 +209,8 @@ class PlannedMotion:
 class Source:
     """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it
     stops, how geometric errors are corrected, where they are, the feed override (1 for 100 %) at which the
-    motion is planned, and limits by index of the tool."""
+    motion is planned, limits by index of the tool, and whether the
+    control limits jerks."""
 
     path: JointPath
     moves: Moves
@@ -179,6 +222,7 @@ class Source:
     correction: PlannedCorrection | None = None
     override: float = 1.0
     tools: Mapping[int, ToolLimits] = field(default_factory=dict)
+    limited_jerk: bool = True
 
     @property
     def bounds(self) -> JointLimits:
@@ -189,6 +233,12 @@ class Source:
         """Limits of the joints, and of the tool that cuts a pass."""
         return replace(self.bounds, tool=self.tools.get(int(self.moves.tool[one.move[0]])))
 
+    def steady(self, one: PassGeometry) -> JointLimits:
+        """What no control keeps by itself, so that it is kept at the constant feed of a block: limits of the tool, and those
+        of the axes where it limits no jerk."""
+        free, found = np.full(len(self.machine.axis_names), np.inf), self.bounds_of(one)
+        return JointLimits(free, free, free, found.tool) if self.limited_jerk else found
+
     def geometry(self, sharpest: float = SHARPEST) -> tuple[list[PassGeometry], list[Diagnostic]]:
         """See `pass_geometry`."""
         return pass_geometry(self.path, self.moves, self.kinematics, self.tolerance, self.stops, sharpest, self.file,
@@ -196,16 +246,19 @@ class Source:
 
 
 def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnostic]]:
-    """Feeds of blocks that keep the limits, and the planned motion when it is asked for.
-
-    Feeds of blocks are for motion that stops at corners; the planned motion blends them (see `steady_feed`).
-    """
-    stopping, diagnostics = source.geometry(CORNER)
-    if diagnostics:
-        return None, diagnostics
-    needed = steady_seconds([(one, source.bounds_of(one)) for one in stopping], len(source.path))
-    beyond = _limits_exceeded(stopping, needed, source)
-    return (None, beyond) if beyond else (PlannedMotion(source, needed), [])
+    """The motion of a path's passes within all limits; errors where there is none, or where it exceeds a limit."""
+    motion = PlannedMotion(source, strict=True)
+    try:
+        stopping, steady = motion._steady
+        planned = zip(motion.passes, motion.plans, strict=True) if source.limited_jerk else ()
+        found = [one for one in planned if _worst(one[1]) > 1.0 + BEYOND]
+    except DiagnosticError as fault:
+        return None, list(fault.diagnostics)
+    beyond = [] if source.limited_jerk else _limits_exceeded(list(stopping), steady, source)
+    if found:
+        one, made = max(found, key=lambda pair: _worst(pair[1]))
+        beyond.append(_beyond(_worst(made), source.moves.line[one.move[[0, -1]]].tolist(), len(found), source.file))
+    return (None, beyond) if beyond else (motion, [])
 
 
 def _limits_exceeded(passes: list[PassGeometry], needed: Floats, source: Source) -> list[Diagnostic]:
@@ -216,10 +269,22 @@ def _limits_exceeded(passes: list[PassGeometry], needed: Floats, source: Source)
         count += int((ratio > 1.0 + BEYOND).sum())
         if len(ratio) and ratio.max() > worst:
             worst, where = float(ratio.max()), int(source.moves.line[source.path.move[one.block[ratio.argmax()]]])
-    if not count:
-        return []
-    return [error("plan.limits", f"a planned feed would take {worst:.3f} times what an axis can do", file=source.file,
-                  lines=[where], count=count, hint=f"{REPORT}; --feed programmed needs no plan")]
+    return [_beyond(worst, [where], count, source.file)] if count else []
+
+
+def _beyond(worst: float, lines: list[int], count: int, file: str) -> Diagnostic:
+    return error("plan.limits", f"a planned feed would take {worst:.3f} times what an axis can do", file=file, lines=lines,
+                 count=count, hint=f"{REPORT}; --feed programmed needs no plan")
+
+
+def _worst(made: Plan) -> float:
+    """Largest ratio of a plan's samples to a limit; of velocities and accelerations where no jerk is limited."""
+    return float(made.usage().worst) if np.isfinite(made.limits.jerk).all() else 0.0
+
+
+def pass_feed(one: PassGeometry, moves: Moves) -> PassFeed:
+    """The largest speed along a pass as the moves ask for it."""
+    return PassFeed(one, one.smooth.s, moves.feed[one.move], moves.seconds[one.move] * one.share)
 
 
 def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits,
@@ -228,7 +293,7 @@ def plan_pass(one: PassGeometry, moves: Moves, limits: JointLimits,
 
     Of second order where the machine states no jerk for some axis.
     """
-    feed = PassFeed(one, one.smooth.s, moves.feed[one.move], moves.seconds[one.move] * one.share)
+    feed = pass_feed(one, moves)
     run = plan if np.isfinite(limits.jerk).all() else plan_second_order
     made = [run(path, limits, feed, options=options) for path in one.paths]
     return replace(made[0], pieces=tuple(piece for each in made for piece in each.pieces),

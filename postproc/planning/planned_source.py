@@ -15,10 +15,11 @@ from toolpaths.smoothing.smooth import Tolerance
 
 
 def source_of(job: Job, moves: Moves, path: JointPath, correction: PlannedCorrection | None = None,
-              override: float = 1.0) -> Source:
-    """The source of the planned motion of a job's path; `correction` and `override` as of `Source`."""
+              override: float = 1.0, limited_jerk: bool = True) -> Source:
+    """The source of the planned motion of a job's path; `correction`, `override` and `limited_jerk` as of `Source`."""
     return Source(path, moves, job.machine, job.kinematics, Tolerance(job.options.tolerance, job.axis_tolerance),
-                  stops_of(job.toolpath, moves), job.toolpath.file, correction, override, limits_by_tool(job))
+                  stops_of(job.toolpath, moves), job.toolpath.file, correction, override, limits_by_tool(job),
+                  limited_jerk)
 
 
 def limits_by_tool(job: Job) -> dict[int, ToolLimits]:

@@ -1,7 +1,7 @@
 """What the commands do, as calls: values and numpy arrays in and out, faults as DiagnosticError.
 
-`convert` and `verify` are those of `postproc.pipeline.convert`; these are the others. Each raises DiagnosticError with
-all diagnostics where its command would end with exit code 1.
+`convert` and `verify` stand in `conversion.py`; these are the others. Each raises
+DiagnosticError with all diagnostics where its command would end with exit code 1.
 """
 
 from __future__ import annotations
@@ -15,13 +15,15 @@ from machines.machine import Machine
 from postproc.base.given import is_number, wrong
 from postproc.base.options import Options
 from postproc.controllers.model import load_controller
+from postproc.cycle_time.conversion import program_clock
 from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.model import load_model, model_name
 from postproc.cycle_time.source import from_conversion, from_gcode, read_file
 from postproc.orientation.plans.choice import OrientationChoice
-from postproc.pipeline.convert import choose_axes, convert, require_call
+from postproc.pipeline.convert import choose_axes, require_call
 from postproc.placement.place import PlacementChoice
 from postproc.placement.place import place as place_part
+from postproc.python.conversion import convert
 from postproc.setup.model import SetupFile, alone, load_setup
 from postproc.verification.neighbour_files import NeighbourFiles
 from toolpaths.cl.text.kinds_of_file import looks_like_apt
@@ -53,7 +55,7 @@ def time(source: Toolpath | FileName, machine: Machine | FileName, controller: F
     planner = read_value(load_model(model or model_name(str(controller), spec.writer))).of_machine(m)
     times = None
     if isinstance(source, Toolpath):
-        result = convert(source, m, controller, setup, options)
+        result = convert(source, m, controller, setup, options, model=model)
         require(result.diagnostics)
         blocks = from_conversion(result, override)
         if planner.kind == "ideal":
@@ -81,7 +83,7 @@ def orient(path: Toolpath, machine: Machine | FileName, controller: FileName = "
         DiagnosticError: carries all that was found.
     """
     options = options or Options(orient="auto")
-    result = choose_axes(path, _machine(machine), controller, options, [])
+    result = choose_axes(path, _machine(machine), controller, options, [], clock=program_clock())
     return read_value((result.choice, result.diagnostics))
 
 

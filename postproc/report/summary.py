@@ -50,6 +50,8 @@ def as_dict(result: PostResult, output: str, estimate: Estimate | None = None) -
         "linearising_bound": _bound(result),
         "feed_reduced_blocks": int(result.feeds.slowed.sum()) if result.feeds is not None else 0,
         "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
+        "optimised": result.optimised.as_dict() if result.optimised else None,
+        "feed_times": result.feed_times.as_dict() if result.feed_times else None,
         "tolerance_shares": result.shares or {},
         "output_modes": output_modes(result),
         "places": places(result, estimate),
@@ -119,6 +121,15 @@ def _orientation(result: PostResult) -> dict[str, Any] | None:
     from postproc.orientation.report.figures_of_choice import chosen
 
     return chosen(result.choice, result.options.orient)
+
+
+def _axes_on_the_control(result: PostResult) -> list[str]:
+    """What the chosen tool axes gain on the control, for people."""
+    if result.choice is None or not result.choice.programs:
+        return []
+    from postproc.orientation.report.figures_of_choice import control_line
+
+    return [control_line(result.choice)]
 
 
 def witness_dict(said: Testimony | None) -> dict[str, Any] | None:
@@ -232,6 +243,7 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None) -
         noted = d["orientation"]
         lines.append(f"tool axes, {noted['plan']}: {noted['turned']} of {len(noted['passes'])} passes turned; planned "
                      f"{_seconds(noted['time_s'])}, with the axes of the CL file {_seconds(noted['reference_time_s'])}")
+        lines += _axes_on_the_control(result)
     if d["files"]:
         lines.append(f"subprograms next to it: {', '.join(Path(file).name for file in d['files'])}")
     lines += place_lines(result, estimate)
@@ -244,6 +256,8 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None) -
         from postproc.cycle_time.conversion import text
 
         lines.append(text(estimate))
+    lines += result.optimised.lines() if result.optimised else []
+    lines += result.feed_times.lines() if result.feed_times else []
     lines.append("axes: " + ", ".join(f"{k} {_places(lo)} to {_places(hi)}" for k, (lo, hi) in d["axis_extents"].items()))
     if d["geometric_errors"] is not None and d["geometric_errors"]["corrected_by"] == "control":
         lines.append(f"geometric errors {d['geometric_errors']['model']}: left to the control, not corrected here")

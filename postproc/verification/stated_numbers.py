@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.base.header_words import HEADER, SETUP_MARK, header_of, read_header
 from postproc.job.job import Job
+from postproc.readback.comparison.compare import Comparison
 from postproc.readback.dialects.base import as_bytes
 from toolpaths.diagnostics import Diagnostic, error
 
@@ -79,3 +80,12 @@ def _same(said: str, right: float) -> bool:
         return said != NOTHING and right == 0.0
     decimals = len(said) - said.index(".") - 1 if "." in said else 0
     return abs(float(said) - right) <= 0.501 * 10.0**-decimals
+
+
+def stated_smoothing(c: Comparison, job: Job, gcode: str) -> list[Diagnostic]:
+    """An error where the smoothing that a program's header states and the deviation that is proved leave the tolerance."""
+    mm, allowed = job.options.smoothing, job.options.tolerance
+    if not mm or c.tip_bound + job.smoothing.most <= allowed * (1.0 + 1e-6):
+        return []
+    return [error("verify.smoothing", f"the header gives the control's smoothing {mm:g} mm, with the deviation of "
+                  f"{c.tip_bound:.6f} mm more than the {allowed:g} mm allowed", file=gcode)]

@@ -12,13 +12,16 @@ import machines
 from machines.machine import Machine, Timing
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.blocks import MotionBlocks
+from postproc.cycle_time.estimate import estimate
 from postproc.cycle_time.model import CycleTimeModel, load_model
-from postproc.cycle_time.source import from_gcode
+from postproc.cycle_time.planned import planned_times
+from postproc.cycle_time.source import from_conversion, from_gcode
+from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from postproc.time_fit.calibrate import CalibratedModel, calibrate
 from postproc.time_fit.log import RunLog
 from postproc.time_fit.runs import run_of_log
-from toolpaths.diagnostics import Diagnostic
+from toolpaths.diagnostics import Diagnostic, read_value
 
 HEAD = "G21 G90 G94 G17"
 
@@ -96,3 +99,9 @@ def _arc(rng: np.random.Generator, at: np.ndarray, top: float) -> str:
     at[:] = [at[0] + i + radius * math.cos(end), at[1] + j + radius * math.sin(end),
              max(at[2] + rng.choice([0.0, -2.0]), top - 60)]
     return f"G{3 if ccw else 2} X{at[0]:.7f} Y{at[1]:.7f} Z{at[2]:.7f} I{i:.7f} J{j:.7f}"
+
+
+def program_seconds(result: PostResult) -> float:
+    """s of a program, links and travel home included: its passes as planned, all else under the ideal control."""
+    model, blocks = read_value(load_model("ideal")), from_conversion(result)
+    return float(estimate(blocks, result.machine, model, times=planned_times(result, blocks, model)[0]).seconds)

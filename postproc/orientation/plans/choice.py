@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from postproc.base.options import Orientation
+from postproc.base.program_time import ProgramTime
 from postproc.orientation.candidates.search import PassSearch
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.plans import OrientationPlan, StateTable
@@ -29,6 +31,7 @@ class OrientationChoice:
     Attributes:
         table: the states out of which the plans are made
         paper: the paper's choice in each pass (a vertex along the mean direction, smallest angles), elsewhere the own axis
+        programs: times on the control of the programs of "keep" and "auto", where a clock was given
         proof: what became of the program of the plan that was asked for; None where none was made
     """
 
@@ -38,6 +41,13 @@ class OrientationChoice:
     plans: dict[Orientation, OrientationPlan]
     paper: OrientationPlan
     proof: PlanProof | None = None
+    programs: Mapping[Orientation, ProgramTime] = field(default_factory=dict)
+
+    @property
+    def gain(self) -> float | None:
+        """Percent of the time of "keep" on the control that "auto" saves; None where one of them is not known."""
+        before, now = self.programs.get("keep"), self.programs.get("auto")
+        return 100.0 * (1.0 - now.seconds / before.seconds) if before and now and before.seconds > 0.0 else None
 
     def toolpath(self, name: Orientation) -> Toolpath:
         """The CL path with the axes of a plan."""

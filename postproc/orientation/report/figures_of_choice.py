@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from postproc.base.options import Orientation
+from postproc.base.program_time import ProgramTime
 from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.candidates.reaches import binding, feed_of, reaches
 from postproc.orientation.candidates.rejections import grouped, runner_up
@@ -29,6 +30,7 @@ def as_dict(choice: OrientationChoice, plan: Orientation = "auto") -> dict[str, 
     proof = choice.proof
     return {"machine": choice.work.machine.name, "plan": plan, "controller": proof.controller if proof else None,
             "proved": proof.ok and proof.bounded if proof else None,
+            "on_the_control": on_the_control(choice),
             "passes": [_pass(tried, made, choice.work) for tried, made in zip(choice.tried, picked, strict=True)],
             "plans": plans | {"paper_per_pass": _plan(choice.paper, keep)}}
 
@@ -42,14 +44,40 @@ def chosen(choice: OrientationChoice, plan: Orientation) -> dict[str, Any]:
               for tried, made in zip(choice.tried, picked, strict=True)]
     return {"plan": plan, "time_s": finite(choice.plans[plan].seconds),
             "reference_time_s": finite(choice.plans["keep"].seconds),
+            "on_the_control": on_the_control(choice),
             "turned": sum(not made.same(tried.own.axis, tried.own.held)
                           for tried, made in zip(choice.tried, picked, strict=True)), "passes": passes}
+
+
+def on_the_control(choice: OrientationChoice) -> dict[str, Any] | None:
+    """Times of the programs of "keep" and "auto" on the control; None where they are not known."""
+    if not choice.programs:
+        return None
+    return {"model": next(iter(choice.programs.values())).model, "gain_percent": choice.gain,
+            **{name: {"time_s": one.seconds, "band_s": list(one.band)} for name, one in choice.programs.items()}}
+
+
+def control_line(choice: OrientationChoice) -> str:
+    """The same for people; "" where nothing is known."""
+    keep, auto = choice.programs.get("keep"), choice.programs.get("auto")
+    if auto is None:
+        return ""
+    said = f"on the control ({auto.model}): auto {_with_band(auto)}"
+    if keep is None:
+        return said + "; with the axes of the CL file no program is written"
+    gained = "nothing gained" if not choice.gain else f"{choice.gain:.1f} % gained"
+    noted = ", within the model's uncertainty" if 0.0 < keep.seconds - auto.seconds < auto.uncertainty else ""
+    return f"{said}, with the axes of the CL file {_with_band(keep)}: {gained}{noted}"
+
+
+def _with_band(one: ProgramTime) -> str:
+    return f"{one.seconds:.2f} s (95 % {one.band[0]:.2f} to {one.band[1]:.2f} s)"
 
 
 def slower(choice: OrientationChoice, plan: Orientation) -> list[Diagnostic]:
     """A warning where a plan takes longer than the axes of the CL file."""
     made, before = choice.plans[plan].seconds, choice.plans["keep"].seconds
-    if not made > before:
+    if not made > before or (plan == "auto" and choice.programs):
         return []
     return [warning("orient.slower", f"{plan} takes {made:.3f} s, the axes of the CL file {before:.3f} s: turning between "
                     "passes costs more than it gives", file=choice.work.toolpath.file,

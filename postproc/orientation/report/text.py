@@ -15,7 +15,7 @@ from postproc.orientation.passes.reasons import RejectionKind
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan
 from postproc.orientation.plans.shares import shares_of, turns
-from postproc.orientation.report.figures_of_choice import NAMES, UNITS, gain
+from postproc.orientation.report.figures_of_choice import NAMES, UNITS, control_line, gain
 from toolpaths.rotations import angle_between
 from toolpaths.table_text import table_text
 from toolpaths.units import DEG
@@ -42,7 +42,8 @@ def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Seque
         lines.append(f"      and {len(rows) - len(shown)} passes that gain less; all are in --json")
     for number in passes:
         lines += ["", *_in_full(*rows[number])]
-    return "\n".join([*lines, "", _totals(choice), *_plans(choice)])
+    noted = [line for line in (control_line(choice),) if line]
+    return "\n".join([*lines, "", _totals(choice), *_plans(choice), *noted])
 
 
 def header(choice: OrientationChoice, plan: Orientation) -> list[str]:

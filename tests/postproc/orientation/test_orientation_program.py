@@ -12,10 +12,10 @@ import toolpaths
 from postproc.base.options import Options
 from postproc.orientation.plans.orient import orient
 from postproc.pipeline.convert import convert
-from postproc.placement.program import program_seconds
 from postproc.report.unwinding import unwinding
 from postproc.setup.model import load_setup
 from tests.postproc.kit import SAMPLES, machine
+from tests.postproc.time_kit import program_seconds
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
 

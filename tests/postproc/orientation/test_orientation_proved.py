@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import postproc
 from machines.machine import Machine, Timing
 from postproc.base.options import Options, Orientation
 from postproc.cli.app import app
@@ -50,7 +49,7 @@ def adjacent(*posts: Box) -> SetupFile:
 
 
 def converted(path: Toolpath, setup: SetupFile, plan: Orientation = "auto") -> PostResult:
-    return postproc.convert(path, quick(), "linuxcnc", setup, Options(orient=plan))
+    return pipeline.convert(path, quick(), "linuxcnc", setup, Options(orient=plan))
 
 
 @cache
@@ -65,7 +64,7 @@ def refused() -> tuple[OrientationChoice, PostResult, list[Diagnostic]]:
 
 def test_a_way_that_touches_is_not_taken() -> None:
     unproved, result, noted = refused()
-    program = postproc.convert(unproved.toolpath("auto"), quick(), "linuxcnc", adjacent(*POSTS))
+    program = pipeline.convert(unproved.toolpath("auto"), quick(), "linuxcnc", adjacent(*POSTS))
     assert {d.code for d in program.diagnostics if d.severity > 1} == {"collision.touch"}
     assert result.ok and result.choice is not None
     auto, before = result.choice.plans["auto"], unproved.plans["auto"]
@@ -114,7 +113,7 @@ def test_the_program_that_proved_is_not_made_again(monkeypatch: pytest.MonkeyPat
     path, setup = strips([0.0] * 2), adjacent()
     result = converted(path, setup)
     assert result.ok and len(made) == 1 and "planned" in result.text
-    planned = postproc.convert(path, quick(), "linuxcnc", setup,
+    planned = pipeline.convert(path, quick(), "linuxcnc", setup,
                                Options(orient="auto", feed="planned", smooth=True))
     assert planned.ok and len(made) == 3 and [one.feed for one in made[1:]] == ["programmed", "planned"]
 

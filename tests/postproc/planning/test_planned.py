@@ -216,7 +216,7 @@ def test_direction_of_a_rotary_axis_is_passed_without_a_swing(off: float) -> Non
     assert result.path is not None and result.job is not None
     made = motion(result)
     cutting = made.needed > 0.0
-    assert made.needed[cutting].sum() < result.path.seconds[cutting].sum()
+    assert made.needed[cutting].sum() < 1.05 * result.path.seconds[cutting].sum()  # rest at both ends, no swing
     one, = made.passes
     path, = one.paths
     assert path.led.any() and np.ptp(path.values[:, 4]) < np.radians(5.0)

@@ -1,0 +1,43 @@
+"""`convert` and `verify` as they are called from Python: choices go by the clock of the control."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from machines.machine import Machine
+from postproc.base.options import Options
+from postproc.base.progress import Progress
+from postproc.cycle_time.conversion import program_clock
+from postproc.pipeline.convert import convert as run_convert
+from postproc.pipeline.convert import verify as run_verify
+from postproc.pipeline.result import PostResult, VerifyResult
+from postproc.setup.model import SetupFile
+from toolpaths.diagnostics import Diagnostic
+from toolpaths.toolpath import Toolpath
+
+
+def convert(path: Toolpath, machine: Machine | str | Path, controller: str | Path = "linuxcnc",
+            setup: SetupFile | str | Path | None = None, options: Options | None = None,
+            diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None, *, model: str = "") -> PostResult:
+    """`pipeline.convert.convert`, what is chosen goes by the control's clock.
+
+    Args:
+        model: of the control, as of `time`
+
+    Raises:
+        DiagnosticError: as there.
+    """
+    return run_convert(path, machine, controller, setup, options, diagnostics, progress, program_clock(model))
+
+
+def verify(gcode: str | Path, path: Toolpath, machine: Machine | str | Path, controller: str | Path = "linuxcnc",
+           setup: SetupFile | str | Path | None = None, options: Options | None = None,
+           diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None, tool_table: str | Path = "", *,
+           model: str = "") -> VerifyResult:
+    """`pipeline.convert.verify`, tool axes chosen by the control's clock as `convert` does; `model` as there.
+
+    Raises:
+        DiagnosticError: as there.
+    """
+    return run_verify(gcode, path, machine, controller, setup, options, diagnostics, progress, tool_table,
+                      program_clock(model))

@@ -1,0 +1,105 @@
+"""`--optimise`: never slower on the control's clock, proved and verified like any other, what was gained by what."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from postproc.base.header_words import read_header
+from postproc.base.options import Options
+from postproc.base.program_time import ProgramTime
+from postproc.cycle_time.conversion import program_clock
+from postproc.pipeline.convert import convert, verify
+from postproc.pipeline.result import PostResult
+from tests.postproc.kit import goto, machine, toolpath
+from tests.postproc.planning.test_planned_feed import wave
+from toolpaths.toolpath import Toolpath
+
+
+def swing(count: int = 6) -> Toolpath:
+    """Few points, the axis turning by 6 degrees from each to the next: many points between."""
+    s = np.linspace(0.0, 1.0, count)
+    tip = np.round(np.stack((60.0 * s, 10.0 * s, 5.0 * np.sin(6.0 * s)), axis=1), 4)
+    axis = np.stack((0.3 + 0.5 * s, 0.4 * np.cos(5.0 * s), np.ones(count)), axis=1)
+    lines = goto(tip, axis / np.linalg.norm(axis, axis=1, keepdims=True))
+    return toolpath("RAPID", lines[0], "FEDRAT/MMPM,6000", *lines[1:])
+
+
+@cache
+def made(controller: str, **options: Any) -> PostResult:
+    return convert(swing(), machine("mikron-ucp710"), controller, options=Options(**options), clock=program_clock())
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", "siemens-840d", *(
+    pytest.param(name, marks=pytest.mark.slow) for name in ("heidenhain-tnc640", "haas-ngc"))])
+def test_nothing_is_slower_and_what_is_gained_adds_up(controller: str) -> None:
+    plain, best = made(controller), made(controller, optimise=True)
+    assert plain.ok and best.ok and best.optimised is not None, [str(d) for d in best.diagnostics]
+    before, after = (program_clock()(one).seconds for one in (plain, best))
+    assert after <= before and best.optimised.after.seconds == after and best.optimised.before.seconds == before
+    assert before - after == pytest.approx(sum(one.before - one.after for one in best.optimised.steps), abs=1e-9)
+    assert best.optimised.tried > 3 and best.optimised.before.bound <= after
+    assert best.comparison is not None and best.comparison.worst_tip <= 0.01
+
+
+def test_a_share_of_the_tolerance_that_gains_is_stated_and_verified(tmp_path: Path) -> None:
+    best = made("linuxcnc", optimise=True)
+    assert best.ok and best.optimised is not None
+    assert best.optimised.steps and any("smoothing" in one.what for one in best.optimised.steps)
+    stated = read_header(best.text.encode()).smoothing
+    assert stated == best.options.smoothing > 0.0
+    program = tmp_path / "p.ngc"
+    program.write_text(best.text)
+    assert verify(program, swing(), machine("mikron-ucp710"), "linuxcnc").ok
+    program.write_text(best.text.replace("smoothing", "rounding"))
+    found = verify(program, swing(), machine("mikron-ucp710"), "linuxcnc")
+    assert (stated > 0.003) == ("verify.smoothing" in {d.code for d in found.diagnostics})
+
+
+def test_a_header_that_gives_the_control_what_the_path_has_used_is_refused(tmp_path: Path) -> None:
+    """0.005 mm are linearised, 0.003 the control's: with 0.007 in header and blocks both leave the tolerance of 0.01."""
+    plain = made("linuxcnc")
+    assert plain.ok and plain.comparison is not None and plain.comparison.tip_bound > 0.0025
+    text = plain.text.replace("G64 P0.002 Q0.001", "G64 P0.006 Q0.001").replace("(feed mode auto)", (
+        "(feed mode auto)\n(control's smoothing 0.007 mm)"))
+    assert "P0.006 " in text and "smoothing 0.007 mm" in text
+    program = tmp_path / "p.ngc"
+    program.write_text(text)
+    found = verify(program, swing(), machine("mikron-ucp710"), "linuxcnc")
+    assert "verify.smoothing" in {d.code for d in found.diagnostics} and not found.ok
+
+
+def test_what_is_slower_is_not_taken() -> None:
+    """A clock that finds every change slower: the program is the one without --optimise."""
+    plain = made("linuxcnc")
+    seen: list[float] = []
+
+    def clock(result: PostResult, band: bool = False) -> ProgramTime:
+        seen.append(100.0 + len(seen))
+        moves = np.zeros(len(result.comparison.moves) if result.comparison else 0)
+        return ProgramTime(seen[-1], (seen[-1], seen[-1]), 90.0, "clock of the test", moves)
+
+    best = convert(swing(), machine("mikron-ucp710"), "linuxcnc", options=Options(optimise=True), clock=clock)
+    assert best.ok and best.optimised is not None and not best.optimised.steps and len(seen) > 5
+    assert [d.code for d in best.diagnostics] == [d.code for d in plain.diagnostics]
+    body = [text.split("\n%")[0].splitlines()[-40:-5] for text in (best.text, plain.text)]
+    assert body[0] == body[1]
+
+
+def test_modes_that_the_shop_asks_for_stay() -> None:
+    best = made("siemens-840d", optimise=True, output="tcp")
+    assert best.ok and best.optimised is not None
+    assert not any("output mode" in one.what for one in best.optimised.steps) and best.setup.output.default == "auto"
+
+
+def test_planned_feeds_are_optimised_too() -> None:
+    lines = wave(40)
+    path = toolpath("RAPID", lines[0], "FEDRAT/MMPM,6000", *lines[1:])
+    best = convert(path, machine("mikron-ucp710"), "fanuc-30i", options=Options(optimise=True, feed="planned"),
+                   clock=program_clock())
+    assert best.ok and best.optimised is not None and best.feed_times is not None
+    assert best.optimised.after.seconds <= best.optimised.before.seconds

@@ -1,0 +1,147 @@
+"""Words of `--feed planned` carry the plan: executed as written on a jerk-limited control, and by closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import toolpaths
+from postproc.base.options import Options
+from postproc.controllers.model import load_controller
+from postproc.cycle_time.conversion import program_clock
+from postproc.cycle_time.estimate import timed
+from postproc.cycle_time.model import load_model
+from postproc.cycle_time.source import from_conversion
+from postproc.feedrate.feed import StepFeed
+from postproc.feedrate.plan import PlannerOptions, plan
+from postproc.path.added_points import cut_at
+from postproc.pipeline.convert import convert as convert_by_clock
+from postproc.pipeline.result import PostResult
+from postproc.planning.word_feeds import LEAST, SPREAD
+from tests.postproc.kit import SAMPLES, convert, good, machine, toolpath
+from tests.postproc.planning.test_planned_feed import wave
+
+JERKY = "fanuc-30i"
+"""a control that limits jerk"""
+PATHS = {"wave, fast": ("mikron-ucp710", 160, 9000), "wave, slow": ("mikron-ucp710", 160, 1500),
+         "wave, few points": ("mikron-ucp710", 40, 6000), "fork head": ("fork-head-ab", 100, 4000),
+         "nutating head": ("nutating-head", 100, 3000), "trunnion": ("trunnion-bc", 100, 5000)}
+
+
+def waves(name: str, count: int, rate: int, feed: str = "planned", controller: str = JERKY) -> PostResult:
+    lines = wave(count)
+    setup = str(SAMPLES / "tools.setup.toml")
+    return good(convert(toolpath("RAPID", lines[0], f"FEDRAT/MMPM,{rate}", *lines[1:]), name, controller, feed=feed,
+                        setup=setup))
+
+
+def lines_and_corner(feed: str = "planned") -> PostResult:
+    return good(convert(toolpath("RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,6000", "GOTO/80,0,50", "GOTO/80,60,50",
+                                 "GOTO/20,60,40"), "mill-3axis", JERKY, feed=feed))
+
+
+def executed(result: PostResult, strict: bool = True) -> tuple[float, float, float]:
+    """(s, worst ratio to a limit, s of the plan) of the passes under the words as steps of the largest speed, from rest to
+    rest: a control that uses its limits to the full."""
+    assert result.motion is not None and result.feeds is not None
+    seconds, worst, planned = 0.0, 0.0, 0.0
+    for one, made in zip(result.motion.passes, result.motion.plans, strict=True):
+        rows = np.flatnonzero(one.ends > one.begin)
+        speed = (one.ends - one.begin)[rows] / result.feeds.seconds[one.block[rows]]
+        edges = np.append(one.begin[rows], one.ends[rows[-1]])
+        for path in one.paths:
+            run = plan(path, result.motion.source.bounds_of(one), StepFeed(edges, speed),
+                       options=PlannerOptions(strict=strict))
+            seconds, worst = seconds + run.seconds, max(worst, run.usage().worst)
+        planned += made.seconds
+    return seconds, worst, planned
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_a_jerk_limited_control_takes_the_plans_time(name: str) -> None:
+    result = waves(*PATHS[name])
+    seconds, worst, planned = executed(result)
+    assert abs(seconds / planned - 1.0) < 0.03 and worst <= 1.0 + 1e-9
+
+
+def test_mean_speeds_would_take_longer() -> None:
+    """Why F is the highest speed of the plan in a block, not the mean."""
+    result = waves(*PATHS["wave, fast"])
+    assert result.motion is not None and result.feeds is not None
+    one, made = result.motion.passes[0], result.motion.plans[0]
+    mean = np.zeros_like(result.feeds.seconds)
+    mean[one.block] = made.blocks(np.append(one.begin, one.ends[-1])).seconds
+    slower = replace(result, feeds=replace(result.feeds, seconds=np.fmax(mean, result.feeds.seconds)))
+    assert executed(slower, strict=False)[0] > 1.04 * made.seconds
+
+
+def test_words_are_near_the_plans_means_and_never_above_its_speeds() -> None:
+    result = waves(*PATHS["wave, fast"])
+    assert result.motion is not None and result.feeds is not None
+    one, made = result.motion.passes[0], result.motion.plans[0]
+    speeds = made.blocks(np.append(one.begin, one.ends[-1]))
+    word = (one.ends - one.begin) / result.feeds.seconds[one.block]
+    assert (word <= speeds.highest * 1.005).all()
+    moving = speeds.lowest > 0.8 * speeds.highest
+    assert (word[moving] <= (1.0 + 3.0 * SPREAD) * speeds.mean[moving]).all() and moving.sum() > 120
+    assert (speeds.seconds[moving] > 0.1 * LEAST).all()
+    assert np.nansum(result.feeds.seconds[one.block]) > 0.9 * made.seconds
+
+
+def test_points_are_added_where_a_block_spans_its_ramps() -> None:
+    plain, result = lines_and_corner("programmed"), lines_and_corner()
+    assert plain.path is not None and result.path is not None and result.motion is not None
+    own = set(np.round(plain.path.q, 9)[:, 0].tolist())
+    assert len(result.path) > len(plain.path) + 20 and own <= set(np.round(result.path.q, 9)[:, 0].tolist())
+    assert np.nansum(result.path.seconds) == pytest.approx(np.nansum(plain.path.seconds), rel=1e-9)
+    seconds, worst, planned = executed(result)
+    assert abs(seconds / planned - 1.0) < 0.03 and worst <= 1.0 + 1e-9
+
+
+def test_cut_parts_stay_on_their_block() -> None:
+    result = waves("mikron-ucp710", 40, 6000, "programmed", "linuxcnc")
+    assert result.path is not None and result.job is not None
+    block, share = np.array([5, 5, 9]), np.array([0.25, 0.75, 0.5])
+    cut = cut_at(result.path, result.job.moves, result.job.kinematics, machine("mikron-ucp710").home, block, share)
+    q, s = result.path.q, result.path.seconds
+    assert len(cut) == len(result.path) + 3 and cut.q[[7, 12]].tolist() == q[[5, 9]].tolist()
+    assert cut.q[5] == pytest.approx(0.75 * q[4] + 0.25 * q[5], abs=1e-12)
+    assert cut.seconds[5:8] == pytest.approx(s[5] * np.array([0.25, 0.5, 0.25]))
+    assert cut.u[5] == pytest.approx(0.25) and cut.u[7] == 1.0
+    assert cut.begin[-1] == result.path.begin[-1] + 3
+
+
+@pytest.mark.parametrize("controller", ["linuxcnc", JERKY])
+def test_both_times_are_reported_and_planned_is_not_slower(controller: str) -> None:
+    lines = wave(60)
+    path = toolpath("RAPID", lines[0], "FEDRAT/MMPM,6000", *lines[1:])
+    made = good(convert_by_clock(path, machine("mikron-ucp710"), controller, options=Options(feed="planned"),
+                                 clock=program_clock()))
+    times = made.feed_times
+    assert times is not None and times.plan > 0.5
+    spec, _ = load_controller(controller)
+    assert spec is not None
+    if spec.feed.limited_jerk:
+        assert times.planned.seconds <= 1.03 * times.programmed.seconds and not times.kept
+        assert times.words > 0.9 * times.plan > times.words_programmed
+    else:
+        written = program_clock()(made).seconds
+        assert written <= times.programmed.seconds
+        assert times.kept == (times.planned.seconds > times.programmed.seconds)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bicubic.cls", "five_tilted.cls"])
+def test_the_model_of_a_control_takes_no_longer(name: str) -> None:
+    """The reference control on its own path: planned words cost nothing that counts."""
+    model, _ = load_model("control")
+    assert model is not None
+    seconds = []
+    for feed in ("programmed", "planned"):
+        path, _ = toolpaths.read(SAMPLES / name)
+        made = good(convert(path, "mikron-ucp710", JERKY, feed=feed))
+        blocks = from_conversion(made)
+        seconds.append(float(timed(blocks, model.of_machine(made.machine)).end.max()))
+    assert seconds[1] <= 1.03 * seconds[0]
