@@ -123,7 +123,7 @@ class SliderModel(KinematicsModel):
         """Vectors that are no directions, a workspace out of reach, a platform that moves otherwise than the kind."""
         found = [*self._leg_problems(), *rail_problems(list(self.legs.values()), self.clearance)]
         yield from found
-        if not found:
+        if not found and not self.certificate:
             yield from self.mobility_problems()
 
     def _leg_problems(self) -> Iterator[KeyProblem]:

@@ -21,6 +21,7 @@ import numpy as np
 from machines.kinematics import by_samples
 from machines.kinematics.chain import Joint
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceParts
+from machines.kinematics.leg_geometry import LegGeometry
 from machines.kinematics.rod_platform import RodPlatform, Transmission
 from machines.kinematics.taylor import TaylorVector, straight
 from machines.kinematics.workspace import Workspace
@@ -86,6 +87,8 @@ class Kinematics(ABC):
     """how legs pass motion and force on to a platform; None where none carry the tool"""
     clearance_parts: ClearanceParts | None = None
     """rods, spindle and slides that may touch each other (`machines.reach`)"""
+    leg_geometry: LegGeometry | None = None
+    """the legs as plain numbers, of a platform that hangs on legs; None of any other machine"""
     workspace: Workspace | None = None
     """where the machine is declared to work: of the platform's reference point, of the gauge point without a platform"""
     singular_names: tuple[str, ...] = ()

@@ -19,6 +19,7 @@ from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceS
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about
 from machines.kinematics.h4_platform import H4Platform
+from machines.kinematics.leg_geometry import LegGeometry, pairs_of
 from machines.kinematics.on_slides import OnSlides
 from machines.kinematics.rod_loops import RodLoop
 from machines.kinematics.sliders import Legs
@@ -74,6 +75,16 @@ class H4Linear(OnSlides):
     def workspace(self) -> Workspace:  # type: ignore[override]  # nothing assigns it
         """of C and the tilt, in the machine frame"""
         return self.platform.workspace
+
+    @property
+    def leg_geometry(self) -> LegGeometry:  # type: ignore[override]  # nothing assigns it
+        """See the base class: the tilt is the platform's turn about x."""
+        of, k = self.legs, len(self.legs.lengths)
+        pairs = np.zeros((k, 3)) if self.clearance is None else pairs_of(k, self.clearance.leg, self.clearance.shift)
+        yes = np.ones(k, dtype=np.bool_)
+        return LegGeometry(self.axis_names[:k], of.points, of.directions, np.zeros((k, 3)), of.lengths, of.roots, yes, ~yes,
+                           self.platform_joints, pairs, ("x", "y", "z", "a"), np.array([0.0, 0.0, -self.gauge]), (),
+                           np.zeros((0, 3)), self.workspace)
 
     @property
     def legs(self) -> Legs:  # type: ignore[override]  # nothing assigns it

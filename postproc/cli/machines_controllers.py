@@ -19,6 +19,8 @@ from postproc.cli.console import (
     shown_errors,
 )
 from postproc.cli.group import Group
+from postproc.cli.machine_certify import EXAMPLES as CERTIFIED
+from postproc.cli.machine_certify import machine_certify
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.machine_new import EXAMPLES as NEW
 from postproc.cli.machine_new import machine_new
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
     from toolpaths.choices import FigureEnding
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                          help="Machines: new, list, show, check, analyse, import, export, schema.")
+                          help="Machines: new, list, show, check, analyse, certify, import, export, schema.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
@@ -44,6 +46,7 @@ setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
 machine_app.command("new", epilog=NEW)(machine_new)
 machine_app.command("import", epilog=IMPORTED)(machine_import)
 machine_app.command("export", epilog=EXPORTED)(machine_export)
+machine_app.command("certify", epilog=CERTIFIED)(machine_certify)
 setup_app.command("new", epilog=EXAMPLES)(setup_new)
 setup_app.command("align", epilog=ALIGNED)(setup_align)
 
@@ -117,11 +120,14 @@ def _joints(machine: Machine, at: Sequence[str] | None) -> Floats:
 def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")], json: Json = "") -> None:
     """Check a machine file and say what is wrong with it."""
     import machines
+    from postproc.cli.catalogue import workspace_dict, workspace_words
 
     m, found = machines.load_checked(file)
     found = [*found, *machines.implausible(file)] if m is not None else found
     good = f"{file}: OK: {m.name}, {m.structure}, axes {' '.join(m.axis_names)}" if m else ""
-    report(tuple(found), json, {"name": m.name if m else None, "diagnostics": [d.as_dict() for d in found]}, good)
+    good += f"\n{words}" if m is not None and (words := workspace_words(m)) else ""
+    report(tuple(found), json, {"name": m.name if m else None, "workspace": workspace_dict(m) if m else None,
+                                "diagnostics": [d.as_dict() for d in found]}, good)
 
 
 @machine_app.command("analyse", epilog="Example: postproc machine analyse uranesx --json -")

@@ -15,6 +15,7 @@ import numpy as np
 
 from machines.kinematics.base import ErrorForm, ErrorForms, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry
+from machines.kinematics.leg_geometry import LegGeometry, pairs_of
 from machines.kinematics.legs.attitudes import direction_of, tilt_of
 from machines.kinematics.legs.bounds import MovingLoops
 from machines.kinematics.legs.over_workspace import OverWorkspace
@@ -43,6 +44,16 @@ class OnLegs(PosesOfLegs):
         """Its rods, of a platform that only translates on three slides and whose gauge point is its reference point."""
         whole = self.legs.on_slides is not None and self.loops.freedoms == ("x", "y", "z") and not self.gauge.any()
         return RodsOnSlides(self) if whole and not len(self.carriers) else None
+
+    @cached_property
+    def leg_geometry(self) -> LegGeometry:  # type: ignore[override]  # nothing assigns it
+        """See the base class."""
+        of, names = self.legs, np.array(self.axis_names)
+        pairs = np.zeros((len(of.lengths), 3)) if self.clearance is None else pairs_of(
+            len(of.lengths), self.clearance.leg, self.clearance.shift)
+        return LegGeometry(self.leg_names, of.points, of.directions, of.arms, of.lengths, of.roots, of.slide, of.arm,
+                           self.loops.joints, pairs, self.loops.freedoms, self.gauge,
+                           tuple(names[self.carriers_at].tolist()), self.carriers, self.workspace)
 
     @property
     def leg_names(self) -> tuple[str, ...]:
