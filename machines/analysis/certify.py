@@ -13,7 +13,7 @@ from machines.analysis.singularity import lipschitz_points
 from machines.certificate.certificate_file import RegionOfPoses, certificate
 from machines.certificate.enclosure import columns
 from machines.certificate.poses import PosesOfBoxes
-from machines.certificate.search import AskedProof, Shortfall, ProvedBoxes, look, prove
+from machines.certificate.search import AskedProof, ProvedBoxes, Shortfall, look, prove
 from machines.certificate.spans import spanned
 from machines.kinematics.leg_geometry import LegGeometry
 from machines.loader import values_of_machine

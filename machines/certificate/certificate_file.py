@@ -41,7 +41,8 @@ def stated(asked: AskedProof, proved: ProvedBoxes) -> Floats:
     return np.asarray(np.maximum(np.floor(SHARE * proved.bounds * DIGITS) / DIGITS, asked.margin), dtype=np.float64)
 
 
-def certificate(name: str, values: Mapping[str, Any], region: RegionOfPoses, asked: AskedProof, proved: ProvedBoxes) -> dict[str, Any]:
+def certificate(name: str, values: Mapping[str, Any], region: RegionOfPoses, asked: AskedProof,
+                proved: ProvedBoxes) -> dict[str, Any]:
     """The file's content, of a proof."""
     bounds = stated(asked, proved)
     boxes = [f"{path or '.'} {' '.join(map(repr, row))}" for path, row in zip(proved.paths, bounds.tolist(), strict=True)]

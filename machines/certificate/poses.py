@@ -40,8 +40,8 @@ class PosesOfBoxes:
     def split(self) -> tuple[Floats, Floats]:
         """(3, 3) from a place to that of the reference point, (M, 3) to the travel of the carriers."""
         free = self.moves.shape[1] - len(self.legs.carriers)
-        parts = np.linalg.pinv(self.moves)
-        return self.moves[:, :free] @ parts[:free], parts[free:]
+        parts: Floats = np.asarray(np.linalg.pinv(self.moves), dtype=np.float64)
+        return np.asarray(self.moves[:, :free] @ parts[:free]), parts[free:]
 
     def turn(self, pose: Span) -> tuple[Span, Span]:
         """(R (N, 3, 3), its derivatives by tilt and heading (N, 2, 3, 3)) of poses (N, 5)."""

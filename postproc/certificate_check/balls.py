@@ -103,7 +103,7 @@ def product(matrix: FloatArray, other: Ball) -> Ball:
 def spectral(other: Ball) -> FloatArray:
     """At most the largest singular value of any matrix (..., n, m) in it."""
     size = other.m.shape[-1] * other.m.shape[-2]
-    finite = np.isfinite(other.r).all(axis=(-1, -2)) & np.isfinite(other.m).all(axis=(-1, -2))
+    finite = np.asarray(np.isfinite(other.r).all(axis=(-1, -2)) & np.isfinite(other.m).all(axis=(-1, -2)))
     middle = np.where(finite[..., None, None], other.m, 0.0)
     most = np.linalg.norm(middle, ord=2, axis=(-2, -1)) * (1.0 + 1e-10)
     spread = np.sqrt((np.where(finite[..., None, None], other.r, 0.0) ** 2).sum(axis=(-1, -2))) * (1.0 + size * EPS)

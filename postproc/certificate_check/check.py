@@ -122,7 +122,7 @@ def _prove(found: dict[str, Any], boxes: list[StatedBox]) -> int:
         lower, upper, stated = (np.array([getattr(box, name) for box in some]) for name in ("lower", "upper", "stated"))
         with np.errstate(invalid="ignore", over="ignore"):  # what is not known is infinite, and confirms nothing
             good, over, worst = _looked(found, shift, lower, upper, stated)
-        for k in np.flatnonzero(~good):
+        for k in np.flatnonzero(np.logical_not(good)):
             box = some[int(k)]
             where = ", ".join(f"{v:.6g}" for v in 0.5 * (box.lower + box.upper))
             if over[k]:

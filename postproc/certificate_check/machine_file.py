@@ -63,7 +63,8 @@ def about(found: dict[str, Any], table: dict[str, Any]) -> None:
 
 def _of_file(leg: dict[str, Any], axis: dict[str, Any], drive: str, side: tuple[float, float]) -> dict[str, Any]:
     """What the certificate says of a leg; `side` is round the ring of a layout."""
-    rods, apart = leg.get("rods") or (), float(leg.get("pair") or 0.0)
+    rods: list[Any] = leg.get("rods") or []
+    apart = float(leg.get("pair") or 0.0)
     pair = np.subtract(rods[0], rods[1]).tolist() if len(rods) == 2 else [apart * side[0], apart * side[1], 0.0]
     return {"drive": leg.get("drive", "slide"), "point": list(leg.get("slide", leg.get("point", (0, 0, 0)))),
             "direction": _unit(leg.get("direction", (0, 0, 1))), "arm": list(leg["arm"]) if drive == "arm" else [0.0] * 3,

@@ -24,6 +24,8 @@ from postproc.cli.machine_certify import machine_certify
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.machine_new import EXAMPLES as NEW
 from postproc.cli.machine_new import machine_new
+from postproc.cli.machine_tolerance import EXAMPLES as TOLERATED
+from postproc.cli.machine_tolerance import machine_tolerance
 from postproc.cli.options import figure_ending
 from postproc.cli.setup_align import EXAMPLES as ALIGNED
 from postproc.cli.setup_align import setup_align
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from toolpaths.choices import FigureEnding
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                          help="Machines: new, list, show, check, analyse, certify, import, export, schema.")
+                          help="Machines: new, list, show, check, analyse, certify, tolerance, import, export, schema.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
@@ -46,6 +48,7 @@ setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
 machine_app.command("new", epilog=NEW)(machine_new)
 machine_app.command("import", epilog=IMPORTED)(machine_import)
 machine_app.command("export", epilog=EXPORTED)(machine_export)
+machine_app.command("tolerance", epilog=TOLERATED)(machine_tolerance)
 machine_app.command("certify", epilog=CERTIFIED)(machine_certify)
 setup_app.command("new", epilog=EXAMPLES)(setup_new)
 setup_app.command("align", epilog=ALIGNED)(setup_align)

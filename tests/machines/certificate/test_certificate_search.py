@@ -147,7 +147,8 @@ def test_a_margin_at_the_least_value_is_undecided_and_said_so() -> None:
     poses, _, _ = boxes(machines.load("hexaslide-parallel-z"), 1)
     space = poses.legs.workspace
     lower, upper = np.array([*space.lower, 0.0, 0.0]), np.array([*space.upper, 0.0, 0.0])
-    asked = AskedProof(poses, lower, upper, np.tile([-np.inf, np.inf], (6, 1)), np.zeros((0, 2)), np.zeros(6, dtype=bool), 0.1)
+    free, none = np.tile([-np.inf, np.inf], (6, 1)), np.zeros((0, 2))
+    asked = AskedProof(poses, lower, upper, free, none, np.zeros(6, dtype=bool), 0.1)
     least = enclosed(poses, spanned(np.array([[*space.lower, 0.0, 0.0]]))).q.lo[0]
     ends = np.stack([least, least + 1e4], axis=1)
     found = prove(replace(asked, travel=ends))
