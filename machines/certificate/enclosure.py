@@ -31,12 +31,14 @@ class Enclosure:
     Attributes:
         under: (N, K) mm^2, h^2 above: a leg that surely reaches has it above 0
         cosine: (N, K)
+        cosine_change: (N, 5, K) by the five numbers of a pose
         q: (N, K) mm or rad
         matrix, change: (N, R, 6) and by the five numbers of a pose (N, 5, R, 6): legs, then pairs
     """
 
     under: Span
     cosine: Span
+    cosine_change: Span
     q: Span
     matrix: Span
     change: Span
@@ -60,11 +62,12 @@ def enclosed(poses: PosesOfBoxes, pose: Span) -> Enclosure:
             held, held_by = crossed(along[:, paired], apart), crossed(along_by[:, :, paired], apart)
             rows.append(joined([held * 0.0, held], -1))
             changes.append(joined([held_by * 0.0, held_by], -1))
-        return Enclosure(under, cosine, q, joined(rows, 1), joined(changes, 2))
+        cosine_by = stacked([one[5] for one in each], 2)
+        return Enclosure(under, cosine, cosine_by, q, joined(rows, 1), joined(changes, 2))
 
 
-LegSpans = tuple[Span, Span, Span, Span, Span]
-"""(h^2 (N,), cosine (N,), q (N,), r / l (N, 3), its derivatives (N, 5, 3))"""
+LegSpans = tuple[Span, Span, Span, Span, Span, Span]
+"""(h^2 (N,), cosine (N,), q (N,), r / l (N, 3), its derivatives (N, 5, 3), those of the cosine (N, 5))"""
 
 
 def _leg(legs: LegGeometry, k: int, end: Span, by: Span) -> LegSpans:
@@ -84,7 +87,7 @@ def _slide(legs: LegGeometry, k: int, w: Span, by: Span) -> LegSpans:
     slope = dotted(aside[:, None], aside_by).over(half[:, None]) * root
     rod_by = aside_by + slope[..., None] * u
     q = w.by(u[None])[:, 0] + half * root
-    return under, half * (1.0 / size), q, rod * (1.0 / size), rod_by * (1.0 / size)
+    return under, half * (1.0 / size), q, rod * (1.0 / size), rod_by * (1.0 / size), slope * (-root / size)
 
 
 def _arm(legs: LegGeometry, k: int, w: Span, by: Span) -> LegSpans:
@@ -103,7 +106,10 @@ def _arm(legs: LegGeometry, k: int, w: Span, by: Span) -> LegSpans:
     rod = w - foot
     rate = dotted(rod[:, None], by).over((half * -root)[:, None])
     rod_by = by - rate[..., None] * moved[:, None]
-    return under, half * (1.0 / (size * reach)), q, rod * (1.0 / size), rod_by * (1.0 / size)
+    x_by, y_by = by.by(a[None])[..., 0], by.by(b[None])[..., 0]
+    half_by = (x[:, None] * x_by + y[:, None] * y_by - c[:, None] * dotted(w[:, None], by)).over(half[:, None])
+    scale = 1.0 / (size * reach)
+    return under, half * scale, q, rod * (1.0 / size), rod_by * (1.0 / size), half_by * scale
 
 
 def _length(legs: LegGeometry, k: int, w: Span, by: Span) -> LegSpans:
@@ -113,7 +119,8 @@ def _length(legs: LegGeometry, k: int, w: Span, by: Span) -> LegSpans:
     along = Span(np.maximum(along.lo, -1.0), np.minimum(along.hi, 1.0))
     rate = dotted(along[:, None], by)
     along_by = (by - rate[..., None] * along[:, None]).over(long[:, None, None])
-    return square, spanned(np.ones_like(long.lo)), long - float(legs.lengths[k]), along, along_by
+    one = spanned(np.ones_like(long.lo))
+    return square, one, long - float(legs.lengths[k]), along, along_by, spanned(np.zeros_like(rate.lo))
 
 
 def columns(legs: LegGeometry) -> tuple[list[int], list[int]]:

@@ -130,8 +130,13 @@ def by_chance(s: Floats, spread: Floats, samples: int, normal: bool, seed: int =
     drawn = (rng.normal(size=shape) if normal else rng.uniform(-1.0, 1.0, shape)) * spread
     errors = drawn @ s.T
     sizes = [np.linalg.norm(errors[:, rows], axis=1) for rows in (slice(0, 3), slice(3, 6))]
-    position, turn = ((float(v.mean()), *map(float, np.percentile(v, (50.0, 95.0, 99.7)))) for v in sizes)
+    position, turn = (_parts(v) for v in sizes)
     return ByChance(position, turn)
+
+
+def _parts(sizes: Floats) -> tuple[float, float, float, float]:
+    half, most, nearly_all = np.percentile(sizes, (50.0, 95.0, 99.7)).tolist()
+    return float(sizes.mean()), half, most, nearly_all
 
 
 def budget(dimensions: tuple[Dimension, ...], most: Floats, allowed: float, cost: Mapping[Part, float]) -> Floats:

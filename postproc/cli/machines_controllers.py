@@ -19,6 +19,8 @@ from postproc.cli.console import (
     shown_errors,
 )
 from postproc.cli.group import Group
+from postproc.cli.machine_analyse import EXAMPLES as ANALYSED
+from postproc.cli.machine_analyse import machine_analyse
 from postproc.cli.machine_certify import EXAMPLES as CERTIFIED
 from postproc.cli.machine_certify import machine_certify
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
@@ -48,6 +50,7 @@ setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
 machine_app.command("new", epilog=NEW)(machine_new)
 machine_app.command("import", epilog=IMPORTED)(machine_import)
 machine_app.command("export", epilog=EXPORTED)(machine_export)
+machine_app.command("analyse", epilog=ANALYSED)(machine_analyse)
 machine_app.command("tolerance", epilog=TOLERATED)(machine_tolerance)
 machine_app.command("certify", epilog=CERTIFIED)(machine_certify)
 setup_app.command("new", epilog=EXAMPLES)(setup_new)
@@ -131,20 +134,6 @@ def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")]
     good += f"\n{words}" if m is not None and (words := workspace_words(m)) else ""
     report(tuple(found), json, {"name": m.name if m else None, "workspace": workspace_dict(m) if m else None,
                                 "diagnostics": [d.as_dict() for d in found]}, good)
-
-
-@machine_app.command("analyse", epilog="Example: postproc machine analyse uranesx --json -")
-def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")],
-                    singular_above: Annotated[float | None, typer.Option("--singular-above", metavar="MM", min=0.0,
-                                              help="prove by a grid that the singular values of a linear Delta with slides "
-                                              "along z stay above this")] = None, json: Json = "") -> None:
-    """Condition number, speed and force transmission, reachable box of a parallel machine, over its workspace."""
-    from machines.analysis.report import analyse
-    from postproc.cli.catalogue import analysis_text
-
-    with shown_errors(json):
-        found = analyse(machine_of(name), singular_above)
-    report((), json, found, analysis_text(found))
 
 
 @machine_app.command("schema")

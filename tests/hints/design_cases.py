@@ -15,6 +15,8 @@ DESIGN = [
     HintCase("certificate.file", "machine certify --check c.json", {"c.json": "{}"},
              "write one with postproc (machine certify) NAME -o CERT.json",
              (Edit(COMMAND, "machine certify --check c.json", r"\1 uranesx -o c.json"),)),
+    HintCase("analysis.map", "machine analyse mill-3axis --map speed", {}, "leave (--map) out",
+             (Edit(COMMAND, " --map speed", ""),)),
     HintCase("sensitivity.legs", "machine tolerance mill-3axis", {}, "name a machine (on legs)",
              (Edit(COMMAND, "mill-3axis", "planar-delta"),)),
     HintCase("certificate.machine", "machine certify --check c.json", {"c.json": _ANOTHER.replace("uranesx", "none.toml")},

@@ -46,7 +46,7 @@ def test_what_is_anywhere_in_a_box_is_in_its_bounds(name: str) -> None:
     over, at = enclosed(poses, box), enclosed(poses, pose)
     sure = (over.under.lo > 0.0).all(axis=1)
     assert sure.mean() > 0.5
-    for part in ("cosine", "q", "matrix", "change"):
+    for part in ("cosine", "cosine_change", "q", "matrix", "change"):
         inside, here = getattr(over, part), getattr(at, part)
         assert (here.lo[sure] >= inside.lo[sure] - 1e-9).all() and (here.hi[sure] <= inside.hi[sure] + 1e-9).all(), part
 
@@ -80,6 +80,8 @@ def test_rates_of_the_matrices_are_their_differences(name: str) -> None:
         step = h * np.eye(5)[i]
         ahead, behind = (enclosed(poses, spanned(pose.lo + s * step)).matrix.lo for s in (1.0, -1.0))
         np.testing.assert_allclose(change[:, i], (ahead - behind) / (2.0 * h), atol=1e-7)
+        ahead, behind = (enclosed(poses, spanned(pose.lo + s * step)).cosine.lo for s in (1.0, -1.0))
+        np.testing.assert_allclose(enclosed(poses, pose).cosine_change.lo[:, i], (ahead - behind) / (2.0 * h), atol=1e-7)
 
 
 @pytest.mark.parametrize("name", ["uranesx", "hexapod", "h4a-c-table"])
