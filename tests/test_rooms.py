@@ -26,6 +26,7 @@ FLOORS = (
     ("machines.exchange", "machine files of others, LinuxCNC's written"),
     ("machines.sheet", "a new machine: its data sheet, pivots, jogs, drawing"),
     ("machines.analysis", "what a machine is good for"),
+    ("machines.layouts", "dimensions of a new machine on legs, its file"),
     ("machines.tolerances", "influence of each dimension on the tool, tolerance budgets"),
     ("machines.geometric_error.tables", "curves and tables of errors, their files"),
     ("machines.geometric_error.actual", "the machine with errors, corrected commands"),

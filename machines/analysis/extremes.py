@@ -18,9 +18,9 @@ from machines.certificate.enclosure import columns, enclosed
 from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import Span, spanned
 from machines.kinematics.leg_geometry import LegGeometry
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats
 
-CLOSE, MOST, FEW, AT_ONCE = 0.01, 10_000, 2_000, 500
+CLOSE, MOST, FEW, AT_ONCE = 0.01, 10_000, 4_000, 500
 """part of the value to which it is found; boxes at most, of a tool that tilts in every direction; at a time"""
 
 
@@ -83,7 +83,7 @@ def largest_over(legs: LegGeometry, lever: float, measure: RateMeasure, close: f
             best, place = float(value[k]), 0.5 * (lower[first][k] + upper[first][k])
         with np.errstate(divide="ignore", invalid="ignore"):
             bound = np.where(e < 1.0, measure.most(value, e), np.inf)
-        bound = np.minimum(np.nan_to_num(bound, nan=np.inf), most[first])
+        bound = np.minimum(np.nan_to_num(bound, nan=np.inf, posinf=np.inf), most[first])
         live = bound > best
         halves = _halved(lower[first][live], upper[first][live], share[live])
         lower, upper = (np.concatenate([old[rest], new]) for old, new in zip((lower, upper), halves, strict=True))
@@ -104,7 +104,8 @@ def _over(poses: PosesOfBoxes, lever: float, measure: RateMeasure, pose: Span) -
         change = over.change[:, :, :count][:, :, :, free] * scale
         cosine = over.cosine[:, :, None]
         by = (change - rows.over(cosine)[:, None] * over.cosine_change[..., None]).over(cosine[:, None])
-    known = np.asarray((np.isfinite(by.lo) & np.isfinite(by.hi)).all(axis=(1, 2, 3)) & (over.under.lo > 0.0).all(axis=1))
+    finite = np.isfinite(by.lo) & np.isfinite(by.hi)
+    known: Bools = np.asarray(finite.all(axis=(1, 2, 3)) & (over.under.lo > 0.0).all(axis=1))
     safe = np.where(np.isfinite(middle).all(axis=(1, 2))[:, None, None], middle, np.eye(count))
     inverse = np.linalg.inv(safe)[:, None]
     by = Span(*(np.where(known[:, None, None, None], end, 0.0) for end in (by.lo, by.hi)))

@@ -92,9 +92,12 @@ def _transmission(kinematics: Transmission, legs: LegGeometry | None) -> dict[st
         "force_transmission": _largest(force_transmission, kinematics, several),
         "manipulability": _largest(manipulability, kinematics, several),
         "conditioning_factor": _least(conditioning_factor, kinematics, several)}
-    for key, measure in MEASURES.items() if legs is not None else ():
+    for key, measure in MEASURES.items():
+        if legs is None:
+            break
         extreme = largest_over(legs, kinematics.lever, measure)
-        found[key] |= {"nowhere_more_than": max(extreme.most, found[key]["worst"]), "boxes_of_the_proof": extreme.boxes}
+        most = max(extreme.most, found[key]["worst"]) if np.isfinite(extreme.most) else None
+        found[key] |= {"nowhere_more_than": most, "boxes_of_the_proof": extreme.boxes}
     return found | ({"turn_lever_mm": kinematics.lever} if kinematics.lever else {})
 
 

@@ -23,6 +23,8 @@ from postproc.cli.machine_analyse import EXAMPLES as ANALYSED
 from postproc.cli.machine_analyse import machine_analyse
 from postproc.cli.machine_certify import EXAMPLES as CERTIFIED
 from postproc.cli.machine_certify import machine_certify
+from postproc.cli.machine_design import EXAMPLES as DESIGNED
+from postproc.cli.machine_design import machine_design
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.machine_new import EXAMPLES as NEW
 from postproc.cli.machine_new import machine_new
@@ -40,7 +42,8 @@ if TYPE_CHECKING:
     from toolpaths.choices import FigureEnding
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                          help="Machines: new, list, show, check, analyse, certify, tolerance, import, export, schema.")
+                          help="Machines: new, list, show, check, analyse, certify, tolerance, design, import, export, "
+                               "schema.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
@@ -51,6 +54,7 @@ machine_app.command("new", epilog=NEW)(machine_new)
 machine_app.command("import", epilog=IMPORTED)(machine_import)
 machine_app.command("export", epilog=EXPORTED)(machine_export)
 machine_app.command("analyse", epilog=ANALYSED)(machine_analyse)
+machine_app.command("design", epilog=DESIGNED)(machine_design)
 machine_app.command("tolerance", epilog=TOLERATED)(machine_tolerance)
 machine_app.command("certify", epilog=CERTIFIED)(machine_certify)
 setup_app.command("new", epilog=EXAMPLES)(setup_new)

@@ -17,6 +17,8 @@ DESIGN = [
              (Edit(COMMAND, "machine certify --check c.json", r"\1 uranesx -o c.json"),)),
     HintCase("analysis.map", "machine analyse mill-3axis --map speed", {}, "leave (--map) out",
              (Edit(COMMAND, " --map speed", ""),)),
+    HintCase("design.none", "machine design --box 100x100x10 --max bulk=20 -o d.toml", {}, "loosen (--max)",
+             (Edit(COMMAND, "bulk=20", "bulk=2000"),)),
     HintCase("sensitivity.legs", "machine tolerance mill-3axis", {}, "name a machine (on legs)",
              (Edit(COMMAND, "mill-3axis", "planar-delta"),)),
     HintCase("certificate.machine", "machine certify --check c.json", {"c.json": _ANOTHER.replace("uranesx", "none.toml")},
