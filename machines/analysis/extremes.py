@@ -104,9 +104,10 @@ def _over(poses: PosesOfBoxes, lever: float, measure: RateMeasure, pose: Span) -
         change = over.change[:, :, :count][:, :, :, free] * scale
         cosine = over.cosine[:, :, None]
         by = (change - rows.over(cosine)[:, None] * over.cosine_change[..., None]).over(cosine[:, None])
-    finite = np.isfinite(by.lo) & np.isfinite(by.hi)
+    finite: Bools = np.asarray(np.isfinite(by.lo) & np.isfinite(by.hi))
     known: Bools = np.asarray(finite.all(axis=(1, 2, 3)) & (over.under.lo > 0.0).all(axis=1))
-    safe = np.where(np.isfinite(middle).all(axis=(1, 2))[:, None, None], middle, np.eye(count))
+    fine: Bools = np.asarray(np.isfinite(middle).all(axis=(1, 2)))
+    safe = np.where(fine[:, None, None], middle, np.eye(count))
     inverse = np.linalg.inv(safe)[:, None]
     by = Span(*(np.where(known[:, None, None, None], end, 0.0) for end in (by.lo, by.hi)))
     share = np.linalg.norm(inverse @ by.middle, ord=2, axis=(2, 3))
