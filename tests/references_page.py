@@ -24,8 +24,8 @@ PAGE, ROWS_FILE = ROOT / "docs" / "references.md", ROOT / "tests" / "references.
 _HEADER = """# The documents, and what became of them
 
 Written by `python tests/references_page.py`. T: Company, *Machines-outils rapides a structure parallele* (2000). P:
-Grandguillaume, Lavernhe, Tournier, orientation by jerk polytopes (2017). C: Oueslati, calibration of a rotary axis (2004). D:
-note on a 2D Delta. "Not yet" is what the project does not have; "no numbers" what a document shows only as a picture, a
+Grandguillaume, Lavernhe, Tournier, orientation by jerk polytopes (2017). C: Oueslati, calibration of a rotary axis (2004).
+D: note on a 2D Delta. "Not yet" is what the project does not have; "no numbers" what a document shows only as a picture, a
 photograph or a lost figure. Formulas are taken with the corrections that recomputing them asked for (misprints, scanning);
 each docstring names its source.
 

@@ -28,6 +28,7 @@ FLOORS = (
     ("machines.analysis", "what a machine is good for"),
     ("machines.layouts", "dimensions of a new machine on legs, its file"),
     ("machines.tolerances", "influence of each dimension on the tool, tolerance budgets"),
+    ("machines.stiffness", "forces in rods and drives, stiffness of the tip"),
     ("machines.geometric_error.tables", "curves and tables of errors, their files"),
     ("machines.geometric_error.actual", "the machine with errors, corrected commands"),
     ("machines.geometric_error.files", "error model files: reading, covariance, fingerprint"),

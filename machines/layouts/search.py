@@ -77,7 +77,8 @@ def geometry(asked: LayoutQuestion, size: float, rod: float) -> LegGeometry:
         names=("X", "Y", "Z"), points=(radius + asked.platform) * out + height * up,
         directions=np.sin(lean) * out + np.cos(lean) * up, arms=np.zeros((3, 3)), lengths=np.full(3, rod),
         roots=np.ones(3), slide=yes, arm=~yes, joints=asked.platform * out, pairs=np.zeros((3, 3)), freedoms=("x", "y", "z"),
-        gauge=np.zeros(3), carrier_names=(), carriers=np.zeros((0, 3)), workspace=Workspace(-0.5 * asked.box, 0.5 * asked.box))
+        gauge=np.zeros(3), carrier_names=(), carriers=np.zeros((0, 3)),
+        workspace=Workspace(-0.5 * asked.box, 0.5 * asked.box))
 
 
 def figures_of(legs: LegGeometry) -> dict[Goal, float]:
@@ -104,7 +105,8 @@ def best(asked: LayoutQuestion, seed: int = 0) -> LayoutFound | None:
         scale = side if asked.goal in ("bulk", "rod") else 1.0
         return float(FAR * over + min(found[asked.goal] / scale, FAR))
 
-    runs = [differential_evolution(cost, Bounds(*np.transpose([SIZES, RODS])), maxiter=ROUNDS, popsize=CROWD, tol=1e-8, seed=seed + k)
+    span = Bounds(*np.transpose([SIZES, RODS]))
+    runs = [differential_evolution(cost, span, maxiter=ROUNDS, popsize=CROWD, tol=1e-8, seed=seed + k)
             for k in range(RESTARTS)]
     size, rod = (min(runs, key=lambda run: float(run.fun)).x * side).tolist()
     found = LayoutFound(size, rod, figures_of(geometry(asked, size, rod)))

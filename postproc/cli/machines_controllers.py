@@ -28,6 +28,8 @@ from postproc.cli.machine_design import machine_design
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.machine_new import EXAMPLES as NEW
 from postproc.cli.machine_new import machine_new
+from postproc.cli.machine_stiffness import EXAMPLES as STIFF
+from postproc.cli.machine_stiffness import machine_stiffness
 from postproc.cli.machine_tolerance import EXAMPLES as TOLERATED
 from postproc.cli.machine_tolerance import machine_tolerance
 from postproc.cli.options import figure_ending
@@ -42,8 +44,8 @@ if TYPE_CHECKING:
     from toolpaths.choices import FigureEnding
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                          help="Machines: new, list, show, check, analyse, certify, tolerance, design, import, export, "
-                               "schema.")
+                          help="Machines: new, list, show, check, analyse, certify, tolerance, stiffness, design, "
+                               "import, export, schema.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
@@ -54,6 +56,7 @@ machine_app.command("new", epilog=NEW)(machine_new)
 machine_app.command("import", epilog=IMPORTED)(machine_import)
 machine_app.command("export", epilog=EXPORTED)(machine_export)
 machine_app.command("analyse", epilog=ANALYSED)(machine_analyse)
+machine_app.command("stiffness", epilog=STIFF)(machine_stiffness)
 machine_app.command("design", epilog=DESIGNED)(machine_design)
 machine_app.command("tolerance", epilog=TOLERATED)(machine_tolerance)
 machine_app.command("certify", epilog=CERTIFIED)(machine_certify)
