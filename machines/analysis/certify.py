@@ -50,10 +50,28 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Certified:
-    """A certificate as the text of its file, and its figures."""
+    """A proof of a machine's workspace: what was asked, what was found, and where the travel of a drive stands against it."""
 
-    text: str
-    figures: dict[str, Any]
+    machine: Machine
+    region: RegionOfPoses
+    asked: AskedProof
+    proved: ProvedBoxes
+    outside: ProvedBoxes | None
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """Of the certificate's file."""
+        return certificate(self.machine.name, values_of_machine(self.machine), self.region, self.asked, self.proved)
+
+    @property
+    def text(self) -> str:
+        """The certificate's file."""
+        return json.dumps(self.content, indent=1) + "\n"
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """Region, margins, bounds, number of boxes."""
+        return _figures(self.machine, self.asked, self.content, self.proved, self.outside)
 
 
 def certify(machine: Machine, wanted: Wanted) -> Certified:
@@ -75,15 +93,14 @@ def certify(machine: Machine, wanted: Wanted) -> Certified:
         outside, proved = proved, prove(asked)
     if proved.lack:
         raise DiagnosticError([_refusal(machine, asked, proved)])
-    content = certificate(machine.name, values_of_machine(machine), region, asked, proved)
-    return Certified(json.dumps(content, indent=1) + "\n", _figures(machine, asked, content, proved, outside))
+    return Certified(machine, region, asked, proved, outside)
 
 
 def _asked(machine: Machine, legs: LegGeometry, wanted: Wanted) -> tuple[AskedProof, RegionOfPoses]:
     space = legs.workspace
     box = wanted.box or (space.lower, space.upper)
     shift = np.zeros(3) if wanted.box is None else np.array([0.0, 0.0, wanted.tool]) - legs.gauge
-    high = 2.0 * np.pi if legs.turns == "abc" and space.tilt[1] > 0.0 else 0.0
+    high = 2.0 * np.pi if legs.tilts_everywhere and space.tilt[1] > 0.0 else 0.0
     lower, upper = np.array([*box[0], space.tilt[0], 0.0]), np.array([*box[1], space.tilt[1], high])
     endless = np.array(legs.arm)
     kept, free = _travel(machine, legs.names), np.tile([-np.inf, np.inf], (len(legs.names), 1))
@@ -109,7 +126,7 @@ def _margin(asked: AskedProof) -> float:
 
 
 def _refusal(machine: Machine, asked: AskedProof, proved: ProvedBoxes) -> Diagnostic:
-    where = pose_words(proved.place, asked.poses.legs.turns)
+    where = pose_words(proved.place, asked.poses.legs)
     of = "tip" if asked.poses.from_point.any() else "platform"
     if proved.lack == "undecided":
         return error("certificate.undecided", f"{proved.tried} boxes and no end, the last round {where} of the {of}: "
@@ -121,13 +138,13 @@ def _refusal(machine: Machine, asked: AskedProof, proved: ProvedBoxes) -> Diagno
                  hint="make the workspace or --box smaller, move the drives, or ask for a smaller --margin")
 
 
-def pose_words(pose: Floats, turns: str) -> str:
+def pose_words(pose: Floats, legs: LegGeometry) -> str:
     """A pose (5,) mm and rad in words."""
     x, y, z, tilt, heading = pose
     words = f"x {x:.4g}, y {y:.4g}, z {z:.4g} mm"
-    if turns:
+    if legs.turns:
         words += f", tilt {tilt / DEG:.4g} degrees"
-    return words + (f" towards {heading / DEG:.4g}" if turns == "abc" else "")
+    return words + (f" towards {heading / DEG:.4g}" if legs.tilts_everywhere else "")
 
 
 def _figures(machine: Machine, asked: AskedProof, content: dict[str, Any], proved: ProvedBoxes,
@@ -143,6 +160,6 @@ def _figures(machine: Machine, asked: AskedProof, content: dict[str, Any], prove
         "boxes_looked_at": proved.tried}
     if outside is not None:
         key = "outside_travel_at" if outside.lack == "travel" else "at_end_of_travel_at"
-        found[key] = pose_words(outside.place, asked.poses.legs.turns)
+        found[key] = pose_words(outside.place, asked.poses.legs)
     points = lipschitz_points(machine.kinematics, asked.margin)
     return found | ({} if points is None else {"lipschitz_squares_of_a_slice": points})

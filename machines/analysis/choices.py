@@ -6,5 +6,5 @@ from typing import Literal
 
 MapMeasure = Literal["condition", "conditioning", "manipulability", "speed", "force"]
 """measures of which there are maps and curves"""
-Across = Literal["x", "y", "z", "tilt"]
+MapNumber = Literal["x", "y", "z", "tilt"]
 """numbers of a place of the platform"""

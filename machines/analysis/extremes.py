@@ -66,7 +66,7 @@ MEASURES = {
 def largest_over(legs: LegGeometry, lever: float, measure: RateMeasure, close: float = CLOSE) -> Extreme:
     """Over the declared workspace, to `close` of its value, or as far as that many boxes lead."""
     space, poses = legs.workspace, PosesOfBoxes(legs, np.zeros(3))
-    high = 2.0 * np.pi if legs.turns == "abc" and space.tilt[1] > 0.0 else 0.0
+    high = 2.0 * np.pi if legs.tilts_everywhere and space.tilt[1] > 0.0 else 0.0
     free = np.array([letter in legs.freedoms for letter in "xyz"])
     lower = np.array([*np.where(free, space.lower, 0.0), space.tilt[0], 0.0])[None]
     upper = np.array([*np.where(free, space.upper, 0.0), space.tilt[1], high])[None]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from machines.analysis.choices import Across, MapMeasure
+from machines.analysis.choices import MapMeasure, MapNumber
 from machines.analysis.transmission import (
     condition_number,
     conditioning_factor,
@@ -31,7 +31,7 @@ from toolpaths.units import DEG
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ACROSS: tuple[Across, ...] = ("x", "y", "z", "tilt")
+MAP_NUMBERS: tuple[MapNumber, ...] = ("x", "y", "z", "tilt")
 OF = {"condition": condition_number, "conditioning": conditioning_factor, "manipulability": manipulability,
       "speed": speed_transmission, "force": force_transmission}
 WORDS: Mapping[MapMeasure, str] = {
@@ -44,11 +44,11 @@ POINTS = 41
 @dataclass(frozen=True, eq=False)
 @arrays(places="N 4", values="N")
 class MeasuredPlaces:
-    """Values at places (x, y, z in mm, tilt in degrees) along `along`: one of ACROSS for a curve, two for a map."""
+    """Values at places (x, y, z in mm, tilt in degrees) along `along`: one of MAP_NUMBERS for a curve, two for a map."""
 
     machine: str
     measure: MapMeasure
-    along: tuple[Across, ...]
+    along: tuple[MapNumber, ...]
     places: Floats
     values: Floats
 
@@ -72,12 +72,13 @@ class MeasuredPlaces:
     def title(self) -> str:
         """Machine, measure, and where the numbers stand that do not change."""
         first = self.places[0]
-        fixed = [f"{name} {first[i]:g} {'degrees' if name == 'tilt' else 'mm'}" for i, name in enumerate(ACROSS)
+        fixed = [f"{name} {first[i]:g} {'degrees' if name == 'tilt' else 'mm'}" for i, name in enumerate(MAP_NUMBERS)
                  if name not in self.along]
         return f"{self.machine}: {WORDS[self.measure]}, platform at {', '.join(fixed)}"
 
 
-def measured(machine: Machine, measure: MapMeasure, along: tuple[Across, ...], at: Mapping[Across, float]) -> MeasuredPlaces:
+def measured(machine: Machine, measure: MapMeasure, along: tuple[MapNumber, ...],
+             at: Mapping[MapNumber, float]) -> MeasuredPlaces:
     """Over the workspace's range of one or two numbers, the others as `at` has them (mm, degrees), else in the middle.
 
     Raises:
@@ -91,8 +92,8 @@ def measured(machine: Machine, measure: MapMeasure, along: tuple[Across, ...], a
     low, high = np.append(space.lower, space.tilt[0]), np.append(space.upper, space.tilt[1])
     middle = np.append(space.middle, np.clip(0.0, *space.tilt))
     for name, value in at.items():
-        middle[ACROSS.index(name)] = value * (DEG if name == "tilt" else 1.0)
-    axes = [ACROSS.index(name) for name in along]
+        middle[MAP_NUMBERS.index(name)] = value * (DEG if name == "tilt" else 1.0)
+    axes = [MAP_NUMBERS.index(name) for name in along]
     sides = np.meshgrid(*(np.linspace(low[i], high[i], POINTS) for i in axes), indexing="ij")
     places = np.tile(middle, (sides[0].size, 1))
     for i, side in zip(axes, sides, strict=True):
@@ -108,7 +109,7 @@ def _values(transmits: Transmission, measure: MapMeasure, places: Floats) -> Flo
 
 def map_figure(found: MeasuredPlaces, ending: FigureEnding) -> bytes:
     """A curve, or lines of equal value over a slice; the largest and the least value are marked."""
-    axes_of = [ACROSS.index(name) for name in found.along]
+    axes_of = [MAP_NUMBERS.index(name) for name in found.along]
     names = [f"{name}, {'degrees' if name == 'tilt' else 'mm'}" for name in found.along]
 
     def fill(sheet: Figure) -> None:

@@ -87,8 +87,6 @@ class Kinematics(ABC):
     """how legs pass motion and force on to a platform; None where none carry the tool"""
     clearance_parts: ClearanceParts | None = None
     """rods, spindle and slides that may touch each other (`machines.reach`)"""
-    leg_geometry: LegGeometry | None = None
-    """the legs as plain numbers, of a platform that hangs on legs; None of any other machine"""
     workspace: Workspace | None = None
     """where the machine is declared to work: of the platform's reference point, of the gauge point without a platform"""
     singular_names: tuple[str, ...] = ()
@@ -258,6 +256,11 @@ class Kinematics(ABC):
         gauge = tip + self.tool_length * axis
         none = np.zeros((len(q), 0, 3))
         return ClearanceGeometry(gauge, np.zeros(len(q)), none, none, gauge, axis)
+
+    @property
+    def leg_geometry(self) -> LegGeometry | None:
+        """The legs as plain numbers, of a platform that hangs on legs; None of any other machine."""
+        return None
 
     @property
     def over_workspace(self) -> PlatformPlaces | None:

@@ -77,7 +77,7 @@ class H4Linear(OnSlides):
         return self.platform.workspace
 
     @property
-    def leg_geometry(self) -> LegGeometry:  # type: ignore[override]  # nothing assigns it
+    def leg_geometry(self) -> LegGeometry:
         """See the base class: the tilt is the platform's turn about x."""
         of, k = self.legs, len(self.legs.lengths)
         pairs = np.zeros((k, 3)) if self.clearance is None else pairs_of(k, self.clearance.leg, self.clearance.shift)

@@ -58,6 +58,11 @@ class LegGeometry:
         return "".join(name for name in self.freedoms if name in "abc")
 
     @property
+    def tilts_everywhere(self) -> bool:
+        """True of a platform that turns about x, y and z: its tool tilts in every direction."""
+        return len(self.turns) == len("abc")
+
+    @property
     def lever(self) -> float:
         """mm per rad that makes turns lengths: the longest platform joint."""
         return max(float(np.linalg.norm(self.joints, axis=1).max(initial=0.0)), 1.0)

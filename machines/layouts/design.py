@@ -27,11 +27,28 @@ WORDS: dict[Goal, str] = {"condition": "condition number", "bulk": "extent acros
 
 @dataclass(frozen=True)
 class Design:
-    """The text of a machine file, figures, and the front where one was asked for."""
+    """What was asked and found, and the front where one was asked for."""
 
-    text: str
-    figures: dict[str, Any]
+    asked: LayoutQuestion
+    found: LayoutFound
     front: tuple[LayoutFound, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """A machine file."""
+        return machine_file(self.asked, self.found)
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """Dimensions, figures over the box, the condition number proved."""
+        asked, found = self.asked, self.found
+        proved = largest_over(geometry(asked, found.size, found.rod), 0.0, MEASURES["condition_number"])
+        return {
+            "layout": asked.layout, "box_mm": asked.box.tolist(), "platform_radius_mm": asked.platform, "goal": asked.goal,
+            "height_mm" if asked.layout == "star" else "radius_mm": found.size, "rod_mm": found.rod,
+            "condition_number": found.figures["condition"], "condition_number_nowhere_more_than": proved.most,
+            "speed_transmission": found.figures["speed"], "extent_across_z_mm": found.figures["bulk"],
+            "front": [_row(one) for one in self.front]}
 
 
 def design(asked: LayoutQuestion, against: Goal | None = None, points: int = 7) -> Design:
@@ -46,16 +63,7 @@ def design(asked: LayoutQuestion, against: Goal | None = None, points: int = 7) 
         raise DiagnosticError([error("design.none", f"no {asked.layout} layout was found for a box of "
                                      f"{' x '.join(f'{v:g}' for v in asked.box)} mm within the limits ({limits})",
                                      hint="loosen --max, or try another --layout")])
-    others = tuple(front(asked, against, points)) if against is not None else ()
-    legs = geometry(asked, found.size, found.rod)
-    proved = largest_over(legs, 0.0, MEASURES["condition_number"])
-    figures: dict[str, Any] = {
-        "layout": asked.layout, "box_mm": asked.box.tolist(), "platform_radius_mm": asked.platform, "goal": asked.goal,
-        "height_mm" if asked.layout == "star" else "radius_mm": found.size, "rod_mm": found.rod,
-        "condition_number": found.figures["condition"], "condition_number_nowhere_more_than": proved.most,
-        "speed_transmission": found.figures["speed"], "extent_across_z_mm": found.figures["bulk"],
-        "front": [_row(one) for one in others]}
-    return Design(machine_file(asked, found), figures, others)
+    return Design(asked, found, tuple(front(asked, against, points)) if against is not None else ())
 
 
 def _row(one: LayoutFound) -> dict[str, float]:

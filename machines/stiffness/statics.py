@@ -1,9 +1,9 @@
 """Forces in rods and drives under a force at the tool, and the compliance of the tool, of machines on legs.
 
 With the rows T = (e, OB x e) of the rods (e from the drive to the platform, O the tip), forces f that push the platform and
-a wrench w on it: T^t f + w = 0. A drive carries g = G^t f with G = e.A' of the rods that it holds (of a leg of changing length
-1). Rods yield by f / k (body and joints), drives by g / K: rods are shorter by M f, M = diag(1 / k) + G diag(1 / K) G^t, and
-the tip moves by C w, C = (T^t M^-1 T)^-1. Source: Company 2000, II-34 to II-38, II-43 to II-51, III-18 to III-22.
+a wrench w on it: T^t f + w = 0. A drive carries g = G^t f with G = e.A' of the rods that it holds (of a leg of changing
+length 1). Rods yield by f / k (body and joints), drives by g / K: rods are shorter by M f, M = diag(1 / k) + G diag(1 / K) G^t,
+and the tip moves by C w, C = (T^t M^-1 T)^-1. Source: Company 2000, II-34 to II-38, II-43 to II-51, III-18 to III-22.
 """
 
 from __future__ import annotations
@@ -67,7 +67,11 @@ def compliance(rows: ForceRows, springs: Springs) -> Floats:
     rod = 1.0 / springs.rod + 2.0 / springs.joint
     yielding = rod * np.eye(rows.rods.shape[1]) + rows.drives @ np.swapaxes(rows.drives, 1, 2) / springs.drive
     t = rows.rods[:, :, rows.columns]
-    whole = np.linalg.inv(np.swapaxes(t, 1, 2) @ np.linalg.solve(yielding, t))
+    if t.shape[1] == t.shape[2]:
+        back = np.linalg.inv(t)
+        whole = back @ yielding @ np.swapaxes(back, 1, 2)
+    else:
+        whole = np.linalg.inv(np.swapaxes(t, 1, 2) @ np.linalg.solve(yielding, t))
     free = rows.columns < 3
     result = np.zeros((len(t), 3, 3))
     at = np.ix_(np.arange(len(t)), rows.columns[free], rows.columns[free])

@@ -7,14 +7,14 @@ Source: Company 2000, annex F: by dimension (F.3.1), by point (F.3.2), after an 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import spanned
 from machines.kinematics.leg_geometry import LegGeometry
-from machines.tolerances.sensitivity import Dimension, Part, RodsOfLegs, adjusted, sensitivity
+from machines.tolerances.sensitivity import DimensionPart, LegDimension, RodsOfLegs, adjusted, sensitivity
 from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 
@@ -49,7 +49,7 @@ def poses_over(legs: LegGeometry) -> PlatformPoses:
     sides = [np.linspace(lo, hi, LEVELS) if letter in legs.freedoms else np.zeros(1)
              for lo, hi, letter in zip(space.lower, space.upper, "xyz", strict=True)]
     tilts = np.linspace(*space.tilt, TILTS) if space.tilt[0] < space.tilt[1] else np.zeros(1)
-    headings = np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False) if legs.turns == "abc" else np.zeros(1)
+    headings = np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False) if legs.tilts_everywhere else np.zeros(1)
     return poses_at(legs, np.stack(np.meshgrid(*sides, tilts, headings), axis=-1).reshape(-1, 5))
 
 
@@ -101,17 +101,17 @@ def largest(of: Influence, poses: PlatformPoses, groups: tuple[tuple[int, ...], 
     return LargestInfluence(best[0], best[1], where[0], where[1])
 
 
-def single(dimensions: tuple[Dimension, ...]) -> tuple[tuple[int, ...], ...]:
+def single(dimensions: tuple[LegDimension, ...]) -> tuple[tuple[int, ...], ...]:
     """Each dimension for itself."""
     return tuple((k,) for k in range(len(dimensions)))
 
 
-def by_point(dimensions: tuple[Dimension, ...]) -> dict[str, tuple[int, ...]]:
-    """The dimensions of each point, guide and rod, by name."""
-    groups: dict[str, tuple[int, ...]] = {}
+def by_point(dimensions: tuple[LegDimension, ...]) -> dict[LegDimension, tuple[int, ...]]:
+    """The dimensions of each point, guide and rod, by what they are of, without a direction."""
+    groups: dict[LegDimension, tuple[int, ...]] = {}
     for k, one in enumerate(dimensions):
-        name = f"{one.part} {one.of}"
-        groups[name] = (*groups.get(name, ()), k)
+        whole = replace(one, axis="")
+        groups[whole] = (*groups.get(whole, ()), k)
     return groups
 
 
@@ -139,7 +139,8 @@ def _parts(sizes: Floats) -> tuple[float, float, float, float]:
     return float(sizes.mean()), half, most, nearly_all
 
 
-def budget(dimensions: tuple[Dimension, ...], most: Floats, allowed: float, cost: Mapping[Part, float]) -> Floats:
+def budget(dimensions: tuple[LegDimension, ...], most: Floats, allowed: float,
+           cost: Mapping[DimensionPart, float]) -> Floats:
     """Tolerances (E,), mm or rad, that keep the root of the sum of squares of all errors within `allowed` mm at least cost.
 
     With s the largest influence (E,) of each dimension and c / t paid for a tolerance t, the sum of c / t is least under

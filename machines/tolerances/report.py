@@ -20,11 +20,12 @@ from machines.tolerances.influence import (
     poses_over,
     single,
 )
-from machines.tolerances.sensitivity import Dimension, Part, RodsOfLegs
+from machines.tolerances.sensitivity import DimensionPart, LegDimension, RodsOfLegs
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.drawing import image
+from toolpaths.shapes import arrays
 from toolpaths.table_text import table_text
 from toolpaths.units import DEG
 
@@ -53,28 +54,62 @@ class ToleranceQuestion:
     spread: float = MICRO
     samples: int = 1000
     allowed: float | None = None
-    cost: Mapping[Part, float] = field(default_factory=dict)
+    cost: Mapping[DimensionPart, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+@arrays(middle="6 E")
 class ToleranceReport:
-    """Figures, and the rows of the table by dimension."""
+    """Influence of the dimensions of a machine: the largest of each and of each point, S in the middle of the workspace."""
 
-    figures: dict[str, Any]
-    rows: list[dict[str, Any]]
+    machine: Machine
+    asked: ToleranceQuestion
+    dimensions: tuple[LegDimension, ...]
+    most: LargestInfluence
+    points: LargestInfluence
+    middle: Floats
+    poses: int
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The table by dimension."""
+        rows = [_row(one, self.most, k) for k, one in enumerate(self.dimensions)]
+        if self.asked.allowed is not None:
+            found = budget(self.dimensions, self.most.position, self.asked.allowed, self.asked.cost)
+            for row, one, value in zip(rows, self.dimensions, found.tolist(), strict=True):
+                row["tolerance"] = value * (1e6 if one.part == "guide" else 1.0 / MICRO) if np.isfinite(value) else None
+        return rows
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """All of it."""
+        asked, points = self.asked, self.points
+        what = "once the rods are adjusted in the middle of the workspace" if asked.adjust else "as built"
+        figures: dict[str, Any] = {
+            "machine": self.machine.name, "tool_mm": asked.tool, "adjusted": asked.adjust,
+            "of": f"largest error of the tip (tool {asked.tool:g} mm) at {self.poses} poses of the workspace, {what}: "
+                  "position in um, turn in urad, per um, of guides per urad",
+            "dimensions": self.rows,
+            "points": [{"point": str(name), "position": _scaled(name.part, float(points.position[k])),
+                        "turn": float(points.turn[k] * (1.0 if name.part == "guide" else 1000.0))}
+                       for k, name in enumerate(by_point(self.dimensions))],
+            "by_chance": _chance(self.middle, asked, self.dimensions)}
+        return figures | (_budget(self.dimensions, self.most, asked) if asked.allowed is not None else {})
 
     @property
     def text(self) -> str:
         """For people."""
-        keys = [key for key in ("dimension", "position", "turn", "tolerance") if key in self.rows[0]]
-        lines = table_text([[_cell(row[key]) for key in keys] for row in self.rows], keys, "lrrr")
+        rows = self.rows
+        keys = [key for key in ("dimension", "position", "turn", "tolerance") if key in rows[0]]
+        lines = table_text([[_cell(row[key]) for key in keys] for row in rows], keys, "lrrr")
         return "\n".join([self.figures["of"], *lines])
 
     @property
     def csv(self) -> str:
         """The same as comma-separated values."""
-        keys = list(self.rows[0])
-        return "\n".join([",".join(keys), *(",".join(str(row[key]) for key in keys) for row in self.rows)]) + "\n"
+        rows = self.rows
+        keys = list(rows[0])
+        return "\n".join([",".join(keys), *(",".join(str(row[key]) for key in keys) for row in rows)]) + "\n"
 
 
 def _cell(value: Any) -> str:
@@ -106,29 +141,15 @@ def tolerances(machine: Machine, asked: ToleranceQuestion) -> ToleranceReport:
     dimensions, of = rods.dimensions, influence(rods, point, asked.adjust)
     poses, middle = poses_over(rods.legs), middle_of(rods.legs)
     most = largest(of, poses, single(dimensions))
-    points = by_point(dimensions)
-    per_point = largest(of, poses, tuple(points.values()))
-    rows = [_row(one, most, k) for k, one in enumerate(dimensions)]
-    what = "once the rods are adjusted in the middle of the workspace" if asked.adjust else "as built"
-    figures: dict[str, Any] = {
-        "machine": machine.name, "tool_mm": asked.tool, "adjusted": asked.adjust,
-        "of": f"largest error of the tip (tool {asked.tool:g} mm) at {len(poses.place)} poses of the workspace, {what}: "
-              "position in um, turn in urad, per um, of guides per urad",
-        "dimensions": rows,
-        "points": [{"point": name, "position": float(_scaled(name, per_point.position[k])),
-                    "turn": float(per_point.turn[k] * (1.0 if name.startswith("guide") else 1000.0))}
-                   for k, name in enumerate(points)],
-        "by_chance": _chance(of(middle)[0], asked, dimensions)}
-    if asked.allowed is not None:
-        figures |= _budget(rows, dimensions, most, asked)
-    return ToleranceReport(figures, rows)
+    points = largest(of, poses, tuple(by_point(dimensions).values()))
+    return ToleranceReport(machine, asked, dimensions, most, points, of(middle)[0], len(poses.place))
 
 
-def _scaled(name: str, value: float) -> float:
-    return value * (MICRO if name.startswith("guide") else 1.0)
+def _scaled(part: DimensionPart, value: float) -> float:
+    return value * (MICRO if part == "guide" else 1.0)
 
 
-def _row(one: Dimension, most: LargestInfluence, k: int) -> dict[str, Any]:
+def _row(one: LegDimension, most: LargestInfluence, k: int) -> dict[str, Any]:
     x, y, z, tilt, heading = most.position_at[k].tolist()
     return {"dimension": str(one), "unit": "urad" if one.part == "guide" else "um",
             "position": float(_scaled(one.part, most.position[k])),
@@ -136,11 +157,11 @@ def _row(one: Dimension, most: LargestInfluence, k: int) -> dict[str, Any]:
             "at_x_mm": x, "at_y_mm": y, "at_z_mm": z, "at_tilt_deg": tilt / DEG, "at_heading_deg": heading / DEG}
 
 
-def _spread(asked: ToleranceQuestion, dimensions: tuple[Dimension, ...]) -> Floats:
+def _spread(asked: ToleranceQuestion, dimensions: tuple[LegDimension, ...]) -> Floats:
     return np.array([asked.spread * (1e-3 if one.part == "guide" else 1.0) for one in dimensions])
 
 
-def _chance(s: Floats, asked: ToleranceQuestion, dimensions: tuple[Dimension, ...]) -> dict[str, Any]:
+def _chance(s: Floats, asked: ToleranceQuestion, dimensions: tuple[LegDimension, ...]) -> dict[str, Any]:
     """In the middle of the workspace, in um and urad."""
     spread = _spread(asked, dimensions)
     found: dict[str, Any] = {"spread_um": asked.spread / MICRO, "samples": asked.samples,
@@ -153,18 +174,14 @@ def _chance(s: Floats, asked: ToleranceQuestion, dimensions: tuple[Dimension, ..
     return found
 
 
-def _budget(rows: list[dict[str, Any]], dimensions: tuple[Dimension, ...], most: LargestInfluence,
-            asked: ToleranceQuestion) -> dict[str, Any]:
-    assert asked.allowed is not None
-    found = budget(dimensions, most.position, asked.allowed, asked.cost)
+def _budget(dimensions: tuple[LegDimension, ...], most: LargestInfluence, asked: ToleranceQuestion) -> dict[str, Any]:
+    allowed = asked.allowed or 0.0
+    found = budget(dimensions, most.position, allowed, asked.cost)
     price = np.array([asked.cost.get(one.part, 1.0) for one in dimensions])
-    for row, one, value in zip(rows, dimensions, found.tolist(), strict=True):
-        row["tolerance"] = value * (1e6 if one.part == "guide" else 1.0 / MICRO) if np.isfinite(value) else None
-    even = asked.allowed / float(np.linalg.norm(most.position))
+    even = allowed / float(np.linalg.norm(most.position))
     first = int(np.argmax(most.position * _spread(asked, dimensions)))
-    return {"budget": {
-        "allowed_um": asked.allowed / MICRO, "cost": float((price / found).sum()),
-        "cost_of_equal_tolerances": float((price / even).sum()), "tighten_first": str(dimensions[first])}}
+    return {"budget": {"allowed_um": allowed / MICRO, "cost": float((price / found).sum()),
+                       "cost_of_equal_tolerances": float((price / even).sum()), "tighten_first": str(dimensions[first])}}
 
 
 def tolerance_figure(machine: Machine, found: ToleranceReport, ending: FigureEnding) -> bytes:

@@ -23,18 +23,18 @@ from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import cross, unit
 from toolpaths.shapes import arrays
 
-Part = Literal["drive", "guide", "foot", "joint", "rod"]
+DimensionPart = Literal["drive", "guide", "foot", "joint", "rod"]
 """what has an error: place of a drive, turn of its guide, joint of a rod at the drive and at the platform, its length"""
-PARTS: tuple[Part, ...] = ("drive", "guide", "foot", "joint", "rod")
+PARTS: tuple[DimensionPart, ...] = ("drive", "guide", "foot", "joint", "rod")
 AXES = {"drive": "xyz", "guide": "abc", "foot": "tnu", "joint": "xyz", "rod": ""}
 """directions: of the machine; turns about them; tangential, inwards, along the guide; of the platform"""
 
 
 @dataclass(frozen=True)
-class Dimension:
+class LegDimension:
     """One dimension: part, whose it is (letter of the leg, with 1 or 2 of a pair's rods), direction."""
 
-    part: Part
+    part: DimensionPart
     of: str
     axis: str
 
@@ -72,10 +72,10 @@ class RodsOfLegs:
         return tuple(f"{name}{n}" if own.count(name) > 1 else name for name, n in zip(own, seen, strict=True))
 
     @property
-    def dimensions(self) -> tuple[Dimension, ...]:
+    def dimensions(self) -> tuple[LegDimension, ...]:
         """Those of drives, guides, feet, joints, rods."""
         whose = {"drive": self.legs.names, "guide": self.legs.names}
-        return tuple(Dimension(part, of, axis) for part in PARTS for of in whose.get(part, self.names)
+        return tuple(LegDimension(part, of, axis) for part in PARTS for of in whose.get(part, self.names)
                      for axis in (AXES[part] or " "))
 
     @property

@@ -19,19 +19,21 @@ from postproc.cli.console import (
     shown_errors,
 )
 from postproc.cli.group import Group
-from postproc.cli.machine_analyse import EXAMPLES as ANALYSED
-from postproc.cli.machine_analyse import machine_analyse
-from postproc.cli.machine_certify import EXAMPLES as CERTIFIED
-from postproc.cli.machine_certify import machine_certify
-from postproc.cli.machine_design import EXAMPLES as DESIGNED
-from postproc.cli.machine_design import machine_design
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.machine_new import EXAMPLES as NEW
 from postproc.cli.machine_new import machine_new
-from postproc.cli.machine_stiffness import EXAMPLES as STIFF
-from postproc.cli.machine_stiffness import machine_stiffness
-from postproc.cli.machine_tolerance import EXAMPLES as TOLERATED
-from postproc.cli.machine_tolerance import machine_tolerance
+from postproc.cli.machine_study import (
+    ANALYSED,
+    CERTIFIED,
+    DESIGNED,
+    STIFF,
+    TOLERATED,
+    machine_analyse,
+    machine_certify,
+    machine_design,
+    machine_stiffness,
+    machine_tolerance,
+)
 from postproc.cli.options import figure_ending
 from postproc.cli.setup_align import EXAMPLES as ALIGNED
 from postproc.cli.setup_align import setup_align

@@ -45,8 +45,8 @@ class OnLegs(PosesOfLegs):
         whole = self.legs.on_slides is not None and self.loops.freedoms == ("x", "y", "z") and not self.gauge.any()
         return RodsOnSlides(self) if whole and not len(self.carriers) else None
 
-    @cached_property
-    def leg_geometry(self) -> LegGeometry:  # type: ignore[override]  # nothing assigns it
+    @property
+    def leg_geometry(self) -> LegGeometry:
         """See the base class."""
         of, names = self.legs, np.array(self.axis_names)
         pairs = np.zeros((len(of.lengths), 3)) if self.clearance is None else pairs_of(
