@@ -50,7 +50,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Certified:
-    """A proof of a machine's workspace: what was asked, what was found, and where the travel of a drive stands against it."""
+    """A proof of a workspace: what was asked, what was found, and where the travel of a drive stands against it."""
 
     machine: Machine
     region: RegionOfPoses

@@ -46,8 +46,10 @@ def certificate_of(values: Mapping[str, Any], file: str) -> Path | None:
     key = key_of(values)
     if (found := shipped().get(key)) is not None:
         return found
-    own = Path(file).with_suffix(NEXT_TO_IT)
     try:
+        own = Path(file).with_suffix(NEXT_TO_IT)
+        if not own.is_file():
+            return None
         with own.open(encoding="utf-8") as text:
             head = text.read(HEAD)
     except (OSError, ValueError):

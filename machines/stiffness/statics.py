@@ -2,7 +2,7 @@
 
 With the rows T = (e, OB x e) of the rods (e from the drive to the platform, O the tip), forces f that push the platform and
 a wrench w on it: T^t f + w = 0. A drive carries g = G^t f with G = e.A' of the rods that it holds (of a leg of changing
-length 1). Rods yield by f / k (body and joints), drives by g / K: rods are shorter by M f, M = diag(1 / k) + G diag(1 / K) G^t,
+length 1). Rods yield by f / k (body and joints), drives by g / K: rods shorten by M f, M = diag(1 / k) + G diag(1 / K) G^t,
 and the tip moves by C w, C = (T^t M^-1 T)^-1. Source: Company 2000, II-34 to II-38, II-43 to II-51, III-18 to III-22.
 """
 

@@ -84,10 +84,10 @@ def test_rates_of_the_matrices_are_their_differences(name: str) -> None:
         np.testing.assert_allclose(enclosed(poses, pose).cosine_change.lo[:, i], (ahead - behind) / (2.0 * h), atol=1e-7)
 
 
-@pytest.mark.parametrize("name", ["uranesx", "hexapod", "h4a-c-table"])
+@pytest.mark.parametrize("name", ["uranesx", "hexapod", "h4a-c-table", "planar-delta-z", "triaglide"])
 def test_no_pose_of_a_box_is_below_its_bound(name: str) -> None:
     """And a small box loses little of the value in its middle: the bound is of the second order."""
-    poses, box, _ = boxes(machines.load(name), 20, seed=3)
+    poses, box, _ = boxes(machines.load(name), 100, seed=3)
     _, held = columns(poses.legs)
     middle = enclosed(poses, spanned(box.middle)).matrix.lo[:, :, held]
     bound, at, _ = least_singular(middle, enclosed(poses, box).change[:, :, :, held], box.radius)
@@ -96,6 +96,10 @@ def test_no_pose_of_a_box_is_below_its_bound(name: str) -> None:
         pose = spanned(rng.uniform(box.lo, box.hi))
         value = np.linalg.svd(enclosed(poses, pose).matrix.lo[:, :, held], compute_uv=False)[:, -1]
         assert (value >= bound - 1e-12).all()
+    for k in range(32):
+        signs = 2.0 * ((k >> np.arange(5)) & 1) - 1.0
+        corner = enclosed(poses, spanned(box.middle + signs * box.radius)).matrix.lo[:, :, held]
+        assert (np.linalg.svd(corner, compute_uv=False)[:, -1] >= bound - 1e-12).all()
     small = Span(box.middle - 1e-4 * box.radius, box.middle + 1e-4 * box.radius)
     near = least_singular(middle, enclosed(poses, small).change[:, :, :, held], small.radius)[0]
     np.testing.assert_allclose(near, at, rtol=1e-2)
