@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import create_model
 
 import machines.kinds as kinds
+from machines.certificate.lookup import certificate_of
 from machines.choices import BoughtOption
 from machines.figures import as_stated, origins_of_figures
 from machines.key_problem import KeyProblem
@@ -21,6 +22,7 @@ from machines.kinematics.base import Kinematics
 from machines.machine import ClampCodes, ControlOptions, Limits, Machine, Timing, Turns
 from machines.models import ControlModel, KinematicsModel, MachineModel, register_beyond
 from machines.plausible import implausible
+from machines.toml_lines import Values
 from machines.user_file import UserFile, nearest_word, read_toml, validate
 from machines.user_model import schema
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, Severity, error, has_errors, read_value
@@ -62,6 +64,17 @@ def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
     return (None if has_errors(diagnostics) else machine), diagnostics
 
 
+def values_of_machine(machine: Machine) -> Values:
+    """The merged values of the file that a machine was loaded from.
+
+    Raises:
+        DiagnosticError: where it cannot be read any more.
+    """
+    known = builtin()
+    source = machine.name if machine.name in known else machine.file
+    return _with_kind(read_value(read_toml(source, known, "machine"))).values
+
+
 def check(file: UserFile) -> tuple[MachineModel | None, list[Diagnostic]]:
     """The model of a machine file that has been read, or None and what is wrong with it."""
     file = as_stated(_with_kind(file))
@@ -74,6 +87,8 @@ def check(file: UserFile) -> tuple[MachineModel | None, list[Diagnostic]]:
     model, diagnostics = validate(file, machine_model(kinematics))
     if model is None:
         return None, diagnostics
+    if (proof := certificate_of(file.values, file.file)) is not None:
+        model.kinematics.take_certificate(str(proof))
     faults = [] if _is_built_in(model) else _of_kind(file, model, build_faults(model.kinematics))
     return model, faults or [file.problem(p.code, p.path, p.message, p.hint) for p in model.problems()]
 
@@ -169,6 +184,7 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         look_ahead=control.look_ahead, block_time=control.block_time,
         length_register=register_beyond(control.length_register),
         radius_register=None if control.radius_register is None else register_beyond(control.radius_register),
+        certificate=model.kinematics.certificate,
         figures=origins_of_figures(model.sources, model.figures()), documents=tuple(model.sources.values()),
         clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
         turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))

@@ -148,6 +148,8 @@ class Machine:
         figures: where a figure of the file comes from, by name ("X.velocity", "timing.clamp"): document and place, or
             "assumed"; what is not in it is stated by whoever wrote the file
         documents: those that figures come from
+        certificate: file that proves that the declared workspace is reached and free of singular positions, "" where that
+            was sampled, or nobody asks it of the machine
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
 
@@ -179,6 +181,7 @@ class Machine:
     hooks: HooksModel = field(default_factory=HooksModel)
     figures: Mapping[str, str] = field(default_factory=dict)
     documents: tuple[Document, ...] = ()
+    certificate: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, PrivateAttr
 
 from machines.choices import Park, Rapids, RolloverRule, Stop
 from machines.figures import Document, FigureSource, FigureTable, by_key, source_problems
@@ -52,6 +52,17 @@ class KinematicsModel(UserModel):
 
     kind: str
     """kind of machine; decides which other keys there are"""
+    _certificate: str = PrivateAttr("")
+
+    @property
+    def certificate(self) -> str:
+        """The file that proves the declared workspace to be reached and free of singular positions; "" where it has to be
+        sampled."""
+        return self._certificate
+
+    def take_certificate(self, file: str) -> None:
+        """There is such a proof: `problems` need not look at the workspace."""
+        self._certificate = file
 
     @abstractmethod
     def build(self) -> Kinematics:

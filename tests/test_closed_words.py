@@ -22,6 +22,7 @@ TEXT = {"str", "str | None"}
 FROM_FILES = {
     "toolpaths/cl/": "words of CL records", "postproc/readback/": "words of programs",
     "postproc/reference/": "words of CL records", "postproc/compile/": "words of CL records",
+    "postproc/certificate_check/": "words of machine files and certificates",
     "postproc/witness/": "words of CL records and programs", "machines/toml_lines.py": "characters of TOML files",
     "machines/geometric_error/tables/": "characters of CSV tables, letters of names",
     "machines/geometric_error/files/": "letters of names of parameters",

@@ -25,6 +25,7 @@ FIGURES = "figures of --json, and text made of them"
 SCHEMA = "a JSON schema"
 TABLES = "tables of a TOML file"
 RECORDS = "JSON in records of CL files"
+CERTIFICATES = "certificates, JSON"
 BORDERS = {
     "postproc/controllers/model.py": "keys of a pydantic model that is copied with others",
     "machines/__init__.py": SCHEMA, "machines/loader.py": SCHEMA, "machines/calibration/measurement_file.py": SCHEMA,
@@ -34,6 +35,14 @@ BORDERS = {
     "machines/user_model.py": SCHEMA, "postproc/python/calls.py": FIGURES,
     "machines/exchange/draft.py": TABLES, "machines/sheet/file_text.py": TABLES,
     "machines/value_words.py": "what pydantic says of a fault",
+    **{f"machines/{name}.py": FIGURES for name in (
+        "analysis/certify", "analysis/chain", "analysis/limits_of_box", "analysis/maps", "layouts/design",
+        "stiffness/report", "tolerances/report")},
+    **{f"{name}.py": CERTIFICATES for name in (
+        "machines/analysis/certificate_figure", "machines/certificate/certificate_file", "machines/certificate/lookup",
+        "postproc/certificate_check/check", "postproc/certificate_check/legs", "postproc/certificate_check/machine_file",
+        "postproc/certificate_check/run")},
+    "postproc/cli/machine_study.py": FIGURES,
     "machines/analysis/report.py": FIGURES, "machines/geometric_error/exchange/survey.py": FIGURES,
     "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,
     **{f"postproc/page/{name}.py": FIGURES for name in (
@@ -74,6 +83,7 @@ DRAWN = "axes of matplotlib"
 LAZY = "names of a package that are imported when they are first asked for"
 ANYTHING = {
     "postproc/base/json_values.py": FIGURES,
+    "machines/certificate/spans.py": "an index of numpy", "postproc/certificate_check/balls.py": "an index of numpy",
     "machines/geometric_error/actual/rods_loop.py": LOOP, "postproc/collision/kernel.py": LOOP,
     "postproc/correction/backlash_steps_loop.py": LOOP, "postproc/cycle_time/linuxcnc_kernels.py": LOOP,
     "postproc/feedrate/kernels/coefficients.py": LOOP, "postproc/feedrate/kernels/interior.py": LOOP,

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from machines.analysis.box import Box, reachable_box
+from machines.analysis.chain import chain_figures
 from machines.analysis.directions import tilts
+from machines.analysis.extremes import MEASURES, largest_over
+from machines.analysis.limits_of_box import ends_of_box, least_margins
 from machines.analysis.singularity import grid_step_that_proves
 from machines.analysis.transmission import (
     Measure,
     WorstValue,
     condition_number,
+    conditioning_factor,
     force_transmission,
+    manipulability,
     speed_acceleration,
     speed_transmission,
     worst,
 )
+from machines.kinematics.leg_geometry import LegGeometry
 from machines.kinematics.rod_platform import RodPlatform, Transmission
 from machines.machine import Machine
 from toolpaths.arrays import Floats
@@ -39,19 +46,28 @@ def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, 
     Raises:
         DiagnosticError: where that proof is asked for and the machine is of another kind.
     """
-    found: dict[str, Any] = {"machine": machine.name, "structure": machine.structure, "axes": list(machine.axis_names)}
+    found: dict[str, Any] = {"machine": machine.name, "structure": machine.structure, "axes": list(machine.axis_names),
+                             "tool_mm": machine.kinematics.tool_length}
+    if machine.kinematics.leg_geometry is not None:
+        found["workspace_examined"] = "proved" if machine.certificate else "sampled"
     kinematics = machine.kinematics
     if (space := kinematics.workspace) is not None:
         found["workspace_mm"] = _span(space.lower, space.upper)
         found["tilt_range_deg"] = [t / DEG for t in space.tilt]
     if kinematics.transmits is not None:
-        found |= _transmission(kinematics.transmits) | _roots(machine)
+        found |= _transmission(kinematics.transmits, kinematics.leg_geometry) | _roots(machine)
     if kinematics.on_rods is not None and not kinematics.on_rods.platform_turns:
         found["acceleration_per_speed_squared_per_mm"] = _largest(speed_acceleration, kinematics.on_rods)
+    if kinematics.workspace is not None:
+        found["least_margins"] = least_margins(machine)
+    if kinematics.transmits is None:
+        found |= chain_figures(machine)
+    box = _box(machine)
     every, largest = tilts(machine)
     found["tilt_in_every_direction_deg"] = every if np.isfinite(every) else None
     found["largest_tilt_deg"] = largest
-    found["reachable_box_mm"] = _box(machine)
+    found["reachable_box_mm"] = _sides(box)
+    found["reachable_box_ends_at"] = ends_of_box(machine, box)
     if singular_above is not None:
         found["singular_values_above_mm"] = singular_above
         found["proved_by_grid_step_mm"] = _proof_step(machine, singular_above)
@@ -68,12 +84,20 @@ def _proof_step(machine: Machine, floor: float) -> float | None:
     return grid_step_that_proves(rods, floor)
 
 
-def _transmission(kinematics: Transmission) -> dict[str, Any]:
+def _transmission(kinematics: Transmission, legs: LegGeometry | None) -> dict[str, Any]:
     several = len(kinematics.headings) > 1
     found: dict[str, Any] = {
         "condition_number": _largest(condition_number, kinematics, several),
         "speed_transmission": _largest(speed_transmission, kinematics, several),
-        "force_transmission": _largest(force_transmission, kinematics, several)}
+        "force_transmission": _largest(force_transmission, kinematics, several),
+        "manipulability": _largest(manipulability, kinematics, several),
+        "conditioning_factor": _least(conditioning_factor, kinematics, several)}
+    for key, measure in MEASURES.items():
+        if legs is None:
+            break
+        extreme = largest_over(legs, kinematics.lever, measure)
+        most = max(extreme.most, found[key]["worst"]) if np.isfinite(extreme.most) else None
+        found[key] |= {"nowhere_more_than": most, "boxes_of_the_proof": extreme.boxes}
     return found | ({"turn_lever_mm": kinematics.lever} if kinematics.lever else {})
 
 
@@ -91,12 +115,18 @@ def _largest(measure: Any, parts: Transmission | RodPlatform, several: bool = Fa
     return _point(worst(bound, parts.workspace, COARSE if several else GRID))
 
 
+def _least(measure: Any, parts: Transmission, several: bool) -> dict[str, Any]:
+    """The least value in the place of the largest."""
+    found = worst(lambda place, tilt: -measure(parts, place, tilt), parts.workspace, COARSE if several else GRID)
+    return _point(replace(found, value=-found.value, least=-found.least)) | {"best_on_grid": -found.least}
+
+
 def _point(value: WorstValue) -> dict[str, Any]:
     return {"worst": value.value, "least_on_grid": value.least, "at_mm": list(value.place),
             "at_tilt_deg": value.tilt / DEG}
 
 
-def _box(machine: Machine) -> dict[str, list[float]] | None:
+def _box(machine: Machine) -> Box | None:
     """In the proportions of the workspace, of straight slides those of their travel, around their middle; else a cube."""
     kinematics = machine.kinematics
     if kinematics.on_rods is not None:
@@ -111,7 +141,7 @@ def _box(machine: Machine) -> dict[str, list[float]] | None:
         tip, axis = kinematics.forward(np.stack([q, machine.home]))
         k = 0 if np.isfinite(tip[0]).all() else 1
         box = reachable_box(machine, tip[k], upper - lower if kinematics.straight_slides else np.ones(3), axis[k])
-    return _sides(box)
+    return box
 
 
 def _sides(box: Box | None) -> dict[str, list[float]] | None:

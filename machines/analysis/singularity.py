@@ -11,8 +11,10 @@ import math
 
 import numpy as np
 
+from machines.kinematics.base import Kinematics
 from machines.kinematics.rod_platform import RodPlatform
 from machines.kinematics.sliders import smallest_singular_value
+from toolpaths.arrays import Ints
 
 FINEST = 1.0
 """mm: smallest step tried"""
@@ -52,10 +54,29 @@ def grid_step_that_proves(kinematics: RodPlatform, floor: float, alpha: float = 
     return None
 
 
+def lipschitz_points(kinematics: Kinematics, margin: float) -> int | None:
+    """Points that III.7.3 needs for a slice of a Delta with slides along z; None of any other machine, or without a proof.
+
+    Args:
+        margin: of the singular values, as a part of the rods' length
+    """
+    rods = kinematics.on_rods
+    if rods is None or rods.platform_turns or not np.allclose(np.abs(rods.legs.directions[:, 2]), 1.0):
+        return None
+    step = grid_step_that_proves(rods, margin * float(rods.legs.lengths.max()))
+    return None if step is None else int(np.prod(_counts(rods, step)))
+
+
+def _counts(kinematics: RodPlatform, step: float) -> Ints:
+    """(2,) points of a square grid over the workspace."""
+    space = kinematics.workspace
+    return np.asarray(np.ceil((space.upper - space.lower)[:2] / step).astype(np.int64) + 1)
+
+
 def _least(kinematics: RodPlatform, step: float) -> float:
     """Smallest singular value of Jx and Jq (mm) over the grid of a slice."""
     space, legs = kinematics.workspace, kinematics.legs
-    counts = np.ceil((space.upper - space.lower)[:2] / step).astype(int) + 1
+    counts = _counts(kinematics, step)
     sides = [np.linspace(lo, hi, n) for lo, hi, n in zip(space.lower[:2], space.upper[:2], counts, strict=True)]
     x, y = (m.ravel() for m in np.meshgrid(*sides))
     ends = np.column_stack([x, y, np.full(len(x), space.middle[2])])[:, None, :] + kinematics.platform_joints

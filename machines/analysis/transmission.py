@@ -59,6 +59,20 @@ def force_transmission(kinematics: Transmission, place: Floats, tilt: Floats) ->
         rates(kinematics, place, tilt, heading), axis=1).max(axis=1))
 
 
+def manipulability(kinematics: Transmission, place: Floats, tilt: Floats) -> Floats:
+    """w = |det J| (N,), II-20 and II-22: how large the platform's speeds are together, not whether one of them is lost."""
+    return _worst_heading(kinematics, lambda heading: np.abs(np.linalg.det(rates(kinematics, place, tilt, heading))))
+
+
+def conditioning_factor(kinematics: Transmission, place: Floats, tilt: Floats) -> Floats:
+    """|det J| over the product of the lengths of its columns (N,), II-23: between 0, singular, and 1, columns square to each
+    other; of tilts in several directions the least."""
+    def of(heading: float) -> Floats:
+        j = rates(kinematics, place, tilt, heading)
+        return np.asarray(-np.abs(np.linalg.det(j)) / np.prod(np.linalg.norm(j, axis=1), axis=1))
+    return np.asarray(-_worst_heading(kinematics, of), dtype=np.float64)
+
+
 def speed_acceleration(rods: RodPlatform, place: Floats, tilt: Floats) -> Floats:
     """eta_av (N,) 1/mm: slide acceleration at unit speed of a Delta's platform in the worst direction (III.6.5).
 

@@ -21,6 +21,7 @@ import numpy as np
 from machines.kinematics import by_samples
 from machines.kinematics.chain import Joint
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceParts
+from machines.kinematics.leg_geometry import LegGeometry
 from machines.kinematics.rod_platform import RodPlatform, Transmission
 from machines.kinematics.taylor import TaylorVector, straight
 from machines.kinematics.workspace import Workspace
@@ -286,6 +287,11 @@ class Kinematics(ABC):
         gauge = tip + self.tool_length * axis
         none = np.zeros((len(q), 0, 3))
         return ClearanceGeometry(gauge, np.zeros(len(q)), none, none, gauge, axis)
+
+    @property
+    def leg_geometry(self) -> LegGeometry | None:
+        """The legs as plain numbers, of a platform that hangs on legs; None of any other machine."""
+        return None
 
     @property
     def over_workspace(self) -> PlatformPlaces | None:

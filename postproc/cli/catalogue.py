@@ -42,7 +42,23 @@ def machine_dict(machine: Machine) -> dict[str, Any]:
                          "unclamp": machine.timing.unclamp},
             "timing_assumed": sorted(machine.timing.assumed),
             "documents": [one.model_dump() for one in machine.documents],
+            "workspace": workspace_dict(machine),
             "control": {"module": control.module, "pins": dict(control.pins)} if control else None}
+
+
+def workspace_dict(machine: Machine) -> dict[str, str] | None:
+    """How the workspace of a machine on legs was looked at when it was loaded; None of any other."""
+    if machine.kinematics.leg_geometry is None:
+        return None
+    return {"examined": "proved" if machine.certificate else "sampled", "certificate": machine.certificate}
+
+
+def workspace_words(machine: Machine) -> str:
+    """The same as a line, "" of a machine without legs."""
+    if (found := workspace_dict(machine)) is None:
+        return ""
+    return "workspace proved to be reached and free of singular positions: " + found["certificate"] if found["certificate"] \
+        else "workspace sampled, not proved: postproc machine certify proves it"
 
 
 def figures_of(machine: Machine, table: str) -> dict[str, str]:
@@ -86,6 +102,7 @@ def machine_text(machine: Machine) -> str:
     for row in d["rotary_axes"]:
         point, along = (", ".join(f"{v:g}" for v in row[key]) for key in ("point", "direction"))
         lines.append(f"  {row['letter']} turns about the line through ({point}) mm along ({along})")
+    lines += [words] if (words := workspace_words(machine)) else []
     lines += _sources(machine)
     if d["control"]:
         pins = ", ".join(f"{k} {v:g}" for k, v in d["control"]["pins"].items())

@@ -22,6 +22,18 @@ from postproc.cli.group import Group
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.machine_new import EXAMPLES as NEW
 from postproc.cli.machine_new import machine_new
+from postproc.cli.machine_study import (
+    ANALYSED,
+    CERTIFIED,
+    DESIGNED,
+    STIFF,
+    TOLERATED,
+    machine_analyse,
+    machine_certify,
+    machine_design,
+    machine_stiffness,
+    machine_tolerance,
+)
 from postproc.cli.options import figure_ending
 from postproc.cli.setup_align import EXAMPLES as ALIGNED
 from postproc.cli.setup_align import setup_align
@@ -34,7 +46,8 @@ if TYPE_CHECKING:
     from toolpaths.choices import FigureEnding
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                          help="Machines: new, list, show, check, analyse, import, export, schema.")
+                          help="Machines: new, list, show, check, analyse, certify, tolerance, stiffness, design, "
+                               "import, export, schema.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
@@ -44,6 +57,11 @@ setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
 machine_app.command("new", epilog=NEW)(machine_new)
 machine_app.command("import", epilog=IMPORTED)(machine_import)
 machine_app.command("export", epilog=EXPORTED)(machine_export)
+machine_app.command("analyse", epilog=ANALYSED)(machine_analyse)
+machine_app.command("stiffness", epilog=STIFF)(machine_stiffness)
+machine_app.command("design", epilog=DESIGNED)(machine_design)
+machine_app.command("tolerance", epilog=TOLERATED)(machine_tolerance)
+machine_app.command("certify", epilog=CERTIFIED)(machine_certify)
 setup_app.command("new", epilog=EXAMPLES)(setup_new)
 setup_app.command("align", epilog=ALIGNED)(setup_align)
 
@@ -117,25 +135,14 @@ def _joints(machine: Machine, at: Sequence[str] | None) -> Floats:
 def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")], json: Json = "") -> None:
     """Check a machine file and say what is wrong with it."""
     import machines
+    from postproc.cli.catalogue import workspace_dict, workspace_words
 
     m, found = machines.load_checked(file)
     found = [*found, *machines.implausible(file)] if m is not None else found
     good = f"{file}: OK: {m.name}, {m.structure}, axes {' '.join(m.axis_names)}" if m else ""
-    report(tuple(found), json, {"name": m.name if m else None, "diagnostics": [d.as_dict() for d in found]}, good)
-
-
-@machine_app.command("analyse", epilog="Example: postproc machine analyse uranesx --json -")
-def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")],
-                    singular_above: Annotated[float | None, typer.Option("--singular-above", metavar="MM", min=0.0,
-                                              help="prove by a grid that the singular values of a linear Delta with slides "
-                                              "along z stay above this")] = None, json: Json = "") -> None:
-    """Condition number, speed and force transmission, reachable box of a parallel machine, over its workspace."""
-    from machines.analysis.report import analyse
-    from postproc.cli.catalogue import analysis_text
-
-    with shown_errors(json):
-        found = analyse(machine_of(name), singular_above)
-    report((), json, found, analysis_text(found))
+    good += f"\n{words}" if m is not None and (words := workspace_words(m)) else ""
+    report(tuple(found), json, {"name": m.name if m else None, "workspace": workspace_dict(m) if m else None,
+                                "diagnostics": [d.as_dict() for d in found]}, good)
 
 
 @machine_app.command("schema")

@@ -7,6 +7,7 @@ from tests.hints.batch_cases import BATCH
 from tests.hints.cl_cases import CL
 from tests.hints.cl_word_cases import CL_WORDS
 from tests.hints.convert_cases import CONVERT
+from tests.hints.design_cases import DESIGN
 from tests.hints.error_cases import ERRORS
 from tests.hints.exchange_cases import EXCHANGE
 from tests.hints.file_cases import FILE
@@ -20,4 +21,4 @@ from tests.hints.tool_cases import TOOLS
 from tests.hints.verify_cases import VERIFY
 
 CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE, *ALIGN, *PLACE, *VERIFY, *EXCHANGE,
-         *OWN_ROOMS, *MACROS, *BATCH]
+         *OWN_ROOMS, *MACROS, *BATCH, *DESIGN]

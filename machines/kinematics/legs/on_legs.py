@@ -15,6 +15,7 @@ import numpy as np
 
 from machines.kinematics.base import ErrorForm, ErrorForms, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry
+from machines.kinematics.leg_geometry import LegGeometry, pairs_of
 from machines.kinematics.legs.attitudes import attitude, tilt_of
 from machines.kinematics.legs.bounds import MovingLoops, PlatformJets
 from machines.kinematics.legs.over_workspace import OverWorkspace
@@ -45,6 +46,18 @@ class OnLegs(RedundantLegs):
         whole = self.legs.on_slides is not None and self.loops.freedoms == ("x", "y", "z") and not self.gauge.any() \
             and self.loops.kept is None
         return RodsOnSlides(self, self.loops.joints) if whole and not len(self.carriers) else None
+
+    @property
+    def leg_geometry(self) -> LegGeometry | None:
+        """See the base class; None of platforms with bars, of those that turn about z alone, and of those carried twice."""
+        if self.loops.kept is not None or self.carried_twice or self.loops.turns not in ("", "a", "b", "abc"):
+            return None
+        of, names = self.legs, np.array(self.axis_names)
+        pairs = np.zeros((len(of.lengths), 3)) if self.clearance is None else pairs_of(
+            len(of.lengths), self.clearance.leg, self.clearance.shift)
+        return LegGeometry(self.leg_names, of.points, of.directions, of.arms, of.lengths, of.roots, of.slide, of.arm,
+                           self.loops.joints, pairs, self.loops.freedoms, self.gauge,
+                           tuple(names[self.carriers_at].tolist()), self.carriers, self.workspace)
 
     @property
     def leg_names(self) -> tuple[str, ...]:

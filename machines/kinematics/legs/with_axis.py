@@ -16,6 +16,7 @@ from machines.kinematics.base import ErrorForm, ErrorForms, Kinematics, as_point
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about
+from machines.kinematics.leg_geometry import LegGeometry
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.one_turn import OneTurn
@@ -58,6 +59,11 @@ class LegsWithAxis(Kinematics):
         found = self.on_legs.one_turn
         assert found is not None
         return found
+
+    @property
+    def leg_geometry(self) -> LegGeometry | None:
+        """See the base class: that of the legs."""
+        return self.on_legs.leg_geometry
 
     @property
     def axis_names(self) -> tuple[str, ...]:  # type: ignore[override]  # nothing assigns it

@@ -1,0 +1,66 @@
+"""The boxes of a certificate that a plane through the middle of its region cuts, with the bound proved in each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from machines.certificate.search import HALVES
+from toolpaths.arrays import Floats
+from toolpaths.choices import FigureEnding
+from toolpaths.drawing import image
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SPANS = ("x_mm", "y_mm", "z_mm", "tilt_rad", "heading_rad")
+PLANES = ((0, 1), (0, 2))
+"""numbers of the pose to the right and up"""
+_SIZE = (13.0, 5.5)
+
+
+def certificate_figure(content: Mapping[str, Any], ending: FigureEnding) -> bytes:
+    """An image file of a certificate's content."""
+    lines = [line.split() for line in content["boxes"]]
+    lower, upper = _ends(content, ["" if line[0] == "." else line[0] for line in lines])
+    bound = np.array([float(line[1]) for line in lines])
+
+    def fill(sheet: Figure) -> None:
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import Normalize
+        from matplotlib.patches import Rectangle
+
+        shade = ScalarMappable(Normalize(float(bound.min()), max(float(bound.max()), float(bound.min()) + 1e-9)), "viridis")
+        panels = sheet.subplots(1, len(PLANES))
+        for axes, (right, up) in zip(panels, PLANES, strict=True):
+            middle = 0.5 * (lower.min(axis=0) + upper.max(axis=0))
+            others = [i for i in range(5) if i not in (right, up)]
+            cut = ((lower <= middle) & (middle <= upper))[:, others].all(axis=1)
+            for k in np.flatnonzero(cut):
+                size = upper[k] - lower[k]
+                axes.add_patch(Rectangle((lower[k, right], lower[k, up]), size[right], size[up], linewidth=0.4,
+                                         edgecolor="#222222", facecolor=shade.to_rgba(bound[k])))
+            axes.set_xlim(lower[:, right].min(), upper[:, right].max())
+            axes.set_ylim(lower[:, up].min(), upper[:, up].max())
+            axes.set_xlabel(f"{'xyz'[right]}, mm")
+            axes.set_ylabel(f"{'xyz'[up]}, mm")
+            axes.set_aspect("equal")
+        sheet.colorbar(shade, ax=list(panels), label="distance from direct singularities, at least")
+
+    of, tool = content["region"]["of"], content["region"]["tool_mm"]
+    title = f"{content['machine']}: {len(lines)} boxes, of the {of}, tool {tool:g} mm"
+    return image(_SIZE, title, fill, ending)
+
+
+def _ends(content: Mapping[str, Any], paths: list[str]) -> tuple[Floats, Floats]:
+    """(lower, upper), each (N, 5), of boxes by the path of halves to each."""
+    spans = np.array([content["region"][name] for name in SPANS])
+    lower, upper = np.tile(spans[:, 0], (len(paths), 1)), np.tile(spans[:, 1], (len(paths), 1))
+    for k, path in enumerate(paths):
+        for letter in path:
+            i = HALVES[0].find(letter)
+            end, j = (upper, i) if i >= 0 else (lower, HALVES[1].index(letter))
+            end[k, j] = 0.5 * (lower[k, j] + upper[k, j])
+    return lower, upper

@@ -1,0 +1,167 @@
+"""A machine's workspace, or a box of tips in it, proved to be reached and free of singular positions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from machines.analysis.singularity import lipschitz_points
+from machines.certificate.certificate_file import RegionOfPoses, certificate
+from machines.certificate.enclosure import columns
+from machines.certificate.poses import PosesOfBoxes
+from machines.certificate.search import AskedProof, ProvedBoxes, Shortfall, look, prove
+from machines.certificate.spans import spanned
+from machines.kinematics.leg_geometry import LegGeometry
+from machines.loader import values_of_machine
+from machines.machine import Machine
+from toolpaths.arrays import Floats
+from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
+from toolpaths.units import DEG
+
+LOOKS, HALF, LAST = 4000, 0.5, 1e4
+"""random poses, of whose least value half is the margin where none is asked for; 1 / its last place"""
+_WORDS: Mapping[Shortfall, str] = {
+    "reach": "a leg does not reach", "travel": "a drive is outside its travel",
+    "direct": "the platform yields with the drives held (distance from a direct singularity)",
+    "inverse": "a rod is nearly square to the motion of its drive (distance from an inverse singularity)",
+    "held": "legs and pairs of rods hardly hold the platform (least singular value of what they hold, V-4)"}
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be certified.
+
+    Attributes:
+        box: (lower, upper) of the tip at the tool's length, mm, or None for the declared workspace of the platform
+        tool: mm
+        margin: least distance from singular positions, free of units; None: half of the least that random poses have
+        travel: whether the drives have to be inside their travel; None: where they are
+    """
+
+    box: tuple[Floats, Floats] | None = None
+    tool: float = 0.0
+    margin: float | None = None
+    travel: bool | None = None
+
+
+@dataclass(frozen=True)
+class Certified:
+    """A proof of a workspace: what was asked, what was found, and where the travel of a drive stands against it."""
+
+    machine: Machine
+    region: RegionOfPoses
+    asked: AskedProof
+    proved: ProvedBoxes
+    outside: ProvedBoxes | None
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """Of the certificate's file."""
+        return certificate(self.machine.name, values_of_machine(self.machine), self.region, self.asked, self.proved)
+
+    @property
+    def text(self) -> str:
+        """The certificate's file."""
+        return json.dumps(self.content, indent=1) + "\n"
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """Region, margins, bounds, number of boxes."""
+        return _figures(self.machine, self.asked, self.content, self.proved, self.outside)
+
+
+def certify(machine: Machine, wanted: Wanted) -> Certified:
+    """The certificate.
+
+    Raises:
+        DiagnosticError: where it cannot be had, with the place and what stands against it.
+    """
+    legs = machine.kinematics.leg_geometry
+    if legs is None:
+        raise DiagnosticError([error("certificate.legs", f"no workspace of {machine.name} is proved: it has no platform "
+                                     "on legs, or one with bars, with a turn about z alone, or carried twice",
+                                     file=machine.file,
+                                     hint="certify machines on legs: a chain of axes is singular where the tool lies along "
+                                     "its rotary axis")])
+    asked, region = _asked(machine, legs, wanted)
+    proved = prove(asked)
+    outside = None
+    if proved.lack in ("travel", "undecided") and wanted.travel is None:
+        asked, region = _asked(machine, legs, Wanted(wanted.box, wanted.tool, wanted.margin, False))
+        outside, proved = proved, prove(asked)
+    if proved.lack:
+        raise DiagnosticError([_refusal(machine, asked, proved)])
+    return Certified(machine, region, asked, proved, outside)
+
+
+def _asked(machine: Machine, legs: LegGeometry, wanted: Wanted) -> tuple[AskedProof, RegionOfPoses]:
+    space = legs.workspace
+    box = wanted.box or (space.lower, space.upper)
+    shift = np.zeros(3) if wanted.box is None else np.array([0.0, 0.0, wanted.tool]) - legs.gauge
+    high = 2.0 * np.pi if legs.tilts_everywhere and space.tilt[1] > 0.0 else 0.0
+    lower, upper = np.array([*box[0], space.tilt[0], 0.0]), np.array([*box[1], space.tilt[1], high])
+    endless = np.array(legs.arm)
+    kept, free = _travel(machine, legs.names), np.tile([-np.inf, np.inf], (len(legs.names), 1))
+    own, none = _travel(machine, legs.carrier_names), np.tile([-np.inf, np.inf], (len(legs.carrier_names), 1))
+    keep = wanted.travel is not False
+    asked = AskedProof(PosesOfBoxes(legs, shift), lower, upper, kept if keep else free, own if keep else none, endless, 0.0)
+    margin = _margin(asked) if wanted.margin is None else wanted.margin
+    whole = wanted.box is None
+    return AskedProof(asked.poses, lower, upper, asked.travel, asked.carrier_travel, endless, margin), RegionOfPoses(
+        "platform" if whole else "tip", 0.0 if whole else wanted.tool, whole)
+
+
+def _travel(machine: Machine, letters: tuple[str, ...]) -> Floats:
+    at = [machine.axis_names.index(letter) for letter in letters]
+    return np.stack([machine.limits.lower[at], machine.limits.upper[at]], axis=1)
+
+
+def _margin(asked: AskedProof) -> float:
+    """Half of the least of random poses, rounded down; at least its last place, so that a singular position is found."""
+    pose = np.random.default_rng(0).uniform(asked.lower, asked.upper, (LOOKS, 5))
+    at = np.nan_to_num(look(asked, spanned(pose)).at, nan=0.0)
+    return max(float(np.floor(HALF * at.min() * LAST) / LAST), 1.0 / LAST)
+
+
+def _refusal(machine: Machine, asked: AskedProof, proved: ProvedBoxes) -> Diagnostic:
+    where = pose_words(proved.place, asked.poses.legs)
+    of = "tip" if asked.poses.from_point.any() else "platform"
+    if proved.lack == "undecided":
+        return error("certificate.undecided", f"{proved.tried} boxes and no end, the last round {where} of the {of}: "
+                     f"nothing keeps clear of the margin {asked.margin:g} by enough to prove it", file=machine.file,
+                     hint="ask for a smaller --margin or a smaller --box, or leave the travel out with --no-travel")
+    due = asked.travel_margin if proved.lack == "travel" else asked.margin
+    value = "" if np.isnan(proved.value) else f" ({proved.value:.4g}, asked for {due:g})"
+    return error("certificate.short", f"{_WORDS[proved.lack]}{value} at {where} of the {of}", file=machine.file,
+                 hint="make the workspace or --box smaller, move the drives, or ask for a smaller --margin")
+
+
+def pose_words(pose: Floats, legs: LegGeometry) -> str:
+    """A pose (5,) mm and rad in words."""
+    x, y, z, tilt, heading = pose
+    words = f"x {x:.4g}, y {y:.4g}, z {z:.4g} mm"
+    if legs.turns:
+        words += f", tilt {tilt / DEG:.4g} degrees"
+    return words + (f" towards {heading / DEG:.4g}" if legs.tilts_everywhere else "")
+
+
+def _figures(machine: Machine, asked: AskedProof, content: dict[str, Any], proved: ProvedBoxes,
+             outside: ProvedBoxes | None) -> dict[str, Any]:
+    region = {key: [v / DEG for v in value] if key.endswith("_rad") else value
+              for key, value in content["region"].items()}
+    found: dict[str, Any] = {
+        "machine": machine.name, "key": content["key"], "covers": content["covers"],
+        "region": {key.replace("_rad", "_deg"): value for key, value in region.items()},
+        "margin": asked.margin, "proved_direct": content["proved"]["direct"], "proved_inverse": content["proved"]["inverse"],
+        "proved_held": content["proved"]["held"] if columns(asked.poses.legs)[0] != columns(asked.poses.legs)[1] else None,
+        "travel_proved": content["travel_proved"], "boxes": len(proved.paths),
+        "boxes_looked_at": proved.tried}
+    if outside is not None:
+        key = "outside_travel_at" if outside.lack == "travel" else "at_end_of_travel_at"
+        found[key] = pose_words(outside.place, asked.poses.legs)
+    points = lipschitz_points(machine.kinematics, asked.margin)
+    return found | ({} if points is None else {"lipschitz_squares_of_a_slice": points})

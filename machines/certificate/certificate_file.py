@@ -1,0 +1,75 @@
+"""The file of a certificate: geometry, region, margins, and every box with what is proved of it; found by a hash.
+
+JSON. A box is a line "path direct inverse held": its path of halves (`search.HALVES`, "." the whole region) and lower
+bounds, free of units, rounded down. The key is the SHA-256 of what the proof rests on in the machine file: the table
+`[kinematics]` without its clearances. Shipped certificates stand in `shipped`, by their key; a shop's own next to its
+machine file, as NAME.certificate.json.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+
+from machines.certificate.lookup import WHOLE, key_of
+from machines.certificate.search import AskedProof, ProvedBoxes
+from machines.kinematics.leg_geometry import LegGeometry
+from toolpaths.arrays import Floats
+
+FORM = 1
+"""of the file; it rises where a key changes its meaning"""
+SHARE, DIGITS = 0.95, 1e4
+"""of a bound that is stated, and 1 / its last place: what is left lets another computation confirm it"""
+
+
+@dataclass(frozen=True)
+class RegionOfPoses:
+    """Whose poses are in the boxes: of the tool's tip or of the platform's reference point."""
+
+    of: str
+    tool: float
+    whole: bool
+    """all of the declared workspace"""
+
+
+def stated(asked: AskedProof, proved: ProvedBoxes) -> Floats:
+    """(N, 3) bounds as the file has them: rounded down, none below the margin."""
+    return np.asarray(np.maximum(np.floor(SHARE * proved.bounds * DIGITS) / DIGITS, asked.margin), dtype=np.float64)
+
+
+def certificate(name: str, values: Mapping[str, Any], region: RegionOfPoses, asked: AskedProof,
+                proved: ProvedBoxes) -> dict[str, Any]:
+    """The file's content, of a proof."""
+    bounds = stated(asked, proved)
+    boxes = [f"{path or '.'} {' '.join(map(repr, row))}" for path, row in zip(proved.paths, bounds.tolist(), strict=True)]
+    span = {key: [float(lo), float(hi)] for key, lo, hi in zip(
+        ("x_mm", "y_mm", "z_mm", "tilt_rad", "heading_rad"), asked.lower, asked.upper, strict=True)}
+    return {
+        "certificate": FORM, "key": key_of(values), "covers": WHOLE if region.whole else "region", "machine": name,
+        "geometry": geometry_table(asked.poses.legs, asked),
+        "region": {"of": region.of, "tool_mm": region.tool} | span,
+        "margin": asked.margin, "travel_margin": asked.travel_margin,
+        "travel_proved": bool(np.isfinite(asked.travel).any()),
+        "proved": dict(zip(("direct", "inverse", "held"), bounds.min(axis=0).tolist(), strict=True)),
+        "digest": sha256("\n".join(boxes).encode()).hexdigest(), "boxes": boxes}
+
+
+def geometry_table(legs: LegGeometry, asked: AskedProof) -> dict[str, Any]:
+    """The legs as the proof takes them, mm and rad; a travel that is not kept is null."""
+    def of(k: int) -> dict[str, Any]:
+        drive = "slide" if legs.slide[k] else "arm" if legs.arm[k] else "length"
+        return {"letter": legs.names[k], "drive": drive, "point": legs.points[k].tolist(),
+                "direction": legs.directions[k].tolist(), "arm": legs.arms[k].tolist(), "joint": legs.joints[k].tolist(),
+                "rod": float(legs.lengths[k]), "root": float(legs.roots[k]), "pair": legs.pairs[k].tolist(),
+                "travel": _ends(asked.travel[k])}
+    return {"freedoms": list(legs.freedoms), "gauge": legs.gauge.tolist(), "legs": [of(k) for k in range(len(legs.names))],
+            "carriers": [{"letter": name, "direction": row.tolist(), "travel": _ends(travel)} for name, row, travel in zip(
+                legs.carrier_names, legs.carriers, asked.carrier_travel, strict=True)]}
+
+
+def _ends(travel: Floats) -> list[float | None]:
+    return [float(v) if np.isfinite(v) else None for v in travel]

@@ -1,0 +1,57 @@
+"""Which certificate goes with a machine file: by the hash of what the proof rests on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+SHIPPED = Path(__file__).parent / "shipped"
+NEXT_TO_IT = ".certificate.json"
+"""what the name of a certificate next to a machine file ends in"""
+APART = ("clearance", "assumed", "source", "family")
+"""keys of `[kinematics]` that the proof does not rest on"""
+WHOLE, HEAD = "workspace", 400
+"""what a certificate of the whole declared workspace covers; characters of its file that say so, and its key"""
+
+
+def key_of(values: Mapping[str, Any]) -> str:
+    """The hash of a machine file's merged values."""
+    kinematics = values.get("kinematics", {})
+    table = {"kind": kinematics.get("family")} | {k: v for k, v in kinematics.items() if k not in APART}
+    text = json.dumps(_plain(table), sort_keys=True, separators=(",", ":"))
+    return sha256(text.encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """Numbers as floats, so that 700 and 700.0 are one."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
+
+
+@cache
+def shipped() -> Mapping[str, Path]:
+    """The certificates that come with the package, by key."""
+    return {path.stem: path for path in sorted(SHIPPED.glob("*.json"))}
+
+
+def certificate_of(values: Mapping[str, Any], file: str) -> Path | None:
+    """The certificate of the whole declared workspace of a machine file of these values: shipped, or next to the file."""
+    key = key_of(values)
+    if (found := shipped().get(key)) is not None:
+        return found
+    try:
+        own = Path(file).with_suffix(NEXT_TO_IT)
+        if not own.is_file():
+            return None
+        with own.open(encoding="utf-8") as text:
+            head = text.read(HEAD)
+    except (OSError, ValueError):
+        return None
+    return own if f'"key": "{key}"' in head and f'"covers": "{WHOLE}"' in head else None

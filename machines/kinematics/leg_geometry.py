@@ -1,0 +1,78 @@
+"""The legs of a platform as plain numbers, whatever kind of machine they carry: what proofs over a workspace need.
+
+Source of the law of one leg: Company 2000, II-7, II-8 (slides); the same closure for arms and rods of changing length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from machines.kinematics.workspace import Workspace
+from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
+
+
+@dataclass(frozen=True, eq=False)
+@arrays(points="K 3", directions="K 3", arms="K 3", lengths="K", roots="K", slide="K", arm="K", joints="K 3", pairs="K 3",
+        gauge="3", carriers="M 3")
+class LegGeometry:
+    """K legs under a platform, in the machine frame, mm.
+
+    Attributes:
+        names: letters of the drives
+        points: (K, 3) foot at q = 0, of an arm a point of its axis
+        directions: (K, 3) unit vectors of slides, axes of arms
+        arms: (K, 3) from the axis to the foot at q = 0; 0 of all that are no arms
+        lengths: (K,) rods, of a leg of changing length at q = 0
+        roots: (K,) the sign of (A - B).A'
+        slide, arm: (K,) what drives the leg; neither: its length
+        joints: (K, 3) platform joints from the reference point, platform level
+        pairs: (K, 3) from one rod of a leg to its other; 0 of a single rod
+        freedoms: letters of what the legs leave the platform, x y z and a b c
+        gauge: (3,) gauge point from the reference point, platform level
+        carrier_names, carriers: slides under legs and platform, or under the part, and how they move the tool
+        workspace: of the reference point and the tilt
+    """
+
+    names: tuple[str, ...]
+    points: Floats
+    directions: Floats
+    arms: Floats
+    lengths: Floats
+    roots: Floats
+    slide: Bools
+    arm: Bools
+    joints: Floats
+    pairs: Floats
+    freedoms: tuple[str, ...]
+    gauge: Floats
+    carrier_names: tuple[str, ...]
+    carriers: Floats
+    workspace: Workspace
+
+    @property
+    def turns(self) -> str:
+        """The turns among the freedoms."""
+        return "".join(name for name in self.freedoms if name in "abc")
+
+    @property
+    def tilts_everywhere(self) -> bool:
+        """True of a platform that turns about x, y and z: its tool tilts in every direction."""
+        return len(self.turns) == len("abc")
+
+    @property
+    def lever(self) -> float:
+        """mm per rad that makes turns lengths: the longest platform joint."""
+        return max(float(np.linalg.norm(self.joints, axis=1).max(initial=0.0)), 1.0)
+
+
+def pairs_of(count: int, leg: Ints, shift: Floats) -> Floats:
+    """(K, 3) mm from one rod to the other of each of `count` legs, of rods `leg` (R,) at `shift` (R, 3); 0 of single."""
+    pairs = np.zeros((count, 3))
+    for k in range(count):
+        own = shift[np.asarray(leg) == k]
+        if len(own) == 2:
+            pairs[k] = own[0] - own[1]
+    return pairs

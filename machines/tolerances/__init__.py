@@ -1,0 +1,1 @@
+"""What the errors of each dimension do to the tool, and which dimension to tighten."""

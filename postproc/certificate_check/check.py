@@ -1,0 +1,229 @@
+"""Whether a certificate proves what it says: boxes that leave no gap, and bounds that another computation confirms.
+
+Everything is computed again from the geometry in the file, with rounding: in each box Y M = I + E for any Y near the inverse
+of M in its middle, so the least singular value of M is at least (1 - |E|) / |Y|. Where that does not reach what the file
+states, the box is cut, down to `DEEPEST`. The geometry is compared with the machine file, read without the project's
+loader. Source of the bound: perturbation of the identity (Golub and Van Loan, 2.3.4).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+
+from postproc.certificate_check.balls import Ball, FloatArray, ball, product, spectral
+from postproc.certificate_check.legs import legs_in, moving
+
+DEEPEST, AT_ONCE = 14, 1_000
+"""cuts of a box of the file; boxes at a time"""
+LOWER, UPPER = "xyztn", "XYZTN"
+SPANS = ("x_mm", "y_mm", "z_mm", "tilt_rad", "heading_rad")
+BOUNDS = ("direct", "inverse", "held")
+_LINE = re.compile(r"(\.|[xyztnXYZTN]+) (\S+) (\S+) (\S+)")
+
+
+class Rejected(ValueError):
+    """The certificate does not prove what it says; the message says where."""
+
+
+@dataclass(frozen=True)
+class StatedBox:
+    """A box of the file, or a part of it: its path, ends (5,), what is stated of it (3,), cuts so far."""
+
+    path: str
+    lower: FloatArray
+    upper: FloatArray
+    stated: FloatArray
+    cuts: int = 0
+
+
+def confirmed(found: dict[str, Any]) -> dict[str, Any]:
+    """What the certificate proves: least bounds, number of boxes.
+
+    Raises:
+        Rejected: where it does not.
+    """
+    try:
+        boxes, margin = _boxes(found), float(found["margin"])
+        least = np.min([box.stated for box in boxes], axis=0)
+        if {name: float(v) for name, v in zip(BOUNDS, least, strict=True)} != found["proved"]:
+            raise Rejected(f"`proved` says {found['proved']}, the boxes have {least.tolist()}")
+        if least.min() < margin:
+            box = min(boxes, key=lambda one: float(one.stated.min()))
+            raise Rejected(f"box {box.path or '.'} states {box.stated.min():g}, less than the margin {margin:g}")
+        _carriers(found)
+        looked = _prove(found, boxes)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as fault:
+        if isinstance(fault, Rejected):
+            raise
+        raise Rejected(f"it is no certificate of this form: {type(fault).__name__}: {fault}") from fault
+    return {"boxes": len(boxes), "looked_at": looked, "margin": margin} | {
+        f"{name}_at_least": float(v) for name, v in zip(BOUNDS, least, strict=True)}
+
+
+def _boxes(found: dict[str, Any]) -> list[StatedBox]:
+    """The boxes of the file, which must cover the region without a gap."""
+    lines = found["boxes"]
+    if sha256("\n".join(lines).encode()).hexdigest() != found["digest"]:
+        raise Rejected("the boxes are not those that its digest was taken of")
+    stated: dict[str, FloatArray] = {}
+    for line in lines:
+        read = _LINE.fullmatch(line)
+        if read is None:
+            raise Rejected(f"{line!r} is no box")
+        path = "" if read[1] == "." else read[1]
+        if path in stated:
+            raise Rejected(f"box {read[1]} is there twice")
+        stated[path] = np.array([float(v) for v in read.groups()[1:]])
+        if not np.isfinite(stated[path]).all():
+            raise Rejected(f"{line!r} states no numbers")
+    spans = np.array([found["region"][name] for name in SPANS], np.float64)
+    if not (np.isfinite(spans).all() and (spans[:, 0] <= spans[:, 1]).all()):
+        raise Rejected(f"the region {spans.tolist()} is empty")
+    boxes: list[StatedBox] = []
+    todo = [StatedBox("", spans[:, 0], spans[:, 1], np.zeros(3))]
+    inner = {path[:k] for path in stated for k in range(len(path))}
+    letters = {path[:k]: LOWER.index(path[k].lower()) for path in stated for k in range(len(path))}
+    while todo:
+        box = todo.pop()
+        if box.path in stated:
+            if box.path in inner:
+                raise Rejected(f"box {box.path or '.'} holds others")
+            boxes.append(StatedBox(box.path, box.lower, box.upper, stated[box.path]))
+        elif box.path in inner:
+            todo += _cut(box, letters[box.path])
+        else:
+            middle = ", ".join(f"{v:g}" for v in 0.5 * (box.lower + box.upper))
+            raise Rejected(f"no box covers {box.path or 'the region'}, round x, y, z, tilt, heading {middle} (mm, rad)")
+    if len(boxes) < len(stated):
+        raise Rejected(f"{len(stated) - len(boxes)} boxes are of another division than the others")
+    return boxes
+
+
+def _cut(box: StatedBox, i: int) -> list[StatedBox]:
+    middle = 0.5 * (box.lower[i] + box.upper[i])
+    below, above = box.upper.copy(), box.lower.copy()
+    below[i] = above[i] = middle
+    return [StatedBox(box.path + LOWER[i], box.lower, below, box.stated, box.cuts + 1),
+            StatedBox(box.path + UPPER[i], above, box.upper, box.stated, box.cuts + 1)]
+
+
+def _prove(found: dict[str, Any], boxes: list[StatedBox]) -> int:
+    """Confirm all boxes; how many were looked at, parts included."""
+    shift = _shift(found["region"], found["geometry"])
+    todo, count = list(boxes), 0
+    while todo:
+        some, todo = todo[-AT_ONCE:], todo[:-AT_ONCE]
+        count += len(some)
+        lower, upper, stated = (np.array([getattr(box, name) for box in some]) for name in ("lower", "upper", "stated"))
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not known is infinite, and confirms nothing
+            good, over, worst = _looked(found, shift, lower, upper, stated)
+        for k in np.flatnonzero(np.logical_not(good)):
+            box = some[int(k)]
+            where = ", ".join(f"{v:.6g}" for v in 0.5 * (box.lower + box.upper))
+            if over[k]:
+                raise Rejected(f"box {box.path or '.'} states more than there is at x, y, z, tilt, heading {where} (mm, "
+                               f"rad): {over[k]}")
+            if box.cuts >= DEEPEST:
+                raise Rejected(f"box {box.path or '.'}, round {where} (mm, rad), is not confirmed: its bounds are too close")
+            todo += _cut(box, int(worst[k]))
+    return count
+
+
+def _shift(region: dict[str, Any], geometry: dict[str, Any]) -> FloatArray:
+    """(3,) from the point of the region to the platform's reference point, platform level."""
+    if region["of"] == "platform":
+        return np.zeros(3)
+    if region["of"] != "tip":
+        raise Rejected(f"the region is of {region['of']!r}, neither of the tip nor of the platform")
+    return np.array([0.0, 0.0, float(region["tool_mm"])]) - np.array(geometry["gauge"], np.float64)
+
+
+def _looked(found: dict[str, Any], shift: FloatArray, lower: FloatArray, upper: FloatArray,
+            stated: FloatArray) -> tuple[FloatArray, list[str], FloatArray]:
+    """(confirmed (N,), what speaks against a box, number of the pose to cut (N,))."""
+    geometry = found["geometry"]
+    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+    radius = half * (1.0 + 1e-12) + 1e-12 * np.abs(middle)
+    here = legs_in(geometry, shift, [ball(middle[:, i]) for i in range(5)])
+    over = legs_in(geometry, shift, [Ball(middle[:, i], radius[:, i]) for i in range(5)])
+    count = len(geometry["legs"])
+    free = ["xyzabc".index(letter) for letter in geometry["freedoms"]]
+    held = [0, 1, 2, 3, 4, 5] if "z" in geometry["freedoms"] else [0, 1, 5]
+    held = held if len(here.rows) >= len(held) else free  # the file states too few rods to hold more
+    matrix, rates = _matrix(here.rows), [_matrix([row[i] for row in over.rates]) for i in range(5)]
+    direct = _least(matrix[:, :count][:, :, free], [rate[:, :count][:, :, free] for rate in rates], radius)
+    whole = _least(matrix[:, :, held], [rate[:, :, held] for rate in rates], radius)
+    cosine = np.min([one.least() for one in over.cosine], axis=0)
+    reaches = np.all([one.least() > 0.0 for one in over.under], axis=0)
+    good = reaches & (direct[0] >= stated[:, 0]) & (cosine >= stated[:, 1]) & (whole[0] >= stated[:, 2])
+    inside, outside = _travel(found, here.q, over.q)
+    at = np.stack([direct[1], np.min([one.most() for one in here.cosine], axis=0), whole[1]], axis=1)
+    against = [_against(at[k], stated[k], bool(outside[k]), bool(np.any([one.most()[k] < 0.0 for one in here.under])))
+               for k in range(len(lower))]
+    share = np.where(np.isfinite(direct[2] + whole[2]), direct[2] + whole[2], half)
+    return good & inside, against, np.where(half > 0.0, share, -1.0).argmax(axis=1)
+
+
+def _against(at: FloatArray, stated: FloatArray, outside: bool, short: bool) -> str:
+    if short:
+        return "a leg does not reach"
+    if outside:
+        return "a drive is outside its travel"
+    less = [f"{name} is {value:.4g}, stated {due:g}" for name, value, due in zip(BOUNDS, at, stated, strict=True)
+            if value < due * (1.0 - 1e-9)]
+    return "; ".join(less)
+
+
+def _matrix(rows: list[list[Ball]]) -> Ball:
+    """(N, R, 6)"""
+    return Ball(np.stack([np.stack([one.m for one in row], axis=-1) for row in rows], axis=1),
+                np.stack([np.stack([one.r for one in row], axis=-1) for row in rows], axis=1))
+
+
+def _least(matrix: Ball, rates: list[Ball], half: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(lower bound of the least singular value over boxes, its value in the middles, share of each number of the pose)."""
+    fine = np.asarray(np.isfinite(matrix.m).all(axis=(1, 2)) & np.isfinite(matrix.r).all(axis=(1, 2)))
+    rows = np.where(fine[:, None, None], matrix.m, 0.0)
+    near = np.linalg.pinv(rows)
+    off = product(near, Ball(rows, np.where(fine[:, None, None], matrix.r, 0.0)))
+    off = Ball(off.m - np.eye(rows.shape[2]), off.r)
+    some = half > 0.0
+    share = np.stack([np.where(some[:, i], spectral(product(near, rate)), 0.0) for i, rate in enumerate(rates)], axis=1)
+    share = np.where(some, np.nan_to_num(share, nan=np.inf, posinf=np.inf) * np.where(some, half, 1.0), 0.0)
+    size = np.linalg.norm(near, ord=2, axis=(1, 2)) * (1.0 + 1e-10)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        bound = np.where(fine & (size > 0.0), (1.0 - spectral(off) - share.sum(axis=1)) / size * (1.0 - 1e-12), -np.inf)
+    at = np.where(fine, np.linalg.svd(rows, compute_uv=False)[:, -1], np.inf)
+    return bound, at, share
+
+
+def _travel(found: dict[str, Any], here: list[Ball], over: list[Ball]) -> tuple[FloatArray, FloatArray]:
+    """(inside the travel everywhere (N,), outside in the middle (N,)); angles may be counted whole turns apart."""
+    inside, outside = np.ones(len(here[0].m), bool), np.zeros(len(here[0].m), bool)
+    margin = float(found["travel_margin"])
+    if found["travel_proved"] is not True:
+        return inside, outside
+    for leg, at, q in zip(found["geometry"]["legs"], here, over, strict=True):
+        low, high = (sign * np.inf if end is None else float(end) for sign, end in zip((-1, 1), leg["travel"], strict=True))
+        turns = 2.0 * np.pi * np.floor((at.m - low) / (2.0 * np.pi)) if leg["drive"] == "arm" and np.isfinite(low) else 0.0
+        inside &= (q.least() - turns >= low + margin) & (q.most() - turns <= high - margin)
+        outside |= (at.m - turns < low + margin - 1e-9) | (at.m - turns > high - margin + 1e-9)
+    return inside, outside
+
+
+def _carriers(found: dict[str, Any]) -> None:
+    """Carriers inside their travel over the whole region; what they do is linear in it."""
+    if found["travel_proved"] is not True or not found["geometry"]["carriers"]:
+        return
+    share, shift = moving(found["geometry"])[1], _shift(found["region"], found["geometry"])
+    spans = np.array([found["region"][name] for name in SPANS[:3]], np.float64) + shift[:, None]
+    corners = np.stack(np.meshgrid(*spans), axis=-1).reshape(-1, 3) @ share.T
+    for one, low, high in zip(found["geometry"]["carriers"], corners.min(axis=0), corners.max(axis=0), strict=True):
+        least, most = one["travel"]
+        if (least is not None and low < least - 1e-9) or (most is not None and high > most + 1e-9):
+            raise Rejected(f"carrier {one['letter']} goes from {low:g} to {high:g} mm, outside its travel")

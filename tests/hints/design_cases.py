@@ -1,0 +1,31 @@
+"""Hints on certificates of workspaces."""
+
+from __future__ import annotations
+
+from tests.hints.case import COMMAND, Edit, HintCase
+
+_ANOTHER = '{"certificate": 1, "machine": "uranesx"}'
+DESIGN = [
+    HintCase("certificate.legs", "machine certify mill-3axis", {}, "certify machines (on legs)",
+             (Edit(COMMAND, "mill-3axis", "uranesx"),)),
+    HintCase("certificate.short", "machine certify uranesx --box=-250:900,-250:250,-250:250 --margin 0.3", {},
+             "make the workspace or (--box) smaller", (Edit(COMMAND, "-250:900", "-250:250"),)),
+    HintCase("certificate.undecided", "machine certify uranesx --margin 0.3836634533", {},
+             "ask for a smaller (--margin)", (Edit(COMMAND, "0.3836634533", "0.3"),)),
+    HintCase("certificate.file", "machine certify --check c.json", {"c.json": "{}"},
+             "write one with postproc (machine certify) NAME -o CERT.json",
+             (Edit(COMMAND, "machine certify --check c.json", r"\1 uranesx -o c.json"),)),
+    HintCase("analysis.map", "machine analyse mill-3axis --map speed", {}, "leave (--map) out",
+             (Edit(COMMAND, " --map speed", ""),)),
+    HintCase("design.none", "machine design --box 100x100x10 --max bulk=20 -o d.toml", {}, "loosen (--max)",
+             (Edit(COMMAND, "bulk=20", "bulk=2000"),)),
+    HintCase("sensitivity.legs", "machine tolerance mill-3axis", {}, "name a machine (on legs)",
+             (Edit(COMMAND, "mill-3axis", "planar-delta"),)),
+    HintCase("certificate.machine", "machine certify --check c.json", {"c.json": _ANOTHER.replace("uranesx", "none.toml")},
+             "name it: postproc machine certify MACHINE.toml --check", (Edit(COMMAND, "certify", "certify uranesx"),),
+             stops=("certificate.rejected",)),
+    HintCase("certificate.rejected", "machine certify --check c.json", {"c.json": _ANOTHER},
+             r"certify again: postproc (machine certify uranesx -o c\.json)",
+             (Edit(COMMAND, "machine certify --check c.json", r"\1"),)),
+]
+"""the margin that is not decided is the least singular value at the corners of the workspace, but for its last digits"""

@@ -1,0 +1,121 @@
+"""Largest values with what they exceed nowhere; indices of chains; what ends a box; maps and curves."""
+
+from __future__ import annotations
+
+import csv
+import json
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import machines
+from machines.analysis.box import Box
+from machines.analysis.chain import chain_figures, indices, scaled_jacobian
+from machines.analysis.extremes import MEASURES, largest_over
+from machines.analysis.limits_of_box import ends_of_box, least_margins
+from machines.analysis.transmission import (
+    condition_number,
+    conditioning_factor,
+    force_transmission,
+    manipulability,
+    rates,
+    speed_transmission,
+    worst,
+)
+from postproc.cli.app import app
+
+SAME = {"condition_number": condition_number,
+        "speed_transmission": speed_transmission, "force_transmission": force_transmission}
+
+
+@pytest.mark.parametrize("key", MEASURES)
+@pytest.mark.parametrize("name", ["uranesx", "rotary-delta", "planar-delta-z", "hexaslide-coplanar"])
+def test_nothing_found_by_other_code_is_above_what_is_proved(name: str, key: str) -> None:
+    """Grid with refinement and random places, by the kinematics of the machine."""
+    kin = machines.load(name).kinematics
+    found = largest_over(kin.leg_geometry, kin.transmits.lever, MEASURES[key])
+    grid = worst(partial(SAME[key], kin.transmits), kin.workspace, (5, 5, 5, 3))
+    place, tilt = kin.workspace.random(np.random.default_rng(0), 500)
+    assert grid.value <= found.most * (1.0 + 1e-9) and SAME[key](kin.transmits, place, tilt).max() <= found.most
+    if kin.leg_geometry.turns != "abc":
+        assert found.value == pytest.approx(grid.value, rel=0.01) and found.most <= 1.0101 * found.value
+
+
+def test_speed_of_uranesx_is_that_of_its_flattest_rod() -> None:
+    """A Delta on parallel slides: largest row norm of J^-1 = L / sqrt(L^2 - d^2), d to the farthest foot (row 4)."""
+    kin = machines.load("uranesx").kinematics
+    found = largest_over(kin.leg_geometry, 0.0, MEASURES["speed_transmission"])
+    feet = kin.legs.points[:, :2] - kin.loops.joints[:, :2]
+    corners = np.array([[x, y] for x in (-250.0, 250.0) for y in (-250.0, 250.0)])
+    d = np.linalg.norm(corners[:, None] - feet, axis=2).max()
+    assert found.value == pytest.approx(1300.0 / np.sqrt(1300.0**2 - d**2), rel=1e-12)
+    assert 2.0 * found.value == pytest.approx(2.761, rel=1e-3)
+
+
+def test_the_condition_number_of_the_h4a_is_below_six_everywhere() -> None:
+    """V.7, over the declared workspace and 45 degrees to both sides: proved, not seen."""
+    kin = machines.load("h4a-c-table").kinematics
+    assert largest_over(kin.leg_geometry, kin.lever, MEASURES["condition_number"], close=0.03).most < 6.0
+
+
+def test_manipulability_says_nothing_of_a_lost_direction() -> None:
+    """II-20 is the product of singular values, II-23 its part of the most that columns of that length could have."""
+    kin = machines.load("hexaslide-cone").kinematics
+    place, tilt = kin.workspace.random(np.random.default_rng(1), 20)
+    j = rates(kin.transmits, place, tilt, 0.0)
+    np.testing.assert_array_less(0.999999 * np.abs(np.linalg.det(j)), manipulability(kin.transmits, place, tilt))
+    assert (conditioning_factor(kin.transmits, place, tilt) <= np.prod(np.linalg.svd(j, compute_uv=False), axis=1) / np.prod(
+        np.linalg.norm(j, axis=1), axis=1) + 1e-12).all()
+    delta = machines.load("uranesx").kinematics.transmits
+    flat, middle = (np.array([[x, 0.0, 0.0]]) for x in (250.0, 0.0))
+    none = np.zeros(1)
+    assert manipulability(delta, flat, none) < manipulability(delta, middle, none)
+    assert condition_number(delta, flat, none) > condition_number(delta, middle, none)
+
+
+def test_indices_of_a_chain() -> None:
+    """Of a mill with square slides all 1; where the tool lies along the rotary axis none."""
+    square, singular = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]], [[1.0, 1.0], [0.0, 1e-12], [0.0, 0.0]]
+    condition, factor, size = indices(np.array([square, singular]))
+    np.testing.assert_allclose(condition, [1.0, np.inf])
+    np.testing.assert_allclose([factor, size], [[1.0, 0.0], [1.0, 0.0]], atol=1e-11)
+    m = machines.load("mikron-ucp710")
+    found = chain_figures(m)["indices"]
+    assert found["singular_at"]["A"] == 0.0 and found["condition_number_at_home"] is None
+    q = m.home.copy()
+    q[m.axis_names.index("A")] = 1.0
+    assert np.linalg.matrix_rank(scaled_jacobian(m, q[None])[0]) == 5
+    assert chain_figures(machines.load("mill-3axis"))["indices"]["condition_number_worst"] == 1.0
+
+
+def test_what_ends_a_box() -> None:
+    mill = machines.load("mill-3axis")
+    box = Box((-500.0, -100.0, -300.0), (500.0, 100.0, 300.0))
+    assert ends_of_box(mill, box) == ["travel of X", "travel of Z"] or ends_of_box(mill, box) == ["travel of X"]
+    delta = machines.load("uranesx")
+    assert "reach of a leg" in ends_of_box(delta, Box((-900.0, -900.0, -100.0), (900.0, 900.0, 100.0)))
+    assert ends_of_box(delta, None) == []
+
+
+def test_the_nearest_stop_and_parts_are_those_of_the_margins() -> None:
+    found = least_margins(machines.load("uranesx"))
+    assert found["nearest_stop"]["what"].startswith("joint") and 0.0 < found["nearest_stop"]["deg"] < 30.0
+    assert found["nearest_parts"]["what"].endswith("spindle") and found["nearest_parts"]["mm"] > 0.0
+
+
+def test_maps_and_curves_as_table_and_figure(tmp_path: Path) -> None:
+    run, table, figure = CliRunner(), tmp_path / "m.csv", tmp_path / "m.svg"
+    done = run.invoke(app, ["machine", "analyse", "uranesx", "--map", "condition", "--at", "z=-100", "--csv", str(table),
+                            "--figure", str(figure), "--json", "-"])
+    assert done.exit_code == 0, done.output
+    found, rows = json.loads(done.stdout), list(csv.DictReader(table.read_text("utf-8").splitlines()))
+    values = np.array([float(row["condition"]) for row in rows])
+    assert values.max() == pytest.approx(found["largest"]["value"], rel=1e-8) and {row["z_mm"] for row in rows} == {"-100"}
+    assert len(rows) == 41**2 and "z -100 mm" in figure.read_text("utf-8")
+    curve = run.invoke(app, ["machine", "analyse", "h4a-c-table", "--map", "speed", "--along", "tilt", "--csv", str(table)])
+    assert curve.exit_code == 0 and len(table.read_text("utf-8").splitlines()) == 42
+    for words in (["--along", "x"], ["--map", "speed", "--along", "q"], ["--map", "speed", "--at", "z"], ["--csv", "a.csv"]):
+        assert run.invoke(app, ["machine", "analyse", "uranesx", *words]).exit_code == 2

@@ -1,0 +1,79 @@
+"""docs/references.md: what of the four documents is which command, call or test; printed values next to computed ones.
+
+`python tests/references_page.py` writes it.
+"""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import numpy as np
+
+from machines.tolerances.influence import influence, largest, single
+from machines.tolerances.sensitivity import sensitivity
+from tests.laws.test_acceptance import ROWS
+from tests.machines.tolerances.annex_f import OM, annex_f, annex_f_poses
+from tests.source import ROOT
+
+PAGE, ROWS_FILE = ROOT / "docs" / "references.md", ROOT / "tests" / "references.toml"
+_HEADER = """# The documents, and what became of them
+
+Written by `python tests/references_page.py`. T: Company, *Machines-outils rapides a structure parallele* (2000). P:
+Grandguillaume, Lavernhe, Tournier, orientation by jerk polytopes (2017). C: Oueslati, calibration of a rotary axis (2004).
+D: note on a 2D Delta. "Not yet" is what the project does not have; "no numbers" what a document shows only as a picture, a
+photograph or a lost figure. Formulas are taken with the corrections that recomputing them asked for (misprints, scanning);
+each docstring names its source.
+
+"""
+
+
+class Place(NamedTuple):
+    """Part of a document, what it is, and what became of it."""
+
+    of: str
+    what: str
+    here: str
+
+
+PLACES = tuple(Place(**row) for row in tomllib.loads(ROWS_FILE.read_text("utf-8"))["place"])
+
+
+def values() -> list[tuple[str, str, str, float]]:
+    """(number, what, printed, computed)"""
+    found = [(str(number), f"{row.what} ({row.recipe})", row.printed, row.compute())
+             for number, rows in ROWS.items() for row in rows]
+    rods, middle = annex_f(), annex_f_poses(1)
+    s = sensitivity(rods, middle.place, middle.turn, OM)[0]
+    names = [str(one) for one in rods.dimensions]
+    for name, i, text in (("drive X x", 0, "0.3333"), ("drive X z", 1, "2.3805"), ("drive Z z", 2, "0.1667"),
+                             ("rod X", 1, "2.5418")):
+        found.append(("10", f"annex F, {'xyz'[i]} of Om per {name}", text, float(s[i, names.index(name)])))
+    most = largest(influence(rods, OM, False), annex_f_poses(5), single(rods.dimensions[:3]))
+    printed = ("2.4812", "1.7646", "5.2422", "3.9264", "2.1175", "6.3577")
+    of = ("place",) * 3 + ("turn",) * 3
+    for letter, text, what, value in zip("xyzxyz", printed, of, [*most.position, *(1000.0 * most.turn)], strict=True):
+        found.append(("11", f"table F-2, P1 in {letter}: {what}", text, float(value)))
+    return found
+
+
+def page() -> str:
+    """The text of the page."""
+    lines = ["| part | what | here |", "|---|---|---|", *(f"| {p.of} | {p.what} | {p.here} |" for p in PLACES), "",
+             "## Values", "",
+             "Numbers as in `tests/laws/test_acceptance.py` and `tests/machines/tolerances`, which hold "
+             "them within their tolerance.", "", "| | what | printed | computed |", "|---|---|---|---|"]
+    lines += [f"| {number} | {what} | {printed} | {np.format_float_positional(value, 5, fractional=False)} |"
+              for number, what, printed, value in values()]
+    lines += ["| 6 | UraneSX, forward of inverse | identity | within 1e-9 mm (`tests/laws/test_acceptance.py`) |",
+              "| 12 | annex E, 60 dimensions against the exact closure | - | within 1e-7 (`tests/machines/tolerances`) |",
+              "| 8, 9 | H4s: sizing, table V-33 | 31.4 degrees, 0.42 m; - | not yet |"]
+    return _HEADER + "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
