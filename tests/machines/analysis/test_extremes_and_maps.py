@@ -58,7 +58,7 @@ def test_speed_of_uranesx_is_that_of_its_flattest_rod() -> None:
 def test_the_condition_number_of_the_h4a_is_below_six_everywhere() -> None:
     """V.7, over the declared workspace and 45 degrees to both sides: proved, not seen."""
     kin = machines.load("h4a-c-table").kinematics
-    assert largest_over(kin.leg_geometry, kin.lever, MEASURES["condition_number"], close=0.03).most < 6.0
+    assert largest_over(kin.leg_geometry, kin.transmits.lever, MEASURES["condition_number"], close=0.03).most < 6.0
 
 
 def test_manipulability_says_nothing_of_a_lost_direction() -> None:
