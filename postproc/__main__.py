@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.cli.guard import guarded
+from postproc.cli.shared.guard import guarded
 
 
 def command() -> None:

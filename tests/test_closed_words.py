@@ -36,7 +36,7 @@ WORDS_OF_FILES = {"Event.word", "Statement.major", "Statement.body", "Record.maj
 OTHERS = {
     ("machines/value_words.py", "kind"): "pydantic's names of faults",
     ("machines/user_file.py", "_Fault.kind"): "pydantic's names of faults",
-    ("postproc/cli/console.py", "target"): "a file, or - for standard output"}
+    ("postproc/cli/shared/console.py", "target"): "a file, or - for standard output"}
 
 
 @cache

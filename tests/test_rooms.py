@@ -78,6 +78,7 @@ FLOORS = (
     ("postproc.explain", "a page for each code of a message"),
     ("postproc.python", "the calls of the package: time, orient, place, calibrate, analyse"),
     ("postproc.batch", "many runs of commands: jobs, workers, what is done already"),
+    ("postproc.cli.shared", "what all commands share: options, messages, files, the outermost guard"),
     ("postproc.cli", "the command line"),
 )
 """(room, what it does): a room imports only rooms before it"""

@@ -18,7 +18,15 @@ from postproc.cli.batch import batch
 from postproc.cli.calibrate import calibrate
 from postproc.cli.compare import EXAMPLE as DIFFERENCES
 from postproc.cli.compare import compare
-from postproc.cli.console import (
+from postproc.cli.errors import errors_app
+from postproc.cli.machines_controllers import controller_app, machine_app, setup_app
+from postproc.cli.orient import EXAMPLES
+from postproc.cli.orient import orient as orient_command
+from postproc.cli.place import EXAMPLES as PLACES
+from postproc.cli.place import place
+from postproc.cli.report import EXAMPLE as REPORTS
+from postproc.cli.report import check_page, pages, report_command
+from postproc.cli.shared.console import (
     Json,
     controller_of,
     machine_of,
@@ -32,11 +40,9 @@ from postproc.cli.console import (
     report,
     shown_errors,
 )
-from postproc.cli.errors import errors_app
-from postproc.cli.group import Group
-from postproc.cli.guard import guarded
-from postproc.cli.machines_controllers import controller_app, machine_app, setup_app
-from postproc.cli.options import (
+from postproc.cli.shared.group import Group
+from postproc.cli.shared.guard import guarded
+from postproc.cli.shared.options import (
     Allow,
     AxisToleranceOption,
     Beyond,
@@ -58,12 +64,6 @@ from postproc.cli.options import (
     only_with_errors,
     word_option,
 )
-from postproc.cli.orient import EXAMPLES
-from postproc.cli.orient import orient as orient_command
-from postproc.cli.place import EXAMPLES as PLACES
-from postproc.cli.place import place
-from postproc.cli.report import EXAMPLE as REPORTS
-from postproc.cli.report import check_page, pages, report_command
 from postproc.cli.time import time
 from toolpaths.choices import FieldEnding, GivenDialect, GivenUnit
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli.console import Json, progress_bar, refuse_overwriting, report, shown_errors
-from postproc.cli.says import SAYS
+from postproc.cli.shared.console import Json, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.cli.shared.says import SAYS
 
 if TYPE_CHECKING:
     from postproc.base.progress import Progress
@@ -141,7 +141,7 @@ def _text_of(values: dict[str, object]) -> str:
     import json
 
     from postproc.base.json_values import plain, rounded
-    from postproc.cli.console import SCHEMA_VERSION
+    from postproc.cli.shared.console import SCHEMA_VERSION
 
     return json.dumps(rounded({"schema_version": SCHEMA_VERSION} | values), indent=2, allow_nan=False, default=plain) + "\n"
 

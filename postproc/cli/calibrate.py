@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from postproc.cli.console import Json, print_json, refuse_inputs, refuse_overwriting, report, shown_errors
-from postproc.cli.options import figure_ending
+from postproc.cli.shared.console import Json, print_json, refuse_inputs, refuse_overwriting, report, shown_errors
+from postproc.cli.shared.options import figure_ending
 
 
 def _schema(wanted: bool) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli.console import (
+from postproc.cli.shared.console import (
     Json,
     controller_file,
     machine_of,
@@ -18,7 +18,7 @@ from postproc.cli.console import (
     report,
     shown_errors,
 )
-from postproc.cli.options import AxisToleranceOption, ToleranceOption, figure_ending
+from postproc.cli.shared.options import AxisToleranceOption, ToleranceOption, figure_ending
 
 if TYPE_CHECKING:
     from postproc.cycle_time.source import ExecutedProgram

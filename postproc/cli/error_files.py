@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
-from postproc.cli.console import report, shown_errors
+from postproc.cli.shared.console import report, shown_errors
 
 if TYPE_CHECKING:
     from machines.geometric_error.actual.model import ErrorModel

@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 
 from machines.geometric_error.tables.choices import MapDirections
-from postproc.cli.console import Json, machine_of, own_files, print_json, refuse_overwriting, report, shown_errors
 from postproc.cli.error_files import finish, loaded, model_files, or_refused, pairs, writable
 from postproc.cli.errors_import import EXAMPLE, import_
-from postproc.cli.group import Group
-from postproc.cli.options import MachineName, figure_ending, word_option
+from postproc.cli.shared.console import Json, machine_of, own_files, print_json, refuse_overwriting, report, shown_errors
+from postproc.cli.shared.group import Group
+from postproc.cli.shared.options import MachineName, figure_ending, word_option
 
 errors_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                          help="Error models: check, export to tables, maps and "

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from machines.geometric_error.tables.choices import MapDirections, TableRule, TableSign
-from postproc.cli.console import Json, machine_of, own_files, refuse_overwriting, shown_errors
 from postproc.cli.error_files import doubted, finish, merged_into, model_files, pairs, required
-from postproc.cli.options import MachineName, word_option
+from postproc.cli.shared.console import Json, machine_of, own_files, refuse_overwriting, shown_errors
+from postproc.cli.shared.options import MachineName, word_option
 
 EXAMPLE = "Example: postproc errors import X=x.comp y.csv -m mill-3axis -o errors.toml"
 Sources = Annotated[list[str], typer.Argument(metavar="SOURCE...", help="tables per axis or of location errors (x.csv), of "

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from machines.exchange.choices import ExportForm, GivenForm
-from postproc.cli.console import Json, machine_of, own_files, refuse_inputs, refuse_overwriting, report, shown_errors
-from postproc.cli.options import word_option
+from postproc.cli.shared.console import Json, machine_of, own_files, refuse_inputs, refuse_overwriting, report, shown_errors
+from postproc.cli.shared.options import word_option
 
 IMPORTED = "Example: postproc machine import shop.ini -o shop.toml --set kinematics.axes.A.point=[0,0,55.5]"
 EXPORTED = "Example: postproc machine export mikron-ucp710 --format linuxcnc-ini -o simulator"

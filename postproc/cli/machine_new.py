@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from postproc.cli.console import Json, refuse_overwriting, report, shown_errors
+from postproc.cli.shared.console import Json, refuse_overwriting, report, shown_errors
 
 if TYPE_CHECKING:
     from machines.machine import Machine

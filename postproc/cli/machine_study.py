@@ -12,8 +12,8 @@ import typer
 
 from machines.analysis.choices import MapMeasure, MapNumber
 from machines.layouts.choices import Goal, SlideLayout
-from postproc.cli.console import Json, machine_of, own_files, refuse_overwriting, report, shown_errors
-from postproc.cli.options import figure_ending, word_option
+from postproc.cli.shared.console import Json, machine_of, own_files, refuse_overwriting, report, shown_errors
+from postproc.cli.shared.options import figure_ending, word_option
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -97,8 +97,8 @@ BoxOption = Annotated[str, typer.Option("--box", metavar="BOX", help="of the tip
                                         "workspace or -250:250,-250:250,-200:200; left out: the declared workspace of the "
                                         "platform")]
 BoxTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, help="length of the tool, with --box")]
-MarginOption = Annotated[float | None, typer.Option("--margin", min=1e-6, max=1.0, help="distance from singular positions, "
-                                                    "no unit; left out: half of the least that random poses have")]
+MarginOption = Annotated[float | None, typer.Option("--margin", metavar="SHARE", min=1e-6, max=1.0, help="distance from singular "
+                                                    "positions, no unit; left out: half of the least that random poses have")]
 TravelOption = Annotated[bool | None, typer.Option("--travel/--no-travel", help="whether drives must be inside their "
                                                    "travel; left out: only where they are everywhere")]
 BoxesFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="boxes in two planes, .png or .svg")]
@@ -177,7 +177,7 @@ AdjustOption = Annotated[bool, typer.Option("--adjust", help="once the rods' len
                                             "workspace is exact")]
 SpreadOption = Annotated[float, typer.Option("--spread", metavar="UM", min=1e-6, help="errors by chance, micrometres; "
                                              "microradians of guides")]
-SamplesOption = Annotated[int, typer.Option("--samples", min=1, max=1_000_000, help="of errors by chance")]
+SamplesOption = Annotated[int, typer.Option("--samples", metavar="N", min=1, max=1_000_000, help="of errors by chance")]
 ErrorOption = Annotated[float | None, typer.Option("--error", metavar="MM", min=1e-9, help="budget: error of the tip that "
                                                    "the tolerances have to keep together")]
 CostOption = Annotated[list[str] | None, typer.Option("--cost", metavar="PART=COST", help="budget: cost of a tolerance of "
@@ -190,7 +190,7 @@ def machine_tolerance(name: Annotated[str, typer.Argument(help="name or TOML fil
                       adjust: AdjustOption = False, spread: SpreadOption = 1.0, samples: SamplesOption = 1000,
                       allowed: ErrorOption = None, cost: CostOption = None, csv: CsvFile = None, figure: BarsFigure = None,
                       json: Json = "") -> None:
-    """Influence of every dimension of a machine on legs on its tool, over the workspace and by chance; tolerance budget."""
+    """Influence of every dimension of a machine on legs on its tool, by place and by chance; tolerance budget."""
     from machines.tolerances.sensitivity import DimensionPart
     from postproc.cli.error_files import pairs
 

@@ -8,17 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from postproc.cli.console import (
-    Json,
-    controller_file,
-    controller_of,
-    machine_of,
-    print_json,
-    refuse_overwriting,
-    report,
-    shown_errors,
-)
-from postproc.cli.group import Group
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.machine_new import EXAMPLES as NEW
 from postproc.cli.machine_new import machine_new
@@ -34,10 +23,21 @@ from postproc.cli.machine_study import (
     machine_stiffness,
     machine_tolerance,
 )
-from postproc.cli.options import figure_ending
 from postproc.cli.setup_align import EXAMPLES as ALIGNED
 from postproc.cli.setup_align import setup_align
 from postproc.cli.setup_new import EXAMPLES, setup_new
+from postproc.cli.shared.console import (
+    Json,
+    controller_file,
+    controller_of,
+    machine_of,
+    print_json,
+    refuse_overwriting,
+    report,
+    shown_errors,
+)
+from postproc.cli.shared.group import Group
+from postproc.cli.shared.options import figure_ending
 from toolpaths.table_text import table_text
 
 if TYPE_CHECKING:
@@ -46,8 +46,7 @@ if TYPE_CHECKING:
     from toolpaths.choices import FigureEnding
 
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
-                          help="Machines: new, list, show, check, analyse, certify, tolerance, stiffness, design, "
-                               "import, export, schema.")
+                          help="Machines: new, list, show, check, analyse, certify, design and more.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                              help="Controllers: list, show, schema.")
 setup_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from postproc.base.options import Orientation
-from postproc.cli.console import (
+from postproc.cli.shared.console import (
     Json,
     controller_of,
     machine_of,
@@ -19,7 +19,7 @@ from postproc.cli.console import (
     report,
     shown_errors,
 )
-from postproc.cli.options import (
+from postproc.cli.shared.options import (
     Allow,
     AxisToleranceOption,
     ClFile,

@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from postproc.cli.console import Json, machine_of, own_files, progress_bar, read_cl, refuse_overwriting, report, shown_errors
-from postproc.cli.options import (
+from postproc.cli.shared.console import (
+    Json,
+    machine_of,
+    own_files,
+    progress_bar,
+    read_cl,
+    refuse_overwriting,
+    report,
+    shown_errors,
+)
+from postproc.cli.shared.options import (
     Allow,
     AxisToleranceOption,
     Beyond,

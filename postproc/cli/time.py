@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from postproc.cli.console import Json, own_files, progress_bar, refuse_overwriting, report, shown_errors
-from postproc.cli.options import (
+from postproc.cli.shared.console import Json, own_files, progress_bar, refuse_overwriting, report, shown_errors
+from postproc.cli.shared.options import (
     AxisToleranceOption,
     Beyond,
     ControllerName,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.base.progress import Progress
-from postproc.cli.console import machine_of
+from postproc.cli.shared.console import machine_of
 from postproc.cycle_time import report as figures
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.estimate import Estimate, estimate, measure_first, timed, total

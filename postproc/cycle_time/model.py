@@ -23,6 +23,9 @@ ASSUMED = {"corner_tolerance": 0.7, "block_time": 0.7, "rapid": 0.05, "override"
            "unclamp": 0.3}
 """standard deviation of the logarithm of a value that no document states"""
 
+AssumedName = Literal["corner_tolerance", "block_time", "rapid", "override", "stop_time", "spindle_time"]
+"""parameters of a model that ASSUMED has a deviation of"""
+
 
 class CalibrationRecord(UserModel):
     """Where the parameters of a calibrated model come from."""
@@ -97,7 +100,7 @@ class CycleTimeModel(UserModel):
     """s, of LinuxCNC"""
     own_share: float = Field(default=0.03, ge=0.0, le=1.0)
     """standard deviation of the time over the model's own, as a share, where every parameter is known"""
-    assumed: tuple[str, ...] = ()
+    assumed: tuple[AssumedName, ...] = ()
     """parameters that no document states and no run has shown"""
     calibration: CalibrationRecord | None = None
 

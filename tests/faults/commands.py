@@ -119,7 +119,7 @@ def started(words: tuple[str, ...], folder: Path, said: Path, before: Callable[[
 
 
 def _called(words: tuple[str, ...]) -> int:
-    from postproc.cli.guard import guarded
+    from postproc.cli.shared.guard import guarded
 
     def command() -> None:
         from postproc.cli.app import app

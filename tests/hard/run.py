@@ -98,7 +98,7 @@ def _endless(*_: object) -> None:
 
 def _outcomes(task: Task, controller: str) -> Iterator[tuple[str, str, str]]:
     """(kind, detail, what was done to the program) of one conversion and of its edits."""
-    from postproc.cli.guard import fingerprint
+    from postproc.cli.shared.guard import fingerprint
 
     step = ""
     try:

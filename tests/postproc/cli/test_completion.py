@@ -13,7 +13,7 @@ from postproc.controllers.model import builtin_files
 @pytest.mark.parametrize(("typed", "found"), [
     ("postproc conv", ["convert"]), ("postproc setup ", ["new", "align", "check", "schema"]),
     ("postproc convert --feed-", ["--feed-mode"]),
-    ("postproc convert part.cls -m mik", ["mikron-ucp710"]), ("postproc time part.cls -m haas-umc-7", ["haas-umc-750"]),
+    ("postproc convert part.cls -m mikron-u", ["mikron-ucp710"]), ("postproc time part.cls -m haas-umc-7", ["haas-umc-750"]),
     ("postproc convert part.cls -c sie", ["siemens-840d"])])
 def test_what_is_begun_is_completed(typed: str, found: list[str]) -> None:
     words = typed.split(" ")
@@ -23,6 +23,6 @@ def test_what_is_begun_is_completed(typed: str, found: list[str]) -> None:
 
 
 def test_all_names_are_known() -> None:
-    from postproc.cli.options import _controllers, _machines
+    from postproc.cli.shared.options import _controllers, _machines
 
     assert set(machines.names()) <= set(_machines("")) and set(builtin_files()) <= set(_controllers(""))

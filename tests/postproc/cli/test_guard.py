@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from postproc import __main__
 from postproc.base.version import VERSION
 from postproc.cli.app import app
-from postproc.cli.guard import fingerprint, guarded
+from postproc.cli.shared.guard import fingerprint, guarded
 from tests.postproc.kit import SAMPLES
 from toolpaths.cl import read as reader
 
@@ -108,7 +108,7 @@ def test_other_ends(end: BaseException, code: int, said: str, tmp_path: Path, mo
         raise end
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("postproc.cli.guard._silence", lambda stream: None)
+    monkeypatch.setattr("postproc.cli.shared.guard._silence", lambda stream: None)
     assert guarded(command) == code
     err = capsys.readouterr().err
     assert err.startswith(said) and (said or err == "") and not list(tmp_path.iterdir())
@@ -119,7 +119,7 @@ def test_a_reader_of_standard_output_that_goes_away(tmp_path: Path) -> None:
     import subprocess
     import sys
 
-    code = "import sys; from postproc.cli.guard import guarded; sys.exit(guarded(lambda: print('x' * 10**6)))"
+    code = "import sys; from postproc.cli.shared.guard import guarded; sys.exit(guarded(lambda: print('x' * 10**6)))"
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path,
                           env={**os.environ, "PYTHONPATH": str(SAMPLES.parent)}) as run:
         assert run.stdout is not None and run.stderr is not None

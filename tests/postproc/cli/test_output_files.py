@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from postproc.cli.app import app
-from postproc.cli.console import print_json
+from postproc.cli.shared.console import print_json
 from postproc.setup.fingerprint import fingerprint
 from postproc.setup.model import load_setup
 from tests.postproc.kit import SAMPLES, TOOLS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from postproc.cli.console import controller_file
+from postproc.cli.shared.console import controller_file
 from postproc.controllers.model import builtin_files
 from postproc.reference.hole_depths import unfit_holes
 from tests.postproc.kit import HEAD, codes, convert, good

@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from postproc.cli.says import SAYS
+from postproc.cli.shared.says import SAYS
 
 ONLY_OF_CL = "dialect"
 """an option that only commands on CL files have: the others take machine and controller"""
@@ -84,7 +84,7 @@ def _values(folder: Path, json: str) -> tuple[dict[str, Any], Path | None]:
     where = found_upwards(folder)
     if where is None:
         return {}, None
-    from postproc.cli.console import report
+    from postproc.cli.shared.console import report
     from postproc.setup.job_file import load_job_file
 
     values, found = load_job_file(where)

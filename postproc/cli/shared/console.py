@@ -11,7 +11,7 @@ import typer
 
 from postproc.base.job_place import NAME
 from postproc.base.json_values import plain, rounded
-from postproc.cli.says import SAYS
+from postproc.cli.shared.says import SAYS
 
 if TYPE_CHECKING:
     from machines.machine import Machine

@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal
 import typer
 from typer.core import TyperArgument, TyperGroup, TyperOption
 
-from postproc.cli.job_defaults import given_defaults
-from postproc.cli.says import SAYS
+from postproc.cli.shared.job_defaults import given_defaults
+from postproc.cli.shared.says import SAYS
 
 MaxFileSize = Annotated[float | None, typer.Option("--max-file-size", metavar="MB", min=0.001, max=1e9, is_eager=True,
                                                    callback=lambda context, value: _hold(context, value),

@@ -167,7 +167,7 @@ _NEW = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_NOFOLLOW", 0)
 
 def _own_places(fault: BaseException) -> Iterator[tuple[str, str]]:
     """(file below the package's folder, function) of each frame in our own code, outermost first."""
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     for frame in _frames(fault.__traceback__):
         file = Path(frame.tb_frame.f_code.co_filename)
         if file.is_relative_to(root) and file.relative_to(root).parts[0] in _ROOMS:
@@ -202,7 +202,7 @@ def _silence(stream: TextIO) -> None:
 
 
 def _interrupted() -> int:
-    from postproc.cli.says import SAYS
+    from postproc.cli.shared.says import SAYS
 
     _say(SAYS.interrupted or "interrupted; nothing was written")
     return INTERRUPTED

@@ -50,7 +50,7 @@ MaxBlocks = Annotated[int | None, typer.Option("--max-blocks", metavar="N", min=
 
 def _names(start: str, *folders: str) -> list[str]:
     """Built-in names of some folders and TOML files of the present one that begin so, for completion in a shell."""
-    here = Path(__file__).parents[2]
+    here = Path(__file__).parents[3]
     known = [file for folder in folders for file in (here / folder).glob("*.toml")]
     return sorted([one.stem for one in known if one.stem.startswith(start)] + [str(one) for one in Path().glob(
         "*.toml") if str(one).startswith(start)])
