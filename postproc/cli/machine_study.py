@@ -97,8 +97,8 @@ BoxOption = Annotated[str, typer.Option("--box", metavar="BOX", help="of the tip
                                         "workspace or -250:250,-250:250,-200:200; left out: the declared workspace of the "
                                         "platform")]
 BoxTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, help="length of the tool, with --box")]
-MarginOption = Annotated[float | None, typer.Option("--margin", metavar="SHARE", min=1e-6, max=1.0, help="distance from singular "
-                                                    "positions, no unit; left out: half of the least that random poses have")]
+MarginOption = Annotated[float | None, typer.Option("--margin", metavar="SHARE", min=1e-6, max=1.0, help=(
+    "distance from singular positions, no unit; left out: half of the least that random poses have"))]
 TravelOption = Annotated[bool | None, typer.Option("--travel/--no-travel", help="whether drives must be inside their "
                                                    "travel; left out: only where they are everywhere")]
 BoxesFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="boxes in two planes, .png or .svg")]
