@@ -21,6 +21,7 @@ from machines.kinematics.legs.on_legs import OnLegs
 from machines.mobility import LEAST, place_words, sign_fault
 from toolpaths.arrays import Floats
 from toolpaths.rotations import cross, unit
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 GRID, HEADINGS, TILTS = (5, 5, 5), 12, 4
@@ -91,6 +92,7 @@ def travel_faults(kinematics: OnLegs, travel: Floats, home: Floats) -> Iterator[
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(rods="N K 3", arms="N K 3")
 class Constraints:
     """What legs and pairs hold, at N places.
 

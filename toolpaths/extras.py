@@ -23,5 +23,5 @@ def need(name: str, what: str) -> None:
     """
     package, extra = EXTRAS[name]
     if importlib.util.find_spec(name) is None:
-        raise DiagnosticError([error("extra.missing", f"{what} the package {package}, which is not installed: "
-                                     f"pip install 'postproc[{extra}]'")])
+        raise DiagnosticError([error("extra.missing", f"{what} the package {package}, which is not installed",
+                                     hint=f"pip install 'postproc[{extra}]'")])

@@ -20,6 +20,7 @@ from machines.loader import values_of_machine
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 LOOKS, HALF, LAST = 4000, 0.5, 1e4
@@ -32,6 +33,7 @@ _WORDS: Mapping[Shortfall, str] = {
 
 
 @dataclass(frozen=True)
+@arrays(box="*3")
 class Wanted:
     """What is to be certified.
 

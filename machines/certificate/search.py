@@ -55,7 +55,7 @@ class AskedProof:
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(bounds="N 3")
+@arrays(bounds="N 3", place="5")
 class ProvedBoxes:
     """Boxes that cover the region, by the path of halves to each, with what is proved of it; `place` where it is not.
 

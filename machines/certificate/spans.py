@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(lo="...", hi="...")
 class Span:
     """Everything between `lo` and `hi`, arrays of one shape; they share their letters with whatever they are of."""
 

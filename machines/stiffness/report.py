@@ -15,6 +15,7 @@ from machines.tolerances.report import rods_of
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
 from toolpaths.drawing import image
+from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ POINTS = 31
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(force="3")
 class StiffnessQuestion:
     """What is asked: stiffness of the parts (N/mm), length of the tool (mm), force at the tip (3,) N."""
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from machines.tolerances.influence import PlatformPoses
 from machines.tolerances.sensitivity import RodsOfLegs, rod_rows
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.shapes import arrays
 
 
@@ -35,7 +35,7 @@ class ForceRows:
 
     rods: Floats
     drives: Floats
-    columns: np.ndarray[tuple[int], np.dtype[np.int64]]
+    columns: Ints
 
 
 def force_rows(rods: RodsOfLegs, poses: PlatformPoses, point: Floats) -> ForceRows:

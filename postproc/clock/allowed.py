@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from postproc.clock.path import BlendedPath, CommandedPath
 from postproc.clock.settings import ControlSettings
@@ -108,7 +107,7 @@ def block_speeds(commanded: CommandedPath, path: BlendedPath, settings: ControlS
     if settings.block_time > 0.0:
         n, k = len(along), np.arange(len(along))
         low, high = np.maximum(k - AVERAGED // 2, 0), np.minimum(k + AVERAGED // 2 + 1, n)
-        taken = np.append(0.0, np.cumsum(np.broadcast_to(commanded.part, n)))
+        taken = np.append(0.0, np.cumsum(commanded.parts))
         speed = np.minimum(speed, (path.ends[high] - path.ends[low]) / (taken[high] - taken[low]) / settings.block_time)
     return np.where(moving, np.minimum(speed, _seen(commanded, path, settings)), np.inf)
 
@@ -120,9 +119,11 @@ def _seen(commanded: CommandedPath, path: BlendedPath, settings: ControlSettings
     A ramp of constant jerk j from v to rest takes 2 sqrt(v/j) over v sqrt(v/j), and with its acceleration held at a
     v/a + a/j over v (v/a + a/j)/2: solved for v.
     """
+    from scipy.ndimage import maximum_filter1d  # loaded where a control's clock is asked for
+
     n = len(commanded.length)
-    read = np.cumsum(np.broadcast_to(commanded.part, n))
-    last = np.minimum(np.searchsorted(read, read - commanded.part + settings.buffer + EVEN, side="right"), n)
+    read = np.cumsum(commanded.parts)
+    last = np.minimum(np.searchsorted(read, read - commanded.parts + settings.buffer + EVEN, side="right"), n)
     room = np.maximum(path.ends[last] - path.ends[1:], 0.5 * np.diff(path.ends))
     slope = np.abs(np.diff(commanded.points, axis=0)) / np.maximum(np.diff(path.ends), NO_MOTION)[:, None]
     width = min(settings.buffer, n)

@@ -44,7 +44,7 @@ COMPILE_FROM = 30
 
 
 @dataclass(frozen=True)
-@arrays(points="V A", length="N", speed="N", tolerance="V", stop="V", weight="A")
+@arrays(points="V A", length="N", speed="N", tolerance="V", stop="V", weight="A", part="N")
 class CommandedPath:
     """What a control is given, N blocks between V = N + 1 points.
 
@@ -53,7 +53,7 @@ class CommandedPath:
         length (N,): path of each block that the feed refers to, > 0 where the axes move; speed (N,): largest along it
         tolerance (V,): mm that the path may leave each point, 0 for none; stop (V,): the axes rest there
         weight (A,): mm that a unit of each axis counts in deviations
-        part (N,): of a block of the program that each is, 1 where it is all of one
+        part (N,): of a block of the program that each is, 1 where it is all of one; None: all are whole
     """
 
     points: Floats
@@ -62,7 +62,12 @@ class CommandedPath:
     tolerance: Floats
     stop: Bools
     weight: Floats
-    part: Floats | float = 1.0
+    part: Floats | None = None
+
+    @property
+    def parts(self) -> Floats:
+        """`part` (N,), 1 where it is not stated."""
+        return np.ones(len(self.length)) if self.part is None else self.part
 
 
 @dataclass(frozen=True)

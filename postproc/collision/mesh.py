@@ -23,6 +23,8 @@ FORMATS = (".stl", ".ply", ".obj", ".off")
 _SMALL, _LARGE = 1.0, 20000.0
 """mm: a solid whose largest side is outside is likely in another unit"""
 
+STL_HEAD, STL_TRIANGLE = 84, 50
+"""bytes of a binary STL file before its triangles, and of each"""
 _LARGEST = 1e7
 """mm or inches of a coordinate: merging vertices counts steps of 1e-8 in integers of 64 bits"""
 
@@ -57,9 +59,12 @@ def _loaded(path: str, _changed: int, _size: int,
     import trimesh
 
     try:
+        data = read_input(path)
+        if cut := _cut_short(data, path):
+            return None, (cut,)
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
-            read = trimesh.load_mesh(BytesIO(read_input(path)), file_type=path.rpartition(".")[2].lower(), process=False,
+            read = trimesh.load_mesh(BytesIO(data), file_type=path.rpartition(".")[2].lower(), process=False,
                                      **_reader(path))
     except OSError as fault:
         return None, (unreadable(fault, "mesh.open", path),)
@@ -81,6 +86,17 @@ def _loaded(path: str, _changed: int, _size: int,
     if mesh.volume < 0.0:
         mesh.invert()
     return mesh, found + _odd_size(mesh, path, units)
+
+
+def _cut_short(data: bytes, path: str) -> Diagnostic | None:
+    """An error for an STL file that is neither text nor as long as its count of triangles says: what a reader makes of it
+    depends on which packages it finds."""
+    if not path.lower().endswith(".stl") or len(data) < STL_HEAD or data.lstrip()[:5].lower() == b"solid":
+        return None
+    due = STL_HEAD + STL_TRIANGLE * int.from_bytes(data[STL_HEAD - 4:STL_HEAD], "little")
+    return None if len(data) >= due else error(
+        "mesh.format", f"is no STL file that can be read (it has {len(data)} bytes, {due} by its count of triangles)",
+        file=path, hint="export it again")
 
 
 def _reader(path: str) -> dict[str, bool]:

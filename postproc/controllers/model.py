@@ -218,6 +218,7 @@ class ControllerFile(UserModel):
     """the same in files of their own, which the set-up may ask for"""
     arcs: ArcRules = ArcRules()
     splines: SplineRules = SplineRules()
+    """blocks of the control for cubics, written where the machine file says that the option is fitted"""
     cycles: Cycles = Cycles()
     feed: FeedRules = FeedRules()
     cutter_compensation: CutterCompensation = CutterCompensation()

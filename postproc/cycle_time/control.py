@@ -64,7 +64,7 @@ def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bool
     axes = blocks.axes
     path = CommandedPath(points, length, target[owner], np.concatenate([[0.0], np.where(last, tolerance[owner], inner)]),
                          np.concatenate([[True], stops[owner] & last]), np.where(axes.rotary, ARM, 1.0),
-                         1.0 if blocks.pieces is None else 1.0 / blocks.pieces[owner])
+                         None if blocks.pieces is None else 1.0 / blocks.pieces[owner])
     jerk = axes.jerk if model.jerk else np.full(len(axes.letters), np.inf)
     weight = path.weight
     step = None if model.corner_step is None else model.corner_step / weight

@@ -19,7 +19,7 @@ LINK = 0.5
 
 
 @dataclass(frozen=True)
-@arrays(times="T", road="T", tip="T 3", axis="T 3")
+@arrays(of_poses="*_", times="T", road="T", tip="T 3", axis="T 3")
 class RoadClock:
     """Even times of a program at the programmed feed, and where the tool is.
 

@@ -82,7 +82,7 @@ class RunPlan:
 
 
 @dataclass(frozen=True)
-@arrays(rows="N", axis="N 3", moved="N", _tip="N 3")
+@arrays(rows="N", axis="N 3", moved="N", _tip="N 3", places="*_")
 class _Part:
     """One run while it is planned: its rows of Moves, the axes they are given, the curves after its first pose.
 

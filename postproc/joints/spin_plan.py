@@ -50,7 +50,7 @@ CHUNK, COMPILE_FROM = 512, 200_000
 
 
 @dataclass(frozen=True)
-@arrays(tip="N 3", axis="N 3", parameters="N F", seconds="N", link="N", steps="N", held="N", tool="N")
+@arrays(tip="N 3", axis="N 3", parameters="N F", seconds="N", link="N", steps="N", held="N", tool="int64: N")
 class _Nodes:
     """Places of all roads in a row.
 

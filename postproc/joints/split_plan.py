@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from machines.machine import Machine
 from postproc.joints.road_clock import RoadClock, clock_of
@@ -76,6 +75,8 @@ def _middle(clock: RoadClock, columns: tuple[int, ...]) -> Floats:
 
 def _carried(clock: RoadClock, middles: Floats, room: Floats, machine: Machine, at: Ints, stretch: float) -> Floats | None:
     """(T, M) the carriers smoothed over a stretch of time (s); None where the platform's room is too small for it."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
+
     half = max(round(0.5 * stretch / clock.step), 1)
     width, third = 2 * half + 1, max(2 * (half // 3) + 1, 1)
     result = np.empty_like(middles)

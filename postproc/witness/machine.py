@@ -158,10 +158,13 @@ class Rods:
             platform, off = self._spun(q, letters, gauge, platform, reach, axis)
         else:
             off, _ = self._legs(q, letters, gauge, platform, reach, axis)
-        if self.wrong and self.held.any():
-            off = 0.5 * (off[::2] + off[1::2])
+        off = self._middles(off)
         aside = np.abs((gauge - apply(platform, reach + self.pivot)) * self.held).max(axis=1)
         return np.asarray(np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0))
+
+    def _middles(self, off: Array) -> Array:
+        """Of pairs that errors may twist, the mean of both rods."""
+        return 0.5 * (off[::2] + off[1::2]) if self.wrong and self.held.any() else off
 
     def _nominal(self, axis: Array) -> Array:
         """(N, 3, 3): the platform as its freedoms let it turn towards tool axes (N, 3), spin left out."""
@@ -183,9 +186,10 @@ class Rods:
                 off, slope = self._legs(q, letters, gauge, platform, reach, axis)
                 if not np.abs(spin := -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)).max(initial=0.0) > SPUN:
                     break
-            better = np.abs(off).max(axis=0) < np.abs(found).max(axis=0)
+            missed, least = (np.abs(self._middles(one)).max(axis=0) for one in (off, found))
+            better = missed < least
             best, found = np.where(better[:, None, None], platform, best), np.where(better, off, found)
-            if (np.abs(found).max(axis=0) <= ROD).all():
+            if (np.minimum(missed, least) <= ROD).all():
                 break
         return best, found
 

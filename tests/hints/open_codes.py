@@ -12,7 +12,7 @@ _WHY = {
         "calibrate.few calibrate.place calibrate.rank calibrate.silent calibrate.unchecked cl.index-axis cl.index-cut "
         "log.fit tool-table.apart"),
     "followed by a test of its own room, which has the files that it takes": (
-        "collision.point compensation.reach file.twice file.unfinished "
+        "extra.missing collision.point compensation.reach file.twice file.unfinished "
         "proof.comment proof.input_changed verify.clamp verify.no_bound"),
     "no small file has been found that leads there: random programs of the tests alone do": (
         "link.blocked path.jump"),

@@ -53,7 +53,7 @@ FAULTS = (
           "- self._tilted(reach, tilt), tilt])", "- self._tilted(reach, tilt), 1.001 * tilt])", ("rods leaning",)),
     Fault("gauge length of rods x 1.001", "kinematics", "PosesOfLegs._ends", "self.tool_length * UP -",
           "1.001 * self.tool_length * UP -", ("delta",)),
-    Fault("legs: rods x 1.0002", "kinematics", "LegsModel.build", "float(leg.rod) for", "1.0002 * leg.rod for",
+    Fault("legs: rods x 1.0002", "kinematics", "LegsModel._on_legs", "float(leg.rod) for", "1.0002 * leg.rod for",
           ("hexapod", "hexaslide")),
     Fault("legs: tool x from the wrong side", "kinematics", "PosesOfLegs.turn_of", "np.stack([x, cross(near, x), near]",
           "np.stack([-x, cross(x, near), near]", ("hexapod",)),

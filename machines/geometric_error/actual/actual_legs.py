@@ -51,8 +51,12 @@ class ActualLegs(Actual):
     @property
     def held(self) -> int:
         """The spin, of a platform that turns about z, and carriers that are redundant."""
-        return int("c" in self.kinematics.loops.turns) + (
-            len(self.kinematics.carriers) if self.kinematics.carried_twice else 0)
+        return self._spins + (len(self.kinematics.carriers) if self.kinematics.carried_twice else 0)
+
+    @property
+    def _spins(self) -> int:
+        """1 of a platform that turns about z."""
+        return int("c" in self.kinematics.loops.turns)
 
     @cached_property
     def frame(self) -> LegFrame:
@@ -79,7 +83,7 @@ class ActualLegs(Actual):
         flat = np.hypot(axis[:, 0], axis[:, 1])
         grow = np.where(flat > 0.0, np.arctan2(flat, axis[:, 2]) / np.where(flat > 0.0, flat, 1.0), 1.0)
         turned = np.column_stack([-axis[:, 1] * grow, axis[:, 0] * grow])
-        kin, spins = self.kinematics, spin[:, None][:, : int(self.turns == 2)]
+        kin, spins = self.kinematics, spin[:, None][:, : self._spins]
         carried = q[:, kin.carriers_at] if kin.carried_twice else q[:, :0]
         return np.column_stack([tip, turned[:, self._about], spins, carried])
 
@@ -99,7 +103,7 @@ class ActualLegs(Actual):
         """Nominal (tip (N, 3), axis (N, 3), spin (N,))."""
         vector, share, cos = self._turn(w)
         axis = np.column_stack([share * vector[:, 1], -share * vector[:, 0], cos])
-        return w[:, :3], axis, w[:, 3 + self.turns] if self.turns == 2 else np.zeros(len(w))
+        return w[:, :3], axis, w[:, 3 + self.turns] if self._spins else np.zeros(len(w))
 
     def joints(self, w: Floats) -> Floats:
         """See the base class."""

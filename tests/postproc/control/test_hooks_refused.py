@@ -71,7 +71,7 @@ def executed(controller: str) -> set[str]:
                         job.machine.clamp_codes)
     names |= {f"G{v:g}" for group in reader.groups.values() for v in group}
     names |= {f"M{v:g}" for v in (*reader.m_codes, *reader.switches)} | {w for w in reader.statements if len(w) > 1}
-    return {name for name in names if re.fullmatch(PASSIVE, name) and not name.startswith("MD")}
+    return {name for name in names if re.fullmatch(PASSIVE, name) and not name.startswith("MD")} - {raw.get("axes", "")}
 
 
 @pytest.mark.parametrize("controller", CONTROLS)

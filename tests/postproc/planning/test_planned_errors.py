@@ -41,11 +41,11 @@ def planned(cl: str, machine: str, controller: str, **options: str) -> PostResul
 
 
 def test_feeds_keep_the_jerk_of_what_corrects_a_screw(tmp_path: Path) -> None:
-    """x - h sin(k x) at v has the jerk h k^3 v^3."""
-    result = planned(LINE.format(12000), "mill-3axis", "linuxcnc", error_model=screw(tmp_path))
+    """x - h sin(k x) at v has the jerk h k^3 v^3; LinuxCNC, which limits no jerk, keeps programmed feeds that are faster."""
+    result = planned(LINE.format(12000), "mill-3axis", "siemens-840d", error_model=screw(tmp_path))
     feeds = [float(f) for f in re.findall(r"F([\d.]+)", result.text)]
     allowed = 60.0 * (result.machine.limits.jerk[0] / (HEIGHT * (2.0 * np.pi / PERIOD) ** 3)) ** (1.0 / 3.0)
-    assert 0.94 * allowed < min(feeds) < allowed < 0.9 * max(feeds)
+    assert 0.88 * allowed < min(feeds) < allowed < 0.9 * max(feeds)
     assert set(re.findall(r"F([\d.]+)", planned(LINE.format(12000), "mill-3axis", "linuxcnc").text)) == {"12000"}
 
 
