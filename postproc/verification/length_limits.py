@@ -29,6 +29,7 @@ from postproc.reference.moves import Moves
 from postproc.setup.model import ToolSetup
 from postproc.verification.executed import executed_poses
 from postproc.verification.length_ends import LEAST, SIGNS, Ends
+from postproc.verification.lifted import lifted
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import lengths
 from toolpaths.shapes import arrays
@@ -54,8 +55,8 @@ class LengthTrial:
     def executed(self, longer: Mapping[int, float], motion: Motion, poses: BlockPoses) -> tuple[Motion, BlockPoses]:
         """With tools longer by so many mm, by their numbers; `motion`, `poses` of the program with gauge lengths.
 
-        The control knows lengths by its registers alone: where no block runs under one that is changed, and no frame
-        was entered with one, every block ends where it did, and so does the gauge point (`BlockPoses.before`).
+        Where no place of a block depends on the lengths, the motion is the same, and so is the gauge point
+        (`BlockPoses.before`).
         """
         tools = dict(self.job.setup.tools)
         for number, mm in longer.items():
@@ -63,16 +64,10 @@ class LengthTrial:
                 update={"gauge_length": self.job.length_of(number) + mm})
         job = replace(self.job, setup=self.job.setup.model_copy(update={"tools": tools}))
         held = job.register_lengths()
-        if self._unread(held, motion):
-            return motion, executed_poses(job, motion, held, poses.before)
-        motion, _ = run(self.code, job.machine.axis_names, replace(self.offsets, lengths=held))
-        return motion, executed_poses(job, motion, held)
-
-    def _unread(self, held: Mapping[int, float], motion: Motion) -> bool:
-        """Whether no block of the motion reads a register that holds another length than the control has."""
-        known = self.offsets.lengths
-        read = (register for register in np.unique(motion.register).tolist() if register >= 0)
-        return motion.table.plain and all(held.get(one, 0.0) == known.get(one, 0.0) for one in read)
+        letters = job.machine.axis_names
+        known = lifted(motion, self.code, letters, self.offsets, held)
+        again = run(self.code, letters, replace(self.offsets, lengths=held))[0] if known is None else known
+        return again, executed_poses(job, again, held, poses.before if again is motion else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,7 +319,7 @@ class _Proof:
     lost: dict[int, int] = field(default_factory=dict)
 
     def keeps(self, numbers: Ints, longer: Floats) -> Bools:
-        """(K,) True where the cuts of each of the tools `numbers` (K,) keep the tolerances, all longer by so many mm (K,)."""
+        """(K,) True where the cuts of each of the tools `numbers` (K,) keep the tolerances, all longer by `longer` (K,) mm."""
         longer_by = dict(zip(numbers.tolist(), longer.tolist(), strict=True))
         motion, executed = self.trial.executed(longer_by, self.motion, self.executed)
         return np.array([self._keeps(motion, executed, number) for number in numbers.tolist()], dtype=np.bool_)
@@ -333,8 +328,8 @@ class _Proof:
         """Whether all cuts of a tool keep the tolerances: not where those of the one move that was lost last do not."""
         job, cuts = self.trial.job, motion.tool == number
         moves, allowed = job.moves.without_pecks(), (job.options.tolerance, job.axis_tolerance)
-        for some in (*(cuts & (self.c.owner == self.c.owner[row]) for row in (self.lost.get(number),) if row is not None),
-                     cuts):
+        lost = self.lost.get(number)
+        for some in [cuts] if lost is None else [cuts & (self.c.owner == self.c.owner[lost]), cuts]:
             owner = np.where(some, self.c.owner, len(moves))
             bound = bound_of_blocks(motion, executed, moves, owner, allowed, job.corrects, judge=True)
             if not (bound.tip <= allowed[0] and bound.axis <= allowed[1]):
