@@ -30,7 +30,7 @@ from postproc.setup.model import ToolSetup
 from postproc.verification.executed import executed_poses
 from postproc.verification.length_ends import LEAST, SIGNS, Ends
 from postproc.verification.lifted import lifted
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, without_nan
 from toolpaths.rotations import lengths
 from toolpaths.shapes import arrays
 
@@ -83,7 +83,7 @@ class _Places:
     @classmethod
     def of(cls, here: tuple[Floats, Floats], there: tuple[Floats, Floats]) -> _Places:
         """From poses with gauge lengths and with tools longer by `STEP`."""
-        return cls(*here, *(np.nan_to_num((b - a) / STEP) for a, b in zip(here, there, strict=True)))
+        return cls(*here, *(without_nan((b - a) / STEP) for a, b in zip(here, there, strict=True)))
 
     @classmethod
     def joined(cls, parts: Sequence[_Places]) -> _Places:
@@ -319,7 +319,7 @@ class _Proof:
     lost: dict[int, int] = field(default_factory=dict)
 
     def keeps(self, numbers: Ints, longer: Floats) -> Bools:
-        """(K,) True where the cuts of each of the tools `numbers` (K,) keep the tolerances, all longer by `longer` (K,) mm."""
+        """(K,) True where the cuts of each of the tools `numbers` (K,) keep the tolerances, longer by `longer` (K,) mm."""
         longer_by = dict(zip(numbers.tolist(), longer.tolist(), strict=True))
         motion, executed = self.trial.executed(longer_by, self.motion, self.executed)
         return np.array([self._keeps(motion, executed, number) for number in numbers.tolist()], dtype=np.bool_)
