@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field
 
 from machines.key_problem import KeyProblem
-from machines.toml_lines import KeyPath, Values
+from machines.toml_lines import KeyPath, Values, own_copy
 from machines.user_file import UserFile
 from machines.user_model import UserModel
 
@@ -79,7 +78,7 @@ def origins_of_figures(documents: Mapping[str, Document], tables: Iterable[Figur
 def as_stated(file: UserFile) -> UserFile:
     """The same file without what its base says of figures that it states itself: they are neither assumed nor the base's
     documents' any more."""
-    values = deepcopy(file.values)
+    values = own_copy(file.values)
     for path in _tables(values):
         table, assumed = _table_at(values, path), (*path, ASSUMED)
         if isinstance(keys := table.get(ASSUMED), list):

@@ -39,6 +39,17 @@ def _parsed(text: str) -> tuple[Values, dict[KeyPath, int]]:
 _kept = lru_cache(maxsize=KEPT)(_parsed)
 
 
+def own_copy(values: Values) -> Values:
+    """A copy of the tables and arrays of TOML values, for whoever changes them; what is in them cannot be changed."""
+    return {key: _own(value) for key, value in values.items()}
+
+
+def _own(value: Any) -> Any:
+    if isinstance(value, dict):
+        return own_copy(value)
+    return [_own(one) for one in value] if isinstance(value, list) else value
+
+
 def key_lines(text: str) -> dict[KeyPath, int]:
     """1-based line of every table, key and array element of a valid TOML text."""
     return _Scanner(text).scan()

@@ -10,7 +10,6 @@ import difflib
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path as FilePath
@@ -19,7 +18,7 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from machines.toml_lines import KEPT, SHORT, KeyPath, Values, parsed
+from machines.toml_lines import KEPT, SHORT, KeyPath, Values, own_copy, parsed
 from machines.user_model import SCHEMA_KEY, key_texts
 from machines.value_words import POINT, advice, allowed, decimal_comma
 from toolpaths.cl.text.kinds_of_file import what_is
@@ -108,14 +107,14 @@ def values_of(path: FilePath) -> Values:
     Raises:
         OSError, UnicodeDecodeError, tomllib.TOMLDecodeError: where it cannot be read.
     """
-    return deepcopy(parsed(read_input(path).decode("utf-8-sig").replace("\r\n", "\n"))[0])
+    return own_copy(parsed(read_input(path).decode("utf-8-sig").replace("\r\n", "\n"))[0])
 
 
 def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]]:
     """`file` as a `model`; None and one diagnostic per fault where it does not fit."""
     text = json.dumps(file.values, default=str)
     try:
-        return (_kept_model(model, text).model_copy(deep=True) if len(text) < SHORT else _model_of(model, text)), []
+        return model.model_validate_json(text), []
     except ValidationError as found:
         return None, [_diagnostic(file, model, fault) for fault in _faults(file.values, model, found)]
 
@@ -164,7 +163,7 @@ def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: Us
     except (ValueError, RecursionError) as fault:  # of Python's own: digits of a number, depth of lists
         why = "its lists or tables are nested too deeply" if isinstance(fault, RecursionError) else str(fault).split(";")[0]
         return None, [error("file.syntax", f"not valid TOML: {why}", file=str(path), hint=_HOW)]
-    own = deepcopy({k: v for k, v in values.items() if k != SCHEMA_KEY or not isinstance(v, str)})
+    own = own_copy({k: v for k, v in values.items() if k != SCHEMA_KEY or not isinstance(v, str)})
     return _with_base(UserFile(name, str(path), own, origins), builtin, kind, (*above, key))
 
 
@@ -174,13 +173,6 @@ def _origins(text: str, file: str) -> dict[KeyPath, ValueSource]:
 
 
 _kept_origins = lru_cache(maxsize=KEPT)(_origins)
-
-
-def _model_of(model: type[M], text: str) -> M:
-    return model.model_validate_json(text)
-
-
-_kept_model = lru_cache(maxsize=KEPT)(_model_of)
 
 
 def _resolve(source: str, builtin: Mapping[str, FilePath], wanted_by: UserFile | None) -> FilePath:

@@ -70,6 +70,11 @@ def among(values: Array, some: Iterable[float]) -> Bools:
     return found
 
 
+def without_nan(values: Floats, nan: float = 0.0) -> Floats:
+    """`numpy.nan_to_num` with `nan` in the place of NaN; the values themselves where all are finite."""
+    return values if np.isfinite(values).all() else np.nan_to_num(values, nan=nan)
+
+
 def box_corners(low: Floats, high: Floats) -> Floats:
     """(8, 3) corners of the box from `low` (3,) to `high` (3,), these two first and last."""
     return np.where(_CORNERS, high, low)

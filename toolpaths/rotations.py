@@ -52,7 +52,11 @@ def dot(a: Floats, b: Floats) -> Floats:
 
 def cross(a: Floats, b: Floats) -> Floats:
     """a x b (..., 3), column by column."""
-    return np.stack([a[..., j] * b[..., k] - a[..., k] * b[..., j] for j, k in ((1, 2), (2, 0), (0, 1))], axis=-1)
+    x0, y0, z0, x1, y1, z1 = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
+    first = y0 * z1 - z0 * y1
+    result: Floats = np.empty((*first.shape, 3))
+    result[..., 0], result[..., 1], result[..., 2] = first, z0 * x1 - x0 * z1, x0 * y1 - y0 * x1
+    return result
 
 
 def angle_between(a: Floats, b: Floats) -> Floats:

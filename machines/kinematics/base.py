@@ -31,6 +31,8 @@ ErrorForm = TypeVar("ErrorForm", covariant=True)
 UP = read_only([0.0, 0.0, 1.0])
 SPIN = "spin"
 """the open parameter that is the turn of the tool about its own axis, rad as in `Kinematics.pose`"""
+KEPT = 32
+"""tools that a machine keeps its kinematics for"""
 
 
 class PlatformPlaces(Protocol):
@@ -157,7 +159,23 @@ class Kinematics(ABC):
         return tip, axis, np.full(len(tip), np.nan)
 
     def with_tool(self, length: float) -> Self:
-        """The same kinematics at the tip of a tool of that length (mm): tip = gauge point - length * axis."""
+        """The same kinematics at the tip of a tool of that length (mm): tip = gauge point - length * axis.
+
+        The last few are kept, with what they have worked out.
+        """
+        kept = self._with_tools
+        if length not in kept:
+            if len(kept) >= KEPT:
+                kept.clear()
+            kept[length] = self.made_with_tool(float(length))
+        return kept[length]
+
+    @cached_property
+    def _with_tools(self) -> dict[float, Self]:
+        return {}
+
+    def made_with_tool(self, length: float) -> Self:
+        """What `with_tool` keeps."""
         made = copy.copy(self)
         for name in [name for name in vars(made) if isinstance(getattr(type(made), name, None), cached_property)]:
             del made.__dict__[name]

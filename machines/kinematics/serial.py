@@ -99,7 +99,7 @@ class Serial(Kinematics):
             return np.full((3, 3), np.nan)
         return np.asarray(np.linalg.inv(directions)) + 0.0
 
-    def with_tool(self, length: float) -> Self:
+    def made_with_tool(self, length: float) -> Self:
         """The same machine at the tip: tip = gauge point - length * axis."""
         return replace(self, tool_length=float(length))
 

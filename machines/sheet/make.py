@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from machines.sheet.pivot_text import read_pivots
 from machines.sheet.pivots import points_of
 from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
 from machines.sheet.touched import AGREE, apart_by, strange_turns, untold, wrong_sign
-from machines.toml_lines import KeyPath
+from machines.toml_lines import KeyPath, own_copy
 from machines.user_file import UserFile, ValueSource, read_toml, validate, wrong_keys
 from toolpaths.diagnostics import Diagnostic, has_errors
 
@@ -109,7 +108,7 @@ def new_machine(source: str | Path, name: str = "") -> NewMachine:
 
 def _without_wrong_keys(file: UserFile) -> DataSheet | None:
     """The rest of a sheet with keys that do not fit, to find faults that they do not touch."""
-    values = deepcopy(file.values)
+    values = own_copy(file.values)
     for *tables, key in wrong_keys(file, DataSheet):
         at = values
         for one in tables:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from machines.kinematics.base import Kinematics
-from toolpaths.arrays import Array, Bools, Floats
+from toolpaths.arrays import Array, Bools, Floats, without_nan
 from toolpaths.rotations import slerp, wrap
 
 TRAVEL_SLACK = 1e-9
@@ -27,7 +27,7 @@ def branches_of(kin: Kinematics, tip: Floats, axis: Floats, near: Floats,
     rotary = np.array(kin.rotary)
     branches = kin.inverse(tip, axis, near=near[0]) if parameters is None else kin.inverse_with(
         tip, axis, parameters, near[0])
-    family = np.stack([kin.singular(np.nan_to_num(b)) & np.isfinite(b).all(axis=1) for b in branches])
+    family = np.stack([kin.singular(without_nan(b)) & np.isfinite(b).all(axis=1) for b in branches])
     if family.any():
         if not (np.isfinite(branches).all(axis=2) & ~family).any():
             branches = np.stack([kin.inverse(tip, axis, near=n)[0] for n in near])
@@ -53,7 +53,7 @@ def _fill_family(kin: Kinematics, tip: Floats, axis: Floats, branches: Floats, f
 def distance(a: Floats, b: Floats, rotary: Bools) -> Floats:
     """Rotary path in rad where the machine has rotary joints, else linear path in mm; NaN counts as infinite."""
     d = wrap(b[..., rotary] - a[..., rotary]) if rotary.any() else b - a
-    result: Floats = np.nan_to_num(np.abs(d).sum(axis=-1), nan=np.inf)
+    result: Floats = without_nan(np.abs(d).sum(axis=-1), np.inf)
     return result
 
 

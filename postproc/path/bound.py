@@ -18,7 +18,7 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import blocks as in_blocks
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from postproc.control.control import Control
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, without_nan
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -136,7 +136,7 @@ class _Offset:
         with np.errstate(invalid="ignore"):  # unbounded, and so NaN: infinite below
             axis = self.seen.axis + share * self.bend.axis + self.turn * self._deviation(curves, tip, share)
         angle = 2.0 * np.arcsin(np.minimum(0.5 * axis, 1.0))
-        return np.nan_to_num(tip, nan=np.inf), np.nan_to_num(angle, nan=np.inf)
+        return without_nan(tip, np.inf), without_nan(angle, np.inf)
 
     def _deviation(self, curves: Curves, tip: Floats, share: float) -> Floats:
         """Bound (N,) of the curve's parameter at the point nearest to the tip less the reference's."""
@@ -173,7 +173,7 @@ def _travel(s: CurveBlocks, middle: Floats) -> TaylorAngle:
     """The curve's parameter through both ends and the point nearest to the block's middle."""
     even = 0.5 * (s.u0 + s.u1)
     length = s.curves.length()
-    found = np.where(length > SHORT, s.curves.project(np.nan_to_num(middle), even), even)
+    found = np.where(length > SHORT, s.curves.project(without_nan(middle), even), even)
     return curve_parameter(s.u0, found, s.u1)
 
 

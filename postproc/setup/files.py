@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from machines.toml_lines import own_copy
 from machines.user_file import UserFile
 from toolpaths.input_files import place
 
@@ -27,7 +27,7 @@ def file_keys(values: Mapping[str, Any]) -> list[Key]:
 
 def seen_from_here(file: UserFile) -> UserFile:
     """The set-up with the names of mesh files that its bases give as it would give them itself."""
-    here, values = Path(file.file).parent, deepcopy(dict(file.values))
+    here, values = Path(file.file).parent, own_copy(dict(file.values))
     for key in file_keys(values):
         there = Path(file.origin(key).file).parent
         value_at(values, key[:-1])[key[-1]] = renamed(str(value_at(values, key)), there, here)

@@ -9,7 +9,7 @@ lengths found, and the bound of its deviation (`deviation_bound`) must keep the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,7 +29,8 @@ from postproc.reference.moves import Moves
 from postproc.setup.model import ToolSetup
 from postproc.verification.executed import executed_poses
 from postproc.verification.length_ends import LEAST, SIGNS, Ends
-from toolpaths.arrays import Bools, Floats, Ints
+from postproc.verification.lifted import lifted
+from toolpaths.arrays import Bools, Floats, Ints, without_nan
 from toolpaths.rotations import lengths
 from toolpaths.shapes import arrays
 
@@ -51,16 +52,22 @@ class LengthTrial:
     offsets: Offsets
     job: Job
 
-    def executed(self, longer: Mapping[int, float]) -> tuple[Motion, BlockPoses]:
-        """With tools longer by so many mm, by their numbers."""
+    def executed(self, longer: Mapping[int, float], motion: Motion, poses: BlockPoses) -> tuple[Motion, BlockPoses]:
+        """With tools longer by so many mm, by their numbers; `motion`, `poses` of the program with gauge lengths.
+
+        Where no place of a block depends on the lengths, the motion is the same, and so is the gauge point
+        (`BlockPoses.before`).
+        """
         tools = dict(self.job.setup.tools)
         for number, mm in longer.items():
             tools[str(number)] = tools.get(str(number), ToolSetup()).model_copy(
                 update={"gauge_length": self.job.length_of(number) + mm})
         job = replace(self.job, setup=self.job.setup.model_copy(update={"tools": tools}))
         held = job.register_lengths()
-        motion, _ = run(self.code, job.machine.axis_names, replace(self.offsets, lengths=held))
-        return motion, executed_poses(job, motion, held)
+        letters = job.machine.axis_names
+        known = lifted(motion, self.code, letters, self.offsets, held)
+        again = run(self.code, letters, replace(self.offsets, lengths=held))[0] if known is None else known
+        return again, executed_poses(job, again, held, poses.before if again is motion else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +83,7 @@ class _Places:
     @classmethod
     def of(cls, here: tuple[Floats, Floats], there: tuple[Floats, Floats]) -> _Places:
         """From poses with gauge lengths and with tools longer by `STEP`."""
-        return cls(*here, *(np.nan_to_num((b - a) / STEP) for a, b in zip(here, there, strict=True)))
+        return cls(*here, *(without_nan((b - a) / STEP) for a, b in zip(here, there, strict=True)))
 
     @classmethod
     def joined(cls, parts: Sequence[_Places]) -> _Places:
@@ -94,7 +101,7 @@ def length_margins(trial: LengthTrial, motion: Motion, executed: BlockPoses, c: 
     job, numbers = trial.job, np.unique(motion.tool[motion.tool >= 0])
     if not job.setup.output.tool_call or not len(numbers):
         return ()
-    again, longer = trial.executed(dict.fromkeys(numbers.tolist(), STEP))
+    again, longer = trial.executed(dict.fromkeys(numbers.tolist(), STEP), motion, executed)
     if len(again) != len(motion):
         return tuple(LengthMargin(number, 0.0, 0.0, "other blocks", "other blocks") for number in numbers.tolist())
     ends, matters = Ends(numbers), length_matters(job)
@@ -104,7 +111,7 @@ def length_margins(trial: LengthTrial, motion: Motion, executed: BlockPoses, c: 
     look.travel()
     look.bounds_of_reach()
     if matters:
-        _prove(trial, c, ends)
+        _prove(_Proof(trial, motion, executed, c), ends)
     return tuple(_margin(job, ends, t) for t in range(len(numbers)))
 
 
@@ -278,7 +285,7 @@ class _Look:
                     self.ends.add(self._tool(rows[k]), sign, column, name)
 
 
-def _prove(trial: LengthTrial, c: Comparison, ends: Ends) -> None:
+def _prove(proof: _Proof, ends: Ends) -> None:
     """Lengths at which the bound of every cut keeps the tolerances: those that were found, else less.
 
     `low` is proved, `high` is not: less and less first, as places lie near to each other, then half between.
@@ -291,7 +298,7 @@ def _prove(trial: LengthTrial, c: Comparison, ends: Ends) -> None:
             k = np.flatnonzero((high > low) & (high > NEAR * low))
             if not len(k):
                 break
-            kept = _keeps(trial, c, ends.numbers[k], direction * next_[k])
+            kept = proof.keeps(ends.numbers[k], direction * next_[k])
             low[k[kept]], high[k[~kept]] = next_[k[kept]], next_[k[~kept]]
             next_ = np.where(low > 0.0, 0.5 * (low + high), share * found)
         short = low < found
@@ -300,16 +307,37 @@ def _prove(trial: LengthTrial, c: Comparison, ends: Ends) -> None:
         ends.mm[:, sign] = np.where(short | by_place, SHARE * low, ends.mm[:, sign])
 
 
-def _keeps(trial: LengthTrial, c: Comparison, numbers: Ints, longer: Floats) -> Bools:
-    """(K,) True where the cuts of each of the tools `numbers` (K,) keep the tolerances, all longer by so many mm (K,)."""
-    motion, executed = trial.executed(dict(zip(numbers.tolist(), longer.tolist(), strict=True)))
-    job, moves = trial.job, trial.job.moves.without_pecks()
-    allowed, result = (job.options.tolerance, job.axis_tolerance), np.zeros(len(numbers), dtype=bool)
-    for k, number in enumerate(numbers.tolist()):
-        owner = np.where(motion.tool == number, c.owner, len(moves))
-        bound = bound_of_blocks(motion, executed, moves, owner, allowed, job.corrects, judge=True)
-        result[k] = bound.tip <= allowed[0] and bound.axis <= allowed[1]
-    return result
+@dataclass(frozen=True, eq=False)
+class _Proof:
+    """Judges lengths by the bounds of all cuts; `lost`: by tool the block that did not keep the tolerances last, whose
+    move is looked at first the next time."""
+
+    trial: LengthTrial
+    motion: Motion
+    executed: BlockPoses
+    c: Comparison
+    lost: dict[int, int] = field(default_factory=dict)
+
+    def keeps(self, numbers: Ints, longer: Floats) -> Bools:
+        """(K,) True where the cuts of each of the tools `numbers` (K,) keep the tolerances, longer by `longer` (K,) mm."""
+        longer_by = dict(zip(numbers.tolist(), longer.tolist(), strict=True))
+        motion, executed = self.trial.executed(longer_by, self.motion, self.executed)
+        return np.array([self._keeps(motion, executed, number) for number in numbers.tolist()], dtype=np.bool_)
+
+    def _keeps(self, motion: Motion, executed: BlockPoses, number: int) -> bool:
+        """Whether all cuts of a tool keep the tolerances: not where those of the one move that was lost last do not."""
+        job, cuts = self.trial.job, motion.tool == number
+        moves, allowed = job.moves.without_pecks(), (job.options.tolerance, job.axis_tolerance)
+        lost = self.lost.get(number)
+        for some in [cuts] if lost is None else [cuts & (self.c.owner == self.c.owner[lost]), cuts]:
+            owner = np.where(some, self.c.owner, len(moves))
+            bound = bound_of_blocks(motion, executed, moves, owner, allowed, job.corrects, judge=True)
+            if not (bound.tip <= allowed[0] and bound.axis <= allowed[1]):
+                row = bound.tip_row if bound.tip > allowed[0] else bound.axis_row
+                if row >= 0:
+                    self.lost[number] = row
+                return False
+        return True
 
 
 def _room(job: Job, moves: Moves, owner: Ints, tip: Floats, axis: Floats, near: Floats) -> Floats:

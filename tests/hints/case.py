@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from typer.testing import CliRunner
+
 from postproc.cli.app import app
 
 COMMAND = ""
@@ -99,8 +101,6 @@ def write(folder: Path, edit: Edit, match: re.Match[str] | None) -> None:
 
 def called(command: str, folder: Path) -> tuple[int, list[dict[str, Any]]]:
     """Exit code and diagnostics of a command in a folder (the working directory is that folder)."""
-    from typer.testing import CliRunner
-
     got = CliRunner().invoke(app, [*shlex.split(command), "--json", "-"])
     assert got.exit_code in (0, 1), f"{command}: {got.exit_code} {got.stderr}\n{got.exception!r}"
     found: list[dict[str, Any]] = json.loads(got.stdout).get("diagnostics", [])

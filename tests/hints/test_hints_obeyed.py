@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from machines.geometric_error.exchange import survey
 from tests.explained_codes import DATA
 from tests.hints.case import HintCase, called
 from tests.hints.cases import CASES
@@ -25,6 +26,12 @@ NOTHING = "nothing is to be done"
 def remedies(hints: list[str]) -> list[str]:
     """Hints that ask for something."""
     return [hint for hint in hints if hint not in VERDICTS and not hint.startswith((NOTHING, REPORT))]
+
+
+@pytest.fixture(autouse=True)
+def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a model of errors does at each of many places changes figures of `errors check`, and no hint."""
+    monkeypatch.setattr(survey, "PLACES", 500)
 
 
 @pytest.mark.parametrize("case", CASES, ids=[f"{c.code}-{k}" for k, c in enumerate(CASES)])

@@ -86,7 +86,7 @@ class ActualKinematics(Kinematics):
         """Of the nominal machine."""
         return self.nominal.singular(q)
 
-    def with_tool(self, length: float) -> Self:
+    def made_with_tool(self, length: float) -> Self:
         """See the base class."""
         return replace(self, nominal=self.nominal.with_tool(length))
 

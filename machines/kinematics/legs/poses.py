@@ -343,7 +343,7 @@ class PosesOfLegs(Kinematics):
         """See the base class."""
         return replace(self, all_roots=True)
 
-    def with_tool(self, length: float) -> Self:
+    def made_with_tool(self, length: float) -> Self:
         """The same machine at the tip of a tool of that length (mm)."""
         return replace(self, tool_length=float(length))
 

@@ -128,7 +128,7 @@ class LegsWithAxis(Kinematics):
 
     # ---- inverse and forward -------------------------------------------------------------------------------
 
-    def with_tool(self, length: float) -> Self:
+    def made_with_tool(self, length: float) -> Self:
         """The same machine at the tip of a tool of that length (mm)."""
         return replace(self, tool_length=float(length))
 

@@ -88,13 +88,16 @@ class BoundSearch:
     def __init__(self, allowed: tuple[float, float], judge: bool = False) -> None:
         self.allowed, self.judge = np.array(allowed), judge
         self.seen, self.closed = np.zeros(2), np.zeros(2)
-        self.k = [-1, -1]
+        self.k, self.k_seen = [-1, -1], [-1, -1]
         self.open: list[tuple[Pieces, PieceBounds]] = []
         self.unbounded: set[int] = set()
 
     def add(self, pieces: Pieces, values: PieceBounds) -> None:
         """Take pieces in; those without a bound count by what was seen of them."""
-        self.seen = np.maximum(self.seen, [values.seen_tip.max(), values.seen_axis.max()])
+        for i, seen in enumerate((values.seen_tip, values.seen_axis)):
+            worst = int(seen.argmax())
+            if seen[worst] > self.seen[i]:
+                self.seen[i], self.k_seen[i] = seen[worst], int(pieces.k[worst])
         bounded = np.isfinite(values.tip) & np.isfinite(values.axis)
         if not bounded.all():
             self.unbounded.update(np.unique(pieces.k[~bounded]).tolist())
@@ -149,6 +152,6 @@ class BoundSearch:
         for pieces, values in self.open:
             self._close(pieces, values)
         tip, axis = np.maximum(self.closed, self.seen).tolist()
-        tip_row, axis_row = (int(rows[k]) if k >= 0 else -1 for k in self.k)
+        tip_row, axis_row = (int(rows[k]) if k >= 0 else -1 for k in (self.k_seen if self.judged else self.k))
         without = rows[np.array(sorted(self.unbounded), dtype=np.int64)]
         return DeviationBound(tip, axis, tip_row, axis_row, len(without), without)

@@ -38,7 +38,7 @@ from postproc.readback.execution.poses import SAMPLES, BlockPoses, arc_sweeps
 from postproc.readback.text.canonical import Canonical
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared
+from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared, without_nan
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves
@@ -282,8 +282,8 @@ def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, 
             guess = np.minimum(begin[part] + t * share[part], 1.0)
             d, e, _ = curve.deviation(tip, axis, guess, within)
             d = np.where(level[part], off_level(curve, tip), d)
-            tip_off[part] = np.fmax(tip_off[part], np.nan_to_num(d, nan=np.inf))
-            axis_off[part] = np.fmax(axis_off[part], np.nan_to_num(e, nan=np.inf))
+            tip_off[part] = np.fmax(tip_off[part], without_nan(d, np.inf))
+            axis_off[part] = np.fmax(axis_off[part], without_nan(e, np.inf))
         for k, places in executed.looks(motion, here):
             tip, axis = executed.poses(motion, here[k], places)
             some = moves.curves(owner[here[k]])

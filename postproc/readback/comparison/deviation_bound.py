@@ -26,7 +26,7 @@ from postproc.readback.comparison.bound_search import BoundSearch, DeviationBoun
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, coordinates, signed_sweep
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, without_nan
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -106,7 +106,7 @@ def _values(motion: Motion, executed: BlockPoses, moves: Moves, ends: _Ends, pie
     executed.look_ahead(motion, rows, places)
     poses = [executed.poses(motion, rows, t) for t in places]
     guess = [np.minimum(ends.begin[pieces.k] + t * ends.share[pieces.k], 1.0) for t in places]
-    nearest = [curves.project(np.nan_to_num(tip), g) for (tip, _), g in zip(poses, guess, strict=True)]
+    nearest = [curves.project(without_nan(tip), g) for (tip, _), g in zip(poses, guess, strict=True)]
     off = executed.off_law(motion, rows).any()
     lawful = [executed.lawful(motion, rows, t) for t in places] if off else poses
     law = _PieceMotion.of(motion, executed, rows, pieces, places, lawful)

@@ -45,11 +45,15 @@ class ExecutionFrame:
 
     def coordinates(self, position: Floats) -> Floats:
         """(N, J) what the words would say at machine positions (N, J) (mm, degrees)."""
-        return FrameTable.of((self,)).coordinates(np.zeros(len(position), dtype=np.int64), position)
+        return self._alone.coordinates(np.zeros(len(position), dtype=np.int64), position)
 
     def position(self, coordinates: Floats) -> Floats:
         """(N, J) machine positions of coordinates (N, J): the slides that bring the tip there at the rotary positions."""
-        return FrameTable.of((self,)).position(np.zeros(len(coordinates), dtype=np.int64), coordinates)
+        return self._alone.position(np.zeros(len(coordinates), dtype=np.int64), coordinates)
+
+    @cached_property
+    def _alone(self) -> FrameTable:
+        return FrameTable.of((self,))
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,14 +109,15 @@ class FrameTable:
     def _parts(self, number: Ints) -> Iterator[tuple[Control, Kinematics, Ints | slice]]:
         """Rows of one control and tool length at a time, not too many; none where the words are machine positions."""
         owners = self.owner[number]
-        for owner in np.flatnonzero(np.bincount(owners)).tolist():
+        one = len(owners) > 0 and bool((owners == owners[0]).all())
+        for owner in owners[:1].tolist() if one else np.flatnonzero(np.bincount(owners)).tolist():
             control, kin = self.frames[owner].control, self.frames[owner].kinematics
             if control is None or kin is None:
                 continue
-            rows = np.flatnonzero(owners == owner)
-            if len(rows) == len(number) <= _CHUNK:
+            if one and len(number) <= _CHUNK:
                 yield control, kin, slice(None)
                 continue
+            rows = np.flatnonzero(owners == owner)
             for at in range(0, len(rows), _CHUNK):
                 yield control, kin, rows[at:at + _CHUNK]
 

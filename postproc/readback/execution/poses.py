@@ -266,7 +266,9 @@ class BlockMotions:
 
     def tiled(self, times: int) -> BlockMotions:
         """The blocks `times` times one after the other, (times K) of them."""
-        before, end, first, last = (np.tile(a, (times, 1)) for a in (self.before, self.end, self.first, self.last))
+        before, end = np.tile(self.before, (times, 1)), np.tile(self.end, (times, 1))
+        first, last = (before, end) if self.motion.table.plain else (
+            np.tile(self.first, (times, 1)), np.tile(self.last, (times, 1)))
         return BlockMotions(self.motion, self.control, np.tile(self.rows, times), before, end, np.tile(self.frame, times),
                             first, last)
 
@@ -309,8 +311,9 @@ def _dog_leg(before: Floats, end: Floats, t: Floats, speed: Floats) -> Floats:
 def _along(motion: Motion, xyz: Ints, rows: Ints, before: Floats, end: Floats, t: Floats) -> Floats:
     """Coordinates (K, J) at fraction t (K,): straight, or on the arc in its plane."""
     result = before + t[:, None] * (end - before)
-    for plane, (i, j) in PLANE_COLUMNS.items():
-        k = np.flatnonzero((motion.code[rows] == 2) & (motion.plane[rows] == plane))
+    arc = motion.code[rows] == 2
+    for plane, (i, j) in PLANE_COLUMNS.items() if arc.any() else ():
+        k = np.flatnonzero(arc & (motion.plane[rows] == plane))
         if len(k):
             a, b = int(xyz[i]), int(xyz[j])
             center = motion.center[rows[k]][:, (i, j)]

@@ -51,7 +51,9 @@ class BlockSection:
     curve: Floats
 
     def cut(self, first: int, last: int) -> BlockSection:
-        """Blocks first to before last."""
+        """Blocks first to before last; all of them are not copied."""
+        if first == 0 and last >= len(self.motion):
+            return self
         return replace(rows_of(self, "N", slice(first, last)), first=self.first + first)
 
     @cached_property

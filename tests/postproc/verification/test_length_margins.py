@@ -85,6 +85,17 @@ def test_where_joints_stay_the_tip_goes_along_the_tool(monkeypatch: pytest.Monke
     np.testing.assert_allclose(margins[0], margins[1], rtol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["head, machine coordinates", "fork head, two tools", "delta"])
+def test_margins_are_those_of_executed_programs(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same figures where every length is executed and every cut is looked at."""
+    result = made(name)
+    keeps = length_limits._Proof.keeps
+    monkeypatch.setattr(length_limits, "lifted", lambda *given: None)
+    monkeypatch.setattr(length_limits._Proof, "keeps", lambda proof, *of: keeps(replace(proof, lost={}), *of))
+    found, _ = read_back(result.text, replace(result.job, errors=result.job.errors), "part.cls", margins=True)
+    assert found is not None and found.lengths == result.comparison.lengths
+
+
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_all_tools_at_their_margins_at_once(name: str) -> None:
     """What one tool may differ by does not depend on the others."""
