@@ -30,7 +30,7 @@ def planned_times(result: PostResult, blocks: MotionBlocks, model: CycleTimeMode
     moves = result.moves or job.moves
     source = source_of(job, moves, result.nominal or path, planned_correction(job, result.compensation, path),
                        override * model.override)
-    motion = PlannedMotion(source, np.zeros(0), strict=bool(np.isfinite(source.bounds.jerk).all()) and not source.tools)
+    motion = PlannedMotion(source, np.zeros(0), strict=bool(np.isfinite(source.bounds.jerk).all()))
     try:
         spans = [(int(one.move.min()), int(one.move.max()), made.seconds)
                  for one, made in zip(motion.passes, motion.plans, strict=True)]
