@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from postproc.clock.path import BlendedPath, CommandedPath
+from postproc.clock.path import SHORTEST, BlendedPath, CommandedPath
 from postproc.clock.settings import ControlSettings
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shapes import arrays
@@ -23,7 +23,7 @@ SLOWEST = 1e-3
 """mm/s or rad/s: least speed to which few blocks read ahead hold the axes"""
 NO_MOTION = 1e-12
 """mm or rad, against division by 0"""
-FIRST, FIRST_AT_REST, GROWTH = 0.02, 1e-5, 0.25
+FIRST, FIRST_AT_REST, GROWTH = 0.02, SHORTEST, 0.25
 """mm: distance of the first place from one of the path, and from a rest; how much the distances grow each"""
 CORNER = 0.0051
 """mm around a corner that is not rounded off within which the path turns (half of the least width of `path.py`)"""

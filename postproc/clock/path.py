@@ -35,7 +35,9 @@ SLOPE = 0.5
 PLACES = np.array([-0.5, -0.3, -0.14, 0.0, 0.14, 0.3, 0.5])
 """of a width where derivatives are taken"""
 BEFORE, APART = 1e-7, 1e-6
-"""mm before a rest where the direction is still that of the path that leads there; least distance of places and points"""
+"""mm before a rest where the direction is still that of the path that leads there; least distance of places"""
+SHORTEST = 1e-5
+"""mm: shorter blocks are no motion; the nearest place to a rest at which bends are seen"""
 SMOOTH_BUMP = (140.0, -420.0, 420.0, -140.0)
 """140 x^3 (1 - x)^3, whose integral is 1 and whose derivatives up to the second vanish at 0 and 1"""
 TAKES_BACK = 0.3
@@ -133,7 +135,7 @@ class BlendedPath:
 
 def blended(path: CommandedPath) -> BlendedPath:
     """The path that the control runs."""
-    moves = np.linalg.norm(np.diff(path.points, axis=0) * path.weight, axis=1) > APART
+    moves = np.linalg.norm(np.diff(path.points, axis=0) * path.weight, axis=1) > SHORTEST
     group = np.concatenate([[0], np.cumsum(moves)])
     if not moves.any():
         flat = np.zeros((1, path.points.shape[1]))
