@@ -187,7 +187,7 @@ def _executed(data: bytes, controller: ControllerFile, controls: dict[str, Contr
 def _blocks(code: Canonical, motion: Motion, machine: Machine, control: Control, controller: ControllerFile,
             origin: BlockOrigin | None, override: float) -> MotionBlocks:
     return blocks_of(code, motion, machine, control, origin, blends_unstated=controller.kinematics.blends_unstated,
-                     by_radius=controller.feed.arc_inverse == "radius", override=override)
+                     exact_path_rests=controller.kinematics.exact_path_rests, by_radius=controller.feed.arc_inverse == "radius", override=override)
 
 
 def read_file(file: str | Path, hint: str = "a CL file, or a program of the controller") -> bytes:
