@@ -68,8 +68,9 @@ def as_text(e: Estimate, name: str, override: float = 1.0, first: Uncertain | No
                      f"deviation of it is {first.seconds:.2f} s")
     lines.append("time by activity: " + ", ".join(f"{key.removesuffix('_s').replace('_', ' ')} {value:.2f} s"
                                          for key, value in d["causes"].items() if value >= 0.005))
-    if d["exact_stops"]["blocks"]:
-        lines.append(f"exact stops (G60, G9, G61): at {d['exact_stops']['blocks']} blocks, {d['exact_stops']['lost_s']:.2f} s")
+    rests = d["exact_stops"]
+    if rests["blocks"]:
+        lines.append(f"exact stops (G60, G9, G61): at {rests['blocks']} blocks, {rests['lost_s']:.2f} s")
     lines += _limits(s, d["feed_s"])
     lines += tables
     lost = [row for row in losses(e, s) if float(str(row["lost_s"])) >= 0.005]

@@ -87,7 +87,7 @@ def operations(e: Estimate, s: TimeShares) -> list[dict[str, object]]:
 
 
 def exact_stops(e: Estimate) -> tuple[int, float]:
-    """(blocks at whose end the program asks for an exact stop and nothing else makes the axes rest, s that their rests cost).
+    """(blocks at whose end the program asks for an exact stop and nothing else makes the axes rest, s that the rests cost).
 
     G60, G9, G09, G61.1; G61 where the control rests under it.
     """

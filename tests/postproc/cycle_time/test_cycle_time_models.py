@@ -16,8 +16,8 @@ from postproc.cycle_time.linuxcnc_kernels import chain_ends, speeds, timeline
 from postproc.cycle_time.linuxcnc_segments import merge
 from postproc.cycle_time.lookahead import rest_to_rest
 from postproc.cycle_time.model import CycleTimeModel
-from postproc.cycle_time.shape import shape
 from postproc.cycle_time.report import as_dict, as_text
+from postproc.cycle_time.shape import shape
 from postproc.cycle_time.shares import most_expensive, operations, shares
 from tests.linuxcnc import time_programs
 from tests.postproc.time_kit import HEAD, blocks, machine, model, random_program
