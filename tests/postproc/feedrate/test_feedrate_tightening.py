@@ -18,6 +18,7 @@ from postproc.feedrate.tightening import BETWEEN, tightened, worst_ratios
 from postproc.feedrate.windows import solve_problem
 from tests.postproc.feedrate.test_feedrate_motion import Circle, Screw
 from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, random_path, uniform, unlimited
+from tests.postproc.feedrate_reference import relaxed_time
 
 
 @pytest.mark.numeric
@@ -84,3 +85,11 @@ def test_accelerations_that_jerk_reaches_within_an_interval_are_kept_between_kno
         assert made.usage().worst < (1.0 + 1e-9 if strict else 1.15)
     tool, joint = made.shares.limits[:, -1], made.shares.limits[:, 0]
     assert not tool.any() and joint[2] < 0.5 * joint[1]
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_no_motion_is_faster_than_the_bound_by_duality_and_ours_little_slower(seed: int) -> None:
+    problem = uniform(random_path(seed), 200).problem()
+    c = solve_problem(problem, NumpySteps).c
+    seconds = float(np.sum(problem.weight * problem.basis.values(c)[0] ** -0.5))
+    assert relaxed_time(problem, c) <= seconds <= 1.1 * relaxed_time(problem, c)
