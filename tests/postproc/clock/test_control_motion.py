@@ -26,7 +26,7 @@ OPTIMUM = 2.17
 """s of the planner on the measured curve itself (`published.py` computes it)"""
 
 
-@pytest.mark.parametrize("chord", [0.1, 0.2])
+@pytest.mark.parametrize("chord", [0.1, 0.2, 0.7])
 def test_the_measured_curve_takes_what_was_measured(chord: float) -> None:
     seconds = execute(commanded(points(chord)), LIMITS).seconds
     assert seconds == pytest.approx(MEASURED, rel=0.05)
