@@ -218,7 +218,10 @@ def _curved(u: Floats, chord: Floats, path: CommandedPath) -> tuple[Bools, Float
 
 def _tangents(u: Floats, chord: Floats, smooth: Bools) -> tuple[Floats, Floats]:
     """(N, A) derivatives at begin and end of each block: of cubic splines through smooth points, without curvature where
-    they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV); `chord` (N,) are the lengths of their parameter."""
+    they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV).
+
+    `chord` (N,) are the lengths of their parameter.
+    """
     from scipy.linalg import solve_banded
 
     n = len(u)
