@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.clock.path import BlendedPath, CommandedPath
+from postproc.clock.path import SHORTEST, BlendedPath, CommandedPath
 from postproc.clock.settings import ControlSettings
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shapes import arrays
@@ -24,7 +24,7 @@ EVEN = 1e-9
 """blocks: parts of a block that are one in the arithmetic of their sum"""
 NO_MOTION = 1e-12
 """mm or rad, against division by 0"""
-FIRST, FIRST_AT_REST, GROWTH = 0.02, 1e-5, 0.25
+FIRST, FIRST_AT_REST, GROWTH = 0.02, SHORTEST, 0.25
 """mm: distance of the first place from one of the path, and from a rest; how much the distances grow each"""
 CORNER = 0.0051
 """mm around a corner that is not rounded off within which the path turns (half of the least width of `path.py`)"""

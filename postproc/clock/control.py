@@ -159,12 +159,15 @@ def _moved(part: Allowed, settings: ControlSettings) -> Floats:
         out = np.empty((FEWEST + round(1.5 * rough / settings.cycle), 3))
         made.append(out[:loop(s, v, a, settings.cycle, *bends, state, out)])
         if state[1] <= 0.0 and state[0] < s[-1]:
-            most = float(part.cap[np.searchsorted(s, state[0]) - 1:].min())
+            most = float(part.cap[max(int(np.searchsorted(s, state[0], side="right")) - 1, 0):].min())
             made.append(short_move(state[0], s[-1] - state[0], float(part.straight[-1, 1]), most, settings.cycle))
             break
         if len(made) > CALLS:
             raise ArithmeticError(f"no end is reached within {sum(map(len, made)) * settings.cycle:.3g} s")
-    return landed(np.concatenate(made), float(s[-1]), settings.cycle)
+    moved = np.concatenate(made)
+    ahead = np.minimum.accumulate(part.cap[::-1])[::-1]
+    free = moved[:, 1] <= ahead[np.clip(np.searchsorted(s, moved[:, 0], side="right") - 1, 0, len(s) - 1)]
+    return landed(moved, float(s[-1]), settings.cycle, free)
 
 
 def _jerk_used(part: Allowed, moved: Floats, settings: ControlSettings) -> Floats:

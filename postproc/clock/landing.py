@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats
 
 LANDING, LATEST = 12.0, 40.0
 """cycles before a rest from which the motion is one polynomial, and at most where the motion slows down too early"""
@@ -12,15 +12,16 @@ SLOWEST = 1e-12
 """mm/s, against division by 0"""
 
 
-def landed(moved: Floats, end: float, cycle: float) -> Floats:
-    """The motion (M, 3) with its last cycles as a polynomial of degree 5 that ends in whole cycles at rest.
+def landed(moved: Floats, end: float, cycle: float, free: Bools) -> Floats:
+    """The motion (M, 3) with its last cycles as a polynomial of degree 5 that ends in whole cycles at rest; it begins where
+    no bend ahead is slower, `free` (M,).
 
     Of a motion that comes to rest at constant jerk the time left is 3 r/v, r the length left and v the speed. In a time
     longer by a share e the polynomial begins at 1 - 3 e of that jerk and ends at 1 - 9 e: never above it.
     """
     v = np.maximum(moved[:, 1], SLOWEST)
     late = np.arange(len(moved)) >= len(moved) - LATEST
-    left = np.where(late & (moved[:, 2] < 0.0), 3.0 * (end - moved[:, 0]) / v, np.inf)
+    left = np.where(late & free & (moved[:, 2] < 0.0), 3.0 * (end - moved[:, 0]) / v, np.inf)
     soon = np.flatnonzero(left <= LANDING * cycle)
     at = int(soon[0]) if len(soon) else int(np.argmin(left))
     if not left[at] <= LATEST * cycle:

@@ -24,6 +24,8 @@ SMOOTH_TURN, SMOOTH_SAG = 1.0, 40.0
 """largest change of direction of neighbouring blocks on one curve, rad, and the sag of its chord in tolerances"""
 EVEN, SLIGHT = 1.5, 0.02
 """on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad"""
+BY_CHORD = 0.5
+"""power of the chord by which splines are parametrised: centripetal (E. T. Y. Lee, Computer-Aided Design 21, 1989)"""
 PIECE_TURN, MOST_PIECES = 0.02, 24
 """rad that a fitted curve turns from piece to piece, and pieces of a block at most"""
 WIDTHS = 0.01 * 1.3 ** np.arange(30)
@@ -35,7 +37,9 @@ SLOPE = 0.5
 PLACES = np.array([-0.5, -0.3, -0.14, 0.0, 0.14, 0.3, 0.5])
 """of a width where derivatives are taken"""
 BEFORE, APART = 1e-7, 1e-6
-"""mm before a rest where the direction is still that of the path that leads there; least distance of places and points"""
+"""mm before a rest where the direction is still that of the path that leads there; least distance of places"""
+SHORTEST = 1e-5
+"""mm: shorter blocks are no motion; the nearest place to a rest at which bends are seen"""
 SMOOTH_BUMP = (140.0, -420.0, 420.0, -140.0)
 """140 x^3 (1 - x)^3, whose integral is 1 and whose derivatives up to the second vanish at 0 and 1"""
 TAKES_BACK = 0.3
@@ -140,7 +144,7 @@ class BlendedPath:
 
 def blended(path: CommandedPath) -> BlendedPath:
     """The path that the control runs."""
-    moves = np.linalg.norm(np.diff(path.points, axis=0) * path.weight, axis=1) > APART
+    moves = np.linalg.norm(np.diff(path.points, axis=0) * path.weight, axis=1) > SHORTEST
     group = np.concatenate([[0], np.cumsum(moves)])
     if not moves.any():
         flat = np.zeros((1, path.points.shape[1]))
@@ -181,13 +185,14 @@ def fitted(path: CommandedPath) -> tuple[Floats, Floats, Floats, Ints]:
     chord = np.maximum(np.linalg.norm(step, axis=1), 1e-12)
     u = step / chord[:, None]
     smooth, turn = _curved(u, chord, path)
-    first, last = _tangents(u, chord, smooth)
+    along = chord**BY_CHORD
+    first, last = _tangents(step / along[:, None], along, smooth)
     bend = np.maximum(np.concatenate([[0.0], np.where(smooth, turn, 0.0)]), np.append(np.where(smooth, turn, 0.0), 0.0))
     count = np.clip(np.ceil(bend / PIECE_TURN), 1, MOST_PIECES).astype(np.int64)
     owner = np.repeat(np.arange(len(u)), count)
     part = (np.arange(len(owner)) - (np.cumsum(count) - count)[owner] + 1.0) / count[owner]
     x = part[:, None]
-    h = chord[owner, None]
+    h = along[owner, None]
     inner = (flat[owner] * (1 + 2 * x) * (1 - x) ** 2 + flat[owner + 1] * x**2 * (3 - 2 * x)
              + h * first[owner] * x * (1 - x) ** 2 + h * last[owner] * x**2 * (x - 1))
     inner[part >= 1.0 - 1e-12] = flat[1:]
@@ -219,8 +224,11 @@ def _curved(u: Floats, chord: Floats, path: CommandedPath) -> tuple[Bools, Float
 
 
 def _tangents(u: Floats, chord: Floats, smooth: Bools) -> tuple[Floats, Floats]:
-    """(N, A) derivatives at begin and end of each block: of cubic splines by chord length through smooth points, without
-    curvature where they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV)."""
+    """(N, A) derivatives at begin and end of each block: of cubic splines through smooth points, without curvature where
+    they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV).
+
+    `chord` (N,) are the lengths of their parameter.
+    """
     from scipy.linalg import solve_banded
 
     n = len(u)

@@ -26,6 +26,8 @@ NEAR = 0.3
 """of the jerks left, by which the motion may differ from the braking curve when it comes upon it"""
 SHORTLY = 16.0
 """cycles: a rest this much before the end is followed by a move of its own to the end"""
+SOON = 2.5
+"""cycles along the braking curve from which the end is reached at once: constant jerk takes 1.8"""
 SLACK = 1.02
 """times the jerk left with which the motion may come upon the braking curve"""
 
@@ -138,6 +140,19 @@ def largest(s: Floats, v: Floats, k: int, x: float, speed: float, gain: float, c
 
 
 @loop
+def soon(s: Floats, v: Floats, k: int, x: float, cycle: float) -> bool:
+    """Whether the end is reached along the braking curve within SOON cycles from x in interval k."""
+    last = len(s) - 1
+    share = (s[k + 1] - x) / (s[k + 1] - s[k])
+    time = share * 2.0 * (s[k + 1] - s[k]) / max(v[k] + v[k + 1], TOUCH_SPEED)
+    for i in range(k + 1, last):
+        if time > SOON * cycle:
+            return False
+        time += 2.0 * (s[i + 1] - s[i]) / max(v[i] + v[i + 1], TOUCH_SPEED)
+    return bool(time <= SOON * cycle)
+
+
+@loop
 def run(s: Floats, v: Floats, a: Floats, cycle: float, d1: Floats, d2: Floats, d3: Floats, acceleration: Floats,
         jerk: Floats, straight: Floats, state: Floats, out: Floats) -> int:
     """Fill out (M, 3) with place, speed, acceleration each cycle and return how many there are; `state` (3,) is where it
@@ -151,7 +166,7 @@ def run(s: Floats, v: Floats, a: Floats, cycle: float, d1: Floats, d2: Floats, d
         out[count, 0], out[count, 1], out[count, 2] = x, speed, gain
         count += 1
         k, _ = braked(s, v, k, x)
-        if x >= s[-1] - straight[k, 1] * cycle * cycle * cycle:
+        if x >= s[-1] - straight[k, 1] * cycle * cycle * cycle and soon(s, v, k, x, cycle):
             state[0], state[1], state[2] = s[-1], 0.0, 0.0
             break
         _, _, j_low, j_high = left(k, speed, gain, d1, d2, d3, acceleration, jerk, straight)

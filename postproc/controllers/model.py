@@ -136,6 +136,8 @@ class InterpolationRules(UserModel):
     """mm that it takes instead of a share, where its tolerance is a parameter of the control"""
     blends_unstated: bool = False
     """where a program states no path mode, corners are blended without a limit"""
+    exact_path_rests: bool = False
+    """under G61 the axes rest at the end of each block; else only where the path turns"""
     smoothing_in_modes: bool = True
     """it may be changed while the tip's or a plane's mode is on"""
     axis_smoothing_share: float = Field(default=0.0, ge=0.0, le=0.8)

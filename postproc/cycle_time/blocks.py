@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from machines.machine import Machine
+from postproc.cycle_time.tip_path import TipPath
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, shared
 from toolpaths.shapes import arrays, rows_of
 
@@ -121,6 +122,7 @@ class MotionBlocks:
         pieces (E,): of how many rows its block of the program consists; None: all of one
         row (E,): row of the executed motion that the block is, or is a piece of; None where none is known
         tool (E,): number of the tool in the spindle, -1 where the program states none
+        tip: of the motion that `row` counts in; None where none is known
     """
 
     axes: Axes
@@ -145,6 +147,7 @@ class MotionBlocks:
     pieces: Ints | None = None
     row: Ints | None = None
     tool: Ints | None = None
+    tip: TipPath | None = None
 
     def __post_init__(self) -> None:
         for name in _SHARED:

@@ -75,7 +75,9 @@ def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
     blocks = as_used(blocks, model)
     if model.spindle_time > 0.0:
         p = blocks.pauses
-        runs_up = np.where(p.cause == Cause.SPINDLE, model.spindle_time, 0.0)
+        starts = p.cause == Cause.SPINDLE
+        factor = np.where(np.cumsum(starts) == 1, model.spindle_first, 1.0)
+        runs_up = np.where(starts, factor * model.spindle_time, 0.0)
         blocks = replace(blocks, pauses=replace(p, seconds=p.seconds + runs_up))
     if model.kind == "linuxcnc":
         return linuxcnc(blocks, Settings(cycle=model.servo_cycle, override=model.override, rapid=model.rapid))

@@ -41,7 +41,7 @@ _TOGETHER = 100_000
 """corners that are looked at together"""
 ON_CYCLE = 1e-6
 """of a servo cycle: nearer to its begin a moment falls on it"""
-COMMAND = {Cause.DWELL: 0.004, Cause.TOOL_CHANGE: 0.038, Cause.SPINDLE: 0.005, Cause.OTHER: 0.007, Cause.INDEXING: 0.0}
+COMMAND = {Cause.DWELL: 0.004, Cause.TOOL_CHANGE: 0.043, Cause.SPINDLE: 0.005, Cause.OTHER: 0.007, Cause.INDEXING: 0.0}
 """s that a command takes next to its own time, measured: the task's cycle is 1 ms, that of tool changes (io) 10 ms"""
 SETTLED = 0.003
 """s from the planner's end to the joints' (cubic interpolation of motion's control.c, measured)"""

@@ -86,6 +86,8 @@ class CycleTimeModel(UserModel):
     """s in position before motion goes on after a stop"""
     spindle_time: float = Field(default=0.0, ge=0.0, le=60.0)
     """s at rest at each M3 or M4: what the spindle takes to come up to speed where the control waits for it"""
+    spindle_first: float = Field(default=1.0, ge=0.0, le=100.0)
+    """times spindle_time that the program's first start takes; a fit of spindle_time scales both"""
     cycle: float = Field(default=0.002, ge=0.0001, le=0.1)
     """s of interpolation, of kind control"""
     bend_acceleration: float = Field(default=0.75, gt=0.0, le=0.95)

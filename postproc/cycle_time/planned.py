@@ -45,7 +45,7 @@ def motion_of(result: PostResult, override: float = 1.0) -> PlannedMotion | None
         return result.motion
     source = source_of(job, result.moves or job.moves, result.nominal or path,
                        planned_correction(job, result.compensation, path), override)
-    return PlannedMotion(source, strict=bool(np.isfinite(source.bounds.jerk).all()) and not source.tools)
+    return PlannedMotion(source, strict=bool(np.isfinite(source.bounds.jerk).all()))
 
 
 def _unsolved(motion: PlannedMotion, moves: Moves, file: str) -> list[Diagnostic]:

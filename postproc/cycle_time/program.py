@@ -50,13 +50,15 @@ class BlockOrigin:
 
 
 def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Control, origin: BlockOrigin | None = None,
-              blends_unstated: bool = False, by_radius: bool = False, override: float = 1.0) -> MotionBlocks:
+              blends_unstated: bool = False, exact_path_rests: bool = False, by_radius: bool = False,
+              override: float = 1.0) -> MotionBlocks:
     """The blocks that move, with their pauses.
 
     Args:
         code: what the reader makes of the text; motion: what executing it gave
         origin: operations and CL lines; by tool where it is left out
         blends_unstated: a program without a path mode blends without a limit, else as the control's smoothing says
+        exact_path_rests: under G61 the axes rest at the end of each block
         by_radius: inverse time of arcs counts radians
         override: the operator's feed override, 1 for 100 %: of feeds alone, not of rapids and taps
     """
@@ -67,7 +69,7 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     start, end = points[:-1], points[1:]
     arc = motion.code == 2
     normal, sweep, center = _arcs(motion, control, arc, start)
-    path, tolerance, chain = _path_modes(words, blends_unstated)
+    path, tolerance, chain = _path_modes(words, blends_unstated, CornerMode.STOP if exact_path_rests else CornerMode.EXACT)
     pieces, inside = _of_curves(code, motion)
     path = np.where(motion.hole, CornerMode.EXACT, np.where(inside, CornerMode.BLEND, path[block]))
     pauses = _pauses(words, block, code.line, motion, machine)
@@ -169,16 +171,16 @@ def _pieces(blocks: MotionBlocks, motion: Motion, control: Control, unit: Floats
     return count
 
 
-def _path_modes(words: Words, blends_unstated: bool) -> tuple[Array, Floats, Floats]:
+def _path_modes(words: Words, blends_unstated: bool, under_61: CornerMode) -> tuple[Array, Floats, Floats]:
     """(B + 1,) Path, tolerance and chain in force at each block: G61, G61.1, G64 P Q (LinuxCNC G-code
-    reference), else what the reader says of the control's smoothing."""
+    reference; G61 as `under_61`), else what the reader says of the control's smoothing."""
     at, codes = words.pick("G")
     keep = np.isin(codes, (61.0, 61.1, 64.0))
     at, codes = at[keep], codes[keep]
     scale = np.where(modal_state(words).inch, MM_PER_INCH, 1.0)[at]
     p, q = (columns(words, letter)[at, 0] * scale for letter in "PQ")
     blend = codes == 64.0
-    path = np.where(blend, CornerMode.BLEND, np.where(codes == 61.0, CornerMode.EXACT, CornerMode.STOP))
+    path = np.where(blend, CornerMode.BLEND, np.where(codes == 61.0, under_61, CornerMode.STOP))
     tolerance = np.where(p > 0.0, p, np.inf)
     chain = np.where(blend, np.where(np.isfinite(q), q, np.where(np.isfinite(p), p, 0.0)), 0.0)
     smooth = fill_values(*words.pick(SMOOTH), words.lines)

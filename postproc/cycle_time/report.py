@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from postproc.cycle_time.estimate import Estimate, Uncertain
-from postproc.cycle_time.shares import TimeShares, losses, most_expensive, operations, shares
+from postproc.cycle_time.shares import TimeShares, exact_stops, losses, most_expensive, operations, shares
 from toolpaths.table_text import table_text
 
 COVERS = ("95 % of runs on a machine as the files describe it: the model's own deviation, and parameters of the control and "
@@ -18,6 +18,7 @@ def as_dict(e: Estimate, first: Uncertain | None = None) -> dict[str, Any]:
     """The keys of `time --json`; s. `first` is the assumed value that widens the band most."""
     s = shares(e)
     cause = {f"{name}_s": float(values.sum()) for name, values in s.by_cause.items()}
+    rests, lost = exact_stops(e)
     return {
         "cycle_time_s": e.seconds,
         "lower_bound_s": e.lower_bound,
@@ -33,6 +34,7 @@ def as_dict(e: Estimate, first: Uncertain | None = None) -> dict[str, Any]:
         "rapids_s": cause["rapids_s"],
         "causes": cause,
         "feed_s": s.feed,
+        "exact_stops": {"blocks": rests, "lost_s": lost},
         "limiting": {letter: {"velocity_s": v, "acceleration_s": a, "jerk_s": j}
                      for letter, (v, a, j) in s.limiting.items()},
         "operations": [{**op, "cutting_s": _cutting(op)} for op in operations(e, s)],
@@ -66,6 +68,9 @@ def as_text(e: Estimate, name: str, override: float = 1.0, first: Uncertain | No
                      f"deviation of it is {first.seconds:.2f} s")
     lines.append("time by activity: " + ", ".join(f"{key.removesuffix('_s').replace('_', ' ')} {value:.2f} s"
                                          for key, value in d["causes"].items() if value >= 0.005))
+    rests = d["exact_stops"]
+    if rests["blocks"]:
+        lines.append(f"exact stops (G60, G9, G61): at {rests['blocks']} blocks, {rests['lost_s']:.2f} s")
     lines += _limits(s, d["feed_s"])
     lines += tables
     lost = [row for row in losses(e, s) if float(str(row["lost_s"])) >= 0.005]

@@ -95,3 +95,14 @@ def axis_limit(share: Floats, limit: Floats) -> Floats:
     """(E,) largest rate along the length that keeps every axis within its limit (A,); inf where nothing moves."""
     with np.errstate(divide="ignore"):
         return np.asarray((limit / share).min(axis=1))
+
+
+def tip_travel(blocks: MotionBlocks) -> Floats:
+    """(E,) mm that the tip travels against the part: arcs by their length, pieces of one row alike; where the tip is not
+    known the length of the words in X, Y, Z."""
+    own = shape(blocks).length
+    if blocks.tip is None or blocks.row is None or not len(blocks):
+        linear = np.linalg.norm(np.diff(blocks.xyz, axis=0), axis=1) > 0.0
+        return np.where(linear | blocks.arc, own, 0.0)
+    rows, which, count = np.unique(np.asarray(blocks.row), return_inverse=True, return_counts=True)
+    return np.where(blocks.arc, own, (blocks.tip.travel(rows) / count)[which])

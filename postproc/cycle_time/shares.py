@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.cycle_time.blocks import Cause, MotionBlocks
+from postproc.cycle_time.blocks import Cause, CornerMode, MotionBlocks
 from postproc.cycle_time.estimate import Estimate
 from postproc.cycle_time.phases import BlockTimes, summed
 from postproc.cycle_time.shape import shape
@@ -84,6 +84,17 @@ def operations(e: Estimate, s: TimeShares) -> list[dict[str, object]]:
     return [{"operation": name, "time_s": float(sum(values[k] for values in sums.values())),
              **{f"{cause}_s": float(values[k]) for cause, values in sums.items()}}
             for k, name in enumerate(e.blocks.operations)]
+
+
+def exact_stops(e: Estimate) -> tuple[int, float]:
+    """(blocks at whose end the program asks for an exact stop and nothing else makes the axes rest, s that the rests cost).
+
+    G60, G9, G09, G61.1; G61 where the control rests under it.
+    """
+    blocks = e.blocks
+    other = blocks.forced | np.append(blocks.rapid[1:] != blocks.rapid[:-1], True)[:len(blocks)]
+    at = (blocks.path == CornerMode.STOP) & ~blocks.rapid & ~other
+    return int(at.sum()), float(e.timed.lost_stop[at].sum())
 
 
 _PLACES = 10

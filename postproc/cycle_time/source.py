@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from postproc.control.rollover import rollovers
 from postproc.controllers.model import ControllerFile
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.program import BlockOrigin, blocks_of
+from postproc.cycle_time.tip_path import TipPath
 from postproc.job.job import with_shop
 from postproc.job.turned_places import turned
 from postproc.pipeline.result import PostResult
@@ -49,7 +50,8 @@ def from_conversion(result: PostResult, override: float = 1.0) -> MotionBlocks:
     kept = np.flatnonzero(found.moves.phase != Phase.PECK)
     origin = BlockOrigin(path.operation[moves.row[owner]].astype(np.int64), names,
                          np.where(inside, moves.line[owner], -1).astype(np.int64), np.where(inside, kept[owner], -1))
-    return _blocks(code, motion, result.machine, job.control, result.controller, origin, override)
+    tip = TipPath(motion, found.poses, tuple(result.machine.rotary))
+    return replace(_blocks(code, motion, result.machine, job.control, result.controller, origin, override), tip=tip)
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,7 @@ def program_blocks(program: ExecutedProgram, file: str = "", override: float = 1
     blocks = None
     if len(motion):
         blocks = _blocks(program.code, motion, program.machine, program.control, program.controller, None, override)
+        blocks = replace(blocks, tip=TipPath(motion, program.poses(), tuple(program.machine.rotary)))
     if blocks is None or not len(blocks):
         return None, [error("gcode.no_motion", "the program moves nothing", file=file,
                             hint="name a program that has moves: G0, G1 with axis words")]
@@ -186,8 +189,10 @@ def _executed(data: bytes, controller: ControllerFile, controls: dict[str, Contr
 
 def _blocks(code: Canonical, motion: Motion, machine: Machine, control: Control, controller: ControllerFile,
             origin: BlockOrigin | None, override: float) -> MotionBlocks:
-    return blocks_of(code, motion, machine, control, origin, blends_unstated=controller.kinematics.blends_unstated,
-                     by_radius=controller.feed.arc_inverse == "radius", override=override)
+    kinematics = controller.kinematics
+    return blocks_of(code, motion, machine, control, origin, blends_unstated=kinematics.blends_unstated,
+                     exact_path_rests=kinematics.exact_path_rests, by_radius=controller.feed.arc_inverse == "radius",
+                     override=override)
 
 
 def read_file(file: str | Path, hint: str = "a CL file, or a program of the controller") -> bytes:

@@ -8,21 +8,27 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from postproc.feedrate.limits import JointLimits
+from postproc.feedrate.limits import JointLimits, steady_cap
 from postproc.feedrate.paths import Eased
-from postproc.feedrate.rows import rows
+from postproc.feedrate.rows import LimitRows, rows
 from postproc.feedrate.spline import Basis, rest_basis
 from toolpaths.arrays import Floats, Ints
 from toolpaths.shapes import arrays
 
+SHORT = 0.01
+"""s: accelerations that full jerk reaches in less may overshoot between knots, which see them at their ends alone"""
+CHANGE = 0.12
+"""of an acceleration limit, by which such accelerations change within an interval at the largest speed"""
+
 
 @dataclass(frozen=True)
-@arrays(dq="J K", d2q="J K", d3q="J K", cap="K", capped="K", weight="K", tight="2 K")
+@arrays(dq="J K", d2q="J K", d3q="J K", cap="K", capped="K", weight="K", tight="2 K", shortest="K")
 class SpeedProblem:
     """Minimise sum w x^-1/2 over coefficients of x, K knots, J joints.
 
     rows `dq`, `d2q`, `d3q` (J, K) by sigma; `cap` (K,) bound on x and the row it comes from, `capped` (K,);
-    `weight` (K,); `tight` (2, K) factors >= 1 on the acceleration and jerk rows. Per knot and joint
+    `weight` (K,); `tight` (2, K) factors >= 1 on the acceleration and jerk rows; `shortest` (K,) the row whose
+    acceleration the last row holds smooth (see `_smooth`), -1 without such a row. Per knot and joint
         velocity      1 - x/cap >= 0
         acceleration  1 -+ (q'' x + q' x'/2)/A >= 0
         jerk          x^-1/2 -+ (q''' x + 3/2 q'' x' + 1/2 q' x'')/J >= 0
@@ -37,6 +43,7 @@ class SpeedProblem:
     capped: Ints
     weight: Floats
     tight: Floats
+    shortest: Ints
 
     @property
     def rows(self) -> int:
@@ -102,7 +109,50 @@ class MotionKnots:
         tight = np.ones((3, len(sigma))) if self.tight is None else self.tight[:, first:last].astype(np.float64)
         h = np.diff(sigma)
         weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
+        at, shortest = _smooth(at, self.sigma[first:last], self._widest(first, last))
         dq, d2q, d3q = (np.ascontiguousarray(order.T) for order in at[:3])
         basis = rest_basis(self.sigma, self.eased.ease, first, last)
         return SpeedProblem(basis, dq, d2q, d3q, at.limits, at.cap / tight[0] ** 2, at.capped,
-                            weight, tight[1:])
+                            weight, tight[1:], shortest)
+
+    def _widest(self, first: int, last: int) -> Floats:
+        """The longer of the intervals before and behind each knot of [first, last)."""
+        low = max(first - 1, 0)
+        h = np.diff(self.sigma[low:last + 1])
+        both = np.maximum(np.insert(h, 0, 0.0), np.append(h, 0.0))
+        return np.asarray(both[first - low:first - low + last - first])
+
+
+def _smooth(at: LimitRows, sigma: Floats, widest: Floats) -> tuple[LimitRows, Ints]:
+    """The rows and one more, where an acceleration limit is reached in less than SHORT; the row (K,) it stands for, or -1.
+
+    Rows see the acceleration at knots. Where jerk allows the whole of it within an interval h, x'' alternates from
+    knot to knot at next to no cost in time, and the acceleration between knots is many times its limit: it overshoots
+    by h |q' x''|/8. The row |q' x''| h/2 <= CHANGE A sqrt(y/x), y the largest x there, leaves a quarter of CHANGE;
+    finer knots widen it, so that the time goes to that of the limits alone.
+    """
+    count = at.dq.shape[1]
+    limits = at.limits
+    short = np.flatnonzero(np.isfinite(limits.acceleration) & (limits.acceleration < SHORT * limits.jerk))
+    if not len(short):
+        return at, np.full(len(sigma), -1)
+    steep = np.abs(at.dq[:, short]) / limits.acceleration[short]
+    row = steep.max(axis=1) * widest / (CHANGE * np.sqrt(_reached(at, sigma)))
+    zero = np.zeros((len(sigma), 1))
+    wide = JointLimits(np.append(limits.velocity, np.inf), np.append(limits.acceleration, np.inf),
+                       np.append(limits.jerk, 1.0), limits.tool)
+    capped = np.where(at.capped == count, count + 1, at.capped)
+    return LimitRows(np.column_stack((at.dq, row)), np.column_stack((at.d2q, zero)), np.column_stack((at.d3q, zero)),
+                     wide, at.cap, capped), short[steep.argmax(axis=1)]
+
+
+def _reached(at: LimitRows, sigma: Floats) -> Floats:
+    """About the largest x (K,) that the accelerations let the motion reach under the caps: |q''| x <= A, x' by what is left
+    or added, |x'| <= 2 (A + |q''| x)/|q'|."""
+    top = np.minimum(at.cap, steady_cap(at.d2q, at.d3q, at.limits))
+    with np.errstate(divide="ignore"):
+        slope = (2.0 * (at.limits.acceleration + np.abs(at.d2q) * top[:, None]) / np.abs(at.dq)).min(axis=1)
+    rise = np.diff(sigma) * np.minimum(np.maximum(slope[1:], slope[:-1]), top.max() / np.diff(sigma))
+    gained = np.insert(np.cumsum(rise), 0, 0.0)
+    forth = gained + np.minimum.accumulate(top - gained)
+    return np.asarray(np.minimum(forth, np.minimum.accumulate((top + gained)[::-1])[::-1] - gained))

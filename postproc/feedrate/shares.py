@@ -51,7 +51,10 @@ class LimitShares:
 
 
 def weigh(problem: SpeedProblem, c: Floats, z: Multipliers, first: int, last: int) -> Floats:
-    """Seconds (3, R + 1) of each row of knots [first, last); the last column is the feed's."""
+    """Seconds (3, R + 1) of each row of knots [first, last); the last column is the feed's.
+
+    The row that holds an acceleration smooth counts as that acceleration.
+    """
     x = problem.basis.values(c)[:, first:last]
     here = slice(first, last)
     count = len(problem.dq) + 1
@@ -61,7 +64,12 @@ def weigh(problem: SpeedProblem, c: Floats, z: Multipliers, first: int, last: in
     for order, rows, multipliers in ((1, problem.acceleration_rows(), z.acceleration),
                                      (2, problem.jerk_rows(), z.jerk)):
         used = np.einsum("ijk,ik->jk", rows[:, :, here], x[:len(rows)])
-        found[order, :-1] = (order + 1) * np.einsum("jk,jk->j", multipliers[:, here], used)
+        cost = (order + 1) * multipliers[:, here] * used
+        found[order, :-1] = cost.sum(axis=1)
+    smooth = problem.shortest[here]
+    if (smooth >= 0).any():
+        found[1] += np.bincount(smooth, cost[-1], minlength=count)
+        found[2, -2] = 0.0
     return found
 
 

@@ -7,14 +7,10 @@ from typing import Any
 import numpy as np
 
 from postproc.cycle_time.estimate import Estimate
-from postproc.cycle_time.shape import shape
 from postproc.cycle_time.shares import shares
 from postproc.pipeline.result import PostResult
-from postproc.readback.comparison.compare import Comparison
 from postproc.report.summary import tools_of
 from postproc.time_study.tables import by_tool
-from toolpaths.arrays import Floats
-from toolpaths.rotations import lengths
 
 
 def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
@@ -25,9 +21,7 @@ def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
         return []
     motion, row = c.executed[1], np.asarray(b.row)
     number = motion.tool[row]
-    seconds = {line["tool"]: line["time_s"] for line in by_tool(e, shares(e))}
-    travel = _travel(c, e)
-    cuts = motion.code > 0
+    timed = {line["tool"]: line for line in by_tool(e, shares(e))}
     back, unit, found = job.placement.inverse(), job.control.unit, list[dict[str, Any]]()
     for tool in tools_of(result):
         blocks = np.flatnonzero(number == tool["number"])
@@ -38,19 +32,9 @@ def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
         first = row[blocks[:1]]
         q = c.poses.joints(motion, first, 1.0)[0] * unit
         registers = np.unique(motion.register[row[blocks]])
-        here = (motion.tool == tool["number"]) & cuts
         found.append(tool | {
             "length_register": next((int(r) for r in registers.tolist() if r >= 0), None),
-            "time_s": seconds[tool["number"]], "cutting_mm": float(travel[here].sum()),
+            "time_s": timed[tool["number"]]["time_s"], "cutting_mm": timed[tool["number"]]["cut_mm"],
             "first_axes": dict(zip(result.machine.axis_names, q.tolist(), strict=True)),
             "first_part_mm": back.points(c.tip[first])[0].tolist()})
     return found
-
-
-def _travel(c: Comparison, e: Estimate) -> Floats:
-    """(M,) mm that the tip travels in each row of the executed motion: straight, of arcs the length of the arc."""
-    travel: Floats = lengths(np.diff(c.tip, axis=0, prepend=c.tip[:1]))
-    row, arc = np.asarray(e.blocks.row)[e.blocks.arc], shape(e.blocks).length[e.blocks.arc]
-    travel[row] = 0.0
-    np.add.at(travel, row, arc)
-    return travel

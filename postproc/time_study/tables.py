@@ -13,7 +13,7 @@ from postproc.cycle_time.blocks import Cause
 from postproc.cycle_time.estimate import Estimate
 from postproc.cycle_time.phases import summed
 from postproc.cycle_time.report import clock
-from postproc.cycle_time.shape import shape
+from postproc.cycle_time.shape import shape, tip_travel
 from postproc.cycle_time.shares import CAUSES, TimeShares, losses, operations
 from toolpaths.arrays import Floats
 from toolpaths.table_text import table_text
@@ -40,12 +40,15 @@ def tables(e: Estimate, s: TimeShares) -> TimeTables:
 def by_tool(e: Estimate, s: TimeShares) -> list[TableRow]:
     """Minutes in cut, distances and changes of each tool, in the order of first use; -1 where the program states none.
 
+    Cuts by the tip's path on the part, rapids by that of the axes.
+
     A tool change counts with the tool that it loads."""
     blocks = e.blocks
     tool = blocks.tool if blocks.tool is not None else np.full(len(blocks), -1)
     number, first, index = np.unique(tool, return_index=True, return_inverse=True)
     linear = np.linalg.norm(np.diff(blocks.xyz, axis=0), axis=1) > 0.0
     length = np.where(linear | blocks.arc, shape(blocks).length, 0.0)
+    cut = tip_travel(blocks)
     cutting = ~blocks.rapid
     p, change = blocks.pauses, blocks.pauses.cause == Cause.TOOL_CHANGE
     after = index[np.minimum(p.block[change] + 1, len(blocks) - 1)]
@@ -60,7 +63,7 @@ def by_tool(e: Estimate, s: TimeShares) -> list[TableRow]:
         "time_s": sums(every) + changing,
         "in_cut_s": sums(np.where(cutting, e.timed.seconds, 0.0)),
         "rapids_s": sums(s.by_cause["rapids"]),
-        "cut_mm": sums(np.where(cutting, length, 0.0)),
+        "cut_mm": sums(np.where(cutting, cut, 0.0)),
         "rapid_mm": sums(np.where(cutting, 0.0, length)),
     }
     return [

@@ -71,6 +71,44 @@ def _convex(problem: SpeedProblem, c: Floats) -> tuple[Floats | None, float]:
     return c, float(np.sum(problem.weight * basis.values(c)[0] ** -0.5))
 
 
+def relaxed_time(problem: SpeedProblem, scale: Floats) -> float:
+    """A certified lower bound of the time on these knots, from the dual of one convex relaxation.
+
+    min sum w t with t >= x^-1/2 free to be larger, and |row of jerk| <= J t in the place of J x^-1/2: each motion within the
+    limits is one of its points, and none of its points costs less than the dual value. `scale` (K + 2,) > 0 are
+    coefficients of about the size of the optimum.
+    """
+    basis, knots = problem.basis, problem.basis.knots
+    order = [_operator(basis.stencil[i]) @ sparse.diags(scale) @ _tie(knots + 2, basis.tied) for i in range(3)]
+    x = basis.values(scale)[0]
+    n, a, j = order[0].shape[1], problem.acceleration_rows(), problem.jerk_rows()
+    none = sparse.csc_matrix((knots, knots))
+    linear = [sparse.hstack((sparse.diags(1.0 / problem.cap) @ order[0], none)),
+              sparse.hstack((-sparse.eye(n), sparse.csc_matrix((n, knots))))]
+    right = [np.ones(knots), np.zeros(n)]
+    for i in range(len(problem.dq)):
+        use = sum(sparse.diags(a[k, i]) @ order[k] for k in range(2))
+        linear += [sparse.hstack((sign * use, none)) for sign in (1.0, -1.0)]
+        use = sparse.diags(x**0.5) @ sum(sparse.diags(j[k, i]) @ order[k] for k in range(3))
+        linear += [sparse.hstack((sign * use, -sparse.eye(knots))) for sign in (1.0, -1.0)]
+        right += [np.ones(knots)] * 2 + [np.zeros(knots)] * 2
+    cone = sparse.lil_matrix((3 * knots, n + knots))
+    cone[0::3, :n] = -(sparse.diags(1.0 / x) @ order[0])
+    cone[1::3, n:] = -sparse.eye(knots)
+    fixed = np.zeros(3 * knots)
+    fixed[2::3] = 1.0
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    goal = np.concatenate((np.zeros(n), problem.weight * x**-0.5))
+    matrix = sparse.vstack((*linear, cone)).tocsc()
+    found = clarabel.DefaultSolver(sparse.csc_matrix((n + knots,) * 2), goal / goal.sum(), matrix,
+                                   np.concatenate((*right, fixed)), [clarabel.NonnegativeConeT(matrix.shape[0] - 3 * knots)]
+                                   + [clarabel.PowerConeT(1.0 / 3.0)] * knots, settings).solve()
+    if found.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
+        raise ArithmeticError(f"no bound: {found.status}")
+    return float(found.obj_val_dual * goal.sum())
+
+
 def _operator(stencil: Floats) -> sparse.csc_matrix:
     """(K, K + 2) matrix of one order of the stencil (3, K)."""
     knots = stencil.shape[1]

@@ -92,7 +92,7 @@ class _Grid:
         basis = rest_basis(self.sigma, self.eased.ease)
         first, second, third = (np.ascontiguousarray(order.T) for order in (dq, d2q, d3q))
         problem = SpeedProblem(basis, first, second, third, limits, cap, np.zeros(len(cap), dtype=np.int64), self.weight,
-                               np.ones((2, len(cap))))
+                               np.ones((2, len(cap))), np.full(len(cap), -1))
         found = solve_problem(problem, self.method.steps, self.near)
         self.near = found.c
         return float(np.sum(self.weight * basis.values(found.c)[0] ** -0.5))

@@ -48,7 +48,7 @@ class FanucReader(IsoReader):
 
     groups: Groups = GROUPS | {
         "offset": (54, 55, 56, 57, 58, 59, 54.1), "length": (43, 43.4, 49), "path": (5.1, 61, 64), "tilt": (68.2, 69),
-        "once": (4, 28, 53, 53.1), "arc_distance": ()}
+        "once": (4, 9, 28, 53, 53.1), "arc_distance": ()}
     m_codes = (*M_CODES, 29.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLO"
     language: MacroLanguage | Literal[""] = "fanuc"

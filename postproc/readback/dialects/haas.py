@@ -29,7 +29,7 @@ class HaasReader(FanucReader):
 
     groups: Groups = GROUPS | {
         "offset": (54, 55, 56, 57, 58, 59, 154), "length": (43, 49, 234), "path": (61, 64, 187), "tilt": (254, 255),
-        "once": (4, 28, 53), "arc_distance": ()}
+        "once": (4, 9, 28, 53), "arc_distance": ()}
     m_codes = (*M_CODES, 97.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLOE"
     language: MacroLanguage | Literal[""] = "haas"

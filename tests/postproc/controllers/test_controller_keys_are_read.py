@@ -20,7 +20,8 @@ TEXTS = {"description", "sources"}
 """for people"""
 ONE_VALUE = {"kinematics.linear"}
 """statements of the file that have one allowed value so far"""
-OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "feed.kept_by_units", "feed.length", "feed.limited_jerk",
+OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "kinematics.exact_path_rests",
+          "feed.kept_by_units", "feed.length", "feed.limited_jerk",
           "feed.arc_inverse", "units.others", "alignment.turns", "alignment.corrects", "alignment.entry",
           "inch.degree", "levels", "smoothing_words", "kinematics.smoothing_in_modes",
           "modes.tcp", "modes.tilted", "arcs.helix_planes",

@@ -16,6 +16,7 @@ from postproc.cycle_time.linuxcnc_kernels import chain_ends, speeds, timeline
 from postproc.cycle_time.linuxcnc_segments import merge
 from postproc.cycle_time.lookahead import rest_to_rest
 from postproc.cycle_time.model import CycleTimeModel
+from postproc.cycle_time.report import as_dict, as_text
 from postproc.cycle_time.shape import shape
 from postproc.cycle_time.shares import most_expensive, operations, shares
 from tests.linuxcnc import time_programs
@@ -225,6 +226,32 @@ def test_the_spindle_runs_up_at_each_start(kind: str) -> None:
     assert total(b, timed(b, slow)) == pytest.approx(total(b, timed(b, quick)) + 4.0, rel=1e-9)
     s = shares(estimate(b, machine(), slow, with_band=False))
     assert s.by_cause["spindle"].sum() == pytest.approx(4.0, abs=0.02)
+
+
+def test_the_first_start_of_a_sinumerik_takes_longer_and_a_fitted_time_scales_both() -> None:
+    """117 and 67 ms in logs; the axes wait for no speed."""
+    b = blocks("G17 G90 G71 G94 G64\nF600\nS500 M3\nG1 X10\nM5\nG1 X20\nS9000 M3\nG1 X30", controller="siemens-840d")
+    m = model("siemens").quick()
+    free = total(b, timed(b, m.model_copy(update={"spindle_time": 0.0})))
+    assert total(b, timed(b, m)) - free == pytest.approx(0.117 + 0.067, abs=1e-3)
+    assert total(b, timed(b, m.model_copy(update={"spindle_time": 0.134}))) - free == pytest.approx(0.368, abs=2e-3)
+
+
+@pytest.mark.parametrize(("controller", "words", "rests"), [
+    ("siemens-840d", ("G60", ""), 3), ("siemens-840d", ("G64", "G9"), 1), ("fanuc-30i", ("G61", ""), 3),
+    ("fanuc-30i", ("G64", "G09"), 1), ("haas-ngc", ("G61", ""), 3), ("haas-ngc", ("G64", "G9"), 1)])
+def test_exact_stops_take_time_and_are_reported(controller: str, words: tuple[str, str], rests: int) -> None:
+    """Along one line, where nothing else slows the axes down."""
+    text = "G17 G90 G21 G94 {}\nG1 X10. F3000.\n{} G1 X20.\nG1 X30.\nG1 X40."
+    by_dialect = text.replace("G21", "G71") if controller == "siemens-840d" else text
+    made, free = (blocks(by_dialect.format(*two), controller=controller) for two in (words, ("G64", "")))
+    m = model({"siemens-840d": "siemens", "fanuc-30i": "fanuc", "haas-ngc": "haas"}.get(controller, "lookahead"))
+    e, plain = (estimate(b, machine(), m, with_band=False) for b in (made, free))
+    assert e.seconds - plain.seconds > 0.02 * rests
+    found = as_dict(e)["exact_stops"]
+    assert found["blocks"] == rests and 0.01 * rests < found["lost_s"] and not as_dict(plain)["exact_stops"]["blocks"]
+    assert f"exact stops (G60, G9, G61): at {rests} blocks" in as_text(e, "a.nc")
+    assert "exact stops" not in as_text(plain, "a.nc")
 
 
 def test_a_corner_is_passed_as_its_parabola_allows() -> None:

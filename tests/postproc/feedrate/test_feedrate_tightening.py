@@ -17,7 +17,8 @@ from postproc.feedrate.spline import rest_basis
 from postproc.feedrate.tightening import BETWEEN, tightened, worst_ratios
 from postproc.feedrate.windows import solve_problem
 from tests.postproc.feedrate.test_feedrate_motion import Circle, Screw
-from tests.postproc.feedrate_kit import MIKRON, random_path, uniform, unlimited
+from tests.postproc.feedrate_kit import MIKRON, PolynomialPath, random_path, uniform, unlimited
+from tests.postproc.feedrate_reference import relaxed_time
 
 
 @pytest.mark.numeric
@@ -71,3 +72,24 @@ def test_limits_at_the_tool_are_tightened_too() -> None:
     found = solve_problem(grid.problem(), NumpySteps)
     factor, better = tightened(grid, spline_profile(grid.sigma, rest_basis(grid.sigma, grid.eased.ease), found.c), 1.02)
     assert factor > 1.05 and better is not None
+
+
+@pytest.mark.parametrize("acceleration", [2.0, 20.0, 200.0, 2000.0])
+def test_accelerations_that_jerk_reaches_within_an_interval_are_kept_between_knots(acceleration: float) -> None:
+    """A line of 200 mm at 20 mm/s: its time is that of a trapezoid, in the fast plan too, and little is exceeded there."""
+    limits = JointLimits(np.array([500.0]), np.array([acceleration]), np.array([1e6]))
+    trapezoid = 200.0 / 20.0 + 20.0 / acceleration
+    for strict in (False, True):
+        made = plan(PolynomialPath([[0.0, 1.0]], 200.0), limits, 20.0, options=PlannerOptions(strict=strict))
+        assert trapezoid < made.seconds < 1.01 * trapezoid
+        assert made.usage().worst < (1.0 + 1e-9 if strict else 1.15)
+    tool, joint = made.shares.limits[:, -1], made.shares.limits[:, 0]
+    assert not tool.any() and joint[2] < 0.5 * joint[1]
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_no_motion_is_faster_than_the_bound_by_duality_and_ours_little_slower(seed: int) -> None:
+    problem = uniform(random_path(seed), 200).problem()
+    c = solve_problem(problem, NumpySteps).c
+    seconds = float(np.sum(problem.weight * problem.basis.values(c)[0] ** -0.5))
+    assert relaxed_time(problem, c) <= seconds <= 1.1 * relaxed_time(problem, c)

@@ -67,6 +67,18 @@ def test_the_table_by_tool_is_the_program() -> None:
     assert float(str(rows[1]["time_s"])) == pytest.approx(2.5 + change, abs=1.0)
 
 
+def test_cuts_count_by_the_tip_on_the_part_whatever_the_words_are() -> None:
+    """On a turning table: once round at 50 mm, then out and round at once, a spiral of 25 to 50 mm; rapids do not count."""
+    at = machine("mikron-ucp710")
+    text = "G21 G90 G94 G17\nG0 Z100\nG0 X50\nF3000\nG1 C360\nG1 X25\nG1 X50 C450\nG0 C0\n"
+    e = estimate(blocks(text, at), at, model("linuxcnc"), with_band=False)
+    row, = by_tool(e, shares(e))
+    phi = np.linspace(0.0, np.pi / 2.0, 2001)
+    spiral = (25.0 + phi * 50.0 / np.pi) * np.exp(1j * phi)
+    expected = 100.0 * np.pi + 25.0 + float(np.abs(np.diff(spiral)).sum())
+    assert row["cut_mm"] == pytest.approx(expected, rel=3e-4)
+
+
 def test_what_if_is_the_machine_with_that_value() -> None:
     m = machine("mill-3axis", timing=True)
     asked = parsed("X.acceleration=1.3, jerk=2,tool_change=0.5,corner_tolerance=3", m)
