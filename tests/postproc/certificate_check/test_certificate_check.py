@@ -28,7 +28,7 @@ from postproc.certificate_check.machine_file import about, hash_of
 from postproc.cli.app import app
 from tests.certificates import on_legs
 
-LARGE = ("hexapod", "hexaslide-cone", "hexaslide-coplanar", "hexaslide-parallel-z")
+LARGE = ("three-arms-three-slides", "hexapod", "hexaslide-cone", "hexaslide-coplanar", "hexaslide-parallel-z")
 Content = dict[str, Any]
 
 
