@@ -17,7 +17,7 @@ from toolpaths.input_files import is_regular, place
 
 StatedOptions = tuple[tuple[str, str], ...]
 """options with their values, "" for one that takes none, in the order of their names"""
-_UNNAMED = re.compile(r"[^A-Za-z0-9._+-]+")
+_UNNAMED = re.compile(r"[^\w.+-]+")
 _LONGEST = 120
 """characters of a name that is made up"""
 
@@ -142,12 +142,21 @@ def _files(number: int, job: JobModel, folder: Path, source: UserFile) -> tuple[
     for pattern in job.files:
         exact = folder / pattern  # a name may hold what is a pattern
         named = [exact] if is_regular(exact) else sorted(
-            Path(one) for one in glob.glob(str(exact), recursive=True) if is_regular(one))  # noqa: PTH207  # absolute
+            Path(one) for one in glob.glob(_pattern(folder, pattern), recursive=True) if is_regular(one))  # noqa: PTH207
         files |= dict.fromkeys(map(place, named))
         if not named:
             missing.append(source.problem("batch.no_file", ("jobs", number, "files"), f"no file {pattern!r} in {folder}",
                                           "name files from the folder of the batch file; * stands for any part of a name"))
     return list(files), missing
+
+
+def _pattern(folder: Path, pattern: str) -> str:
+    """A pattern from a folder; brackets and stars in names of folders that stand there are letters."""
+    text, here = glob.escape(str(folder)), folder
+    for part in Path(pattern).parts:
+        here = here / part
+        text = f"{text}/{glob.escape(part) if here.is_dir() and part != '**' else part}"
+    return glob.escape(str(here)) if Path(pattern).is_absolute() and here.is_dir() else text
 
 
 def _named(names: Iterable[str], folder: Path) -> list[str]:

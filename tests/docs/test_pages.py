@@ -89,3 +89,11 @@ def test_there_is_a_page_for_what_shops_ask() -> None:
     index = (ROOT / "docs" / "index.md").read_text("utf-8")
     assert all(f"tutorials/{p.stem}" in index for p in (ROOT / "docs" / "tutorials").glob("*.md"))
     assert re.search(r"^how-to/\*$", index, re.MULTILINE)
+
+
+def test_every_page_stands_in_a_table_of_contents() -> None:
+    """One that stands in none is not in the navigation, and `make docs` ends with an error."""
+    index, folder = (ROOT / "docs" / "index.md").read_text("utf-8"), ROOT / "docs"
+    named = {found for block in re.findall(r"```\{toctree\}(.*?)```", index, re.S) for line in block.splitlines()
+             if line and not line.startswith(":") for found in folder.glob(f"{line}.md")}
+    assert sorted({*PAGES, folder / "python.md"} - named - {folder / "index.md"}) == []
