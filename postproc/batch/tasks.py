@@ -152,11 +152,12 @@ def _files(number: int, job: JobModel, folder: Path, source: UserFile) -> tuple[
 
 def _pattern(folder: Path, pattern: str) -> str:
     """A pattern from a folder; brackets and stars in names of folders that stand there are letters."""
-    text, here = glob.escape(str(folder)), folder
-    for part in Path(pattern).parts:
+    whole = (folder / pattern).parts
+    text, here = "", Path(whole[0])
+    for part in whole[1:]:
         here = here / part
-        text = f"{text}/{glob.escape(part) if here.is_dir() and part != '**' else part}"
-    return glob.escape(str(here)) if Path(pattern).is_absolute() and here.is_dir() else text
+        text += f"/{glob.escape(part) if here.is_dir() and part != '**' else part}"
+    return str(Path(whole[0])).rstrip("/\\") + text
 
 
 def _named(names: Iterable[str], folder: Path) -> list[str]:
