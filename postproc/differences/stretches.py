@@ -19,7 +19,7 @@ ARC_PLACES = 16
 
 @dataclass(frozen=True)
 @arrays(tip="P 3", axis="P 3", line="int64: P", first="int64: S", last="int64: S", cut="bool: S", row="int64: S",
-        row_last="int64: S")
+        row_last="int64: S", of="int64: P", rest="S")
 class Stretches:
     """S stretches of a program over P places.
 
@@ -29,6 +29,8 @@ class Stretches:
         first, last (S,): places of a stretch, from where it begins to where it ends, both included
         cut (S,): True for a cut or a whole hole, False for all that lies between two of these
         row, row_last (S,): executed blocks that it begins and ends with
+        of (P,): executed block of each place
+        rest (S,): s that the tool rests in it, or behind it before the next one
     """
 
     tip: Floats
@@ -39,6 +41,8 @@ class Stretches:
     cut: Bools
     row: Ints
     row_last: Ints
+    of: Ints
+    rest: Floats
 
     def __len__(self) -> int:
         return len(self.first)
@@ -65,7 +69,7 @@ def _moved(tip: Floats, axis: Floats, row: Ints, count: int) -> Bools:
 
 def _cut_up(motion: Motion, moved: Bools, row: Ints, tip: Floats, axis: Floats) -> Stretches:
     """Stretches of the blocks that move; `tip`, `axis` hold one place before the first block."""
-    kept = np.flatnonzero(moved & ~(motion.hole & (motion.code == 0)))  # how pecks come back is the cycle's own
+    kept = np.flatnonzero(moved & ~_pecks(motion))  # how pecks come back is the cycle's own
     cutting, tool = motion.code[kept] > 0, motion.tool[kept]
     hole = np.where(motion.hole[kept], motion.block[kept], -1)
     new = np.ones(len(kept), dtype=bool)
@@ -76,4 +80,23 @@ def _cut_up(motion: Motion, moved: Bools, row: Ints, tip: Floats, axis: Floats) 
     upto = np.searchsorted(row, kept, side="right")
     line = np.concatenate([motion.line[row[:1]], motion.line[row]]).astype(np.int64)
     return Stretches(tip, axis, line, where[begins].astype(np.int64), upto[ends].astype(np.int64), cutting[begins],
-                     kept[begins].astype(np.int64), kept[ends].astype(np.int64))
+                     kept[begins].astype(np.int64), kept[ends].astype(np.int64),
+                     np.concatenate([row[:1], row]).astype(np.int64), _rests(motion, kept[begins]))
+
+
+def _pecks(motion: Motion) -> Bools:
+    """(E,) rapids of a cycle between its first and its last feed: those before and behind are links as any other."""
+    feeds = np.flatnonzero(motion.hole & (motion.code > 0))
+    if not len(feeds):
+        return np.zeros(len(motion), dtype=bool)
+    hole = motion.block[feeds]
+    at = np.searchsorted(hole, motion.block)
+    first, last = feeds[np.minimum(at, len(feeds) - 1)], feeds[np.searchsorted(hole, motion.block, side="right") - 1]
+    rows = np.arange(len(motion))
+    return np.asarray(motion.hole & (motion.code == 0) & (rows > first) & (rows < last))
+
+
+def _rests(motion: Motion, begins: Ints) -> Floats:
+    """(S,) s of rest of stretches that begin with those blocks; what comes before the first counts with it."""
+    of = np.maximum(np.searchsorted(begins, np.arange(len(motion)), side="right") - 1, 0)
+    return np.bincount(of, weights=motion.dwell, minlength=len(begins)).astype(np.float64)

@@ -99,7 +99,8 @@ def test_names_of_folders_and_files_may_hold_what_is_a_pattern_or_no_ascii(tmp_p
     for name in ("\u00fc.cls", "\u00f6.cls", "x[1].cls", "a b.cls"):
         (folder / "Teile [a]" / name).write_text("", encoding="utf-8")
     tasks, wrong = planned(jobs)
-    assert wrong == [] and sorted(task.figures.name for task in tasks) == ["a_b.json", "x_1_.json", "\u00f6.json", "\u00fc.json"]
+    names = ["a_b.json", "x_1_.json", "\u00f6.json", "\u00fc.json"]
+    assert wrong == [] and sorted(task.figures.name for task in tasks) == names
     again, wrong = planned(batch_folder(folder, JOBS.replace("*.cls", f"{folder}/Teile [a]/*.cls"), parts=0))
     assert wrong == [] and [task.file for task in again] == [task.file for task in tasks]
     assert planned(batch_folder(folder, JOBS.replace("*.cls", "**/*.cls"), parts=0))[0] != []
