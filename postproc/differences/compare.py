@@ -104,8 +104,7 @@ def _matched(of_a: Stretches, a: ExecutedProgram, of_b: Stretches,
     if np.array_equal(tools_a, tools_b):
         pairs = list(zip(cuts_a.tolist(), cuts_b.tolist(), strict=True))
     else:
-        matcher = SequenceMatcher(None, _keys(of_a, a, cuts_a), _keys(of_b, b, cuts_b), autojunk=False)
-        for _, i0, i1, j0, j1 in matcher.get_opcodes():
+        for i0, i1, j0, j1 in _runs(_keys(of_a, a, cuts_a), _keys(of_b, b, cuts_b)):
             alike = np.array_equal(tools_a[i0:i1], tools_b[j0:j1])
             pairs += zip(cuts_a[i0:i1].tolist(), cuts_b[j0:j1].tolist(), strict=True) if alike else ()
             lone += [] if alike else [*_lone("a", of_a, cuts_a[i0:i1]), *_lone("b", of_b, cuts_b[j0:j1])]
@@ -113,6 +112,18 @@ def _matched(of_a: Stretches, a: ExecutedProgram, of_b: Stretches,
     lone += [] if lone else [*_lone("a", of_a, np.setdiff1d(np.flatnonzero(~of_a.cut), [i for i, _ in links])),
                              *_lone("b", of_b, np.setdiff1d(np.flatnonzero(~of_b.cut), [j for _, j in links]))]
     return sorted(pairs + links), tuple(lone)
+
+
+def _runs(a: list[tuple[float, ...]], b: list[tuple[float, ...]]) -> list[tuple[int, int, int, int]]:
+    """Runs of keys that are the same or stand in each other's place: begin and end in A, then in B. The search takes time by
+    the square of what lies between what both begin and end with."""
+    short = min(len(a), len(b))
+    first = next((k for k in range(short) if a[k] != b[k]), short)
+    last = next((k for k in range(short - first) if a[-1 - k] != b[-1 - k]), short - first)
+    ends = len(a) - last, len(b) - last
+    matcher = SequenceMatcher(None, a[first:ends[0]], b[first:ends[1]], autojunk=False)
+    inside = [(i0 + first, i1 + first, j0 + first, j1 + first) for _, i0, i1, j0, j1 in matcher.get_opcodes()]
+    return [(0, first, 0, first), *inside, (ends[0], len(a), ends[1], len(b))]
 
 
 def _links(of_a: Stretches, of_b: Stretches, cuts: dict[int, int]) -> list[tuple[int, int]]:

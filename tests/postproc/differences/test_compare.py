@@ -161,3 +161,10 @@ def test_order_of_curves() -> None:
     circle = 10.0 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
     assert in_order(circle, circle.copy(), 0.0) and in_order(circle, circle[::3].copy(), 0.04)
     assert not in_order(circle, circle[::-1].copy(), 0.0) and not in_order(circle, np.vstack([circle, circle]), 0.0)
+
+
+def test_one_cut_more_among_many_alike_is_found_at_once(tmp_path: Path) -> None:
+    """Cuts between the same two places: a search for common runs of all of them takes time by the square of their number."""
+    one = "G1 Z-1 F300\nX20\nG0 Z5\nG0 X0\n"
+    values, _ = _compared(tmp_path, HEAD + 300 * one + END, HEAD + 301 * one + END)
+    assert len(values["lone"]) == 1 and not values["apart"] and values["same"] is False
