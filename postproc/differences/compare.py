@@ -10,7 +10,7 @@ import numpy as np
 from postproc.cycle_time.source import ExecutedProgram
 from postproc.differences.distance import CurveGap, gap
 from postproc.differences.states import BETWEEN, StateDifference, events, states
-from postproc.differences.stretches import Stretches, stretches
+from postproc.differences.stretches import ProgramLine, Stretches, line_at, stretches
 from toolpaths.arrays import Ints
 
 _GRID = 1.0
@@ -22,10 +22,10 @@ class StretchPair:
     """A stretch of A and the same of B: lines where they begin, lines where they are farthest apart, gap."""
 
     cut: bool
-    line_a: int
-    line_b: int
-    worst_a: int
-    worst_b: int
+    line_a: ProgramLine
+    line_b: ProgramLine
+    worst_a: ProgramLine
+    worst_b: ProgramLine
     gap: CurveGap
 
 
@@ -34,7 +34,7 @@ class Lone:
     """A cut, or a move between cuts, that only one program has: "a" or "b", its first line, mm that its tip moves."""
 
     program: str
-    line: int
+    line: ProgramLine
     length: float
     cut: bool
 
@@ -75,7 +75,7 @@ def compare(a: ExecutedProgram, b: ExecutedProgram) -> ProgramDifferences:
     of_a, of_b = stretches(a), stretches(b)
     matched, lone = _matched(of_a, a, of_b, b)
     alike = a.controller == b.controller
-    pairs = tuple(_pair(of_a, i, of_b, j) for i, j in matched)
+    pairs = tuple(_pair(of_a, a, i, of_b, b, j) for i, j in matched)
     if not alike:  # how pecks follow each other is the control's own
         pairs = tuple(replace(one, gap=replace(one.gap, reordered=False)) if a.motion.hole[of_a.row[i]] and one.cut
                       and b.motion.hole[of_b.row[j]] else one for (i, j), one in zip(matched, pairs, strict=True))
@@ -107,10 +107,10 @@ def _matched(of_a: Stretches, a: ExecutedProgram, of_b: Stretches,
         for i0, i1, j0, j1 in _runs(_keys(of_a, a, cuts_a), _keys(of_b, b, cuts_b)):
             alike = np.array_equal(tools_a[i0:i1], tools_b[j0:j1])
             pairs += zip(cuts_a[i0:i1].tolist(), cuts_b[j0:j1].tolist(), strict=True) if alike else ()
-            lone += [] if alike else [*_lone("a", of_a, cuts_a[i0:i1]), *_lone("b", of_b, cuts_b[j0:j1])]
+            lone += [] if alike else [*_lone("a", a, of_a, cuts_a[i0:i1]), *_lone("b", b, of_b, cuts_b[j0:j1])]
     links = _links(of_a, of_b, dict(pairs))
-    lone += [] if lone else [*_lone("a", of_a, np.setdiff1d(np.flatnonzero(~of_a.cut), [i for i, _ in links])),
-                             *_lone("b", of_b, np.setdiff1d(np.flatnonzero(~of_b.cut), [j for _, j in links]))]
+    lone += [] if lone else [*_lone("a", a, of_a, np.setdiff1d(np.flatnonzero(~of_a.cut), [i for i, _ in links])),
+                             *_lone("b", b, of_b, np.setdiff1d(np.flatnonzero(~of_b.cut), [j for _, j in links]))]
     return sorted(pairs + links), tuple(lone)
 
 
@@ -133,18 +133,20 @@ def _links(of_a: Stretches, of_b: Stretches, cuts: dict[int, int]) -> list[tuple
             and (j := around[i - 1] + 1) < len(of_b) and not of_b.cut[j] and around.get(i + 1) == j + 1]
 
 
-def _lone(name: str, one: Stretches, numbers: Ints) -> list[Lone]:
-    return [Lone(name, int(one.line[one.first[k] + 1]), _length(one, k), bool(one.cut[k])) for k in numbers.tolist()]
+def _lone(name: str, program: ExecutedProgram, one: Stretches, numbers: Ints) -> list[Lone]:
+    return [Lone(name, line_at(program, one, int(one.first[k]) + 1), _length(one, k), bool(one.cut[k]))
+            for k in numbers.tolist()]
 
 
 def _length(one: Stretches, k: int) -> float:
     return float(np.linalg.norm(np.diff(one.tip[one.first[k]:one.last[k] + 1], axis=0), axis=1).sum())
 
 
-def _pair(of_a: Stretches, i: int, of_b: Stretches, j: int) -> StretchPair:
+def _pair(of_a: Stretches, a: ExecutedProgram, i: int, of_b: Stretches, b: ExecutedProgram, j: int) -> StretchPair:
     here = slice(int(of_a.first[i]), int(of_a.last[i]) + 1)
     there = slice(int(of_b.first[j]), int(of_b.last[j]) + 1)
     found = gap(of_a.tip[here], of_a.axis[here], of_b.tip[there], of_b.axis[there])
-    return StretchPair(bool(of_a.cut[i]), int(of_a.line[here.start + 1]), int(of_b.line[there.start + 1]),
-                int(of_a.line[min(here.start + found.at_a + 1, here.stop - 1)]),
-                int(of_b.line[min(there.start + found.at_b + 1, there.stop - 1)]), found)
+    lines = (line_at(a, of_a, here.start + 1), line_at(b, of_b, there.start + 1),
+             line_at(a, of_a, min(here.start + found.at_a + 1, here.stop - 1)),
+             line_at(b, of_b, min(there.start + found.at_b + 1, there.stop - 1)))
+    return StretchPair(bool(of_a.cut[i]), *lines, found)

@@ -9,7 +9,7 @@ from postproc.cycle_time.report import clock
 from postproc.cycle_time.source import ExecutedProgram
 from postproc.differences.compare import ProgramDifferences, StretchPair
 from postproc.differences.states import StateDifference
-from postproc.differences.stretches import stretches
+from postproc.differences.stretches import ProgramLine, stretches
 from toolpaths.choices import FigureEnding
 from toolpaths.drawing import image
 from toolpaths.table_text import table_text
@@ -33,15 +33,21 @@ def as_dict(found: ProgramDifferences, names: tuple[str, str], seconds: tuple[fl
     return {"a": names[0], "b": names[1], "same": cuts and links, "same_cuts": cuts, "same_links": links, "cuts": found.cuts,
             "cycle_time_s": list(seconds), "worst_cut": _pair(found.worst(True)), "worst_link": _pair(found.worst(False)),
             "apart": [_pair(one) for one in found.pairs if one.cut and _apart(one, tolerance)],
-            "lone": [{"program": one.program, "line": one.line, "length_mm": one.length,
+            "lone": [{"program": one.program, **_lines(line=one.line), "length_mm": one.length,
                       "cut": one.cut} for one in found.lone],
             "states": [_state(one) for one in found.states], "events": [_state(one) for one in found.events],
             "not_compared": list(not_compared(found))}
 
 
 def _state(one: StateDifference) -> dict[str, Any]:
-    return {"what": one.what, "a": one.value_a, "b": one.value_b, "cuts": one.count, "line_a": one.line_a,
-            "line_b": one.line_b}
+    return {"what": one.what, "a": one.value_a, "b": one.value_b, "cuts": one.count,
+            **_lines(line_a=one.line_a, line_b=one.line_b)}
+
+
+def _lines(**named: ProgramLine) -> dict[str, Any]:
+    """Lines, and files of those in a subprogram's own."""
+    files = {name.replace("line", "file"): one.file for name, one in named.items() if one.file}
+    return {name: one.line for name, one in named.items()} | files
 
 
 def not_compared(found: ProgramDifferences) -> tuple[str, ...]:
@@ -53,8 +59,13 @@ def not_compared(found: ProgramDifferences) -> tuple[str, ...]:
 
 def _pair(one: StretchPair | None) -> dict[str, Any] | None:
     return None if one is None else {
-        "cut": one.cut, "line_a": one.worst_a, "line_b": one.worst_b, "tip_mm": one.gap.tip, "axis_deg": one.gap.axis / DEG,
-        "reordered": one.gap.reordered}
+        "cut": one.cut, **_lines(line_a=one.worst_a, line_b=one.worst_b), "tip_mm": one.gap.tip,
+        "axis_deg": one.gap.axis / DEG, "reordered": one.gap.reordered}
+
+
+def _stated(one: StateDifference) -> tuple[str, str]:
+    """Lines of an event; "" in the program that has none."""
+    return str(one.line_a) if one.line_a.line else "", str(one.line_b) if one.line_b.line else ""
 
 
 def _apart(one: StretchPair, tolerance: tuple[float, float]) -> bool:
@@ -82,7 +93,7 @@ def as_text(found: ProgramDifferences, names: tuple[str, str], seconds: tuple[fl
     lines += _table("in one program alone", alone, ("in", "line", "mm", ""), "lrrl")
     lines += _table("states of cuts", [(one.what, one.value_a, one.value_b, one.count, one.line_a, one.line_b)
                                        for one in found.states], ("", "A", "B", "cuts", "line A", "line B"), "lllrrr")
-    lines += _table("stops and tool changes", [(one.what, one.value_a, one.value_b, one.line_a or "", one.line_b or "")
+    lines += _table("stops and tool changes", [(one.what, one.value_a, one.value_b, *_stated(one))
                                                for one in found.events], ("", "A", "B", "line A", "line B"), "lllrr")
     lines.append(f"not compared: {'; '.join(not_compared(found))}")
     return "\n".join(lines)

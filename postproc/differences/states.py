@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.cycle_time.source import ExecutedProgram
 from postproc.differences.distance import CurveGap
-from postproc.differences.stretches import Stretches
+from postproc.differences.stretches import ProgramLine, Stretches, line_at, line_of
 from postproc.readback.text.canonical import LOADED
 from postproc.readback.text.modal import codes
 from postproc.reference.coolant import label
@@ -40,8 +40,8 @@ class StateDifference:
     value_a: str
     value_b: str
     count: int
-    line_a: int
-    line_b: int
+    line_a: ProgramLine
+    line_b: ProgramLine
 
 
 @dataclass(frozen=True)
@@ -81,13 +81,13 @@ def states(of_a: Stretches, a: ExecutedProgram, of_b: Stretches, b: ExecutedProg
            matched: Sequence[tuple[int, int, CurveGap]]) -> tuple[StateDifference, ...]:
     """What differs in stretches that are pairs, each combination once. Registers, work offsets, smoothing and pecks mean the
     same on one control alone."""
-    found: dict[tuple[str, str, str], list[tuple[int, int]]] = {}
+    found: dict[tuple[str, str, str], list[tuple[ProgramLine, ProgramLine]]] = {}
     alike = a.controller == b.controller
     for i, j, apart in matched:
-        lines = int(of_a.line[of_a.first[i] + 1]), int(of_b.line[of_b.first[j] + 1])
+        lines = line_at(a, of_a, int(of_a.first[i]) + 1), line_at(b, of_b, int(of_b.first[j]) + 1)
         if abs(of_a.rest[i] - of_b.rest[j]) > _REST:
-            found.setdefault(("dwell" if of_a.cut[i] else BETWEEN, *(f"{one:g} s" for one in (
-                round(float(of_a.rest[i]), 3), round(float(of_b.rest[j]), 3)))), []).append(lines)
+            rests = [f"{round(float(one), 3):g} s" for one in (of_a.rest[i], of_b.rest[j])]
+            found.setdefault(("dwell" if of_a.cut[i] else BETWEEN, rests[0], rests[1]), []).append(lines)
         if of_a.cut[i]:
             near, mine, other = _PLACE + 2.0 * apart.tip, _courses(a, of_a, i, alike), _courses(b, of_b, j, alike)
             for what, course in mine.items():
@@ -142,8 +142,8 @@ def events(of_a: Stretches, a: ExecutedProgram, of_b: Stretches, b: ExecutedProg
     mine, other = _events(of_a, a), _events(of_b, b)
     counts = Counter(what for what, _ in mine), Counter(what for what, _ in other)
     lines = dict(reversed(mine)), dict(reversed(other))
-    return tuple(StateDifference(what, _times(counts[0][what]), _times(counts[1][what]), 0, lines[0].get(what, 0),
-                                 lines[1].get(what, 0))
+    return tuple(StateDifference(what, _times(counts[0][what]), _times(counts[1][what]), 0,
+                                 *(one.get(what, ProgramLine(0)) for one in lines))
                  for what in dict.fromkeys([*counts[0], *counts[1]]) if counts[0][what] != counts[1][what])
 
 
@@ -151,13 +151,13 @@ def _times(count: int) -> str:
     return f"{count} times" if count > 1 else "once" if count else "none"
 
 
-def _events(one: Stretches, program: ExecutedProgram) -> list[tuple[str, int]]:
+def _events(one: Stretches, program: ExecutedProgram) -> list[tuple[str, ProgramLine]]:
     """(what and where, line) of stops and tool changes."""
     code, block = program.code, program.motion.block
     begin, end = block[one.row[one.cut]], block[one.row_last[one.cut]]
     stops, loaded = codes(code.words, "M", _STOPS), code.words.pick(LOADED)
     found = [*_placed(stops, "M{:g}", begin, end), *_placed(loaded, "tool change to T{:g}", begin, end)]
-    return [(what, int(code.line[at])) for what, at in sorted(found, key=lambda each: each[1])]
+    return [(what, line_of(code, at)) for what, at in sorted(found, key=lambda each: each[1])]
 
 
 def _placed(stated: tuple[Ints, Floats], name: str, begin: Ints, end: Ints) -> list[tuple[str, int]]:

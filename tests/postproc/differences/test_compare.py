@@ -168,3 +168,16 @@ def test_one_cut_more_among_many_alike_is_found_at_once(tmp_path: Path) -> None:
     one = "G1 Z-1 F300\nX20\nG0 Z5\nG0 X0\n"
     values, _ = _compared(tmp_path, HEAD + 300 * one + END, HEAD + 301 * one + END)
     assert len(values["lone"]) == 1 and not values["apart"] and values["same"] is False
+
+
+def test_lines_of_a_subprogram_come_with_its_file(tmp_path: Path) -> None:
+    for name, far in (("one", 20), ("two", 25)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "p.nc").write_text("%\nO0001\nG21 G90 G17 G40 G49 G80 G94\nG54\nT1 M6\nS1000 M3\nG0 X0. Y0.\n"
+                                              "G43 H1 Z50.\nM98 P2000\nG0 Z50.\nM30\n%\n", encoding="utf-8")
+        (tmp_path / name / "O2000.nc").write_text(f"%\nO2000\nG0 Z2.\nG1 Z-1. F300.\nX{far}.\nM99\n%\n", encoding="utf-8")
+    ran = CliRunner().invoke(app, ["compare", str(tmp_path / "one/p.nc"), str(tmp_path / "two/p.nc"), "-m", "mill-3axis",
+                                   "-c", "fanuc-30i", "--json", str(tmp_path / "o.json")])
+    assert ran.exit_code == 0 and "O2000.nc:5" in ran.output, ran.output
+    worst = json.loads((tmp_path / "o.json").read_text("utf-8"))["worst_cut"]
+    assert (worst["line_a"], worst["file_a"], worst["tip_mm"]) == (5, "O2000.nc", pytest.approx(5.0))
