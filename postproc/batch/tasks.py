@@ -142,7 +142,7 @@ def _files(number: int, job: JobModel, folder: Path, source: UserFile) -> tuple[
     for pattern in job.files:
         exact = folder / pattern  # a name may hold what is a pattern
         named = [exact] if is_regular(exact) else sorted(
-            Path(one) for one in glob.glob(_pattern(folder, pattern), recursive=True) if is_regular(one))  # noqa: PTH207
+            Path(one) for one in glob.glob(_pattern(folder, pattern), recursive=True) if is_regular(one))  # noqa: PTH207  # absolute
         files |= dict.fromkeys(map(place, named))
         if not named:
             missing.append(source.problem("batch.no_file", ("jobs", number, "files"), f"no file {pattern!r} in {folder}",
