@@ -13,7 +13,7 @@ from machines.user_file import UserFile, nearest
 from postproc.batch.forms import INPUTS, CommandForm, CommandForms
 from postproc.batch.model import BatchFile, JobModel, OptionValue
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.input_files import is_regular, place
+from toolpaths.input_files import is_regular, place, there_is
 
 StatedOptions = tuple[tuple[str, str], ...]
 """options with their values, "" for one that takes none, in the order of their names"""
@@ -141,8 +141,8 @@ def _files(number: int, job: JobModel, folder: Path, source: UserFile) -> tuple[
     missing = []
     for pattern in job.files:
         exact = folder / pattern  # a name may hold what is a pattern
-        named = [exact] if is_regular(exact) else sorted(
-            Path(one) for one in glob.glob(_pattern(folder, pattern), recursive=True) if is_regular(one))  # noqa: PTH207  # absolute
+        every = glob.glob(_pattern(folder, pattern), recursive=True)  # noqa: PTH207  # absolute
+        named = [exact] if is_regular(exact) else sorted(Path(one) for one in every if is_regular(one))
         files |= dict.fromkeys(map(place, named))
         if not named:
             missing.append(source.problem("batch.no_file", ("jobs", number, "files"), f"no file {pattern!r} in {folder}",
@@ -156,7 +156,7 @@ def _pattern(folder: Path, pattern: str) -> str:
     text, here = "", Path(whole[0])
     for part in whole[1:]:
         here = here / part
-        text += f"/{glob.escape(part) if here.is_dir() and part != '**' else part}"
+        text += f"/{glob.escape(part) if there_is(here) and part != '**' else part}"
     return str(Path(whole[0])).rstrip("/\\") + text
 
 
