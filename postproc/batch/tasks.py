@@ -13,11 +13,11 @@ from machines.user_file import UserFile, nearest
 from postproc.batch.forms import INPUTS, CommandForm, CommandForms
 from postproc.batch.model import BatchFile, JobModel, OptionValue
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.input_files import is_regular, place
+from toolpaths.input_files import is_regular, place, there_is
 
 StatedOptions = tuple[tuple[str, str], ...]
 """options with their values, "" for one that takes none, in the order of their names"""
-_UNNAMED = re.compile(r"[^A-Za-z0-9._+-]+")
+_UNNAMED = re.compile(r"[^\w.+-]+")
 _LONGEST = 120
 """characters of a name that is made up"""
 
@@ -141,13 +141,23 @@ def _files(number: int, job: JobModel, folder: Path, source: UserFile) -> tuple[
     missing = []
     for pattern in job.files:
         exact = folder / pattern  # a name may hold what is a pattern
-        named = [exact] if is_regular(exact) else sorted(
-            Path(one) for one in glob.glob(str(exact), recursive=True) if is_regular(one))  # noqa: PTH207  # absolute
+        every = glob.glob(_pattern(folder, pattern), recursive=True)  # noqa: PTH207  # absolute
+        named = [exact] if is_regular(exact) else sorted(Path(one) for one in every if is_regular(one))
         files |= dict.fromkeys(map(place, named))
         if not named:
             missing.append(source.problem("batch.no_file", ("jobs", number, "files"), f"no file {pattern!r} in {folder}",
                                           "name files from the folder of the batch file; * stands for any part of a name"))
     return list(files), missing
+
+
+def _pattern(folder: Path, pattern: str) -> str:
+    """A pattern from a folder; brackets and stars in names of folders that stand there are letters."""
+    whole = (folder / pattern).parts
+    text, here = "", Path(whole[0])
+    for part in whole[1:]:
+        here = here / part
+        text += f"/{glob.escape(part) if there_is(here) and part != '**' else part}"
+    return str(Path(whole[0])).rstrip("/\\") + text
 
 
 def _named(names: Iterable[str], folder: Path) -> list[str]:

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
 
 import numpy as np
 
 from postproc.cycle_time.source import ExecutedProgram
 from postproc.differences.distance import CurveGap, gap
-from postproc.differences.stretches import Stretches, stretches
-from postproc.reference.coolant import label
-from toolpaths.arrays import Floats, Ints
+from postproc.differences.states import BETWEEN, StateDifference, events, states
+from postproc.differences.stretches import ProgramLine, Stretches, line_at, stretches
+from toolpaths.arrays import Ints
 
 _GRID = 1.0
 """mm by which begin and end of stretches are known again where the programs have different ones"""
-_SIDES = {41: "left", 42: "right"}
 
 
 @dataclass(frozen=True)
@@ -24,60 +22,66 @@ class StretchPair:
     """A stretch of A and the same of B: lines where they begin, lines where they are farthest apart, gap."""
 
     cut: bool
-    line_a: int
-    line_b: int
-    worst_a: int
-    worst_b: int
+    line_a: ProgramLine
+    line_b: ProgramLine
+    worst_a: ProgramLine
+    worst_b: ProgramLine
     gap: CurveGap
 
 
 @dataclass(frozen=True)
 class Lone:
-    """A cut that only one program has: "a" or "b", its first line, mm that its tip moves."""
+    """A cut, or a move between cuts, that only one program has: "a" or "b", its first line, mm that its tip moves."""
 
     program: str
-    line: int
+    line: ProgramLine
     length: float
-
-
-@dataclass(frozen=True)
-class StateDifference:
-    """What differs in the states of stretches that are the same: its name, both values, how often, first lines."""
-
-    what: str
-    value_a: str
-    value_b: str
-    count: int
-    line_a: int
-    line_b: int
+    cut: bool
 
 
 @dataclass(frozen=True)
 class ProgramDifferences:
-    """All that two programs do differently."""
+    """All that two programs do differently; `one_control`: what means the same on one control alone was compared, too."""
 
     cuts: int
     pairs: tuple[StretchPair, ...]
     lone: tuple[Lone, ...]
     states: tuple[StateDifference, ...]
+    events: tuple[StateDifference, ...]
+    one_control: bool
 
     def worst(self, cut: bool) -> StretchPair | None:
         """The pair of cuts, or of rapids, whose tips are farthest apart."""
         return max((one for one in self.pairs if one.cut is cut), key=lambda one: one.gap.tip, default=None)
 
-    def same(self, tip: float, axis: float) -> bool:
+    def same_cuts(self, tip: float, axis: float) -> bool:
         """True where cuts stay within `tip` mm and `axis` rad of each other, none is missing, and no state differs."""
-        cuts = [one.gap for one in self.pairs if one.cut]
-        return not (self.lone or self.states) and all(
-            one.tip <= tip and one.axis <= axis and not one.backward for one in cuts)
+        states = any(one.what != BETWEEN for one in self.states)
+        return not states and self._same(True, tip, axis)
+
+    def same_links(self, tip: float, axis: float) -> bool:
+        """The same of what lies between cuts, with rests, stops and tool changes."""
+        rests = any(one.what == BETWEEN for one in self.states)
+        return not (rests or self.events) and self._same(False, tip, axis)
+
+    def _same(self, cut: bool, tip: float, axis: float) -> bool:
+        gaps = [one.gap for one in self.pairs if one.cut is cut]
+        return not any(one.cut or not cut for one in self.lone) and all(
+            one.tip <= tip and one.axis <= axis and not one.reordered for one in gaps)
 
 
 def compare(a: ExecutedProgram, b: ExecutedProgram) -> ProgramDifferences:
     """What two programs do differently, each on its machine with its control."""
     of_a, of_b = stretches(a), stretches(b)
     matched, lone = _matched(of_a, a, of_b, b)
-    pairs = tuple(_pair(of_a, i, of_b, j) for i, j in matched)
-    return ProgramDifferences(int(of_a.cut.sum()), pairs, lone, _states(of_a, a, of_b, b, matched))
+    alike = a.controller == b.controller
+    pairs = tuple(_pair(of_a, a, i, of_b, b, j) for i, j in matched)
+    if not alike:  # how pecks follow each other is the control's own
+        pairs = tuple(replace(one, gap=replace(one.gap, reordered=False)) if a.motion.hole[of_a.row[i]] and one.cut
+                      and b.motion.hole[of_b.row[j]] else one for (i, j), one in zip(matched, pairs, strict=True))
+    gaps = [(i, j, one.gap) for (i, j), one in zip(matched, pairs, strict=True)]
+    return ProgramDifferences(int(of_a.cut.sum()), pairs, lone, states(of_a, a, of_b, b, gaps),
+                              () if any(one.cut for one in lone) else events(of_a, a, of_b, b), alike)
 
 
 def _keys(one: Stretches, program: ExecutedProgram, cuts: Ints) -> list[tuple[float, ...]]:
@@ -100,73 +104,49 @@ def _matched(of_a: Stretches, a: ExecutedProgram, of_b: Stretches,
     if np.array_equal(tools_a, tools_b):
         pairs = list(zip(cuts_a.tolist(), cuts_b.tolist(), strict=True))
     else:
-        matcher = SequenceMatcher(None, _keys(of_a, a, cuts_a), _keys(of_b, b, cuts_b), autojunk=False)
-        for _, i0, i1, j0, j1 in matcher.get_opcodes():
+        for i0, i1, j0, j1 in _runs(_keys(of_a, a, cuts_a), _keys(of_b, b, cuts_b)):
             alike = np.array_equal(tools_a[i0:i1], tools_b[j0:j1])
             pairs += zip(cuts_a[i0:i1].tolist(), cuts_b[j0:j1].tolist(), strict=True) if alike else ()
-            lone += [] if alike else [*_lone("a", of_a, cuts_a[i0:i1]), *_lone("b", of_b, cuts_b[j0:j1])]
-    known = set(pairs)
-    links = [(i - 1, j - 1) for i, j in pairs if i and j and not of_a.cut[i - 1] and not of_b.cut[j - 1]
-             and (i < 2 or j < 2 or (i - 2, j - 2) in known)]
+            lone += [] if alike else [*_lone("a", a, of_a, cuts_a[i0:i1]), *_lone("b", b, of_b, cuts_b[j0:j1])]
+    links = _links(of_a, of_b, dict(pairs))
+    lone += [] if lone else [*_lone("a", a, of_a, np.setdiff1d(np.flatnonzero(~of_a.cut), [i for i, _ in links])),
+                             *_lone("b", b, of_b, np.setdiff1d(np.flatnonzero(~of_b.cut), [j for _, j in links]))]
     return sorted(pairs + links), tuple(lone)
 
 
-def _lone(name: str, one: Stretches, numbers: Ints) -> list[Lone]:
-    return [Lone(name, int(one.line[one.first[k] + 1]), _length(one, k)) for k in numbers.tolist()]
+def _runs(a: list[tuple[float, ...]], b: list[tuple[float, ...]]) -> list[tuple[int, int, int, int]]:
+    """Runs of keys that are the same or stand in each other's place: begin and end in A, then in B. The search takes time by
+    the square of what lies between what both begin and end with."""
+    short = min(len(a), len(b))
+    first = next((k for k in range(short) if a[k] != b[k]), short)
+    last = next((k for k in range(short - first) if a[-1 - k] != b[-1 - k]), short - first)
+    ends = len(a) - last, len(b) - last
+    matcher = SequenceMatcher(None, a[first:ends[0]], b[first:ends[1]], autojunk=False)
+    inside = [(i0 + first, i1 + first, j0 + first, j1 + first) for _, i0, i1, j0, j1 in matcher.get_opcodes()]
+    return [(0, first, 0, first), *inside, (ends[0], len(a), ends[1], len(b))]
+
+
+def _links(of_a: Stretches, of_b: Stretches, cuts: dict[int, int]) -> list[tuple[int, int]]:
+    """What lies between cuts that are pairs, before the first ones and behind the last ones."""
+    around = {**cuts, -1: -1, len(of_a): len(of_b)}
+    return [(i, j) for i in np.flatnonzero(~of_a.cut).tolist() if i - 1 in around
+            and (j := around[i - 1] + 1) < len(of_b) and not of_b.cut[j] and around.get(i + 1) == j + 1]
+
+
+def _lone(name: str, program: ExecutedProgram, one: Stretches, numbers: Ints) -> list[Lone]:
+    return [Lone(name, line_at(program, one, int(one.first[k]) + 1), _length(one, k), bool(one.cut[k]))
+            for k in numbers.tolist()]
 
 
 def _length(one: Stretches, k: int) -> float:
     return float(np.linalg.norm(np.diff(one.tip[one.first[k]:one.last[k] + 1], axis=0), axis=1).sum())
 
 
-def _pair(of_a: Stretches, i: int, of_b: Stretches, j: int) -> StretchPair:
+def _pair(of_a: Stretches, a: ExecutedProgram, i: int, of_b: Stretches, b: ExecutedProgram, j: int) -> StretchPair:
     here = slice(int(of_a.first[i]), int(of_a.last[i]) + 1)
     there = slice(int(of_b.first[j]), int(of_b.last[j]) + 1)
     found = gap(of_a.tip[here], of_a.axis[here], of_b.tip[there], of_b.axis[there])
-    return StretchPair(bool(of_a.cut[i]), int(of_a.line[here.start + 1]), int(of_b.line[there.start + 1]),
-                int(of_a.line[min(here.start + found.at_a + 1, here.stop - 1)]),
-                int(of_b.line[min(there.start + found.at_b + 1, there.stop - 1)]), found)
-
-
-def _states(of_a: Stretches, a: ExecutedProgram, of_b: Stretches, b: ExecutedProgram,
-            matched: Sequence[tuple[int, int]]) -> tuple[StateDifference, ...]:
-    """What differs at the begin of cuts that are pairs, each combination once."""
-    found: dict[tuple[str, str, str], list[tuple[int, int]]] = {}
-    for i, j in matched:
-        if of_a.cut[i]:
-            lines = int(of_a.line[of_a.first[i] + 1]), int(of_b.line[of_b.first[j] + 1])
-            mine, other = _state(a, of_a, i), _state(b, of_b, j)
-            for what in mine:
-                if mine[what] != other[what]:
-                    found.setdefault((what, _text(mine[what]), _text(other[what])), []).append(lines)
-    return tuple(StateDifference(*key, len(lines), *lines[0]) for key, lines in found.items())
-
-
-def _state(program: ExecutedProgram, one: Stretches, k: int) -> dict[str, list[str]]:
-    """What holds in a cut, each value as often as it changes, in words."""
-    motion = program.motion
-    rows = np.arange(int(one.row[k]), int(one.row_last[k]) + 1)
-    rows = rows[motion.code[rows] > 0]
-    feed = np.where(motion.inverse[rows], np.nan, motion.feed[rows] * motion.unit[rows])
-    turns = motion.rpm[rows] * motion.spindle[rows]
-    sides, flowing = motion.compensation[rows].astype(np.float64), motion.coolant[rows].astype(np.float64)
-    lengths = np.array([program.lengths.get(h, 0.0) if h >= 0 else np.nan for h in motion.register[rows].tolist()])
-    return {"feed": ["inverse time" if np.isnan(f) else f"{f:.6g} mm/min" for f in _changes(feed)],
-            "spindle": ["standing" if r == 0.0 else f"{abs(r):g} rev/min{'' if r > 0.0 else ' anti-clockwise'}"
-                        for r in _changes(turns)],
-            "coolant": [label(int(c)) for c in _changes(flowing)],
-            "radius compensation": [_SIDES.get(int(c), "off") for c in _changes(sides)],
-            "length": ["none" if np.isnan(x) else f"{x:g} mm" for x in _changes(lengths)]}
-
-
-def _changes(values: Floats) -> list[float]:
-    """A value, and the next one wherever it changes."""
-    new = np.ones(len(values), dtype=bool)
-    new[1:] = (values[1:] != values[:-1]) & ~(np.isnan(values[1:]) & np.isnan(values[:-1]))
-    return [float(v) for v in values[new]]
-
-
-def _text(values: list[str]) -> str:
-    """Values of one cut for people."""
-    return values[0] if len(values) == 1 else f"{values[0]}, then {values[1]}" if len(values) == 2 else \
-        f"{values[0]}, then {values[1]} ... ({len(values)} values)"
+    lines = (line_at(a, of_a, here.start + 1), line_at(b, of_b, there.start + 1),
+             line_at(a, of_a, min(here.start + found.at_a + 1, here.stop - 1)),
+             line_at(b, of_b, min(there.start + found.at_b + 1, there.stop - 1)))
+    return StretchPair(bool(of_a.cut[i]), *lines, found)

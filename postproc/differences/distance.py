@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.differences.order import in_order
 from toolpaths.arrays import Floats, Ints
 
 _STEP = 2.0
@@ -14,23 +15,20 @@ _MOST = 20_000
 """places of one curve that are compared: longer curves are looked at less densely"""
 _NEAR = 8
 """nearest places whose segments are looked at: the distance is never less than the true one"""
-_SHARES = 17
-_SAME = 1e-6
-"""mm"""
 
 
 @dataclass(frozen=True)
 class CurveGap:
     """What is between two curves: mm of the tips, rad of the axes, the place of each where the tips are farthest apart.
 
-    `backward`: one of them is run from its end to its begin.
+    `reordered`: they are not run in the same order: from the other end, or parts of one again.
     """
 
     tip: float
     axis: float
     at_a: int
     at_b: int
-    backward: bool
+    reordered: bool
 
 
 def gap(tip_a: Floats, axis_a: Floats, tip_b: Floats, axis_b: Floats) -> CurveGap:
@@ -38,7 +36,7 @@ def gap(tip_a: Floats, axis_a: Floats, tip_b: Floats, axis_b: Floats) -> CurveGa
     (Hausdorff), with the angle of the axes there."""
     there, back = _one_sided(tip_a, axis_a, tip_b, axis_b), _one_sided(tip_b, axis_b, tip_a, axis_a)
     worse = there if there.tip >= back.tip else CurveGap(back.tip, back.axis, back.at_b, back.at_a, False)
-    return CurveGap(worse.tip, max(there.axis, back.axis), worse.at_a, worse.at_b, _runs_back(tip_a, tip_b, worse.tip))
+    return CurveGap(worse.tip, max(there.axis, back.axis), worse.at_a, worse.at_b, not in_order(tip_a, tip_b, worse.tip))
 
 
 def _one_sided(tip_a: Floats, axis_a: Floats, tip_b: Floats, axis_b: Floats) -> CurveGap:
@@ -87,16 +85,3 @@ def _to_segments(point: Floats, curve: Floats, near: Ints) -> tuple[Floats, Floa
         away, share, at = np.where(better, here, away), np.where(better, t, share), np.where(better, first, at)
     return away, share, at
 
-
-def _runs_back(tip_a: Floats, tip_b: Floats, apart: float) -> bool:
-    """True where B is nearer to A when it is run from its end, by places at equal shares of their lengths."""
-    shares = np.linspace(0.0, 1.0, _SHARES)
-    a, b, back = _at_shares(tip_a, shares), _at_shares(tip_b, shares), _at_shares(tip_b, shares[::-1])
-    along, against = (float(np.linalg.norm(a - other, axis=1).max()) for other in (b, back))
-    return along > against + 2.0 * apart + _SAME
-
-
-def _at_shares(tip: Floats, shares: Floats) -> Floats:
-    """Places (K, 3) at shares of the length of a curve."""
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(tip, axis=0), axis=1))])
-    return np.column_stack([np.interp(shares * length[-1], length, tip[:, j]) for j in range(3)])

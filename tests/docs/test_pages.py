@@ -11,6 +11,7 @@ from typer.main import get_command
 
 from postproc.cli.app import app
 from postproc.cli.batch import wrong_use
+from postproc.explain.pages import pages
 from postproc.setup.model import load_setup
 from tests.docs.page import ROOT, blocks
 from tests.docs.page import faults as faults_of
@@ -89,3 +90,20 @@ def test_there_is_a_page_for_what_shops_ask() -> None:
     index = (ROOT / "docs" / "index.md").read_text("utf-8")
     assert all(f"tutorials/{p.stem}" in index for p in (ROOT / "docs" / "tutorials").glob("*.md"))
     assert re.search(r"^how-to/\*$", index, re.MULTILINE)
+
+
+def test_every_page_stands_in_a_table_of_contents() -> None:
+    """One that stands in none is not in the navigation, and `make docs` ends with an error."""
+    index, folder = (ROOT / "docs" / "index.md").read_text("utf-8"), ROOT / "docs"
+    named = {found for block in re.findall(r"```\{toctree\}(.*?)```", index, re.S) for line in block.splitlines()
+             if line and not line.startswith(":") for found in folder.glob(f"{line}.md")}
+    assert sorted({*PAGES, folder / "python.md"} - named - {folder / "index.md"}) == []
+
+
+def test_codes_of_messages_on_pages_are_such_as_there_are() -> None:
+    """First columns of tables and `postproc explain`: what a user looks up by them must be there."""
+    known = pages()
+    how_tos = [page for page in PAGES if page.parent.name == "how-to"]
+    named = [(page.name, code) for page in how_tos for row in re.findall(r"^\| (`[^|]*`) \|", page.read_text("utf-8"), re.M)
+             for code in re.findall(r"`([a-z-]+\.[a-z_-]+)`", row)]
+    assert len(named) >= 8 and [each for each in named if each[1] not in known] == []

@@ -32,7 +32,8 @@ _FUNCTION = re.compile(r"SQRT|SQ|SIN|COS|TAN|ASIN|ACOS|ATAN|LN|LOG|EXP|NEG|INT|A
 _GIVEN = re.compile(r"(Q[LRS]?\d+)[ \t]*=[ \t]*")
 _STRING = re.compile(r"(?:DECLARE STRING[ \t]+)?QS(\d+)[ \t]*=[ \t]*")
 _NAMED = re.compile(r"(TOOL (?:CALL|DEF)[ \t]+)\"([^\"]*)\"")
-_USED = re.compile(r"([-+]?)[ \t]*Q([LRS]?)(\d+)(?![\d]|[ \t]*=)")
+_USED = re.compile(r"\"[^\"]*\"|([-+]?)[ \t]*Q([LRS]?)(\d+)(?![\d]|[ \t]*=)")
+"""parameters of a row, and names in quotes, which hold none"""
 _FN = re.compile(r"FN[ \t]*(\d+)[ \t]*:[ \t]*")
 _JUMP = re.compile(r"IF[ \t]*(.+?)[ \t]*(EQU|NE|GT|LT|IS UNDEFINED|IS DEFINED)[ \t]*(.*?)[ \t]*GOTO LBL[ "
                     "\t]*(?:\"([^\"]+)\"|(\\S+))")
@@ -157,7 +158,7 @@ class KlartextMacros:
         elif m := _LABEL.fullmatch(row):
             if m[1] == "0" and level.label:
                 self.levels.pop()
-        elif m := _CALL.fullmatch(self.filled(row) if "Q" in row else row):
+        elif m := _CALL.fullmatch(self.filled(row) if "Q" in row and row.startswith("CALL LBL") else row):
             self._call(level, m[1].rstrip("."), m[2])
         elif m := _PROGRAM.fullmatch(self.strings.filled(row) if "QS" in row else row):
             self._program(m[1])
@@ -194,7 +195,7 @@ class KlartextMacros:
                 self.put(m[1], value)
         if "QS" in row:
             row = _NAMED.sub(lambda m: m[1] + str(self._tool(m[2])), self.strings.filled(row))
-        row = _USED.sub(lambda m: self._figure(m), row)
+        row = _USED.sub(lambda m: m[0] if m[0].startswith('"') else self._figure(m), row)
         return _TOOL.sub(r"\1\2", row)
 
     def _figure(self, m: re.Match[str]) -> str:

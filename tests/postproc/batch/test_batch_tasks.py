@@ -90,3 +90,17 @@ def test_a_key_changes_with_every_byte_that_a_task_reads(tmp_path: Path) -> None
     (tmp_path / "postproc.toml").unlink()
     jobs.write_text(JOBS + "[jobs.options]\ntolerance = 0.02\n", encoding="utf-8")
     assert not {key for _, key in with_keys(jobs)} & {*before, *changed, *with_job}
+
+
+def test_names_of_folders_and_files_may_hold_what_is_a_pattern_or_no_ascii(tmp_path: Path) -> None:
+    folder = tmp_path / "job [7]"
+    (folder / "Teile [a]").mkdir(parents=True)
+    jobs = batch_folder(folder, JOBS.replace("*.cls", "Teile [a]/*.cls"), parts=0)
+    for name in ("\u00fc.cls", "\u00f6.cls", "x[1].cls", "a b.cls"):
+        (folder / "Teile [a]" / name).write_text("", encoding="utf-8")
+    tasks, wrong = planned(jobs)
+    names = ["a_b.json", "x_1_.json", "\u00f6.json", "\u00fc.json"]
+    assert wrong == [] and sorted(task.figures.name for task in tasks) == names
+    again, wrong = planned(batch_folder(folder, JOBS.replace("*.cls", f"{folder}/Teile [a]/*.cls"), parts=0))
+    assert wrong == [] and [task.file for task in again] == [task.file for task in tasks]
+    assert planned(batch_folder(folder, JOBS.replace("*.cls", "**/*.cls"), parts=0))[0] != []

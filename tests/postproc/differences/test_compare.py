@@ -12,12 +12,20 @@ from typer.testing import CliRunner
 
 from postproc.cli.app import app
 from postproc.differences.distance import gap
+from postproc.differences.order import in_order
 
 HEAD = "%\nG21 G90 G17 G40 G49 G80 G94 G91.1\nG54\nG53 G0 Z0\nT1 M6\nS1000 M3\nM8\nG0 X0 Y0\nG43 H1 Z50\nG0 Z2\n"
 CUT = "G1 Z-1 F300\nX20\nG2 X20 Y20 J10\nG1 X0\nG0 Z50\n"
 SECOND = "G0 X40 Y0\nG0 Z2\nG1 Z-1 F300\nY20\nG0 Z50\n"
 END = "G53 G0 Z0\nM5 M9\nM2\n%\n"
-SETUP = "[part]\norigin = [0, 0, -150]\n[tools.1]\ngauge_length = 60.0\n"
+SETUP = ("[part]\norigin = [0, 0, -150]\n[tools.1]\ngauge_length = 60.0\n[tools.2]\ngauge_length = 80.0\n"
+         "[tools.3]\ngauge_length = 80.0\n")
+
+
+DRILLS = "G0 X60 Y0\nG98 G81 X60 Y0 Z-5 R2 F100\nX70\nG80\n"
+EXPANDED = "G0 X60 Y0\n" + "".join(f"G0 X{x}\nG0 Z2\nG1 Z-5 F100\nG0 Z50\n" for x in (60, 70))
+THIRD = "G53 G0 Z0\nM5 M9\nT2 M6\nS2000 M3\nM8\nG0 X0 Y40\nG43 H2 Z50\nG0 Z2\nG1 Z-1 F200\nX30\nX40\nG0 Z50\n"
+WHOLE = HEAD + CUT + SECOND + DRILLS + THIRD + END
 
 
 def _compared(folder: Path, a: str, b: str, *words: str) -> tuple[dict[str, object], str]:
@@ -77,7 +85,7 @@ def test_another_direction_is_another_cut(tmp_path: Path) -> None:
     straight = np.column_stack([np.linspace(0, 30, 5), np.zeros(5), np.zeros(5)])
     up = np.tile([0.0, 0.0, 1.0], (5, 1))
     found = gap(straight, up, straight[::-1].copy(), up)
-    assert found.tip < 1e-12 and found.backward
+    assert found.tip < 1e-12 and found.reordered
 
 
 def test_two_machines_and_controls_and_a_picture(tmp_path: Path) -> None:
@@ -93,3 +101,83 @@ def test_two_machines_and_controls_and_a_picture(tmp_path: Path) -> None:
     assert ran.exit_code == 0 and "cuts: the same" in ran.output, ran.output
     assert b"<svg" in (tmp_path / "f.svg").read_bytes()
     assert CliRunner().invoke(app, [*both, "-m", "mill-3axis"]).exit_code == 2
+
+
+@pytest.mark.parametrize(("old", "new", "cuts", "named"), [
+    ("G0 X40 Y0\nG0 Z2\n", "G0 Z-3\nG0 X40 Y0\nG0 Z2\n", True, "between cuts: different"),  # a rapid through the part
+    ("G43 H1 Z50\n", "G43 H1 Z50\nG0 Z-10\n", True, "between cuts: different"),
+    ("X40\nG0 Z50\nG53", "X40\nG0 Z-20\nG0 Z50\nG53", True, "between cuts: different"),  # behind the last cut
+    ("G98", "G99", True, "between cuts: different"),
+    ("G43 H2", "G43 H1", False, "length"),
+    ("G43 H2", "G43 H3", False, "length register"),  # of the same length
+    ("M8\nG0 X0 Y40", "G0 X0 Y40", False, "coolant"),
+    ("S2000 M3", "S2000", False, "standing"),
+    ("X30\n", "G41 D2 X30\n", False, "left"),
+    ("X30\n", "X30\nG4 P2\n", False, "dwell"),
+    ("G0 X40 Y0\n", "G4 P5\nG0 X40 Y0\n", True, "dwell between cuts"),
+    ("G81 X60 Y0 Z-5 R2", "G82 P1 X60 Y0 Z-5 R2", False, "dwell"),
+    ("G81 X60 Y0 Z-5 R2", "G83 Q1 X60 Y0 Z-5 R2", False, "rapids of the cycle"),
+    ("X60 Y0 Z-5 R2 F100\nX70", "X70 Y0 Z-5 R2 F100\nX60", False, "10.0000"),
+    ("G54\n", "G55\n", False, "work offset"),
+    ("G0 X40 Y0\n", "M0\nG0 X40 Y0\n", True, "M0 before cut 2"),
+    ("X30\n", "X30\nM1\n", True, "M1 in cut 5"),
+    ("M5 M9\nM2", "M5 M9\nT3 M6\nM2", True, "tool change to T3 at the end"),
+    ("T2 M6", "T3 M6", False, "in one program alone"),
+    ("X30\nX40", "X30\nX40\nX30\nX40", False, "other order"),  # a spring pass
+    ("G54\n", "G54\nG64 P1\n", False, "smoothing"),
+    ("Z-1 F200\nX30\n", "Z-1 F200\nX20\nX30\n", True, "the same")])
+def test_planted_changes_are_never_the_same(old: str, new: str, cuts: bool, named: str, tmp_path: Path) -> None:
+    assert WHOLE.count(old)
+    values, text = _compared(tmp_path, WHOLE, WHOLE.replace(old, new, 1))
+    assert values["same_cuts"] is cuts and values["same"] is (named == "the same") and named in text, text
+    assert "not compared: " in text
+
+
+def test_a_feed_that_changes_at_another_place_is_found(tmp_path: Path) -> None:
+    a, b = (WHOLE.replace("X30\nX40\n", f"X{x} \nF100 X40\n") for x in (20, 30))
+    state = _compared(tmp_path, a, b)[0]["states"]
+    assert [(s["what"], s["a"][:8], s["b"][:8]) for s in state] == [("feed changes at", "x 20.000", "x 30.000")]
+    timed = WHOLE.replace("G1 Z-1 F200\nX30\nX40\n", "G93 G1 Z-1 F20\nX30 F10\nX40 F10\nG94\n")
+    state = _compared(tmp_path, timed, timed.replace("X40 F10", "X40 F5"))[0]["states"]
+    assert [(s["what"], s["a"], s["b"]) for s in state] == [("inverse time", "15 s", "21 s")]
+
+
+def test_a_cycle_and_its_moves_are_the_same(tmp_path: Path) -> None:
+    values, text = _compared(tmp_path, WHOLE, WHOLE.replace(DRILLS, EXPANDED))
+    assert values["same"] is True, text
+
+
+def test_inches_are_the_same(tmp_path: Path) -> None:
+    a = HEAD + "G1 Z-1 F300\nX20\nG0 Z50\n" + END
+    b = HEAD.replace("G21", "G20").replace("Z50", "Z1.968504").replace("Z2", "Z.078740").replace("G54", "G54 G64 P0") + \
+        "G1 Z-.039370 F11.811\nX.787402\nG0 Z1.968504\n" + END
+    values, text = _compared(tmp_path, a.replace("G54", "G54 G64 P0"), b)
+    assert values["same"] is True, text
+
+
+def test_order_of_curves() -> None:
+    """A circle run the other way round, and one run twice, are the same set of places."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 73)
+    circle = 10.0 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    assert in_order(circle, circle.copy(), 0.0) and in_order(circle, circle[::3].copy(), 0.04)
+    assert not in_order(circle, circle[::-1].copy(), 0.0) and not in_order(circle, np.vstack([circle, circle]), 0.0)
+
+
+def test_one_cut_more_among_many_alike_is_found_at_once(tmp_path: Path) -> None:
+    """Cuts between the same two places: a search for common runs of all of them takes time by the square of their number."""
+    one = "G1 Z-1 F300\nX20\nG0 Z5\nG0 X0\n"
+    values, _ = _compared(tmp_path, HEAD + 300 * one + END, HEAD + 301 * one + END)
+    assert len(values["lone"]) == 1 and not values["apart"] and values["same"] is False
+
+
+def test_lines_of_a_subprogram_come_with_its_file(tmp_path: Path) -> None:
+    for name, far in (("one", 20), ("two", 25)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "p.nc").write_text("%\nO0001\nG21 G90 G17 G40 G49 G80 G94\nG54\nT1 M6\nS1000 M3\nG0 X0. Y0.\n"
+                                              "G43 H1 Z50.\nM98 P2000\nG0 Z50.\nM30\n%\n", encoding="utf-8")
+        (tmp_path / name / "O2000.nc").write_text(f"%\nO2000\nG0 Z2.\nG1 Z-1. F300.\nX{far}.\nM99\n%\n", encoding="utf-8")
+    ran = CliRunner().invoke(app, ["compare", str(tmp_path / "one/p.nc"), str(tmp_path / "two/p.nc"), "-m", "mill-3axis",
+                                   "-c", "fanuc-30i", "--json", str(tmp_path / "o.json")])
+    assert ran.exit_code == 0 and "O2000.nc:5" in ran.output, ran.output
+    worst = json.loads((tmp_path / "o.json").read_text("utf-8"))["worst_cut"]
+    assert (worst["line_a"], worst["file_a"], worst["tip_mm"]) == (5, "O2000.nc", pytest.approx(5.0))

@@ -89,6 +89,14 @@ def test_faults_stand_at_the_line_that_was_written() -> None:
     assert [(d.code, d.file, d.lines) for d in found] == [("gcode.variable", "O9000.nc", (3,))]
 
 
+@pytest.mark.parametrize("name", ["Q2", "PLATE-Q17", "QL3"])
+def test_names_of_klartext_hold_no_parameters(name: str) -> None:
+    """The name of a program is that of its file, which a user chooses."""
+    text = f"BEGIN PGM {name} MM\nTOOL CALL \"MILL Q2\" Z S1000\nL X+0 Y+0 Z+0 R0 FMAX\n"
+    text += f"L X+1 R0 FMAX M30\nEND PGM {name} MM\n"
+    assert not [one for one in executed(TNC, text)[1] if one.code == "gcode.variable"]
+
+
 @pytest.mark.parametrize(("control", "text"), [
     (FANUC, HEAD + "N1 #1=0\nGOTO1\nM30\n"), (LINUXCNC, HEAD + "O1 WHILE [1]\nO1 ENDWHILE\nM2\n"),
     (SIEMENS, SINUMERIK + "AA: R1=1\nGOTOB AA\nM30\n"), (TNC, "BEGIN PGM A MM\nLBL 1\n"
