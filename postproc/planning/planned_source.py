@@ -31,9 +31,11 @@ def source_of(job: Job, moves: Moves, path: JointPath, correction: PlannedCorrec
 
 
 def shifted_moves(job: Job, moves: Moves) -> Bools:
-    """(M,) moves that the control may shift by a radius, up to the rapid behind CUTCOM/OFF. Their blocks stay whole: a control
-    takes the radius up, and off, over one block, and finds corners between two; parts shorter than the radius are alarms or
-    gouges."""
+    """(M,) moves that the control may shift by a radius, up to the rapid behind CUTCOM/OFF.
+
+    Their blocks stay whole: a control takes the radius up, and off, over one block, and finds corners between two; parts
+    shorter than the radius are alarms or gouges.
+    """
     shifted = compensation_states(job.toolpath)[moves.row] != OFF
     ends = (moves.kind == Kind.RAPID) & ~shifted
     number = np.arange(len(moves))

@@ -103,3 +103,16 @@ def test_planned_feeds_are_optimised_too() -> None:
                    clock=program_clock())
     assert best.ok and best.optimised is not None and best.feed_times is not None
     assert best.optimised.after.seconds <= best.optimised.before.seconds
+
+
+def test_programmed_feeds_that_are_kept_are_what_is_timed() -> None:
+    """A control that makes its ramps itself, and runs programmed feeds faster: times are those of the program written."""
+    def clock(result: PostResult, band: bool = False) -> ProgramTime:
+        seconds = 10.0 if result.options.feed == "planned" else 8.0
+        moves = np.zeros(len(result.comparison.moves) if result.comparison else 0)
+        return ProgramTime(seconds, (seconds, seconds), 5.0, "clock of the test", moves)
+
+    path = toolpath("RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,6000", "GOTO/20,0,50", "GOTO/21,1,50")
+    best = convert(path, machine("mill-3axis"), "linuxcnc", options=Options(optimise=True, feed="planned"), clock=clock)
+    assert best.ok and best.optimised is not None and best.feed_times is not None and best.feed_times.kept
+    assert (best.optimised.before.seconds, best.optimised.after.seconds) == (8.0, 8.0) == (8.0, clock(best).seconds)
