@@ -177,5 +177,7 @@ def test_files_of_subprograms_take_the_time_of_the_program_in_one(controller: st
         setup = SetupFile.model_validate({"output": {"files": files}, "tools": {"1": {"gauge_length": 120.0}}})
         made = convert(path, "mill-3axis", controller, setup=setup)
         assert made.ok and bool(made.files) == files
-        times.append((estimate_of(made).seconds, from_conversion(made).tolerance))  # type: ignore[union-attr]
+        found = estimate_of(made)
+        assert found is not None
+        times.append((found.seconds, from_conversion(made).tolerance))
     assert times[0][0] == pytest.approx(times[1][0], abs=1e-9) and np.array_equal(times[0][1], times[1][1], equal_nan=True)
