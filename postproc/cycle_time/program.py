@@ -63,8 +63,7 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
         override: the operator's feed override, 1 for 100 %: of feeds alone, not of rapids and taps
     """
     origin = origin or BlockOrigin.by_tool(motion)
-    block = _block_of(code, motion)
-    words, unit = code.words, np.where(machine.rotary, DEG, 1.0)
+    block, words, unit = motion.block, code.words, np.where(machine.rotary, DEG, 1.0)
     points = np.concatenate([motion.start[None], motion.end]) * unit
     start, end = points[:-1], points[1:]
     arc = motion.code == 2
@@ -95,22 +94,6 @@ def _of_curves(code: Canonical, motion: Motion) -> tuple[Ints, Bools]:
     first = np.searchsorted(motion.block, motion.block)
     count = np.searchsorted(motion.block, motion.block, side="right") - first
     return np.where(curved, count, 1), curved & (np.arange(every) < first + count - 1)
-
-
-def _block_of(code: Canonical, motion: Motion) -> Ints:
-    """(E,) the canonical block of each row of motion.
-
-    Blocks and rows stand in running order; where lines come back (subprograms) each row takes the next block of its line.
-    """
-    line = code.line
-    if (np.diff(line) >= 0).all():
-        return np.searchsorted(line[1:], motion.line) + 1
-    result, at = np.empty(len(motion), dtype=np.int64), 1
-    for k, wanted in enumerate(motion.line.tolist()):
-        while at < len(line) - 1 and line[at] != wanted:
-            at += 1
-        result[k] = at
-    return result
 
 
 def _arcs(motion: Motion, control: Control, arc: Bools, start: Floats) -> tuple[Floats, Floats, Floats]:

@@ -19,7 +19,7 @@ from postproc.job.job import prepare, with_shop
 from postproc.pipeline.feeds_by_clock import ProgramClock, with_compared_feeds
 from postproc.pipeline.free_spin import with_spin_needed
 from postproc.pipeline.hooks import refused_hooks
-from postproc.pipeline.native_splines import as_arcs, asked_splines, held_splines, with_cubics
+from postproc.pipeline.native_splines import as_arcs, asked_splines, held_near, with_cubics
 from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.optimised import optimised
 from postproc.pipeline.result import PostResult, VerifyResult
@@ -69,10 +69,11 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
     found = _reading(path, diagnostics)
     native = with_cubics(path, options) if asked_splines(path, machine, spec, options) else path
     made = _converted(_begun(native, machine, controller, spec, setup, options, found), progress, clock)
-    if made.ok or native is path:
+    held = made.ok and made.program is not None and len(made.program.curves) > 0
+    if held or native is path:
         return made
     other = _converted(_begun(path, machine, controller, spec, setup, options, found), progress, clock)
-    return other.with_found([as_arcs(path, made.diagnostics)]) if other.ok else other
+    return other.with_found([as_arcs(path, made.diagnostics)]) if other.ok and not made.ok else other
 
 
 def _converted(start: PostResult, progress: Progress | None, clock: ProgramClock | None) -> PostResult:
@@ -199,7 +200,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
                          hashlib.sha256(data).hexdigest())
     if other := other_axes(data, options, str(gcode)):
         return replace(begun, diagnostics=(*other, *known))
-    path = with_cubics(path, options) if held_splines(data, spec) else path
+    path = with_cubics(path, options) if held_near(data, NeighbourFiles(gcode), spec) else path
     start, _ = _oriented(_begun(path, machine, controller, spec, setup, options, known), progress, clock)
     path, found = start.toolpath, list(start.diagnostics)
     if has_errors(found):

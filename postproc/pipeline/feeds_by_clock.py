@@ -24,7 +24,8 @@ StagedWhole = Callable[[PostResult], PostResult]
 
 def with_compared_feeds(start: PostResult, stages: StagedWhole, clock: ProgramClock | None) -> PostResult:
     """The program with planned feeds, and what they do; the programmed feeds where the control makes its ramps itself and
-    planned ones take longer. Other conversions as they are."""
+    planned ones take longer, unless tools have limits of their own, which only planned feeds keep. Other conversions as they
+    are."""
     made = stages(start)
     if clock is None or start.options.feed != "planned" or not made.ok or made.motion is None or not made.motion.passes:
         return made
@@ -32,7 +33,8 @@ def with_compared_feeds(start: PostResult, stages: StagedWhole, clock: ProgramCl
     if not plain.ok:
         return made
     planned, programmed = clock(made, band=True), clock(plain, band=True)
-    kept = not start.controller.feed.limited_jerk and planned.seconds > programmed.seconds
+    slower = planned.seconds > programmed.seconds
+    kept = not start.controller.feed.limited_jerk and slower and not made.motion.source.tools
     times = FeedTimes(programmed, planned, _stated(plain), _stated(made), made.motion.seconds, kept)
     return replace(plain if kept else made, motion=made.motion, feed_times=times)
 

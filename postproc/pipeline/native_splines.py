@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile
@@ -11,6 +15,8 @@ from toolpaths.diagnostics import Diagnostic, Severity, warning
 from toolpaths.toolpath import Toolpath
 
 _SHIFTED = ("CUTCOM",)
+_BEFORE = rb"^[ \t/]*(?:N?\d+)?[ \t/]*(?:G\d+[ \t]+)*"
+"""what stands before the word of such a block"""
 
 
 def asked_splines(path: Toolpath, machine: Machine, controller: ControllerFile, options: Options) -> bool:
@@ -23,9 +29,17 @@ def asked_splines(path: Toolpath, machine: Machine, controller: ControllerFile, 
 
 
 def held_splines(data: bytes, controller: ControllerFile) -> bool:
-    """True where a program holds blocks that run a cubic."""
+    """True where a program holds blocks that run a cubic: their word behind what numbers and skips a block, and G codes."""
     word = controller.splines.word.encode()
-    return bool(word) and any(line.lstrip(b"0123456789N \t").startswith(word) for line in data.upper().splitlines())
+    return bool(word) and re.search(_BEFORE + re.escape(word) + rb"(?![A-Z0-9_])", data.upper(), re.MULTILINE) is not None
+
+
+def held_near(data: bytes, others: Mapping[str, bytes], controller: ControllerFile) -> bool:
+    """True where a program, or a subprogram in a file next to it whose name stands in its blocks, holds such blocks."""
+    if not controller.splines.word or held_splines(data, controller):
+        return bool(controller.splines.word)
+    words = set(re.findall(rb"[A-Z0-9_]+", re.sub(rb";[^\n]*", b"", data.upper())))
+    return any(Path(name).stem.upper().encode() in words and held_splines(others[name], controller) for name in others)
 
 
 def with_cubics(path: Toolpath, options: Options) -> Toolpath:

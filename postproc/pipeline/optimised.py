@@ -40,11 +40,16 @@ class _Best:
 
 
 def optimised(start: PostResult, stages: StagedWhole, clock: ProgramClock) -> PostResult:
-    """The conversion of `start` with the choices that make its program the fastest; as it is where none is faster."""
-    made = stages(start)
+    """The conversion of `start` with the choices that make its program the fastest; as it is where none is faster.
+
+    On controls that make their ramps themselves planned feeds are written only where they are faster: with each choice."""
+    planned = start.options.feed == "planned"
+    compared = planned and not start.controller.feed.limited_jerk
+    written = partial(with_compared_feeds, stages=stages, clock=clock) if compared else stages
+    made = written(start)
     if not made.ok:
         return made
-    search = _Search(_Best(start, made, clock(made)), stages, clock)
+    search = _Search(_Best(start, made, clock(made)), written, clock)
     search.modes()
     search.smoothing()
     for moved in (True, False):
@@ -54,7 +59,7 @@ def optimised(start: PostResult, stages: StagedWhole, clock: ProgramClock) -> Po
     for mode in get_args(FeedModeChoice):
         search.to(f"feed mode {mode}", _options(partial(replace, feed_mode=mode)))
     best = search.best
-    made = with_compared_feeds(best.start, stages, clock) if best.start.options.feed == "planned" else best.made
+    made = with_compared_feeds(best.start, stages, clock) if planned and not compared else best.made
     return replace(made, optimised=Optimised(tuple(search.steps), search.first, best.time, search.tried))
 
 

@@ -46,7 +46,7 @@ from postproc.pipeline.stage_values import (
 from postproc.pipeline.tolerance_shares import tolerance_shares
 from postproc.planning.planned import PlannedMotion, planned_motion
 from postproc.planning.planned_errors import PlannedCorrection, on_written, planned_correction
-from postproc.planning.planned_source import limits_not_kept, source_of
+from postproc.planning.planned_source import limits_not_kept, shifted_moves, source_of
 from postproc.readback.comparison.slow_moves import with_fingerprint
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
@@ -192,7 +192,7 @@ def planned(made: CheckedStage, progress: Progress | None) -> tuple[PlannedStage
     motion, found = plan_motion(job, made.moves, made.nominal or made.path, correction)
     if motion is None or made.nominal is not None or not job.controller.feed.limited_jerk:
         return handed_on(PlannedStage, made, motion=motion), found
-    motion = motion.with_points(job.machine.home, job.control.unit)
+    motion = motion.with_points(job.machine.home, job.control.unit, shifted_moves(job, made.moves))
     return handed_on(PlannedStage, made, motion=motion, path=motion.source.path), found
 
 

@@ -27,7 +27,7 @@ from postproc.planning.steady_feed import CORNER, steady_seconds
 from postproc.planning.word_feeds import points_between, with_points, word_seconds
 from postproc.reference.moves import Moves
 from postproc.setup.model import ToolSetup
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import REPORT, Diagnostic, DiagnosticError, error, require
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.blend import SHARPEST
@@ -165,15 +165,17 @@ class PlannedMotion:
             raise DiagnosticError([error("plan.failed", f"no motion could be planned: {fault}", file=self.source.file,
                                          lines=lines, hint=f"{REPORT}; --feed programmed needs no plan")]) from fault
 
-    def with_points(self, home: Floats, unit: Floats) -> PlannedMotion:
+    def with_points(self, home: Floats, unit: Floats, whole: Bools) -> PlannedMotion:
         """The same motion on blocks of which none spans too much change of speed; arcs stay whole.
 
         Args:
             home: (J,) joints before the first block; unit (J,): mm or degrees of a unit of each joint
+            whole: (M,) moves whose blocks stay as they are
         """
         path, made = self.source.path, tuple(zip(self.passes, self.plans, strict=True))
         before = np.concatenate([home[None], path.q[:-1]])
-        added = points_between(made, path.code == FEED, (np.abs(path.q - before) * unit).max(axis=1, initial=0.0), SHORTEST)
+        travel = (np.abs(path.q - before) * unit).max(axis=1, initial=0.0)
+        added = points_between(made, (path.code == FEED) & ~whole[path.move], travel, SHORTEST)
         cut = cut_at(path, self.source.moves, self.source.kinematics, home, *added)
         return replace(self, source=replace(self.source, path=cut),
                        made=tuple((with_points(one, added, len(path)), plan) for one, plan in made))

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from postproc.feedrate.limits import ToolLimits
 from postproc.job.job import Job
 from postproc.path.model import JointPath
 from postproc.planning.pass_geometry import stops_of
 from postproc.planning.planned import Source, tool_limits
 from postproc.planning.planned_errors import PlannedCorrection
+from postproc.reference.events import compensation_states
 from postproc.reference.moves import Moves
 from postproc.setup.model import TOOL_LIMITS
+from toolpaths.arrays import Bools
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.smoothing.smooth import Tolerance
+from toolpaths.toolpath import Kind
+
+OFF = 40
+"""state of CUTCOM"""
 
 
 def source_of(job: Job, moves: Moves, path: JointPath, correction: PlannedCorrection | None = None,
@@ -20,6 +28,19 @@ def source_of(job: Job, moves: Moves, path: JointPath, correction: PlannedCorrec
     return Source(path, moves, job.machine, job.kinematics, Tolerance(job.options.tolerance, job.axis_tolerance),
                   stops_of(job.toolpath, moves), job.toolpath.file, correction, override, limits_by_tool(job),
                   limited_jerk)
+
+
+def shifted_moves(job: Job, moves: Moves) -> Bools:
+    """(M,) moves that the control may shift by a radius, up to the rapid behind CUTCOM/OFF.
+
+    Their blocks stay whole: a control takes the radius up, and off, over one block, and finds corners between two; parts
+    shorter than the radius are alarms or gouges.
+    """
+    shifted = compensation_states(job.toolpath)[moves.row] != OFF
+    ends = (moves.kind == Kind.RAPID) & ~shifted
+    number = np.arange(len(moves))
+    last, end = (np.maximum.accumulate(np.where(what, number, -1)) for what in (shifted, ends))
+    return np.asarray(last > end)
 
 
 def limits_by_tool(job: Job) -> dict[int, ToolLimits]:

@@ -61,6 +61,8 @@ class Polynomials:
     def block(self, b: int, here: list[DialectStatement], unit: float, new: New) -> str:
         """Words of block b, `unit` mm in a unit of length; what is wrong with it, "" for nothing."""
         if any(s.name == "POLY" for s in here):
+            if b in self.ended:
+                return "POLY next to another code of motion"
             self.begun = b
             new.append((b, "G", 1.0))
         terms = [s for s in here if s.name == "PO"]
@@ -68,12 +70,15 @@ class Polynomials:
             return ""
         if self.begun < 0 or np.searchsorted(self.ended, self.begun) < np.searchsorted(self.ended, b, side="right"):
             return "PO without POLY in force"
-        length = next((s.number(0) for s in here if s.name == "PL"), 1.0)
+        lengths = [s.number(0) for s in here if s.name == "PL"]
+        length = lengths[0] if lengths else 1.0
         axes = [str(s.args[0]) for s in terms]
         if "" in axes:
             return "a denominator polynomial, PO[]"
         if not set(axes) <= set("XYZ") or len(set(axes)) < len(axes):
             return "PO of another axis than X, Y, Z, or of one twice"
+        if len(lengths) > 1:
+            return "PL twice"
         curve = np.zeros((3, MOST - 1))
         for s in terms:
             values = [v for v in s.args[1:] if isinstance(v, float)]

@@ -190,7 +190,8 @@ def test_spl_as_its_page_has_it() -> None:
 
 @pytest.mark.parametrize("body", [
     "PO[X]=(1,2,3)\n", "POLY PO[]=(1,1) PO[X]=(2,1)\n", "POLY PO[C]=(1,2)\n", "POLY PO[X]=(1,2,3,4,5,6)\n",
-    "POLY PO[X]=(1,2) PL=0\n", "G93\nPOLY PO[X]=(1,2) F10\n", "G41\nPOLY PO[X]=(1,2)\n", "POLY X1\nG1 PO[X]=(1,2)\n",
+    "POLY PO[X]=(1,2) PL=0\n", "POLY PO[X]=(1,2) PL=2 PL=3\n", "G0 X5 POLY\n",
+    "G1 POLY PO[X]=(1,2)\n", "G93\nPOLY PO[X]=(1,2) F10\n", "G41\nPOLY PO[X]=(1,2)\n", "POLY X1\nG1 PO[X]=(1,2)\n",
     "R1=2\nPOLY PO[X]=(1,2,3)\n"])
 def test_other_polynomials_are_refused(body: str) -> None:
     head = "G17 G710 G90 G94 G40 G64\nG54\nG0 X0 Y0 Z0\nG1 X0 F600\n"
@@ -214,3 +215,34 @@ def test_what_is_refused_as_blocks_is_written_as_arcs(monkeypatch: pytest.Monkey
     monkeypatch.setattr(SiemensWriter, "cubic", lambda self, block: cubic(self, block).replace("PO[X]=(", "PO[X]=(1"))
     made = converted.__wrapped__(SIEMENS)
     assert made.ok and "splines.as_arcs" in {d.code for d in made.diagnostics} and not BLOCK[SIEMENS].search(made.text)
+
+
+MORE = "OPSKIP/OFF\nNURBS/\nKNOT/1.0\nCNTRL/15,9,-3\nCNTRL/16,-4,-3\nCNTRL/18,-9,-4\nRAPID\nGOTO/12,-9"
+SKIPPED = FILE.replace("NURBS/", "OPSKIP/ON\nNURBS/").replace("RAPID\nGOTO/12,-9", MORE)
+
+
+@pytest.mark.parametrize(("controller", "text", "files"), [
+    (SIEMENS, FILE, True), (TNC, FILE, True), (SIEMENS, SKIPPED, False), (TNC, SKIPPED, False),
+    (SIEMENS, SKIPPED.replace("OPSKIP/OFF\n", ""), False)])
+def test_what_is_written_is_verified(controller: str, text: str, files: bool, tmp_path: Path) -> None:
+    """Polynomials in files of subprograms, behind a code of the feed, or none left under the block switch."""
+    read = read_bytes(text)
+    setup = SETUP.model_copy(update={"output": SETUP.output.model_copy(update={"files": files})})
+    made = postproc.convert(read.toolpath, shop("splines = true"), controller, setup, diagnostics=read.diagnostics)
+    assert made.ok and bool(made.files) == files
+    (tmp_path / "part.nc").write_text(made.text)
+    for name, block in made.files.items():
+        (tmp_path / name).write_text(block)
+    found = postproc.verify(tmp_path / "part.nc", read.toolpath, shop("splines = true"), controller, setup,
+                            diagnostics=read.diagnostics)
+    assert {d.code for d in found.diagnostics if d.severity.name == "ERROR"} == set()
+
+
+def test_programs_next_to_it_are_no_subprograms(tmp_path: Path) -> None:
+    """A program with polynomials beside it, whose name only a remark holds, does not change what is verified."""
+    plain = converted(SIEMENS, "")
+    (tmp_path / "part.nc").write_text(plain.text)
+    (tmp_path / "A.nc").write_text(converted(SIEMENS).text)
+    read = read_bytes(FILE)
+    found = postproc.verify(tmp_path / "part.nc", read.toolpath, shop(""), SIEMENS, SETUP, diagnostics=read.diagnostics)
+    assert found.ok, [str(d) for d in found.diagnostics]

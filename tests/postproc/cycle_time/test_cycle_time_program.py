@@ -11,11 +11,12 @@ import postproc
 import toolpaths
 from postproc.controllers.model import load_controller
 from postproc.cycle_time.blocks import Cause, CornerMode, MotionBlocks
+from postproc.cycle_time.conversion import estimate_of
 from postproc.cycle_time.estimate import estimate
 from postproc.cycle_time.shape import shape
 from postproc.cycle_time.source import from_conversion, from_gcode
 from postproc.setup.model import SetupFile
-from tests.postproc.kit import SAMPLES, TOOLS
+from tests.postproc.kit import SAMPLES, TOOLS, convert, toolpath
 from tests.postproc.time_kit import HEAD, blocks, machine, model
 from toolpaths.cl.text.kinds_of_file import looks_like_gcode
 
@@ -165,3 +166,18 @@ def test_faults_of_a_program_are_reported() -> None:
                        ("F100 G1 Q\nM2\n", "gcode.syntax")):
         made, found = from_gcode(text.encode(), machine(), spec, SetupFile(), "a.ngc")
         assert made is None and code in [d.code for d in found], [str(d) for d in found]
+
+
+@pytest.mark.parametrize("controller", ["siemens-840d", "heidenhain-tnc640"])
+def test_files_of_subprograms_take_the_time_of_the_program_in_one(controller: str) -> None:
+    """Their lines begin anew: what is in force at a block (its smoothing here) goes by the order in which blocks run."""
+    path = toolpath("RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,6000", *(f"GOTO/{4 * k},{3 * (k % 3)},50" for k in range(1, 12)))
+    times = []
+    for files in (False, True):
+        setup = SetupFile.model_validate({"output": {"files": files}, "tools": {"1": {"gauge_length": 120.0}}})
+        made = convert(path, "mill-3axis", controller, setup=setup)
+        assert made.ok and bool(made.files) == files
+        found = estimate_of(made)
+        assert found is not None
+        times.append((found.seconds, from_conversion(made).tolerance))
+    assert times[0][0] == pytest.approx(times[1][0], abs=1e-9) and np.array_equal(times[0][1], times[1][1], equal_nan=True)

@@ -15,6 +15,7 @@ from postproc.base.program_time import ProgramTime
 from postproc.cycle_time.conversion import program_clock
 from postproc.pipeline.convert import convert, verify
 from postproc.pipeline.result import PostResult
+from postproc.setup.model import SetupFile
 from tests.postproc.kit import goto, machine, toolpath
 from tests.postproc.planning.test_planned_feed import wave
 from toolpaths.toolpath import Toolpath
@@ -103,3 +104,31 @@ def test_planned_feeds_are_optimised_too() -> None:
                    clock=program_clock())
     assert best.ok and best.optimised is not None and best.feed_times is not None
     assert best.optimised.after.seconds <= best.optimised.before.seconds
+
+
+def faster_as_programmed(result: PostResult, band: bool = False) -> ProgramTime:
+    """The clock of a control that makes its ramps itself, and runs programmed feeds faster."""
+    seconds = 10.0 if result.options.feed == "planned" else 8.0
+    moves = np.zeros(len(result.comparison.moves) if result.comparison else 0)
+    return ProgramTime(seconds, (seconds, seconds), 5.0, "clock of the test", moves)
+
+
+CORNER = ("RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,6000", "GOTO/20,0,50", "GOTO/21,1,50")
+
+
+def test_programmed_feeds_that_are_kept_are_what_is_timed() -> None:
+    """Times are those of the program written."""
+    best = convert(toolpath(*CORNER), machine("mill-3axis"), "linuxcnc", options=Options(optimise=True, feed="planned"),
+                   clock=faster_as_programmed)
+    assert best.ok and best.optimised is not None and best.feed_times is not None and best.feed_times.kept
+    assert (best.optimised.before.seconds, best.optimised.after.seconds) == (8.0, 8.0)
+    assert faster_as_programmed(best).seconds == 8.0
+
+
+@pytest.mark.parametrize("limits", [{}, {"tip_acceleration": 300.0}])
+def test_limits_of_a_tool_are_kept_by_planned_feeds_alone(limits: dict[str, float]) -> None:
+    """Programmed feeds that are faster are none that keep what the set-up asks for."""
+    setup = SetupFile.model_validate({"tools": {"1": {"gauge_length": 120.0, **limits}}})
+    made = convert(toolpath(*CORNER), machine("mill-3axis"), "linuxcnc", setup, Options(feed="planned"),
+                   clock=faster_as_programmed)
+    assert made.ok and made.feed_times is not None and made.feed_times.kept == (not limits)

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import postproc
 import toolpaths
 from machines.geometric_error import correct, load
 from postproc.base.options import Options
+from postproc.pipeline.convert import convert
 from postproc.pipeline.result import PostResult
 
 LINE = ("UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nFEDRAT/{},MMPM\nRAPID\nGOTO/-160,0,20\nGOTO/-160,0,0\nGOTO/160,0,0\n"
@@ -34,8 +34,7 @@ def screw(folder: Path) -> str:
 
 def planned(cl: str, machine: str, controller: str, **options: str) -> PostResult:
     path, found = toolpaths.read_bytes(cl)
-    result = postproc.convert(path, machine, controller, diagnostics=found,
-                              options=Options(feed="planned", **options))
+    result = convert(path, machine, controller, diagnostics=found, options=Options(feed="planned", **options))
     assert result.ok, [str(d) for d in result.diagnostics]
     return result
 

@@ -145,3 +145,16 @@ def test_the_model_of_a_control_takes_no_longer(name: str) -> None:
         blocks = from_conversion(made)
         seconds.append(float(timed(blocks, model.of_machine(made.machine)).end.max()))
     assert seconds[1] <= 1.03 * seconds[0]
+
+
+def test_blocks_that_a_radius_shifts_stay_whole() -> None:
+    """A control takes the radius up, and off, over one block, and finds corners between two (Fanuc B-63944EN-2, cutter
+    compensation: PS0041 where a corner's blocks are shorter than the shift)."""
+    before = ["RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,6000", "GOTO/0,0,40"]
+    shifted = ["CUTCOM/LEFT", "GOTO/10,0,40", "GOTO/40,0,40", "GOTO/40,30,40", "CUTCOM/OFF", "GOTO/60,30,40"]
+    after = ["RAPID", "GOTO/60,30,50", "GOTO/0,30,40"]
+    made = good(convert(toolpath(*before, *shifted, *after), "mill-3axis", JERKY, feed="planned"))
+    assert made.path is not None and made.job is not None
+    row = made.job.moves.row[made.path.move]
+    counts = np.bincount(row[made.path.code == 1], minlength=8)
+    assert counts[1] > 2 and counts[7] > 2 and (counts[2:6] == 1).all(), counts
