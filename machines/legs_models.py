@@ -174,7 +174,7 @@ class LegsModel(KinematicsModel):
         found = [fault for path, layout in self._layouts() for fault in layout.problems(path)] or [
             *self._table_problems(), *self._freedom_problems()]
         yield from found
-        if not found and not self.certificate:
+        if not found and not self.examined:
             legs = list(self.drives.values())
             yield from leg_faults(self._on_legs(), [_pair(leg) for leg in legs], [leg.bar for leg in legs])
 
