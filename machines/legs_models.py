@@ -174,7 +174,7 @@ class LegsModel(KinematicsModel):
         found = [fault for path, layout in self._layouts() for fault in layout.problems(path)] or [
             *self._table_problems(), *self._freedom_problems()]
         yield from found
-        if not found and not self.certificate:
+        if not found and not self.examined:
             legs = list(self.drives.values())
             yield from leg_faults(self._on_legs(), [_pair(leg) for leg in legs], [leg.bar for leg in legs])
 
@@ -227,6 +227,10 @@ class LegsModel(KinematicsModel):
                                  f"write bar = {name!r} in the tables of its legs, or take the bar out")
         if self.rotary is not None:
             yield from self.rotary.problems((*self.drives, *self.carriers))
+            if self.carriers:
+                yield KeyProblem("machine.geometry", ("carriers",), "a platform with a rotary axis is carried by no slides: "
+                                 "it moves along x, y and z by itself", "take [kinematics.carriers] out, or "
+                                 "[kinematics.rotary]")
             if turns not in ("a", "b"):
                 yield KeyProblem("machine.geometry", ("rotary",), "a rotary axis goes with a platform that tilts about "
                                  f"x or y; this one is free in {' '.join(self.freedoms)}", "take [kinematics.rotary] "

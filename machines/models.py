@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr
 
+from machines.certificate.lookup import comes_with_package
 from machines.choices import Park, Rapids, RolloverRule, Stop
 from machines.figures import Document, FigureSource, FigureTable, by_key, source_problems
 from machines.hooks import HooksModel
@@ -60,8 +61,13 @@ class KinematicsModel(UserModel):
         sampled."""
         return self._certificate
 
+    @property
+    def examined(self) -> bool:
+        """True where the proof comes with the package: `problems` need not look at the workspace."""
+        return comes_with_package(self._certificate)
+
     def take_certificate(self, file: str) -> None:
-        """There is such a proof: `problems` need not look at the workspace."""
+        """There is such a proof."""
         self._certificate = file
 
     @abstractmethod

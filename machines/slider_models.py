@@ -141,7 +141,7 @@ class SliderModel(KinematicsModel):
         found = list(self._layout_problems()) or [
             *self._leg_problems(), *rail_problems(list(self.slides.values()), self.clearance)]
         yield from found
-        if not found and not self.certificate:
+        if not found and not self.examined:
             yield from self.mobility_problems()
 
     def _leg_problems(self) -> Iterator[KeyProblem]:

@@ -89,6 +89,10 @@ def certify(machine: Machine, wanted: Wanted) -> Certified:
                                      file=machine.file,
                                      hint="certify machines on legs: a chain of axes is singular where the tool lies along "
                                      "its rotary axis")])
+    if wanted.box is not None and legs.head:
+        raise DiagnosticError([error("certificate.head", f"no box of tips of {machine.name} is proved: an axis between "
+                                     "platform and spindle moves the tip about", file=machine.file,
+                                     hint="leave --box out: the declared workspace of the platform is proved")])
     asked, region = _asked(machine, legs, wanted)
     proved = prove(asked)
     outside = None

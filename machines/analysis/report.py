@@ -20,6 +20,7 @@ from machines.analysis.transmission import (
     condition_number,
     conditioning_factor,
     force_transmission,
+    heading_of,
     manipulability,
     speed_acceleration,
     speed_transmission,
@@ -112,13 +113,20 @@ def _roots(machine: Machine) -> dict[str, Any]:
 
 def _largest(measure: Any, parts: Transmission | RodPlatform, several: bool = False) -> dict[str, Any]:
     bound: Measure = partial(measure, parts)
-    return _point(worst(bound, parts.workspace, COARSE if several else GRID))
+    found = worst(bound, parts.workspace, COARSE if several else GRID)
+    return _point(found) | _heading(measure, parts, found, several)
 
 
 def _least(measure: Any, parts: Transmission, several: bool) -> dict[str, Any]:
     """The least value in the place of the largest."""
     found = worst(lambda place, tilt: -measure(parts, place, tilt), parts.workspace, COARSE if several else GRID)
-    return _point(replace(found, value=-found.value, least=-found.least)) | {"best_on_grid": -found.least}
+    place = {key: value for key, value in _point(replace(found, value=-found.value)).items() if key != "least_on_grid"}
+    return place | _heading(measure, parts, found, several, True) | {"best_on_grid": -found.least}
+
+
+def _heading(measure: Any, parts: Any, at: WorstValue, several: bool, least: bool = False) -> dict[str, Any]:
+    """Where a tilt has several directions, the one that is meant."""
+    return {"at_heading_deg": heading_of(measure, parts, at, least) / DEG} if several else {}
 
 
 def _point(value: WorstValue) -> dict[str, Any]:

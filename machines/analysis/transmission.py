@@ -33,6 +33,41 @@ class WorstValue:
     least: float
 
 
+@dataclass(frozen=True, eq=False)
+class Towards:
+    """A `Transmission` that tilts into one direction alone."""
+
+    parts: Transmission
+    heading: float
+
+    @property
+    def workspace(self) -> Workspace:
+        """See `Transmission`."""
+        return self.parts.workspace
+
+    @property
+    def lever(self) -> float:
+        """See `Transmission`."""
+        return self.parts.lever
+
+    @property
+    def headings(self) -> Floats:
+        """(1,) rad."""
+        return np.array([self.heading])
+
+    def loops_at(self, place: Floats, tilt: Floats, heading: float) -> tuple[Floats, Floats]:
+        """See `Transmission`."""
+        return self.parts.loops_at(place, tilt, heading)
+
+
+def heading_of(measure: Callable[[Transmission, Floats, Floats], Floats], parts: Transmission, at: WorstValue,
+               least: bool = False) -> float:
+    """rad: the direction of the tilt in which a measure has its largest (least) value at a place."""
+    place, tilt = np.array([at.place]), np.array([at.tilt])
+    found = [float(measure(Towards(parts, float(h)), place, tilt)[0]) for h in parts.headings]
+    return float(parts.headings[int(np.argmin(found) if least else np.argmax(found))])
+
+
 def rates(kinematics: Transmission, place: Floats, tilt: Floats, heading: float = 0.0) -> Floats:
     """J (N, K, K) at places (N, 3) and tilts (N,) of the workspace: platform (mm, lever x turn) per drive (mm)."""
     jx, along = kinematics.loops_at(place, tilt, heading)

@@ -14,8 +14,8 @@ NEXT_TO_IT = ".certificate.json"
 """what the name of a certificate next to a machine file ends in"""
 APART = ("clearance", "assumed", "source", "family")
 """keys of `[kinematics]` that the proof does not rest on"""
-WHOLE, HEAD = "workspace", 400
-"""what a certificate of the whole declared workspace covers; characters of its file that say so, and its key"""
+WHOLE = "workspace"
+"""what a certificate of the whole declared workspace covers"""
 
 
 def key_of(values: Mapping[str, Any]) -> str:
@@ -46,12 +46,21 @@ def certificate_of(values: Mapping[str, Any], file: str) -> Path | None:
     key = key_of(values)
     if (found := shipped().get(key)) is not None:
         return found
+    own = Path(file).with_suffix(NEXT_TO_IT) if file else None
+    return own if own is not None and _is_whole(own, key) else None
+
+
+def comes_with_package(file: str) -> bool:
+    """True of a certificate that the project's own check has confirmed; any other is a claim until it is checked."""
+    return bool(file) and Path(file).parent == SHIPPED
+
+
+def _is_whole(file: Path, key: str) -> bool:
+    """True of the whole, unchanged certificate of a workspace with that key: nobody has edited its boxes or its margin."""
     try:
-        own = Path(file).with_suffix(NEXT_TO_IT)
-        if not own.is_file():
-            return None
-        with own.open(encoding="utf-8") as text:
-            head = text.read(HEAD)
-    except (OSError, ValueError):
-        return None
-    return own if f'"key": "{key}"' in head and f'"covers": "{WHOLE}"' in head else None
+        found = json.loads(file.read_text("utf-8")) if file.is_file() else None
+        return isinstance(found, dict) and found["key"] == key and found["covers"] == WHOLE and bool(
+            found["digest"] == sha256("\n".join(found["boxes"]).encode()).hexdigest()
+            and 0.0 < float(found["margin"]) <= min(float(v) for v in found["proved"].values()))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError):
+        return False

@@ -34,6 +34,7 @@ class LegGeometry:
         gauge: (3,) gauge point from the reference point, platform level
         carrier_names, carriers: slides under legs and platform, or under the part, and how they move the tool
         workspace: of the reference point and the tilt
+        head: True where an axis between platform and spindle turns the tool: its tip is not at rest on the platform
     """
 
     names: tuple[str, ...]
@@ -51,6 +52,7 @@ class LegGeometry:
     carrier_names: tuple[str, ...]
     carriers: Floats
     workspace: Workspace
+    head: bool = False
 
     @property
     def turns(self) -> str:

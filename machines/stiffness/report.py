@@ -38,6 +38,8 @@ class StiffnessQuestion:
 def stiffness(machine: Machine, asked: StiffnessQuestion) -> dict[str, Any]:
     """Least and largest stiffness of the tip, deflection, rod and drive forces under the force, with the pose of each.
 
+    Of a machine with an axis between platform and spindle: that axis at 0.
+
     Raises:
         DiagnosticError: of a machine without legs.
     """
@@ -51,7 +53,9 @@ def stiffness(machine: Machine, asked: StiffnessQuestion) -> dict[str, Any]:
     bar, drive = (np.unravel_index(int(np.abs(v).argmax()), v.shape) for v in (bars, drives))
     directions = {f"stiffness_{letter}_least_n_per_um": float(1e-3 / c[:, i, i].max())
                   for i, letter in enumerate("xyz") if c[:, i, i].max() > 0.0}
-    found = {"machine": machine.name, "tool_mm": asked.tool, "poses": len(tip), "force_n": asked.force.tolist()} | directions
+    found = {"machine": machine.name, "tool_mm": asked.tool, "poses": len(tip), "force_n": asked.force.tolist()}
+    found |= {"spindle_axis_deg": 0.0} if rods.legs.head else {}
+    found |= directions
     return found | {
         "stiffness_n_per_um": {"least": float(tip[least] * 1e-3), **_at(poses, least), "largest": float(tip[most] * 1e-3)},
         "deflection_um": {"worst": float(bend[worst] * 1e3), "along_xyz": (c[worst] @ asked.force * 1e3).tolist(),

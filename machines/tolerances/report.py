@@ -81,14 +81,20 @@ class ToleranceReport:
         return rows
 
     @property
+    def head(self) -> str:
+        """Where an axis between platform and spindle stands for these figures, "" of machines without."""
+        legs = self.machine.kinematics.leg_geometry
+        return ", axis at the spindle at 0" if legs is not None and legs.head else ""
+
+    @property
     def figures(self) -> dict[str, Any]:
         """All of it."""
         asked, points = self.asked, self.points
         what = "once the rods are adjusted in the middle of the workspace" if asked.adjust else "as built"
         figures: dict[str, Any] = {
             "machine": self.machine.name, "tool_mm": asked.tool, "adjusted": asked.adjust,
-            "of": f"largest error of the tip (tool {asked.tool:g} mm) at {self.poses} poses of the workspace, {what}: "
-                  "position in um, turn in urad, per um, of guides per urad",
+            "of": f"largest error of the tip (tool {asked.tool:g} mm{self.head}) at {self.poses} poses of the workspace, "
+                  f"{what}: position in um, turn in urad, per um, of guides per urad",
             "dimensions": self.rows,
             "points": [{"point": str(name), "position": _scaled(name.part, float(points.position[k])),
                         "turn": float(points.turn[k] * (1.0 if name.part == "guide" else 1000.0))}
@@ -124,9 +130,10 @@ def rods_of(machine: Machine) -> RodsOfLegs:
     """
     legs, parts = machine.kinematics.leg_geometry, machine.kinematics.clearance_parts
     if legs is None or parts is None or parts.clearance is None:
-        raise DiagnosticError([error("sensitivity.legs", f"{machine.name} has no platform on legs", file=machine.file,
-                                     hint="name a machine on legs; errors of a chain of axes are in error models (convert "
-                                     "--error-model)")])
+        raise DiagnosticError([error(
+            "sensitivity.legs", f"{machine.name} has no platform on legs, or one with bars, with a turn about z alone, or "
+            "carried twice", file=machine.file,
+            hint="name a machine on legs; errors of a chain of axes are in error models (convert --error-model)")])
     return RodsOfLegs(legs, parts.clearance.leg, parts.clearance.shift)
 
 

@@ -23,11 +23,17 @@ DEEPEST, AT_ONCE = 14, 1_000
 LOWER, UPPER = "xyztn", "XYZTN"
 SPANS = ("x_mm", "y_mm", "z_mm", "tilt_rad", "heading_rad")
 BOUNDS = ("direct", "inverse", "held")
-_LINE = re.compile(r"(\.|[xyztnXYZTN]+) (\S+) (\S+) (\S+)")
+FORM, COVERS = 1, ("workspace", "region")
+"""of the file that this check reads; what a certificate may be of"""
+_LINE = re.compile(r"(\.|[xyztnXYZTN]{1,64}) (\S+) (\S+) (\S+)")
 
 
 class Rejected(ValueError):
     """The certificate does not prove what it says; the message says where."""
+
+
+NO_CERTIFICATE = (KeyError, TypeError, ValueError, IndexError, AttributeError, ArithmeticError)
+"""what reading a file of another form may raise"""
 
 
 @dataclass(frozen=True)
@@ -48,21 +54,42 @@ def confirmed(found: dict[str, Any]) -> dict[str, Any]:
         Rejected: where it does not.
     """
     try:
-        boxes, margin = _boxes(found), float(found["margin"])
+        margin = _margins(found)
+        boxes = _boxes(found)
         least = np.min([box.stated for box in boxes], axis=0)
         if {name: float(v) for name, v in zip(BOUNDS, least, strict=True)} != found["proved"]:
             raise Rejected(f"`proved` says {found['proved']}, the boxes have {least.tolist()}")
-        if least.min() < margin:
+        if not least.min() >= margin:
             box = min(boxes, key=lambda one: float(one.stated.min()))
             raise Rejected(f"box {box.path or '.'} states {box.stated.min():g}, less than the margin {margin:g}")
         _carriers(found)
-        looked = _prove(found, boxes)
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as fault:
+        looked, region = _prove(found, boxes), _region(found["region"])
+    except NO_CERTIFICATE as fault:
         if isinstance(fault, Rejected):
             raise
         raise Rejected(f"it is no certificate of this form: {type(fault).__name__}: {fault}") from fault
-    return {"boxes": len(boxes), "looked_at": looked, "margin": margin} | {
+    return {"region": region} | {"boxes": len(boxes), "looked_at": looked, "margin": margin} | {
         f"{name}_at_least": float(v) for name, v in zip(BOUNDS, least, strict=True)}
+
+
+def _region(region: dict[str, Any]) -> dict[str, Any]:
+    """Of which point, and its poses, mm and degrees."""
+    spans = {name: np.array(region[name], np.float64) for name in SPANS}
+    return {"of": region["of"], "tool_mm": float(region["tool_mm"])} | {
+        name.replace("_rad", "_deg"): (np.degrees(v) if name.endswith("_rad") else v).tolist() for name, v in spans.items()}
+
+
+def _margins(found: dict[str, Any]) -> float:
+    """The margin; all that says how the rest is meant has to be what this check knows: a negative margin, or one that is no
+    number, would let any bound pass."""
+    if found["certificate"] != FORM or found["covers"] not in COVERS:
+        raise Rejected(f"form {found['certificate']!r} of a certificate that covers {found['covers']!r} is not known here")
+    if not isinstance(found["travel_proved"], bool):
+        raise Rejected(f"`travel_proved` is {found['travel_proved']!r}, neither true nor false")
+    margin, travel = float(found["margin"]), float(found["travel_margin"])
+    if not (0.0 < margin < np.inf and 0.0 <= travel < np.inf):
+        raise Rejected(f"a margin of {margin:g}, {travel:g} of the travel, proves nothing")
+    return margin
 
 
 def _boxes(found: dict[str, Any]) -> list[StatedBox]:

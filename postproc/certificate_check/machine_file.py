@@ -41,6 +41,9 @@ def about(found: dict[str, Any], table: dict[str, Any]) -> None:
     if found.get("key") != hash_of(table):
         raise Rejected("its key is not the hash of the machine file: the file has changed, or it is another machine's")
     kinematics, geometry = table["kinematics"], found["geometry"]
+    _plain(kinematics)
+    if found["region"]["of"] == "tip" and kinematics.get("rotary", {}).get("carries") == "spindle":
+        raise Rejected("an axis between platform and spindle moves the tip about: only the platform's places are proved")
     own, given = legs_of(kinematics), geometry["legs"]
     if list(own) != [leg["letter"] for leg in given]:
         raise Rejected(f"it has legs {[leg['letter'] for leg in given]}, the machine file {list(own)}")
@@ -54,11 +57,24 @@ def about(found: dict[str, Any], table: dict[str, Any]) -> None:
         if not _same(value, geometry[what]):
             raise Rejected(f"{what} is {geometry[what]}, in the machine file {value}")
     carriers = {one["letter"]: one for one in geometry["carriers"]}
+    if len(carriers) != len(geometry["carriers"]) or set(carriers) != set(kinematics.get("carriers", {})):
+        raise Rejected(f"it has carriers {[one['letter'] for one in geometry['carriers']]}, the machine file "
+                       f"{list(kinematics.get('carriers', {}))}")
     for letter, carrier in kinematics.get("carriers", {}).items():
         due = {"direction": _unit(carrier["direction"]), "travel": _travel(table["axes"][letter], "slide")}
         if letter not in carriers or not all(_same(v, carriers[letter][k]) for k, v in due.items()):
             raise Rejected(f"carrier {letter} is another in the machine file")
     _whole(found, kinematics)
+
+
+def _plain(kinematics: dict[str, Any]) -> None:
+    """Machines that the geometry of a certificate cannot describe are proved by none."""
+    freedoms = set(kinematics.get("freedoms", "xyz"))
+    for what, there in (("a platform with bars", kinematics.get("bars")),
+                        ("a platform that turns about z alone", freedoms & set("abc") == {"c"}),
+                        ("a platform carried twice", kinematics.get("carriers") and freedoms >= set("xyz"))):
+        if there:
+            raise Rejected(f"the machine file is of {what}: no certificate of this form describes it")
 
 
 def _of_file(leg: dict[str, Any], axis: dict[str, Any], drive: str, side: tuple[float, float]) -> dict[str, Any]:

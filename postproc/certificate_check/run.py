@@ -8,7 +8,7 @@ from typing import Any
 
 from machines.loader import builtin
 from machines.user_file import base_chain, values_of
-from postproc.certificate_check.check import Rejected, confirmed
+from postproc.certificate_check.check import NO_CERTIFICATE, Rejected, confirmed
 from postproc.certificate_check.machine_file import about
 from postproc.witness.machine import merged
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
@@ -42,7 +42,7 @@ def checked(file: Path, machine: str = "") -> tuple[dict[str, Any], list[Diagnos
         return {"machine": source, "confirmed": False}, [error(
             "certificate.rejected", str(fault), file=str(file),
             hint=f"certify again: postproc machine certify {source} -o {file.name}")]
-    except (KeyError, TypeError, ValueError, AttributeError) as fault:
+    except NO_CERTIFICATE as fault:
         return {"machine": source, "confirmed": False}, [error(
             "certificate.rejected", f"it is no certificate of this form: {type(fault).__name__}: {fault}", file=str(file),
             hint=f"certify again: postproc machine certify {source} -o {file.name}")]

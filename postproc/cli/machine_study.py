@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 ANALYSED = "Examples: postproc machine analyse uranesx --json -; " \
            "postproc machine analyse uranesx --map condition --along x --along y --at z=-100 --figure map.svg --csv map.csv"
-SingularOption = Annotated[float | None, typer.Option("--singular-above", metavar="MM", min=0.0,
+SingularOption = Annotated[float | None, typer.Option("--singular-above", metavar="MM", min=0.0, max=1e6,
                                                       help="prove by a grid that the singular values of a linear Delta with "
                                                       "slides along z stay above this")]
 MapOption = Annotated[MapMeasure | None, word_option("--map", MapMeasure, "measure of a map or a curve")]
@@ -96,7 +96,8 @@ CheckFile = Annotated[Path | None, typer.Option("--check", metavar="CERT.json", 
 BoxOption = Annotated[str, typer.Option("--box", metavar="BOX", help="of the tip, mm: 500x500x400 in the middle of the "
                                         "workspace or -250:250,-250:250,-200:200; left out: the declared workspace of the "
                                         "platform")]
-BoxTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, help="length of the tool, with --box")]
+BoxTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, max=1e4,
+                                          help="length of the tool, with --box")]
 MarginOption = Annotated[float | None, typer.Option("--margin", metavar="SHARE", min=1e-6, max=1.0, help=(
     "distance from singular positions, no unit; left out: half of the least that random poses have"))]
 TravelOption = Annotated[bool | None, typer.Option("--travel/--no-travel", help="whether drives must be inside their "
@@ -172,13 +173,16 @@ def _check(name: str, file: Path, json: str, more: bool) -> None:
 
 
 TOLERATED = "Example: postproc machine tolerance uranesx --tool 120 --error 0.02 --cost guide=3 --csv uranesx.csv"
-TipTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, help="length of the tool whose tip is meant")]
+TipTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, max=1e4,
+                                          help="length of the tool whose tip is meant")]
 AdjustOption = Annotated[bool, typer.Option("--adjust", help="once the rods' lengths are set so that the middle of the "
                                             "workspace is exact")]
-SpreadOption = Annotated[float, typer.Option("--spread", metavar="UM", min=1e-6, help="errors by chance, micrometres; "
+SpreadOption = Annotated[float, typer.Option("--spread", metavar="UM", min=1e-6, max=1e6,
+                                              help="errors by chance, micrometres; "
                                              "microradians of guides")]
 SamplesOption = Annotated[int, typer.Option("--samples", metavar="N", min=1, max=1_000_000, help="of errors by chance")]
-ErrorOption = Annotated[float | None, typer.Option("--error", metavar="MM", min=1e-9, help="budget: error of the tip that "
+ErrorOption = Annotated[float | None, typer.Option("--error", metavar="MM", min=1e-9, max=1e3,
+                                                   help="budget: error of the tip that "
                                                    "the tolerances have to keep together")]
 CostOption = Annotated[list[str] | None, typer.Option("--cost", metavar="PART=COST", help="budget: cost of a tolerance of "
                                                       "drive, guide, foot, joint or rod against the others, else 1")]
@@ -219,10 +223,13 @@ def machine_tolerance(name: Annotated[str, typer.Argument(help="name or TOML fil
 
 
 STIFF = "Example: postproc machine stiffness uranesx --rod 100 --joint 150 --drive 80 --tool 120 --force 300,0,-500"
-RodOption = Annotated[float, typer.Option("--rod", metavar="N/UM", min=1e-9, help="stiffness of a rod's body along it")]
-JointOption = Annotated[float | None, typer.Option("--joint", metavar="N/UM", min=1e-9, help="of each joint along the rod; "
+RodOption = Annotated[float, typer.Option("--rod", metavar="N/UM", min=1e-9, max=1e9,
+                                            help="stiffness of a rod's body along it")]
+JointOption = Annotated[float | None, typer.Option("--joint", metavar="N/UM", min=1e-9, max=1e9,
+                                                     help="of each joint along the rod; "
                                                    "left out: it does not yield")]
-DriveOption = Annotated[float | None, typer.Option("--drive", metavar="N/UM", min=1e-9, help="of a drive along its motion; "
+DriveOption = Annotated[float | None, typer.Option("--drive", metavar="N/UM", min=1e-9, max=1e9,
+                                                     help="of a drive along its motion; "
                                                    "left out: it does not yield")]
 ForceOption = Annotated[str, typer.Option("--force", metavar="FX,FY,FZ", help="at the tip, N, in the machine's directions")]
 StiffnessMap = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="map of the middle slice, .png or .svg")]
@@ -261,7 +268,7 @@ def machine_stiffness(name: Annotated[str, typer.Argument(help="name or TOML fil
 DESIGNED = "Example: postproc machine design --layout parallel-z --box 500x500x400 --max bulk=1475 -o delta.toml"
 LayoutOption = Annotated[SlideLayout, word_option("--layout", SlideLayout, "how the slides stand")]
 BoxSides = Annotated[str, typer.Option("--box", metavar="XxYxZ", help="sides of the workspace, mm")]
-PlatformOption = Annotated[float, typer.Option("--platform", metavar="MM", min=1.0, help="from the middle of the "
+PlatformOption = Annotated[float, typer.Option("--platform", metavar="MM", min=1.0, max=1e5, help="from the middle of the "
                                                  "platform to its joints")]
 GoalOption = Annotated[Goal, word_option("--least", Goal, "what is to be least")]
 MaxOption = Annotated[list[str] | None, typer.Option("--max", metavar="FIGURE=VALUE", help="largest condition, bulk (mm, "

@@ -150,7 +150,8 @@ class Rods:
         for name, along in self.carriers.items():
             tip = tip - q[:, letters.index(name)][:, None] * along
         head = rotations(np.eye(3)[int(self.turns != "b")], turn * (self.carries == "spindle"))
-        platform, tool = self._nominal(axis), apply(head, _UP[None])
+        tool = apply(head, _UP[None])
+        platform = self._nominal(axis * np.where(tool[:, 2:] < 0.0, -1.0, 1.0))  # past a quarter turn the head points back
         if self.wrong and self.turns != "c":
             platform = _between(np.broadcast_to(apply(platform, tool), axis.shape), axis) @ platform
         expected, gauge, reach = apply(platform, tool), tip + length[:, None] * axis, apply(head, self.reach[None])

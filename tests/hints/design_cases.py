@@ -8,6 +8,8 @@ _ANOTHER = '{"certificate": 1, "machine": "uranesx"}'
 DESIGN = [
     HintCase("certificate.legs", "machine certify mill-3axis", {}, "certify machines (on legs)",
              (Edit(COMMAND, "mill-3axis", "uranesx"),)),
+    HintCase("certificate.head", "machine certify h4a-spindle-axis --box=-5:5,-5:5,-650:-640", {},
+             "leave (--box) out", (Edit(COMMAND, " --box=-5:5,-5:5,-650:-640", ""),)),
     HintCase("certificate.short", "machine certify uranesx --box=-250:900,-250:250,-250:250 --margin 0.3", {},
              "make the workspace or (--box) smaller", (Edit(COMMAND, "-250:900", "-250:250"),)),
     HintCase("certificate.undecided", "machine certify uranesx --margin 0.3836634533", {},

@@ -63,7 +63,8 @@ class LegsWithAxis(Kinematics):
     @property
     def leg_geometry(self) -> LegGeometry | None:
         """See the base class: that of the legs."""
-        return self.on_legs.leg_geometry
+        found = self.on_legs.leg_geometry
+        return None if found is None else replace(found, head=self.axis.at_spindle)
 
     @property
     def axis_names(self) -> tuple[str, ...]:  # type: ignore[override]  # nothing assigns it

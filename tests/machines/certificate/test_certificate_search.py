@@ -190,6 +190,31 @@ def test_another_geometry_is_sampled_until_it_is_certified(tmp_path: Path) -> No
     assert machines.load(file).certificate == ""
 
 
+def test_a_claim_next_to_a_machine_file_does_not_stand_for_a_look_at_its_workspace(tmp_path: Path) -> None:
+    """Whoever writes the new key into the old certificate gets no singular machine past the sampling."""
+    file, claim = tmp_path / "mine.toml", tmp_path / "mine.certificate.json"
+    file.write_text('base = "uranesx"\n[kinematics.legs.X]\nrod = 700\n', encoding="utf-8")
+    good = json.loads(certify(machines.load("uranesx"), Wanted()).text)
+    key = key_of({"kinematics": values_of_machine(machines.load("uranesx"))["kinematics"]})
+    assert good["key"] == key
+    values = json.loads(json.dumps(values_of_machine(machines.load("uranesx"))))
+    values["kinematics"]["legs"]["X"]["rod"] = 700
+    claim.write_text(json.dumps(good | {"key": key_of(values)}), encoding="utf-8")
+    with pytest.raises(DiagnosticError, match="workspace"):
+        machines.load(file)
+    near = 'base = "uranesx"\n[kinematics.legs.X]\nrod = 1301\n'
+    file.write_text(near, encoding="utf-8")
+    values["kinematics"]["legs"]["X"]["rod"] = 1301
+    for edit in ({}, {"boxes": ["x 1 1 1"]}, {"margin": -1.0}, {"margin": float("nan")}, {"digest": 3}, {"proved": {}}):
+        claim.write_text(json.dumps(good | {"key": key_of(values)} | edit), encoding="utf-8")
+        assert bool(machines.load(file).certificate) == (not edit)
+
+
+def test_a_box_of_tips_behind_an_axis_at_the_spindle_is_refused() -> None:
+    with pytest.raises(DiagnosticError, match=r"certificate\.head"):
+        certify(machines.load("h4a-spindle-axis"), Wanted((np.full(3, -1.0), np.full(3, 1.0)), 100.0))
+
+
 def test_halving_goes_across_what_matters() -> None:
     """A linear Delta with slides along z is the same at every height: no box is halved there."""
     content = json.loads(certify(machines.load("uranesx"), Wanted(travel=False)).text)

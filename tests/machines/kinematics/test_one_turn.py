@@ -163,6 +163,8 @@ def test_v4_is_refused_where_the_condition_number_is_good(phi: tuple[int, ...], 
     ("h4-rotary", "rods = [[0, -30, 0], [0, 30, 0]]\n", "", "machine.mobility", "do not hold the platform everywhere"),
     ("tilting-arms-c-table", '"z", "b"]', '"z", "c"]', "machine.geometry", "a rotary axis goes with a platform"),
     ("tilting-arms-c-table", 'letter = "C"', 'letter = "A"', "machine.axis-letter", "A drives a leg too"),
+    ("tilting-arms-c-table", "[kinematics.rotary]", "[kinematics.carriers.P]\ndirection = [1, 0, 0]\n[kinematics.rotary]",
+     "machine.geometry", "is carried by no slides"),
     ("tilting-arms-c-table", 'carries = "part"', 'carries = "part"\npivot = [1, 0, 0]', "machine.geometry", "a table turns"),
 ])
 def test_what_does_not_go_together_is_refused(name: str, old: str, new: str, code: str, words: str, tmp_path: Path) -> None:

@@ -158,6 +158,56 @@ def test_a_machine_that_has_changed_is_noticed() -> None:
             about(GOOD | {"key": hash_of(other)}, other)
 
 
+def _all_bounds(value: float) -> Callable[[Content], object]:
+    return lambda found: found.update(boxes=[f"{line.split()[0]} {value} {value} {value}" for line in found["boxes"]])
+
+
+@pytest.mark.parametrize("margin", [0.0, -1.0, float("nan"), float("inf"), 10**400])
+def test_a_margin_that_lets_any_bound_pass_is_rejected(margin: float) -> None:
+    """A singular position inside has bounds of 0 or less."""
+    found = changed(_all_bounds(-0.5 if margin else 0.0))
+    found["margin"] = margin
+    with pytest.raises(Rejected, match=r"margin|no certificate"):
+        confirmed(sealed(found))
+
+
+@pytest.mark.parametrize("edit", [
+    {"travel_margin": -1000.0}, {"travel_margin": float("nan")}, {"travel_proved": "yes"}, {"certificate": 99},
+    {"covers": "all"}, {"covers": ["workspace"]}], ids=str)
+def test_words_that_the_check_does_not_know_are_rejected(edit: Content) -> None:
+    with pytest.raises(Rejected):
+        confirmed(deepcopy(GOOD) | edit)
+
+
+def test_carriers_that_the_machine_has_not_are_rejected() -> None:
+    """They would take a part of each place on themselves: the legs were looked at in a smaller workspace."""
+    found = deepcopy(GOOD)
+    found["geometry"]["carriers"] = [{"letter": name, "direction": row, "travel": [None, None]} for name, row in zip(
+        "UVW", np.eye(3).tolist(), strict=True)]
+    with pytest.raises(Rejected, match="carriers"):
+        about(found, json.loads(json.dumps(values_of_machine(machines.load("rotary-delta")))))
+
+
+@pytest.mark.parametrize("name", ["h4-rotary", "macro-micro"])
+def test_machines_that_no_certificate_describes_are_rejected(name: str) -> None:
+    table = json.loads(json.dumps(values_of_machine(machines.load(name))))
+    with pytest.raises(Rejected, match="no certificate of this form describes it"):
+        about(GOOD | {"key": hash_of(table)}, table)
+
+
+def test_a_box_of_tips_behind_an_axis_at_the_spindle_is_rejected() -> None:
+    table = json.loads(json.dumps(values_of_machine(machines.load("h4a-spindle-axis"))))
+    found = json.loads(shipped()[hash_of(table)].read_text("utf-8"))
+    found["region"]["of"], found["covers"] = "tip", "region"
+    with pytest.raises(Rejected, match="moves the tip about"):
+        about(found, table)
+
+
+def test_the_check_says_of_what_the_region_is() -> None:
+    region = confirmed(deepcopy(GOOD))["region"]
+    assert region["of"] == "platform" and region["x_mm"] == GOOD["region"]["x_mm"] and region["tilt_deg"] == [0.0, 0.0]
+
+
 def test_balls_hold_what_they_stand_for() -> None:
     """Products, quotients, roots, angles of random numbers inside, taken in more digits than a float has."""
     rng = np.random.default_rng(0)

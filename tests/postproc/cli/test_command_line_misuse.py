@@ -8,9 +8,11 @@ import re
 from pathlib import Path
 
 import pytest
+import typer
 
 import postproc
 from postproc.base.json_values import rounded
+from postproc.cli.app import app
 from tests.postproc.cli.test_cli import MILL, POCKET, cl, run
 from tests.postproc.kit import SAMPLES, TOOLS
 
@@ -122,3 +124,25 @@ def test_names_and_paths_instead_of_loaded_files() -> None:
     path, _ = toolpaths.read(SAMPLES / "pocket.cls")
     result = postproc.convert(path, "mill-3axis", setup=TOOLS)
     assert result.ok and result.setup.tools["1"].gauge_length == 120.0 and "(setup " in result.text
+
+
+def _numbers(command: object, path: tuple[str, ...] = ()) -> list[tuple[tuple[str, ...], str, float | None, float | None]]:
+    """(command, option, least, greatest) of all options that are numbers with a fraction."""
+    own = [(path, p.name, p.min, p.max) for p in command.params
+           if "float" in str(getattr(getattr(p, "type_descriptor", None), "annotation", ""))]
+    return own + [row for name, inner in getattr(command, "commands", {}).items() for row in _numbers(inner, (*path, name))]
+
+
+def test_every_number_of_an_option_has_both_bounds() -> None:
+    """So that none is infinite: a stiffness or a tool without end ended in a traceback, or in figures of nothing."""
+    found = _numbers(typer.main.get_command(app))
+    assert len(found) > 20
+    assert [row for row in found if row[2] is None or row[3] is None] == []
+
+
+@pytest.mark.parametrize("words", ["stiffness uranesx --rod inf", "stiffness uranesx --rod 100 --tool inf",
+                                   "stiffness planar-delta --rod inf", "tolerance uranesx --tool inf",
+                                   "certify uranesx --box=5x5x5 --tool inf", "analyse uranesx --singular-above inf"])
+def test_what_is_infinite_is_wrong_use(words: str) -> None:
+    got = run("machine", *words.split())
+    assert got.exit_code == 2 and "less than or equal" in got.stderr, got.stderr

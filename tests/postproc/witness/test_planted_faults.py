@@ -5,6 +5,7 @@ The read-back shares all of these with what it proves, so that it agrees with mo
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -33,6 +34,7 @@ from postproc.job.job import Job
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import Placement, SetupFile
 from postproc.verification.second_witness import second_witness
+from postproc.witness.machine import rods as rods_of_file
 from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.feeds import PER_MINUTE
 from toolpaths.toolpath import Kind, Toolpath
@@ -364,3 +366,17 @@ def test_a_planted_fault_is_found(name: str, monkeypatch: Patch) -> None:
     unspoilt(*case)
     plant(monkeypatch)
     assert codes(converted(*case)), f"{name}: the second witness agrees with the fault"
+
+
+def test_a_head_past_a_quarter_turn_is_no_fault() -> None:
+    """The tool points down past the level there; the platform tilts as little as before."""
+    kin, length = machines.load("h4a-spindle-axis").kinematics.with_tool(60.0), np.full(40, 60.0)
+    rng = np.random.default_rng(3)
+    space = kin.workspace
+    pose = np.column_stack([rng.uniform(space.lower, space.upper, (40, 3)), rng.uniform(*space.tilt, 40)])
+    q = kin.joints_at(pose, rng.uniform(1.7, 2.8, (40, 1)) * rng.choice([-1.0, 1.0], (40, 1)))
+    tip, axis, _ = kin.pose(q)
+    file = Path(machines.__file__).parent / "data" / "h4a-spindle-axis.toml"
+    witness = rods_of_file(tomllib.loads(file.read_text("utf-8")))
+    assert witness.misfit(q, kin.axis_names, tip, axis, length).max() < 1e-6
+    assert witness.misfit(q, kin.axis_names, tip, axis + np.array([0.0, 1e-4, 0.0]), length).min() > 1e-3
