@@ -11,7 +11,7 @@ import machines
 import postproc
 import toolpaths
 from postproc.base.options import Options
-from postproc.controllers.model import builtin_files, load_controller
+from postproc.controllers.model import builtin_files
 from postproc.setup.model import load_setup
 from tests.postproc.kit import setup_of
 from toolpaths.diagnostics import Severity
@@ -76,22 +76,11 @@ def part_for(machine: str) -> tuple[toolpaths.Toolpath, object]:
     return toolpaths.read_bytes(PART)[0], setup
 
 
-def lettered(machine: str, control: str) -> list[str]:
-    """Letters of axes for which a control has no word."""
-    spec, _ = load_controller(control)
-    assert spec is not None
-    return [letter for letter in machines.load(machine).axis_names if letter not in spec.axes]
-
-
 @pytest.mark.covering
 @pytest.mark.parametrize("control", sorted(builtin_files()))
 @pytest.mark.parametrize("machine", machines.names())
 def test_a_small_part_is_written_and_proved(machine: str, control: str) -> None:
     path, setup = part_for(machine)
-    if missing := lettered(machine, control):
-        result = postproc.convert(path, machine, control, setup)
-        assert [d.code for d in result.diagnostics if d.severity is Severity.ERROR] == ["write.axis_letters"], missing
-        return
     coarse = {"h4a-spindle-axis": 0.02, "rotary-delta": 0.04} if control == "haas-ngc" else {}  # three decimals of a degree
     tolerance = coarse.get(machine, 0.01)
     result = postproc.convert(path, machine, control, setup, Options(tolerance=tolerance))
