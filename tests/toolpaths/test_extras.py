@@ -41,8 +41,7 @@ def test_drawings_without_matplotlib(words: str, tmp_path: Path, monkeypatch: py
 
 
 def test_what_is_there_is_no_fault() -> None:
-    for name in EXTRAS:
-        need(name, "this needs")
+    assert [need(name, "this needs") for name in EXTRAS] == [None] * len(EXTRAS)
 
 
 def test_each_extra_brings_its_packages(monkeypatch: pytest.MonkeyPatch) -> None:
