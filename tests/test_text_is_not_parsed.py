@@ -28,6 +28,7 @@ FILES = {
     "machines.serial_models": "structures of machines (ISO 10791-6)",
     "machines.calibration.folded_names": "names of parameters",
     "machines.geometric_error.exchange.imports": "tables of others",
+    "postproc.pipeline.native_splines": "words of splines in programs",
     "postproc.pipeline.hooks": "blocks of controller files",
     "postproc.batch.tasks": "names of files that are made up",
     "postproc.reference.records": "blocks of INSERT records",

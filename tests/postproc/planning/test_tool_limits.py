@@ -133,7 +133,7 @@ def corners() -> Source:
 def test_a_looser_limit_never_slows_the_strict_plan(name: str, values: tuple[float, ...]) -> None:
     """Nor is it 3 % slower than the fast plan, whose samples exceed the limits a little."""
     source = corners()
-    strict, fast = ([PlannedMotion(replace(source, tools={0: ToolLimits(**{name: value})}), np.zeros(0), strict=keep).seconds
+    strict, fast = ([PlannedMotion(replace(source, tools={0: ToolLimits(**{name: value})}), strict=keep).seconds
                      for value in values] for keep in (True, False))
     assert all(behind <= 1.002 * before for before, behind in pairwise(strict))
     assert all(one <= 1.03 * other for one, other in zip(strict, fast, strict=True))
