@@ -7,6 +7,7 @@ folder under `python -m postproc`, a package of that name earlier on sys.path or
 from __future__ import annotations
 
 import importlib.util
+from functools import cache
 from pathlib import Path
 
 _MARKS = {"machines": "loader.py", "toolpaths": "toolpath.py"}
@@ -20,8 +21,12 @@ def _names_in(folder: Path) -> set[str]:
         return set()
 
 
+@cache
 def foreign() -> str:
-    """What stands in the place of one of our packages, and what to do; "" where all is well. Nothing is imported."""
+    """What stands in the place of one of our packages, and what to do; "" where all is well.
+
+    Nothing is imported; it is looked at once.
+    """
     here = Path(__file__).parents[2]
     for name, mark in _MARKS.items():
         spec = importlib.util.find_spec(name)

@@ -105,8 +105,8 @@ def _tasks_of(number: int, job: JobModel, batch: BatchFile, source: UserFile, fo
     given = sorted((shared | own).items())
     several = {option for option, value in given
                if isinstance(value, list) and form.options[option] != "many" and len(value) > 1}
-    sides = (files, _named(machines, folder) if "machine" in form.options else [""],
-             _named(controllers, folder) if "controller" in form.options else [""],
+    sides = (files, named(machines, folder) if "machine" in form.options else [""],
+             named(controllers, folder) if "controller" in form.options else [""],
              list(product(*(_choices(option, value, form, folder) for option, value in given))))
     tasks = []
     for file, machine, controller, options in product(*sides):
@@ -160,7 +160,7 @@ def _pattern(folder: Path, pattern: str) -> str:
     return str(Path(whole[0])).rstrip("/\\") + text
 
 
-def _named(names: Iterable[str], folder: Path) -> list[str]:
+def named(names: Iterable[str], folder: Path) -> list[str]:
     """Built-in names as they are, TOML files absolute; "" where there are none."""
     return [str(place(folder / name)) if name.lower().endswith(".toml") else name for name in names] or [""]
 

@@ -74,7 +74,7 @@ def _planned(jobs: Path, root: Any) -> tuple[list[Task], list[str], Path]:
     """
     from postproc.batch.fingerprint import keys_of
     from postproc.batch.model import load_batch
-    from postproc.batch.tasks import tasks_of
+    from postproc.batch.tasks import named, tasks_of
     from toolpaths.diagnostics import DiagnosticError, has_errors
     from toolpaths.input_files import place
 
@@ -83,7 +83,7 @@ def _planned(jobs: Path, root: Any) -> tuple[list[Task], list[str], Path]:
         raise DiagnosticError(found)
     names = [name for controllers in (spec.controllers, *(job.controllers for job in spec.jobs)) for name in controllers]
     folder = place(jobs.parent)
-    endings = _endings([str(place(folder / name)) if name.lower().endswith(".toml") else name for name in names])
+    endings = _endings(named(names, folder))
     tasks, wrong = tasks_of(spec, source, forms(root), endings)
     wrong = [*found, *wrong, *(_wrong_use(root, tasks, jobs) if not wrong else [])]
     if has_errors(wrong):

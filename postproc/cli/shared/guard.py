@@ -38,6 +38,7 @@ def guarded(command: Callable[[], object]) -> int:
         if wrong := _too_little_memory() or _other_packages():
             _say(wrong)
             return 1
+        _forget()
         try:
             command()
             code = 0
@@ -51,6 +52,13 @@ def guarded(command: Callable[[], object]) -> int:
         return _console_gone(fault) if _of_console(fault) else _failed(fault)
     except Exception as fault:
         return _failed(fault)
+
+
+def _forget() -> None:
+    """What a command before this one, in the same process, had to say of its interruption."""
+    from postproc.cli.shared.says import SAYS
+
+    SAYS.interrupted = ""
 
 
 def fingerprint(fault: BaseException) -> str:
