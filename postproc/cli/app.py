@@ -309,7 +309,7 @@ def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", 
         result = read_file(file, units=options.units or None, dialect=options.dialect or None,
                            allow_unknown=options.allow_unknown, progress=lambda at, total: progress("reading", at, total))
     found = figures(result)
-    report(tuple(result.diagnostics), json, found, text_of(result))
+    report(tuple(result.diagnostics), json, found, text_of(result) if result.lines else "")
 
 
 def run_command(arguments: Sequence[str]) -> Ran:

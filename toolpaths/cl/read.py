@@ -20,13 +20,13 @@ from toolpaths.cl.structure import open_paths
 from toolpaths.cl.systems.recognise import read_form, recognised
 from toolpaths.cl.text.dialects import DIALECTS, Dialect, detect, units_said
 from toolpaths.cl.text.log import DiagnosticLog
-from toolpaths.cl.text.other_formats import other_format
+from toolpaths.cl.text.other_formats import APT, other_format
 from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, ReadProgress, scan
 from toolpaths.cl.text.source import normalise
 from toolpaths.cl.text.statements import Lexer, StatementList
 from toolpaths.diagnostics import Diagnostic, Severity, has_errors
 from toolpaths.input_files import read_input, unreadable
-from toolpaths.toolpath import ClSource, Toolpath
+from toolpaths.toolpath import ClSource, RecordCounts, Toolpath
 
 _OWN_HEAD = b"$$-> TOOLPATH /"
 _TAIL = 400
@@ -90,8 +90,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     raw = data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data)
     other = None if recognised(raw) else other_format(raw)
     if other:
-        log.error("cl.format", f"this is {other[0]}", hint=other[1])
-        return ReadResult(_with_faults(_empty(file), log.diagnostics()), log.diagnostics())
+        return _refused(file, f"this is {other[0]}", other[1])
     plain = normalise(raw, log)
     largest = LARGEST_OWN if plain.startswith(_OWN_HEAD) else LARGEST
     form = read_form(plain, dialect, log)
@@ -110,13 +109,15 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     if file and not form:
         _cut_off(raw, lines, log)
     counts = report_others(b)
-    if b.row == 0:
+    if b.row == 0 and not has_errors(log.diagnostics()):
         log.error("cl.empty", "the file has no points", hint="a CL file has GOTO records")
     toolpath = assemble(b)
     _check_rapids(b, toolpath)
     if not form:
         check_forms(program, log, b.allow_unknown, found)
     records = counted(b, frozenset(HANDLERS))
+    if _no_apt_text(b, records):
+        return _refused(file, "no line of it is a record of APT text, and it is no form of a CAM system that is read", APT)
     turning = [op.turning for op in toolpath.operations]
     if any(turning) and has_errors(log.diagnostics()):
         whole = "this is a turning file" if all(turning) else "turning stands between milling"
@@ -126,6 +127,19 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     object.__setattr__(read, "source", ClSource(raw, units or "", dialect or ""))
     return ReadResult(read, diagnostics, counts, found.name, evidence,
                       b.arc_records, b.cycle_records, lines)
+
+
+def _refused(file: str, message: str, hint: str) -> ReadResult:
+    """A file that is none to read: one error, whatever its lines are."""
+    log = DiagnosticLog(file)
+    log.error("cl.format", message, hint=hint)
+    return ReadResult(_with_faults(_empty(file), log.diagnostics()), log.diagnostics())
+
+
+def _no_apt_text(b: ToolpathBuilder, records: RecordCounts) -> bool:
+    """True where no line of a file is a record, and nothing else is wrong with it."""
+    errors = {d.code for d in b.log.diagnostics() if d.severity is Severity.ERROR}
+    return b.row == 0 and records.executed == 0 and records.dropped and errors == {"cl.text"}
 
 
 def _check_rapids(b: ToolpathBuilder, toolpath: Toolpath) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,8 @@ STEP = ("ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION(({}),'2;1');\nFILE_SCHEMA(({})
         "#20=MACHINING_WORKPLAN('x','','','');\n")
 
 
+GPPL = "@start_of_file\n    num_tools:2 part_name:'P'\n@line\n    xpos:1. ypos:2. zpos:3.\n"
+"""the trace of SolidCAM's posts"""
 IGES = f"{'G1 part':<72}S      1\n{'more of it':<72}S      2\n{'1H,,1H;,4Hpart;':<72}G      1\n"
 """its first line reads as a block of a program"""
 
@@ -31,6 +34,8 @@ IGES = f"{'G1 part':<72}S      1\n{'more of it':<72}S      2\n{'1H,,1H;,4Hpart;'
     ('{"operations": [{"moves": []}]}', "a JSON file"), ("\ufeff<?xml version='1.0'?>\n<toolpath/>", "an XML or HTML file"),
     ("0 BEGIN PGM PART MM\n1 TOOL CALL 1 Z S900\n", "a Heidenhain program"), ("PK\x03\x04FCStd", "a document or archive"),
     ('{"format": "OpenToolpath", "version": "1.0"}', "an OpenToolpath file"), (OTP, "an OpenToolpath file"),
+    (GPPL, "a file of SolidCAM's posts"), ("1 PARTNO 'P'\n2 RAPID\n3 GOTO X 0 Y 0\n", "no line of it is a record"),
+    ("a,b\n1,2,3\n4,5,6\n", "no line of it is a record"),
     ("%PDF-1.4\n", "a document or archive"), (IGES, "an IGES file"), ("solid a\n  facet normal 0 0 1\n", "an STL mesh"),
     ("\0" * 80 + "\1\0\0\0" + "\0" * 50, "an STL mesh"), ("  0\nSECTION\n  2\nHEADER\n", "a DXF drawing"),
     ("999\nmade by hand\n0\r\nSECTION\n2\nENTITIES\n", "a DXF drawing")])
@@ -38,6 +43,23 @@ def test_what_a_file_is_is_one_line(text: str, said: str) -> None:
     path, found = toolpaths.read_bytes(text.encode())
     assert [d.code for d in found] == ["cl.format"] and said in found[0].message and found[0].hint
     assert len(path) == 0
+
+
+def test_binary_files_are_neither_cl_text_nor_programs() -> None:
+    """By chance some line of a binary file begins as a block of a program does; NULs alone and wide text are text."""
+    records = struct.pack("<3i3d", 5000, 5, 7, 0.1, 2.3, -9.7) * 50 + b"\nG1 X5\n"
+    assert "a binary file" in toolpaths.read_bytes(records)[1][0].message
+    assert not looks_like_gcode(records) and looks_like_gcode(b"G1 X5\n") and looks_like_gcode(b"%\x00\x00\nG1 X5\n")
+    wide, damaged = "UNITS/MM\nFEDRAT/9,MMPM\nGOTO/1,2,3\n".encode("utf-16"), b"UNITS/MM\n" + 40 * b"\0" + b"GOTO/1,2,3\n"
+    for text in (wide, damaged):
+        assert len(toolpaths.read_bytes(text)[0]) == 1
+
+
+@pytest.mark.parametrize(("text", "code"), [("GOTO 1,2,3\n", "cl.slash"), ("PARTNO/A\nGOTP/1,2,3\n", "cl.unknown-word"),
+                                            ("PARTNO/A\nUNITS/MM\n1 2 3 4\n", "cl.text"), ("", "cl.empty")])
+def test_that_a_file_has_no_points_is_no_second_fault(text: str, code: str) -> None:
+    """Records that are wrong are the cause; where one line is a record, lines that are none are told by their numbers."""
+    assert [d.code for d in toolpaths.read_bytes(text.encode())[1] if d.severity.name == "ERROR"] == [code]
 
 
 def test_shapes_of_a_cad_system_are_no_program() -> None:

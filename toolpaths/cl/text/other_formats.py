@@ -10,6 +10,9 @@ and compound files by the first bytes of PKZIP and OLE. IGES by its version 5.3,
 section and G for the next in column 73, then the number of the line); STL by 3D Systems' StereoLithography Interface
 Specification (solid, facet normal; binary: 80 bytes, a count, 50 bytes each); DXF by Autodesk's DXF Reference (group code 0
 SECTION, comments by 999; binary: its first 18 characters).
+SolidCAM's GPPL by its GPPTool User Guide (procedures begin with @, the trace of a post names them as they run). Binary files
+by their control characters: PowerMILL's .cut is one ("CLDATA as used by PowerMill", Delcam 2016, which leaves the structure
+of a record to another document), so are the binary CL files of NX, CATIA, APT and NCL ("CAM Interface Kits", ICAM V27).
 """
 
 from __future__ import annotations
@@ -23,6 +26,11 @@ _KLARTEXT = re.compile(rb"\s*(?:\d+\s+)?BEGIN PGM\s")
 _OTP = re.compile(rb'"[^"]*(?:opentoolpath|otp-core)', re.IGNORECASE)
 _IGES = re.compile(rb"(?:[^\r\n]{72}S[ 0-9]{7}[ \t]*\r?\n)+[^\r\n]{72}G[ 0]{6}1[ \t]*\r?\n")
 _DXF = re.compile(rb"(?:999[ \t]*\r?\n[^\n]*\n\s*)*0[ \t]*\r?\n[ \t]*SECTION[ \t]*\r?\n|AutoCAD Binary DXF")
+_GPPL = re.compile(rb"^[ \t]*@[a-zA-Z]\w*", re.MULTILINE)
+_CONTROL = bytes(sorted({*range(1, 9), *range(14, 26), *range(28, 32), 127}))
+"""characters that no text has; NUL is left out, which wide encodings and damaged files have"""
+_BINARY_LEAST, _BINARY_SHARE = 8, 0.02
+"""of them, in number and of all bytes, from which on a file is no text"""
 _STL_HEAD, _FACET = 84, 50
 """bytes of a binary STL file before its triangles, and of each"""
 _BLANK = b"\xef\xbb\xbf \t\r\n"
@@ -43,6 +51,8 @@ def other_format(data: bytes) -> tuple[str, str] | None:
     text = head.lstrip(_BLANK)
     if text.startswith(b"ISO-10303-21"):
         return _part_21(head)
+    if is_binary(data):
+        return "a binary file, not text, as PowerMILL (.cut), GibbsCAM and binary CL files are", APT
     if text[:1] in (b"{", b"["):
         return "a JSON file", APT
     if text.startswith(b"<"):
@@ -51,7 +61,16 @@ def other_format(data: bytes) -> tuple[str, str] | None:
         return "a Heidenhain program, written for one control", "name the CL file that it was made from"
     if _POF.search(head) and b"GOTO" not in head.upper():
         return "a POF file of hyperMILL, the form for its own posts", "choose a CL or APT post in hyperMILL"
+    if len(_GPPL.findall(head)) > 1 and b"GOTO" not in head.upper():
+        return "a file of SolidCAM's posts (GPPL or its trace)", "choose a CL or APT post in SolidCAM"
     return None
+
+
+def is_binary(data: bytes) -> bool:
+    """True for bytes that are no text in any encoding: by control characters among the first; no damaged CL file."""
+    head = data[:HEAD]
+    found = len(head) - len(head.translate(None, _CONTROL))
+    return b"GOTO" not in head.upper() and found >= max(_BINARY_LEAST, _BINARY_SHARE * len(head))
 
 
 def shape_file(data: bytes) -> str:
