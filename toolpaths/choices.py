@@ -9,7 +9,7 @@ LengthUnit = Literal["mm", "inch"]
 GivenUnit = Literal["", "mm", "inch"]
 """asked for; "" as the file says"""
 DialectName = Literal["generic", "nx", "makino", "creo", "solidworks", "solidworks-clt", "tlaxis", "catia", "ncl",
-                      "camplete", "mfgsuite", "autodesk-iso", "hsmworks", "nci", "freecad", "step-nc"]
+                      "camplete", "mfgsuite", "autodesk-iso", "hsmworks", "surfcam", "nci", "freecad", "step-nc"]
 GivenDialect = Literal["", DialectName]
 """asked for; "" as the file is recognised"""
 FigureEnding = Literal[".png", ".svg"]

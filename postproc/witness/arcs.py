@@ -43,7 +43,7 @@ def circle(r: Record, dialect: WitnessDialect) -> Given | None:
         return Given(tuple(n[:3]), (0.0, 0.0, -1.0), turns)
     if r.has("COUNTERCLOCKWISE", "CCLW"):
         return Given(tuple(n[:3]), (0.0, 0.0, 1.0), turns)
-    sense = -1 if len(n) == 11 and dialect.name in ("generic", "solidworks") else dialect.sense or 1
+    sense = -1 if len(n) == 11 and dialect.name in ("generic", "solidworks", "surfcam") else dialect.sense or 1
     return Given(tuple(n[:3]), tuple(sense * v for v in normal), turns)
 
 

@@ -30,7 +30,7 @@ _SILENT = """
     COMMENT RTCP DELETE OP_NAME SELECTL TDATA OPERTN SEQUENCE PART_OPE PROGRAM MACHINE CATPROCESS CATPRODUCT OPTYPE DMIS
     MAXDPM MAXVEL POSMAP REGBRK PIVOTZ MATLNO HEADER PROGRM MDWRIT MDEND MAGTAP INTCOD TMARK LIBRY REDEF CANON VERIFY
     PPLOT OVPLOT END DRAFT OUTOL TOLTBL PPTOL MCHFIN THICK"""
-_NO_MOTION = frozenset(_SILENT.split())
+_NO_MOTION, _ABSOLUTE = frozenset(_SILENT.split()), [1.0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]
 _UNREAD_MOTION = frozenset((
     "HELICAL", "TRACUT", "COPY", "MOVNRB", "THREAD", "CALL", "INDEX", "MACRO", "MCS", "MCSYS", "ZERO", "TLON", "PSIS",
     "INDIRP", "ROTHED"))
@@ -67,7 +67,7 @@ def _one(e: Execution, r: Record, line: int) -> None:
     handler = HANDLERS.get(r.major)
     if handler is not None:
         handler(e, r, line)
-    elif r.major.startswith("$$") or r.major in _NO_MOTION:
+    elif r.major.startswith("$$") or r.major in _NO_MOTION or (r.major == "MCS" and list(r.numbers) == _ABSOLUTE):
         pass
     elif r.major in _UNREAD_MOTION or len(r.numbers) >= 3 or not r.major:
         e.lost(r.major.split(",")[0] or "lines of numbers", line)

@@ -28,7 +28,7 @@ ALL = {d.name: d for d in (
     GENERIC, WitnessDialect("nx", -1, -1, whole=False, axis_back=True), WitnessDialect("makino", -1, whole=False),
     WitnessDialect("creo", local_three=True), WitnessDialect("solidworks", local_three=True),
     WitnessDialect("solidworks-clt", 0, local_three=True), WitnessDialect("tlaxis", 0, local_three=True),
-    *(WitnessDialect(name) for name in ("catia", "ncl", "nci", "freecad", "step-nc")),
+    *(WitnessDialect(name) for name in ("catia", "ncl", "surfcam", "nci", "freecad", "step-nc")),
     *(WitnessDialect(name, unread=True) for name in ("camplete", "mfgsuite", "autodesk-iso", "hsmworks", "own")))}
 _WORDS = {
     "own": ("$$->TOOLPATH",), "camplete": ("MCS",), "mfgsuite": ("MCSYS",),
@@ -50,6 +50,8 @@ def dialect_of(records: list[Record], data: bytes) -> WitnessDialect:
         return ALL["own"]
     if "MAKINO-FF" in head or "FF/CAM" in head:
         return ALL["makino"]
+    if "SURFCAM INC" in head:
+        return ALL["surfcam"]
     if any(r.major == "CIRCLE" and r.has("CLOCKWISE", "COUNTERCLOCKWISE") for r in records):
         return ALL["solidworks-clt"]
     for name, words in _WORDS.items():

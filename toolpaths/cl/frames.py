@@ -100,7 +100,8 @@ def csys(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def mcs(b: ToolpathBuilder, s: Statement) -> None:
-    """MCS/X axis, Y axis, Z axis, origin (12 numbers): the work plane of Autodesk's posts for CAMplete and MANUSnc."""
+    """MCS/X axis, Y axis, Z axis, origin (12 numbers): the work plane of Autodesk's posts for CAMplete and MANUSnc;
+    SURFCAM's view."""
     if len(s.numbers) != 12:
         b.log.error("cl.frame", f"MCS has {len(s.numbers)} numbers, it takes X, Y and Z axis and origin (12)", b.line,
                     "write X axis, Y axis, Z axis, origin: 12 numbers")
@@ -110,6 +111,11 @@ def mcs(b: ToolpathBuilder, s: Statement) -> None:
     if matrix is None or float(matrix[:, 2] @ axes[2]) < 1.0 - _ORTHOGONAL:
         b.log.error("cl.frame", "the axes of MCS are not three right-handed unit vectors at right angles", b.line,
                     "correct the axes: X, Y, Z of length 1, Z = X x Y")
+        return
+    if b.dialect.views_absolute and (axes[3].any() or not np.allclose(matrix, np.eye(3), atol=_ORTHOGONAL)):
+        b.log.error("cl.frame", f"MCS/{s.body[:60]}: a view of SURFCAM that is not upright in the absolute origin, and no "
+                    "source says which system its points count in", b.line, "post all paths of the file in one view, "
+                    "with the switch for 5 axes")
         return
     set_system(b, "MCS", matrix, axes[3] * b.scale)
 

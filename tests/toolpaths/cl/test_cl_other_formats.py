@@ -9,6 +9,7 @@ import pytest
 
 import toolpaths
 from tests.practice_files import CASES, SHAPES, practice_file
+from toolpaths.cl.read import read_bytes
 from toolpaths.cl.systems.recognise import recognised
 from toolpaths.cl.text.kinds_of_file import looks_like_gcode, what_is
 from toolpaths.cl.text.other_formats import other_format
@@ -35,6 +36,7 @@ IGES = f"{'G1 part':<72}S      1\n{'more of it':<72}S      2\n{'1H,,1H;,4Hpart;'
     ("0 BEGIN PGM PART MM\n1 TOOL CALL 1 Z S900\n", "a Heidenhain program"), ("PK\x03\x04FCStd", "a document or archive"),
     ('{"format": "OpenToolpath", "version": "1.0"}', "an OpenToolpath file"), (OTP, "an OpenToolpath file"),
     (GPPL, "a file of SolidCAM's posts"), ("1 PARTNO 'P'\n2 RAPID\n3 GOTO X 0 Y 0\n", "no line of it is a record"),
+    ("=http://www.cimco-software.com/namespace/nc/format/compact-nci\n", "the intermediate file (.cnc) of Fusion"),
     ("a,b\n1,2,3\n4,5,6\n", "no line of it is a record"),
     ("%PDF-1.4\n", "a document or archive"), (IGES, "an IGES file"), ("solid a\n  facet normal 0 0 1\n", "an STL mesh"),
     ("\0" * 80 + "\1\0\0\0" + "\0" * 50, "an STL mesh"), ("  0\nSECTION\n  2\nHEADER\n", "a DXF drawing"),
@@ -109,3 +111,16 @@ def test_what_says_that_a_file_is_turning(said: str, turning: bool) -> None:
     """Names that only begin as that of a lathe say nothing, MODE/MILL takes back what was said before it."""
     path = toolpaths.read_bytes(f"PARTNO T\n{said}\nUNITS/MM\nFEDRAT/200,MMPM\nGOTO/10,5,0\nFINI\n".encode())[0]
     assert any(op.turning for op in path.operations) is turning
+
+
+def test_a_view_of_surfcam_is_taken_where_it_is_the_absolute_system() -> None:
+    """MCS is a word of Autodesk's posts too, whose arcs go left-hand and whose cycles state heights."""
+    text = (ROOT / "samples/other_forms/surfcam.apt").read_text("utf-8")
+    read = read_bytes(text)
+    assert (read.dialect, len(read.toolpath), read.toolpath.records.dropped) == ("surfcam", 7, 0)
+    for old, new in (("1.0000,0.0000,0.0000,0.0000\n", "1.0000,0.0000,0.0000,5.0000\n"),
+                     ("MCS/1.0000,0.0000,0.0000,0.0000,1.0000", "MCS/0.0000,1.0000,0.0000,-1.0000,0.0000")):
+        wrong = [d.code for d in toolpaths.read_bytes(text.replace(old, new))[1] if d.severity.name == "ERROR"]
+        assert wrong == ["cl.frame"]
+    autodesk = text.replace("SURFCAM INC", "CAMPLETE")
+    assert read_bytes(autodesk).dialect == "camplete"

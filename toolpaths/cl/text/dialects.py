@@ -47,6 +47,7 @@ class Dialect:
         operations_in_comments: comments name the operations
         trntyp_begins: TRNTYP begins an operation, which has no name
         multax_off_keeps: behind MULTAX/OFF points of three numbers keep the last axis
+        views_absolute: MCS is taken where it is the absolute system alone: no source says whether points count in it or not
         planes: how cycles state their planes
     """
 
@@ -68,6 +69,7 @@ class Dialect:
     operations_in_comments: bool = False
     trntyp_begins: bool = False
     multax_off_keeps: bool = False
+    views_absolute: bool = False
     planes: Planes = Planes.RELATIVE
 
 
@@ -88,6 +90,7 @@ DIALECTS: dict[DialectName, Dialect] = {d.name: d for d in (
     Dialect("mfgsuite", "Autodesk APT for MfgSuite", planes=Planes.DOWN),
     Dialect("autodesk-iso", "Autodesk Common ISO 4343 APT", planes=Planes.BOTTOM),
     Dialect("hsmworks", "HSMWorks Generative Machining APT", planes=Planes.OVER_BOTTOM),
+    Dialect("surfcam", "SURFCAM (INC2APT)", eleven_clockwise=True, views_absolute=True),
     Dialect("nci", "Mastercam NCI"),
     Dialect("freecad", "FreeCAD"),
     Dialect("step-nc", "STEP-NC of ISO 14649"),
@@ -103,9 +106,11 @@ _MAJORS: tuple[tuple[DialectName, tuple[str, ...]], ...] = (
     ("catia", (COMMENT + "*CATIA0", "TLON,GOFWD", "INDIRV", "AUTOPS", "PSIS", "TOOLNO")),
     ("creo", ("CAMERA", "PPWORD")),
 )
-_TEXTS: tuple[tuple[DialectName, str], ...] = (("makino", "MAKINO-FF"), ("makino", "FF/CAM"),
+_TEXTS: tuple[tuple[DialectName, str], ...] = (("makino", "MAKINO-FF"), ("surfcam", "SURFCAM INC"), ("makino", "FF/CAM"),
           ("catia", "CATIA"), ("catia", "TOOLCHANGEBEGINNING"), ("nx", "CENTERLINE DATA"),
           ("ncl", "NCL"), ("ncl", "NCLCAM"), ("creo", "PRO/NC"), ("creo", "PRO/CLFILE"), ("creo", "CREO"))
+_NAMED = ("makino", "surfcam")
+"""systems that write words of others, and their own name in each file"""
 OWN = DATA_COMMENT + "TOOLPATH"
 """Mark of the text that `write` makes."""
 
@@ -120,8 +125,8 @@ def detect(program: StatementList) -> tuple[Dialect, str]:
     if OWN in majors:
         return DIALECTS["generic"], f"{OWN} in line {majors[OWN]}"
     text = _by_text(program)
-    if text is not None and text[0] == "makino":
-        return DIALECTS["makino"], text[1]
+    if text is not None and text[0] in _NAMED:
+        return DIALECTS[text[0]], text[1]
     sense_word = _clockwise_word(program)
     if sense_word:
         return DIALECTS["solidworks-clt"], f"CIRCLE with a sense word in line {sense_word}"

@@ -13,6 +13,7 @@ SECTION, comments by 999; binary: its first 18 characters).
 SolidCAM's GPPL by its GPPTool User Guide (procedures begin with @, the trace of a post names them as they run). Binary files
 by their control characters: PowerMILL's .cut is one ("CLDATA as used by PowerMill", Delcam 2016, which leaves the structure
 of a record to another document), so are the binary CL files of NX, CATIA, APT and NCL ("CAM Interface Kits", ICAM V27).
+The intermediate file of Fusion and HSM by the name of its form in its first bytes.
 """
 
 from __future__ import annotations
@@ -51,6 +52,8 @@ def other_format(data: bytes) -> tuple[str, str] | None:
     text = head.lstrip(_BLANK)
     if text.startswith(b"ISO-10303-21"):
         return _part_21(head)
+    if b"/nc/format/compact-nci" in head[:400]:
+        return "the intermediate file (.cnc) of Fusion and HSM", "choose one of their posts for APT"
     if is_binary(data):
         return "a binary file, not text, as PowerMILL (.cut), GibbsCAM and binary CL files are", APT
     if text[:1] in (b"{", b"["):
