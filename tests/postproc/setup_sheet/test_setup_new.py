@@ -273,6 +273,15 @@ def test_a_refusal_by_travel_names_a_place_that_works(tmp_path: Path) -> None:
     assert out.exists()
 
 
+def test_where_no_place_fits_nothing_says_move_the_part(tmp_path: Path) -> None:
+    """Two cuts farther apart than the travel is long: remedies that contradict each other are none."""
+    file = tmp_path / "long.apt"
+    file.write_text("UNITS/MM\nLOADTL/1\nSPINDL/RPM,3000,CLW\nFEDRAT/500,MMPM\nRAPID\nGOTO/0,0,50\nGOTO/0,0,0\nGOTO/10,0,0\n"
+                    "GOTO/2000,0,0\nGOTO/2010,0,0\nGOTO/2020,0,0\nRAPID\nGOTO/2020,0,50\nFINI\n")
+    got = run("convert", file, "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.nc", code=1)
+    assert "no place of the part was found" in got.stderr and "move the part" not in got.stderr
+
+
 def test_what_no_place_puts_right_is_explained(tmp_path: Path) -> None:
     made = sheet(SAMPLES / "five_faces.cls", "mill-3axis", "linuxcnc")
     assert not made.text
