@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,8 +30,8 @@ ALIKE = 4
 """diagnostics of one code and one remedy up to which each is shown"""
 PLACED = frozenset({"travel.exceeded", "reach.axis", "reach.position", "link.blocked", "path.jump"})
 """codes whose remedy is that of `place.found`, where that is said"""
-MOVED = "move the part in the set-up (part.origin)"
-"""remedy that is none where no place of the part fits"""
+MOVED = re.compile(r"^move the part in the set-up \(part\.origin\)(?:, turn it)?(?:, (?:or )?)?")
+"""remedies that are none where no place of the part fits"""
 FOLLOWS = {"cl.no-feed": ("feed.missing", "cl.feed"), "cl.no-units": ("cl.empty",), "cl.rapid-below": ("cl.cycle-depth",),
            "setup.tool_unused": ("tool.number",), "place.found": ("path.odd_record",),
            "joints.chosen": ("travel.exceeded", "reach.axis", "path.odd_record"),
@@ -233,7 +234,7 @@ def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
             diagnostics = tuple(replace(d, hint="") if d.code in PLACED and "system =" not in d.hint else d
                                 for d in diagnostics)
         elif any(d.code == "place.found" for d in diagnostics):
-            diagnostics = tuple(replace(d, hint="") if d.hint == MOVED else d for d in diagnostics)
+            diagnostics = tuple(replace(d, hint=MOVED.sub("", d.hint)) for d in diagnostics)
     groups: dict[tuple[Severity, str, str], list[Diagnostic]] = {}
     for d in diagnostics:
         if d.severity >= least:
