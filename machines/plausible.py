@@ -29,6 +29,8 @@ SLOWEST = 8.0
 """the fastest of X, Y, Z over the slowest"""
 SHORTEST = 12.0
 """the longest travel of X, Y, Z over the shortest: an inch taken for a mm makes 25.4"""
+TURNING = (0.05, 20.0)
+"""deg/s of the fastest rotary axis per mm/s of the fastest slide: a unit mistaken in all of one kind makes 60 times"""
 TILT = 900.0
 """deg/s of a rotary axis with ends"""
 END, MIDDLE = 0.12, 0.15
@@ -91,11 +93,29 @@ def _unlike(machine: Machine) -> Iterator[KeyProblem]:
             says = (f"{key} of {short} is {values[least]:g} {unit}, of {long} {values[largest]:g}: {times:.3g} times as "
                     f"much, of most machines less than {most:g} times")
             yield KeyProblem("machine.plausible", ("axes", short, key), says, hint)
+    yield from _turning(machine)
     for j, name in enumerate(machine.axis_names):
         speed = float(limits.velocity[j]) / DEG
         if machine.rotary[j] and not machine.endless[j] and TILT < speed <= ROTARY["velocity"][1]:
             says = f"{name} tilts at {speed:g} deg/s, {speed / 6.0:g} turns per minute: most less than {TILT / 6.0:g}"
             yield KeyProblem("machine.plausible", ("axes", name, "velocity"), says, "see to its unit: deg/s or turns/min")
+
+
+def _turning(machine: Machine) -> Iterator[KeyProblem]:
+    """Turns and slides of one machine are about as fast as one another."""
+    rotary, speed = np.array(machine.rotary, bool), machine.limits.velocity
+    if not rotary.any() or rotary.all():
+        return
+    turn, slide = int(np.where(rotary, speed, -1.0).argmax()), int(np.where(rotary, -1.0, speed).argmax())
+    per = float(speed[turn]) / DEG / float(speed[slide])
+    if TURNING[0] <= per <= TURNING[1]:
+        return
+    slow, fast = (slide, turn) if per > TURNING[1] else (turn, slide)
+    name, said = machine.axis_names[slow], [
+        f"{speed[j] / DEG:.4g} deg/s" if machine.rotary[j] else f"{speed[j]:.4g} mm/s" for j in (slow, fast)]
+    says = f"{name} goes at {said[0]} at most, {machine.axis_names[fast]} at {said[1]}: one is not of the other's machine"
+    units = "turns per minute, deg/s or deg/min" if slow == turn else "mm/s, mm/min or m/min"
+    yield KeyProblem("machine.plausible", ("axes", name, "velocity"), says, f"see to the units of both: {units}")
 
 
 def _pivot_in_inches(machine: Machine, joint: Joint, slides: list[Joint]) -> Iterator[KeyProblem]:

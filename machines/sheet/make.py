@@ -10,6 +10,7 @@ from pathlib import Path
 from machines.figures import ASSUMED, SOURCE
 from machines.loader import as_warnings, assemble, check
 from machines.machine import Machine
+from machines.sheet.distances import against_distances, distances
 from machines.sheet.file_text import FileValue, machine_text, nested
 from machines.sheet.jog import sense
 from machines.sheet.model import AxisSheet, DataSheet, TouchedSheet
@@ -19,7 +20,7 @@ from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantit
 from machines.sheet.touched import AGREE, apart_by, strange_turns, untold, wrong_sign
 from machines.toml_lines import KeyPath, own_copy
 from machines.user_file import UserFile, ValueSource, read_toml, validate, wrong_keys
-from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.diagnostics import Diagnostic, Severity, has_errors
 
 ENDLESS = "endless"
 NAME = "sheet"
@@ -152,6 +153,7 @@ def _made(file: UserFile, sheet: DataSheet, name: str) -> NewMachine:
         _axis(making, letter, axis, letter in sheet.rotary)
     _geometry(making, sheet)
     _times(making, sheet)
+    _table_top(making, sheet)
     if making.found:
         return NewMachine(None, "", making.found)
     whole = UserFile(name or file.name, file.file, nested(making.figures), making.origins)
@@ -159,7 +161,9 @@ def _made(file: UserFile, sheet: DataSheet, name: str) -> NewMachine:
     if model is None or has_errors(faults):
         return NewMachine(None, "", faults)
     machine = assemble(whole, model)
-    return NewMachine(machine, machine_text(making.figures, Path(file.file).name), [*faults, *as_warnings(whole, machine)])
+    odd = [file.problem(p.code, p.path, p.message, p.hint) for p in against_distances(machine, sheet)]
+    found = [*faults, *as_warnings(whole, machine), *(replace(one, severity=Severity.WARNING) for one in odd)]
+    return NewMachine(machine, machine_text(making.figures, Path(file.file).name), found)
 
 
 def _header(making: _Making, sheet: DataSheet) -> None:
@@ -285,6 +289,14 @@ def _times(making: _Making, sheet: DataSheet) -> None:
             making.stated(("timing", key), _round(value or 0.0), ("times", of_sheet), f"times {of_sheet}")
         else:
             making.assume(("timing", key), _TIMES[key], ("description",))
+
+
+def _table_top(making: _Making, sheet: DataSheet) -> None:
+    """Faults of the distances' texts."""
+    try:
+        distances(sheet)
+    except WrongFigureError as wrong:
+        making.fault(("table_top",), f"table_top: {wrong.says}", wrong.hint)
 
 
 def _round(value: float) -> float:

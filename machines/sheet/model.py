@@ -78,6 +78,15 @@ class TouchedSheet(UserModel):
     """each rotary axis is turned in one of them at least"""
 
 
+class TableTopSheet(UserModel):
+    """The `[table_top]` table: what brochures print next to travel; it proves travel and pivots, nothing is made of it."""
+
+    spindle_to_table: tuple[str, str] | None = None
+    """from the spindle's nose to the table's top at both ends of Z, ["102 mm", "610 mm"], all axes at 0"""
+    size: str = ""
+    """of the table: its diameter, or its longer side; "500 mm"."""
+
+
 class TimingSheet(UserModel):
     """The `[times]` table."""
 
@@ -118,6 +127,8 @@ class DataSheet(UserModel):
     """where the rotary axes lie"""
     touched: TouchedSheet | None = None
     """readings that prove pivots and signs: by them one point of the table must stay one point"""
+    table_top: TableTopSheet = TableTopSheet()
+    """distances that prove travel and pivots"""
     times: TimingSheet = TimingSheet()
     """times that no axis gives"""
 

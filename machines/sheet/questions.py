@@ -81,8 +81,25 @@ def sheet_text(ask: Ask) -> str:
         sheet.lines += _pivots(sheet, tuple(table), tuple(head))
     speed = sheet.text("largest speed of the spindle, e.g. 8100 rpm; empty: not known", "", _quantity("turning speed"))
     sheet.lines.insert(2, f"spindle = {speed}")
+    top = _table_top(sheet) if table else []
     change = sheet.text("tool change, chip to chip, e.g. 4.2 s; empty: not known", "", _quantity("time"))
-    return "\n".join([*sheet.lines, *(["", "[times]", f"tool_change = {change}"] if change != '""' else [])]) + "\n"
+    return "\n".join([*sheet.lines, *top, *(["", "[times]", f"tool_change = {change}"] if change != '""' else [])]) + "\n"
+
+
+def _table_top(sheet: _Sheet) -> list[str]:
+    """Distances that prove the Z of the pivots."""
+    def ends(text: str) -> str:
+        both = text.split(" to ")
+        if text and len(both) != 2:
+            raise ValueError(f"{text!r} is not two lengths as 102 mm to 610 mm")
+        for one in both if text else ():
+            read_quantity(one, "length")
+        return json.dumps([one.strip() for one in both]) if text else ""
+
+    between = sheet.text("spindle nose to table, least and most, e.g. 102 mm to 610 mm; empty: not known", "", ends)
+    size = sheet.text("diameter or longer side of the table, e.g. 500 mm; empty: not known", "", _quantity("length"))
+    given = [*([f"spindle_to_table = {between}"] if between else []), *([f"size = {size}"] if size != '""' else [])]
+    return ["", "[table_top]", *given] if given else []
 
 
 def _letters(sheet: _Sheet, words: str, default: str, known: str = "ABC", most: int = 2) -> list[str]:

@@ -123,6 +123,9 @@ def test_a_head_by_swivel_data(tmp_path: Path) -> None:
 MRZP, SECOND = "[-381.02, -254.11, -558.4]", "[-381.05, -254.11, -500.2]"
 ODD = "machine.plausible"
 HEAD = '[0, 0, 250.1], "I2" = [0.02, 0, 30], "I1" = [-0.02, 0, -280.1]'
+TOP = '[table_top]\nspindle_to_table = ["{}", "{}"]\nsize = "{}"\n[times]'
+SLOW = TRUNNION.replace('"22.9 m/min"', '"381 mm/min"').replace('"900 ipm"', '"381 mm/min"')
+"""mm/s typed as mm/min for all slides"""
 UPSIDE_DOWN = '[0, 0, -250.1], "I2" = [0.02, 0, -30], "I1" = [-0.02, 0, 280.1]'
 
 
@@ -144,6 +147,15 @@ UPSIDE_DOWN = '[0, 0, -250.1], "I2" = [0.02, 0, -30], "I1" = [-0.02, 0, 280.1]'
     (TRUNNION, '["-35 deg", "120 deg"]', '"155 deg"', "sheet.figure", "one figure", None),
     (TRUNNION, 'form = "haas"', 'form = "siemens"', "sheet.figure", "MRZP is not a name of siemens", "points"),
     (TRUNNION, 'table = ["B", "C"]', 'table = ["C"]', "sheet.figure", "B is neither", "[B]"),
+    (TRUNNION, "[times]", TOP.format("102 mm", "610 in", "500 mm"), ODD, "from 102 to 15494 mm", "spindle_to_table"),
+    (TRUNNION, "[times]", TOP.format("102 mm", "610 mm", "500 in"), ODD, "the table is 12700 mm large", "size = "),
+    (TRUNNION.replace("-558.4", "-58.4"), "[times]", TOP.format("102 mm", "610 mm", "500 mm"), ODD,
+     "551.6 mm above the table's top", "points"),
+    (TRUNNION.replace("-558.4", "-958.4"), "[times]", TOP.format("102 mm", "610 mm", "500 mm"), ODD,
+     "348.4 mm below the table's top", "points"),
+    (TRUNNION, "[times]", TOP.format("102", "610 mm", "500 mm"), "sheet.figure", "'102' has no unit", "[table_top]"),
+    (SLOW, "20 in", "20 in", ODD, "X goes at 6.35 mm/s at most, B at 300 deg/s", "rapid"),
+    (TRUNNION.replace('"300 deg/s"', '"50 deg/min"'), '"50 rpm"', '"300 deg/min"', ODD, "B goes at 5 deg/s", "300 deg"),
     (TRUNNION, "rapid = ", "rapit = ", "file.unknown-key", "rapit", "rapit"),
 ])
 def test_a_slip_is_seen_at_its_line(tmp_path: Path, text: str, old: str, new: str, code: str, says: str,
@@ -154,6 +166,15 @@ def test_a_slip_is_seen_at_its_line(tmp_path: Path, text: str, old: str, new: st
     assert (one.file == str(tmp_path / "shop.sheet.toml") and one.hint) or code == "file.unknown-key"
     if line is not None:
         assert one.lines == (line_of(text.replace(old, new, 1), line),)
+
+
+def test_distances_of_the_brochure_agree_with_it(tmp_path: Path) -> None:
+    """They prove figures and make none: the machine is the same."""
+    good = made(tmp_path, TRUNNION, "[times]", TOP.format("610 mm", "102 mm", "500 mm"))
+    assert good.diagnostics == [] and good.text == made(tmp_path, TRUNNION).text
+    assert "equal ends" in made(tmp_path, TRUNNION, "[times]", TOP.format("1 in", "25.4 mm", "")).diagnostics[0].message
+    moved = made(tmp_path, TRUNNION.replace('["X"]', '["X", "Z"]'), "[times]", TOP.format("2 in", "22 in", ""))
+    assert moved.diagnostics == [], "where Z moves the table its top has no one place"
 
 
 def test_all_faults_come_in_one_run(tmp_path: Path) -> None:
