@@ -92,6 +92,8 @@ class _SiemensMachine:
             self._put(geometry)
         elif "kinematics.structure" in self.draft.stated:
             pass
+        elif turning and any(d.code == "import.geometry" for d in self.draft.found):
+            pass  # what is wrong with the transformation has been said
         elif turning:
             self.draft.error("import.geometry", "neither a transformation that is read nor a swivel data record "
                              f"says where {' and '.join(turning)} {'are' if turning[1:] else 'is'}", hint=_HINT)

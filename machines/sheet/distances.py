@@ -55,7 +55,7 @@ def against_distances(machine: Machine, sheet: DataSheet) -> Iterator[KeyProblem
     for joint in machine.kinematics.chain:
         if joint.rotary and joint.name in sheet.table and abs(float(joint.direction[2])) < _LEVEL:
             above = float(joint.point[2]) - top
-            if abs(above) > reach:
+            if abs(above) > reach and joint.point[2] < upper[z]:
                 says = (f"{joint.name} turns about a line {abs(above):g} mm {'above' if above > 0 else 'below'} the table's "
                         f"top, which lies {far:g} mm below the spindle; tables tilt about a line within {reach:g} mm of it")
                 yield KeyProblem(ODD, ("pivots", "points"), says, "see to sign and unit of its Z: machine coordinates, mm, "
