@@ -185,8 +185,8 @@ def test_kinematics_of_a_tnc_are_refused_in_one_line(tmp_path: Path) -> None:
 def test_a_transformation_that_lacks_an_axis_is_one_fault(tmp_path: Path) -> None:
     """That nothing else says where the axes are is no second one."""
     (tmp_path / "m.arc").write_text(AXES.format(first="A", second="C") + "N24100 $MC_TRAFO_TYPE_1=24\n")
-    found = [d for d in import_machine(tmp_path / "m.arc").diagnostics if d.code == "import.geometry"]
+    found = [d for d in import_machine(tmp_path / "m.arc", "auto", ())[2] if d.code == "import.geometry"]
     assert [d.message for d in found] == ["$MC_TRAFO_TYPE_1 = 24, and no $MC_TRAFO5_AXIS1_1"]
     (tmp_path / "m.arc").write_text(AXES.format(first="A", second="C"))
-    [other] = [d for d in import_machine(tmp_path / "m.arc").diagnostics if d.code == "import.geometry"]
+    [other] = [d for d in import_machine(tmp_path / "m.arc", "auto", ())[2] if d.code == "import.geometry"]
     assert "neither a transformation" in other.message
