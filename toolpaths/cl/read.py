@@ -93,8 +93,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         return _refused(file, f"this is {other[0]}", other[1])
     plain = normalise(raw, log)
     largest = LARGEST_OWN if plain.startswith(_OWN_HEAD) else LARGEST
-    form = read_form(plain, dialect, log)
-    if form:
+    if form := read_form(plain, dialect, log):
         program, points, lines, found, evidence = form.program, form.points, form.lines, DIALECTS[form.name], form.evidence
     else:
         parts = scan(plain, progress, largest)
@@ -139,7 +138,7 @@ def _refused(file: str, message: str, hint: str) -> ReadResult:
 def _no_apt_text(b: ToolpathBuilder, records: RecordCounts) -> bool:
     """True where no line of a file is a record, and nothing else is wrong with it."""
     errors = {d.code for d in b.log.diagnostics() if d.severity is Severity.ERROR}
-    return b.row == 0 and records.executed == 0 and records.dropped and errors == {"cl.text"}
+    return b.row == 0 and records.executed == 0 and records.dropped > 0 and errors == {"cl.text"}
 
 
 def _check_rapids(b: ToolpathBuilder, toolpath: Toolpath) -> None:

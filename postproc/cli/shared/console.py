@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,8 +29,11 @@ ALIKE = 4
 """diagnostics of one code and one remedy up to which each is shown"""
 PLACED = frozenset({"travel.exceeded", "reach.axis", "reach.position", "link.blocked", "path.jump"})
 """codes whose remedy is that of `place.found`, where that is said"""
-MOVED = re.compile(r"^move the part in the set-up \(part\.origin\)(?:, turn it)?(?:, (?:or )?)?")
-"""remedies that are none where no place of the part fits"""
+_MOVE, _LOWER = "move the part in the set-up (part.origin)", "lower clearance.margin"
+_SHORTER = "use a shorter tool (gauge_length)"
+WITHOUT_MOVE = {_MOVE: "", f"{_MOVE}, or {_LOWER}": _LOWER, f"{_MOVE}, turn it, or {_LOWER}": _LOWER,
+                f"{_MOVE}, {_LOWER}, or {_SHORTER}": f"{_LOWER}, or {_SHORTER}"}
+"""remedies of travel and reach, and what is left of each where no place of the part fits"""
 FOLLOWS = {"cl.no-feed": ("feed.missing", "cl.feed"), "cl.no-units": ("cl.empty",), "cl.rapid-below": ("cl.cycle-depth",),
            "setup.tool_unused": ("tool.number",), "place.found": ("path.odd_record",),
            "joints.chosen": ("travel.exceeded", "reach.axis", "path.odd_record"),
@@ -234,7 +236,7 @@ def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
             diagnostics = tuple(replace(d, hint="") if d.code in PLACED and "system =" not in d.hint else d
                                 for d in diagnostics)
         elif any(d.code == "place.found" for d in diagnostics):
-            diagnostics = tuple(replace(d, hint=MOVED.sub("", d.hint)) for d in diagnostics)
+            diagnostics = tuple(replace(d, hint=WITHOUT_MOVE.get(d.hint, d.hint)) for d in diagnostics)
     groups: dict[tuple[Severity, str, str], list[Diagnostic]] = {}
     for d in diagnostics:
         if d.severity >= least:
