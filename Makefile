@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile -rfEs
 SOURCES := toolpaths machines postproc
 NUMERIC = $(shell grep -rl --include='test_*.py' 'mark\.numeric' tests)
 
-.PHONY: docs demo test quick numeric hard damage changes slow mutants programs faults fuzz lint lock clean
+.PHONY: docs demo test quick numeric hard damage changes slow mutants programs faults fuzz same lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -51,6 +51,10 @@ programs: $(STAMP)
 MOMENTS ?= 200
 faults: $(STAMP)
 	$(BIN)/python tests/faults/run.py --count $(MOMENTS)
+
+# The same bytes over kinds of processor, threads, hash seeds, zones, languages; PYTHONS="PATH ..." other interpreters, too.
+same: $(STAMP)
+	$(BIN)/python -m tests.determinism.run $(foreach one,$(PYTHONS),--python "$(one)")
 
 # Every reader under coverage-guided fuzzing, TIME seconds each; ONLY="cl fanuc" takes these. Findings are files in out/fuzz.
 TIME ?= 1200

@@ -75,6 +75,7 @@ FLOORS = (
     ("postproc.report", "summary, trace, residual field"),
     ("postproc.setup_sheet", "a new set-up: facts, questions, a place that fits"),
     ("postproc.page", "the report: a page that opens offline, and the same as JSON"),
+    ("postproc.dossier", "a machine described: as text, as JSON, as a page"),
     ("postproc.explain", "a page for each code of a message"),
     ("postproc.python", "the calls of the package: time, orient, place, calibrate, analyse"),
     ("postproc.batch", "many runs of commands: jobs, workers, what is done already"),

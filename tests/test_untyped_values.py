@@ -42,6 +42,8 @@ BORDERS = {
         "machines/analysis/certificate_figure", "machines/certificate/certificate_file", "machines/certificate/lookup",
         "postproc/certificate_check/check", "postproc/certificate_check/legs", "postproc/certificate_check/machine_file",
         "postproc/certificate_check/run")},
+    **{f"postproc/dossier/{name}.py": FIGURES for name in ("content", "page", "words")},
+    "machines/analysis/levers.py": FIGURES, "postproc/cli/machine_report.py": FIGURES,
     "postproc/cli/machine_study.py": FIGURES,
     "machines/analysis/report.py": FIGURES, "machines/geometric_error/exchange/survey.py": FIGURES,
     "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,

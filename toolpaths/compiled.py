@@ -11,7 +11,6 @@ the same function as machine code, and with it all loops that it calls by their 
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -35,13 +34,10 @@ class Loop:
     every processor, and those of the interpreter.
 
     Attributes:
-        fused: lets the compiler join a product and a sum: faster, and the last bits depend on the processor;
-            only where results need to agree within a tolerance
         alone: other loops do not follow once this one is compiled (`wanted`)
         takes: one compiled form for arrays of any layout; without it one for each kind of arguments that comes
     """
 
-    fused: bool = False
     alone: bool = False
     takes: Takes = ()
 
@@ -51,16 +47,16 @@ def loop(function: Function) -> Function: ...
 
 
 @overload
-def loop(*, fused: bool = False, alone: bool = False,
+def loop(*, alone: bool = False,
          takes: Takes = ()) -> Callable[[Function], Function]: ...
 
 
-def loop(function: Function | None = None, *, fused: bool = False, alone: bool = False,
+def loop(function: Function | None = None, *, alone: bool = False,
          takes: Takes = ()) -> Function | Callable[[Function], Function]:
     """Mark a function over numbers and arrays as one that can be compiled; it is not changed. Options as in `Loop`."""
 
     def marked(function: Function) -> Function:
-        setattr(function, _LOOP, Loop(fused, alone, takes))
+        setattr(function, _LOOP, Loop(alone, takes))
         return function
 
     return marked if function is None else marked(function)
@@ -89,11 +85,6 @@ def chosen(function: Callable[..., Result], size: int, enough: int) -> Callable[
 def available() -> bool:
     """Whether there is a compiler at all; without one everything is interpreted, or done by numpy."""
     return find_spec("numba") is not None
-
-
-def loaded() -> bool:
-    """Whether the compiler is loaded, so that nobody waits for that."""
-    return sys.modules.get("numba") is not None
 
 
 _made: dict[Callable[..., Any], Callable[..., Any]] = {}
@@ -128,7 +119,7 @@ def _by_numba(function: Callable[..., Any], how: Loop) -> Callable[..., Any]:
         return types.Array(number, dimensions, "A", readonly=True) if dimensions else number
 
     signature = tuple(argument(*one) for one in how.takes) or None
-    options: dict[str, Any] = {"nogil": True, "fastmath": {"contract"} if how.fused else False, "error_model": "numpy"}
+    options: dict[str, Any] = {"nogil": True, "fastmath": False, "error_model": "numpy"}
     try:
         return cast(Callable[..., Any], njit(signature, cache=True, **options)(function))
     except RuntimeError:  # no folder for the cache

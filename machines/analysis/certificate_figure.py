@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPANS = ("x_mm", "y_mm", "z_mm", "tilt_rad", "heading_rad")
-PLANES = ((0, 1), (0, 2))
-"""numbers of the pose to the right and up"""
+PLANES = ((0, 1), (0, 2), (1, 2))
+"""numbers of the pose to the right and up; the first two are drawn in which the region has a size"""
 _SIZE = (13.0, 5.5)
 
 
@@ -33,14 +33,16 @@ def certificate_figure(content: Mapping[str, Any], ending: FigureEnding) -> byte
         from matplotlib.patches import Rectangle
 
         shade = ScalarMappable(Normalize(float(bound.min()), max(float(bound.max()), float(bound.min()) + 1e-9)), "viridis")
-        panels = sheet.subplots(1, len(PLANES))
-        for axes, (right, up) in zip(panels, PLANES, strict=True):
+        size = upper.max(axis=0) - lower.min(axis=0)
+        planes = [plane for plane in PLANES if (size[list(plane)] > 0.0).all()][:2]
+        panels = sheet.subplots(1, len(planes), squeeze=False)[0]
+        for axes, (right, up) in zip(panels, planes, strict=True):
             middle = 0.5 * (lower.min(axis=0) + upper.max(axis=0))
             others = [i for i in range(5) if i not in (right, up)]
             cut = ((lower <= middle) & (middle <= upper))[:, others].all(axis=1)
             for k in np.flatnonzero(cut):
-                size = upper[k] - lower[k]
-                axes.add_patch(Rectangle((lower[k, right], lower[k, up]), size[right], size[up], linewidth=0.4,
+                sides = upper[k] - lower[k]
+                axes.add_patch(Rectangle((lower[k, right], lower[k, up]), sides[right], sides[up], linewidth=0.4,
                                          edgecolor="#222222", facecolor=shade.to_rgba(bound[k])))
             axes.set_xlim(lower[:, right].min(), upper[:, right].max())
             axes.set_ylim(lower[:, up].min(), upper[:, up].max())

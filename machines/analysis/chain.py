@@ -41,7 +41,7 @@ def scaled_jacobian(machine: Machine, q: Floats) -> Floats:
 
 def chain_figures(machine: Machine) -> dict[str, Any]:
     """Indices at home, and at the worst of the positions looked at; of a machine with rotary axes where it is singular."""
-    q = _positions(machine)
+    q = rotary_positions(machine)
     tip, _ = machine.kinematics.forward(q)
     q = q[np.isfinite(tip).all(axis=1)]
     if not len(q):
@@ -59,8 +59,8 @@ def chain_figures(machine: Machine) -> dict[str, Any]:
     return found
 
 
-def _positions(machine: Machine) -> Floats:
-    """Home, ends of travel of the rotary axes, random ones; slides at home."""
+def rotary_positions(machine: Machine) -> Floats:
+    """(N, J) mm and rad: home, ends of travel of the rotary axes, random ones; slides at home."""
     rotary = np.array(machine.rotary)
     low = np.where(np.isfinite(machine.limits.lower), machine.limits.lower, -np.pi)
     high = np.where(np.isfinite(machine.limits.upper), machine.limits.upper, np.pi)

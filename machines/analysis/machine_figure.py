@@ -48,7 +48,7 @@ def machine_figure(machine: Machine, ending: FigureEnding, q: Floats | None = No
             _view(axes, machine, parts, rig, feet, right, up)
             axes.set_title(name)
 
-    return image(_SIZE, f"{machine.name}: {machine.structure}\nat {position_words(machine, at)}", fill, ending)
+    return image(_SIZE, f"{machine.name}: {machine.structure}, at {position_words(machine, at)}", fill, ending)
 
 
 def position_words(machine: Machine, q: Floats) -> str:

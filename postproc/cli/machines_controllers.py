@@ -11,6 +11,7 @@ import typer
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
 from postproc.cli.machine_new import EXAMPLES as NEW
 from postproc.cli.machine_new import machine_new
+from postproc.cli.machine_report import REPORTED, machine_report
 from postproc.cli.machine_study import (
     ANALYSED,
     CERTIFIED,
@@ -57,6 +58,7 @@ machine_app.command("new", epilog=NEW)(machine_new)
 machine_app.command("import", epilog=IMPORTED)(machine_import)
 machine_app.command("export", epilog=EXPORTED)(machine_export)
 machine_app.command("analyse", epilog=ANALYSED)(machine_analyse)
+machine_app.command("report", epilog=REPORTED)(machine_report)
 machine_app.command("stiffness", epilog=STIFF)(machine_stiffness)
 machine_app.command("design", epilog=DESIGNED)(machine_design)
 machine_app.command("tolerance", epilog=TOLERATED)(machine_tolerance)
@@ -90,7 +92,7 @@ def machine_show(name: Annotated[str, typer.Argument(help="name or TOML file")],
                  at: ShownAt = None,
                  json: Json = "") -> None:
     """Show a machine: axes, travel, limits, which values are assumed."""
-    from postproc.cli.catalogue import machine_dict, machine_text
+    from postproc.dossier.words import machine_dict, machine_text
 
     ending = figure_ending(figure)
     if at and figure is None:
@@ -134,7 +136,7 @@ def _joints(machine: Machine, at: Sequence[str] | None) -> Floats:
 def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")], json: Json = "") -> None:
     """Check a machine file and say what is wrong with it."""
     import machines
-    from postproc.cli.catalogue import workspace_dict, workspace_words
+    from postproc.dossier.words import workspace_dict, workspace_words
 
     m, found = machines.load_checked(file)
     found = [*found, *machines.implausible(file)] if m is not None else found

@@ -15,7 +15,7 @@ import numpy as np
 
 from postproc.feedrate.kernels.splines import spline
 from toolpaths.arrays import Floats
-from toolpaths.compiled import compiled, wanted
+from toolpaths.compiled import available, compiled
 
 KERNEL_FROM = 200_000
 """Places at once from which compiling the evaluation of a spline pays."""
@@ -80,7 +80,7 @@ class SplinePath:
 
     def derivatives(self, s: Floats) -> Derivatives:
         """See `ParametricPath`."""
-        if wanted(len(s), KERNEL_FROM):
+        if len(s) >= KERNEL_FROM and available():  # by size alone: the last bits differ from scipy's
             first = self._orders[0]
             out = np.empty((4, len(s), self._coefficients[0].shape[1]))
             at = np.ascontiguousarray(s, dtype=np.float64)

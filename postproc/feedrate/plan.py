@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.feedrate.feed import AllowedFeed, FeedLimit
 from postproc.feedrate.limits import JointLimits, squared_speed
-from postproc.feedrate.mesh import FEWEST, Marks, Spacing, mesh, ramp_time
+from postproc.feedrate.mesh import Marks, Spacing, mesh, ramp_time
 from postproc.feedrate.motion import CHUNK, SAMPLE, MotionPiece, Plan
 from postproc.feedrate.paths import Eased, ParametricPath
 from postproc.feedrate.problem import MotionKnots
@@ -79,8 +79,7 @@ def plan(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, st
         raise ValueError("knots are for a motion without stops")
     pieces, reports, guess = [], [], []
     stretches = _stretches(path, stops, options.ease)
-    knots_about = sum(max(FEWEST, (eased.last - eased.first) / options.knots.longest) for eased in stretches)
-    options = replace(options, method=options.method.settled(int(knots_about)))
+    options = replace(options, method=options.method.settled())
     for eased in stretches:
         sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
         profile, report, slower = _solve(MotionKnots(eased, sigma, limits, allowed), options)

@@ -19,7 +19,7 @@ from postproc.feedrate.interior import InteriorSolution, NewtonSteps, NumpySteps
 from postproc.feedrate.problem import MotionKnots, SpeedProblem
 from postproc.feedrate.shares import weigh
 from toolpaths.arrays import Floats
-from toolpaths.compiled import wanted
+from toolpaths.compiled import available
 from toolpaths.shapes import arrays
 
 WINDOW, OVERLAP = 8192, 1024
@@ -28,8 +28,6 @@ APART, OVER = 1e-3, 1.002
 """Relative difference of neighbours, and ratio to a limit in the blend, from which the overlap is widened."""
 WIDEST = 16
 """Times the asked overlap beyond which it is not widened."""
-KERNEL_FROM = 20_000
-"""Knots from which compiling pays."""
 
 
 COLD, WARM = 5.0, 0.03
@@ -38,16 +36,20 @@ COLD, WARM = 5.0, 0.03
 
 @dataclass(frozen=True)
 class Method:
-    """How to solve: compiled loops or numpy (None: by size), threads, window and overlap in knots."""
+    """How to solve: compiled loops or numpy (None: compiled where that can be), threads, window and overlap in knots.
+
+    Never by what is compiled already: the two differ in the last bits, and a program must not depend on what the process
+    did before.
+    """
 
     kernel: bool | None = None
     threads: int = 1
     window: int = WINDOW
     overlap: int = OVERLAP
 
-    def settled(self, knots: int) -> Method:
-        """With `kernel` decided for so many knots in all."""
-        return self if self.kernel is not None else replace(self, kernel=wanted(knots, KERNEL_FROM))
+    def settled(self) -> Method:
+        """With `kernel` decided."""
+        return self if self.kernel is not None else replace(self, kernel=available())
 
     @property
     def steps(self) -> Callable[[SpeedProblem, Floats], NewtonSteps]:
@@ -85,7 +87,7 @@ class WindowSolution(NamedTuple):
 def solved(knots: MotionKnots, method: Method, near: Floats | None = None) -> SolvedWindows:
     """Least time on the knots; `near`: coefficients (K + 2,) of a similar motion to start from."""
     count = len(knots.sigma)
-    make = method.settled(count).steps
+    make = method.settled().steps
     inner = np.linspace(0, count, max(1, round(count / method.window)) + 1).astype(int).tolist()
     windows = list(pairwise(inner))
     wide = [method.overlap] * len(windows)

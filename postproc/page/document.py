@@ -51,7 +51,7 @@ def document(report: dict[str, Any], texts: Sequence[tuple[str, str, bytes]]) ->
         "<!doctype html>", '<html lang="en"><head><meta charset="utf-8">',
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{escape(_printable(report['part'])[:TITLE])} - report</title>", f"<style>{style}</style></head>", body,
+        f"<title>{escape(printable(report['part'])[:TITLE])} - report</title>", f"<style>{style}</style></head>", body,
         f'<script type="application/json" id="report">{embedded(light)}</script>', *parts,
         "<script>\n\"use strict\";", *scripts, "</script>", "</body></html>", ""])
 
@@ -63,7 +63,7 @@ def embedded(value: object) -> str:
         "\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
-def _printable(text: str) -> str:
+def printable(text: str) -> str:
     """Without what turns the direction of writing, and without control characters (Unicode categories Cc and Cf)."""
     return "".join(" " if category(letter) in ("Cc", "Cf") else letter for letter in text)
 

@@ -45,9 +45,27 @@ def input_hashes(machine: str, controller: str, options: Options) -> dict[ProofI
     setup = (*(_with_files(options.setup, {}, _meshes) if options.setup else ()),
              *(_with_files(options.hooks, {}, _none) if options.hooks else ()))
     return {"setup": setup,
-            "machine": _with_files(machine, builtin(), _kind),
+            "machine": machine_hashes(machine),
             "controller": _with_files(controller, builtin_files(), _none),
-            "error_model": _with_files(options.error_model, {}, _tables) if options.error_model else ()}
+            "error_model": error_model_hashes(options.error_model) if options.error_model else ()}
+
+
+def machine_hashes(machine: str) -> Hashes:
+    """Of a machine's file, its bases, the code of its kind.
+
+    Raises:
+        OSError: where a file cannot be read any more.
+    """
+    return _with_files(machine, builtin(), _kind)
+
+
+def error_model_hashes(file: str) -> Hashes:
+    """Of an error model and its tables.
+
+    Raises:
+        OSError: where a file cannot be read any more.
+    """
+    return _with_files(file, {}, _tables)
 
 
 def _with_files(source: str, known: Mapping[str, Path], named: Callable[[UserFile], list[Path]]) -> Hashes:

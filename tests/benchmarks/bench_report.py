@@ -1,8 +1,9 @@
 """The report: bytes by part, seconds to make and to open it, frames per second while it turns, by number of points.
 
-    python tests/benchmarks/bench_report.py [POINTS ...]
+    python tests/benchmarks/bench_report.py [--five-axis] [POINTS ...]
 
-Default 100, 10000, 1000000 points of `samples/make_big.py` on the three-axis machine under LinuxCNC. The page is opened
+Default 100, 10000, 1000000 points of `samples/make_big.py` on the three-axis machine under LinuxCNC; with --five-axis on the
+trunnion. The page is opened
 three times in headless Chromium with software rendering; the first time starts its graphics process. Asked for: at most 3 MB
 and 16 bytes a point without texts, open within 1 s at 10,000 points and 3 s at a million.
 """
@@ -30,16 +31,18 @@ FRAMES = """(coarse) => new Promise((done) => { const view = shown.view, g = vie
   step(); })"""
 
 
-def made(count: int, folder: Path) -> tuple[Path, float, float]:
+def made(count: int, folder: Path, five: bool) -> tuple[Path, float, float]:
     """(page, processor seconds, MB of memory) of a report of so many points."""
     cl, page = folder / f"{count}.cls", folder / f"{count}.html"
-    subprocess.run([sys.executable, "samples/make_big.py", str(max(count, 1000)), str(cl)], cwd=ROOT, check=True)
+    subprocess.run([sys.executable, "samples/make_big.py", str(max(count, 1000)), str(cl),
+                    *(["--five-axis"] if five else [])], cwd=ROOT, check=True)
     if count < 1000:
         lines = cl.read_text().splitlines()
         cl.write_text("\n".join([*lines[:count], *lines[-3:]]) + "\n")
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    subprocess.run([sys.executable, "-m", "postproc", "report", str(cl), "-m", "mill-3axis", "-c", "linuxcnc", "--setup",
-                    "samples/tools.setup.toml", "-o", str(page), "-q"], cwd=ROOT, check=True)
+    machine = ["-m", "mikron-ucp710"] if five else ["-m", "mill-3axis", "--setup", "samples/tools.setup.toml"]
+    subprocess.run([sys.executable, "-m", "postproc", "report", str(cl), *machine, "-c", "linuxcnc", "-o", str(page), "-q"],
+                   cwd=ROOT, check=True)
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return page, used.ru_utime - before, used.ru_maxrss / 1024.0
 
@@ -61,8 +64,9 @@ def opened(page: Path) -> tuple[list[float], list[float]]:
 
 def main() -> None:
     with TemporaryDirectory() as folder:
-        for count in [int(word) for word in sys.argv[1:]] or [100, 10_000, 1_000_000]:
-            page, processor, memory = made(count, Path(folder))
+        words = [word for word in sys.argv[1:] if word != "--five-axis"]
+        for count in [int(word) for word in words] or [100, 10_000, 1_000_000]:
+            page, processor, memory = made(count, Path(folder), "--five-axis" in sys.argv)
             text = page.read_text("utf-8")
             found = re.finditer(r'(?s)<script type=[^>]*id="([\w-]+)"[^>]*>(.*?)</script>', text)
             parts = {one[1]: len(one[2]) for one in found}

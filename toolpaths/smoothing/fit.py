@@ -13,7 +13,7 @@ import numpy as np
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.bspline import DEGREE, ORDER, KnotVectors
-from toolpaths.smoothing.sweep import WIDTH, Data, Normal, evaluate, sweep_for
+from toolpaths.smoothing.sweep import WIDTH, Data, Normal, evaluate, sweep_here
 
 PENALTY = 1000.0
 """Weight of (width^3 third derivative)^2 against one point's square of deviation."""
@@ -165,7 +165,7 @@ def _rounds(knots: KnotVectors, line: _Polyline, fixed: tuple[Floats, Floats],
     """
     k = knots.span(line.s, line.stretch)
     places = Data(line.s, line.p, k, k - DEGREE - ORDER * line.stretch)
-    penalty, run, weight = _penalty(knots), sweep_for(len(k)), line.weight.copy()
+    penalty, run, weight = _penalty(knots), sweep_here(), line.weight.copy()
     c, ratio = np.zeros((knots.count, WIDTH)), np.zeros(len(k))
     begin = np.flatnonzero(np.diff(line.stretch, prepend=-1))
     of_stretch = np.repeat(np.arange(len(begin)), np.diff(knots.first) - ORDER)

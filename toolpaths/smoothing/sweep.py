@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from toolpaths.arrays import Floats, Ints
-from toolpaths.compiled import compiled, loaded, loop
+from toolpaths.compiled import available, compiled, loop
 from toolpaths.smoothing.bspline import ORDER, basis
 
 WIDTH = 6
@@ -19,8 +19,6 @@ WIDTH = 6
 AIM = 0.8
 """Part of the tolerance above which a place gets more weight."""
 STRONGEST = 1e6
-COMPILE = 30_000
-"""Places from which waiting for the compiler pays."""
 
 
 class Data(NamedTuple):
@@ -112,6 +110,7 @@ def compiled_sweep(t: Floats, data: Data, c: Floats, weight: Floats, tolerance: 
                     normal.right)
 
 
-def sweep_for(count: int) -> Callable[..., None]:
-    """The one that is sooner done with so many places; a compiler that is loaded already is used."""
-    return compiled_sweep if count >= COMPILE or loaded() else sweep
+def sweep_here() -> Callable[..., None]:
+    """Compiled where there is a compiler, whatever is loaded already: the two differ in the last bits, and a program must
+    not depend on what the process did before."""
+    return compiled_sweep if available() else sweep

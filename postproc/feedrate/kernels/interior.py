@@ -32,7 +32,7 @@ F1, F2, F3, F4, F5, F6, F7, F8 = (_N(i * LANES) for i in range(1, 9))
 F9, F10, F11 = _N(9 * LANES), _N(10 * LANES), _N(11 * LANES)
 
 
-@loop(fused=True)
+@loop
 def _knots(w: Any, c: Any, b: Any, k: Any, mu: Any, dual: Any) -> None:
     """Block b of w from coefficients c[k:]: x and derivatives, roots, the velocity row, sums of the others at zero."""
     for i in range(L):
@@ -57,7 +57,7 @@ def _knots(w: Any, c: Any, b: Any, k: Any, mu: Any, dual: Any) -> None:
         w[p + SUM_Z] = 0.0
 
 
-@loop(fused=True)
+@loop
 def _joint(w: Any, v: Any, b: Any, q: Any, ia: Any, ij: Any, mu: Any, dual: Any) -> None:
     """Add the rows of one joint, block q of v, to block b of w; ia, ij one over its limits of acceleration and jerk."""
     for i in range(L):
@@ -98,7 +98,7 @@ def _joint(w: Any, v: Any, b: Any, q: Any, ia: Any, ij: Any, mu: Any, dual: Any)
         w[p + H22] += ratio * j2 * j2
 
 
-@loop(fused=True)
+@loop
 def assemble(w: Any, v: Any, c: Any, inverse: Any, blocks: Any, mu: Any, dual: Any) -> Any:
     """Update z by the dual step; leave each knot's part of the Newton equations in G and H. Returns gap and time.
 
@@ -118,7 +118,7 @@ def assemble(w: Any, v: Any, c: Any, inverse: Any, blocks: Any, mu: Any, dual: A
     return gap, time
 
 
-@loop(fused=True)
+@loop
 def band(w: Any, blocks: Any, low: Any, force: Any) -> None:
     """Add the knots' parts to the lower band (3, n) and the right side (n,) in the coefficients, n padded to the lanes."""
     for block in range(blocks):
@@ -159,7 +159,7 @@ def band(w: Any, blocks: Any, low: Any, force: Any) -> None:
             force[n + _TWO] += w[p + G2]
 
 
-@loop(fused=True)
+@loop
 def pentadiagonal(low: Any, x: Any, inverse: Any, below: Any) -> Any:
     """Solve by LDL': lower band (3, n), x (n,) right side, then answer; room inverse (n,), below (2, n).
 
@@ -187,7 +187,7 @@ def pentadiagonal(low: Any, x: Any, inverse: Any, below: Any) -> Any:
     return True
 
 
-@loop(fused=True)
+@loop
 def direction(w: Any, v: Any, dc: Any, inverse: Any, blocks: Any, mu: Any) -> Any:
     """Relative changes of z for the step dc; returns the largest relative decrease of a slack and of a z."""
     # Largest fall of a slack by itself and of a z by itself: one over them are the steps to the nearest bound.

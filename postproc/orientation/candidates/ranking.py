@@ -46,7 +46,7 @@ class Ranking:
 
     def __init__(self, first: Candidate) -> None:
         knots = sum(len(each) for each in first.knots)
-        method = Method().settled(knots)
+        method = Method().settled()
         self._grids = [] if knots > LONG else [_Grid(stretch.s, each, AllowedFeed(stretch.feed), first.jerky, method)
                                                for stretch, each in zip(first.one.stretches, first.knots, strict=True)]
 

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import machines
 from postproc.cli.app import app
-from postproc.cli.catalogue import machine_text, rotary_lines
+from postproc.dossier.words import machine_text, rotary_lines
 from tests.postproc.kit import machine
 
 NAMES = [name for name in machines.names() if any(machine(name).rotary)]

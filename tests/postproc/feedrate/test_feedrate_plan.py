@@ -250,11 +250,3 @@ def test_where_tightening_is_in_vain_the_best_is_kept() -> None:
     made = plan(PolynomialPath([[0.0, 1.0]], 100.0), JointLimits(*np.array([[500.0], [2500.0], [5e8]])),
                 options=STRICT)
     assert made.usage().worst <= 1.0 and made.seconds < 1.06 * 0.4
-
-
-def test_compiling_is_decided_by_the_whole_motion(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not by each piece: many short ones are many knots, too."""
-    asked: list[int] = []
-    monkeypatch.setattr(windows, "wanted", lambda size, enough: bool(asked.append(size)))
-    plan(random_path(2), MIKRON, stops=[20.0, 50.0, 80.0])
-    assert asked and min(asked) >= 4 * 128

@@ -13,8 +13,6 @@ import numpy as np
 from postproc.feedrate.plan import PlannerOptions, plan, plan_second_order
 from postproc.feedrate.windows import Method
 from tests.postproc.feedrate_kit import MIKRON, uniform, zigzag
-from postproc.feedrate import windows
-windows.KERNEL_FROM = 1_500
 path = zigzag(160.0)
 made = plan(path, MIKRON, knots=uniform(path, 1_600).sigma)
 assert made.solved and made.seconds > plan_second_order(path, MIKRON).seconds
