@@ -7,7 +7,7 @@ import gc
 from postproc.cli.shared.guard import guarded
 
 COLLECTED_FROM = 50_000
-"""objects made since the last look for garbage at which there is one; Python's 700 takes 40 ms of a small conversion, in which
+"""objects made since the last look for garbage at which there is one; Python's 700 takes 40 ms of a small conversion, where
 nearly all that is made is imported and stays"""
 
 

@@ -16,6 +16,7 @@ from postproc.correction.error_sampling import changes, looks_between
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import FEW, BlockPoses, alike, begins
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 ARC = 2
 LOOKS = 16
@@ -38,10 +39,11 @@ class ActualBlockPoses(BlockPoses):
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t, errors in, by the approach direction that
         each axis last moved."""
-        for ahead in self._together:
-            if ahead.rows is rows and (k := ahead.number(t)) >= 0:
+        for asked, ahead in self._together:
+            if asked is rows and (k := ahead.number(t)) >= 0:
                 if not ahead.poses:
-                    made = self._aimed(np.tile(motion.tool[rows], len(ahead.times)), *ahead.found)
+                    tools = np.tile(motion.tool[rows], len(ahead.times))
+                    made = self._aimed(tools, ahead.near, ahead.q, ahead.approach)
                     ahead.poses.extend(a.reshape(len(ahead.times), len(rows), 3) for a in made)
                 return ahead.poses[0][k], ahead.poses[1][k]
         return self._aimed(motion.tool[rows], *self._at(motion, rows, t))
@@ -74,7 +76,7 @@ class ActualBlockPoses(BlockPoses):
             found = self._at(motion, np.tile(rows, len(times)), shares)
             pose, q, approach = (part.reshape(len(times), len(rows), -1) for part in found)
             self._seen[:] = [(rows, t, (pose[k], q[k], approach[k])) for k, t in enumerate(times)]
-            self._together.append(_Together(rows, tuple(times), found))
+            self._together.append((rows, _Together(times, *found)))
 
     def joints(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """See `BlockPoses`."""
@@ -86,7 +88,7 @@ class ActualBlockPoses(BlockPoses):
         return []
 
     @cached_property
-    def _together(self) -> list[_Together]:
+    def _together(self) -> list[tuple[Ints, _Together]]:
         return []
 
     def nominal(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
@@ -227,13 +229,15 @@ class ActualBlockPoses(BlockPoses):
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(near="M 6", q="M J", approach="M J")
 class _Together:
-    """Places that were looked ahead at: of blocks `rows` (K,) at several fractions, one fraction after the other; `poses`:
-    tips and axes (times, K, 3), once they are asked for."""
+    """Places looked ahead at, one fraction of the blocks after the other: nominal poses (M, 6), joints (M, J), their
+    approach directions; `poses`: tips and axes (times, K, 3), once they are asked for."""
 
-    rows: Ints
-    times: tuple[float | Floats, ...]
-    found: tuple[Floats, Floats, Floats]
+    times: Sequence[float | Floats]
+    near: Floats
+    q: Floats
+    approach: Floats
     poses: list[Floats] = field(default_factory=list)
 
     def number(self, t: float | Floats) -> int:
