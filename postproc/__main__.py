@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import sys
 
 from postproc.cli.shared.guard import guarded
 
@@ -15,8 +16,9 @@ def command() -> None:
     """The command line."""
     gc.set_threshold(COLLECTED_FROM, *gc.get_threshold()[1:])
     from postproc.cli.app import app
+    from postproc.cli.shared.group import only_called
 
-    app()
+    only_called(app, sys.argv[1:])()
 
 
 def main() -> None:
