@@ -224,7 +224,8 @@ def test_help_is_instant_and_lists_the_commands() -> None:
 NOT_NEEDED = (
     "numba", "scipy", "rich", "ruckig", "toppra", "trimesh", "toolpaths.smoothing", "toolpaths.cl.systems.nci",
     "toolpaths.cl.systems.freecad", "toolpaths.cl.systems.step_nc", "machines.geometric_error.actual",
-    "machines.kinematics.legs", "postproc.feedrate", "postproc.planning.planned", "postproc.correction", "postproc.readback.macros.siemens",
+    "machines.kinematics.legs", "postproc.feedrate", "postproc.planning.planned", "postproc.correction",
+    "postproc.readback.macros.siemens",
     "postproc.readback.macros.klartext", "postproc.readback.macros.fanuc", "postproc.readback.dialects.siemens",
     "postproc.readback.dialects.klartext", "postproc.readback.dialects.haas", "postproc.writing.siemens",
     "postproc.writing.heidenhain", "postproc.cycle_time.linuxcnc", "postproc.proof.file", "postproc.pipeline.optimised",
