@@ -51,20 +51,6 @@ def load(source: str | Path) -> Machine:
 
 def load_checked(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
     """The machine of a built-in name or a path, or None and every fault of its file."""
-    if str(source) not in builtin():
-        return _read(source)
-    machine, found = _of_package(str(source))
-    return machine, [*found]
-
-
-@cache
-def _of_package(name: str) -> tuple[Machine | None, tuple[Diagnostic, ...]]:
-    """A machine of a built-in name: its files stay as they are while a process runs, and machines do."""
-    machine, found = _read(name)
-    return machine, tuple(found)
-
-
-def _read(source: str | Path) -> tuple[Machine | None, list[Diagnostic]]:
     file, diagnostics = read_toml(source, builtin(), "machine")
     if file is None:
         return None, diagnostics
