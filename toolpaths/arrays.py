@@ -70,6 +70,12 @@ def among(values: Array, some: Iterable[float]) -> Bools:
     return found
 
 
+def within(values: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike) -> Array:
+    """`numpy.clip`, which takes five times as long for few."""
+    made: Array = np.minimum(np.maximum(values, low), high)
+    return made
+
+
 def without_nan(values: Floats, nan: float = 0.0) -> Floats:
     """`numpy.nan_to_num` with `nan` in the place of NaN; the values themselves where all are finite."""
     return values if np.isfinite(values).all() else np.nan_to_num(values, nan=nan)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats, Ints, taken
+from toolpaths.arrays import Bools, Floats, Ints, taken, within
 from toolpaths.rotations import angle_between, cross, lengths, slerp, whole_turns
 from toolpaths.shapes import arrays
 
@@ -48,6 +49,11 @@ class Curves:
         """The curves with these indices, in this order; a slice copies nothing."""
         return Curves(*(taken(getattr(self, name), index) for name in self.__dataclass_fields__))
 
+    @cached_property
+    def _arcs(self) -> Ints:
+        """Numbers of the curves that are arcs."""
+        return np.flatnonzero(self.is_arc)
+
     def at(self, u: Floats) -> tuple[Floats, Floats]:
         """(tip (N, 3), axis (N, 3)) at u (N,). The ends are the given ends to the last bit."""
         return self.tip_at(u), self.axis_at(u)
@@ -55,7 +61,7 @@ class Curves:
     def tip_at(self, u: Floats) -> Floats:
         """tip (N, 3) at u (N,)."""
         tip = self.start + u[:, None] * (self.end - self.start)
-        arc = np.flatnonzero(self.is_arc)
+        arc = self._arcs
         if len(arc):
             tip[arc] = self._arc_tip(arc, u[arc])
         return np.where((u == 1.0)[:, None], self.end, tip)
@@ -81,7 +87,7 @@ class Curves:
     def length(self) -> Floats:
         """Path length (N,) of the tip, mm; helices by their true length."""
         chord: Floats = lengths(self.end - self.start)
-        arc = np.flatnonzero(self.is_arc)
+        arc = self._arcs
         if len(arc):
             normal, radial = self.normal[arc], self.start[arc] - self.center[arc]
             radial = radial - np.einsum("ni,ni->n", radial, normal)[:, None] * normal
@@ -98,10 +104,10 @@ class Curves:
         size = np.einsum("ni,ni->n", span, span)
         along = np.einsum("ni,ni->n", tip - self.start, span)
         u = np.where(size > _EPS, along / np.where(size > _EPS, size, 1.0), guess)
-        arc = np.flatnonzero(self.is_arc)
+        arc = self._arcs
         if len(arc):
             u[arc] = self._arc_project(arc, tip[arc], guess[arc])
-        result: Floats = np.clip(u, 0.0, 1.0)
+        result: Floats = within(u, 0.0, 1.0)
         return result
 
     def turned(self, axis: Floats, guess: Floats) -> Floats:
@@ -110,7 +116,7 @@ class Curves:
         turns = turn > 1e-6
         across = cross(cross(self.axis0, self.axis1), self.axis0) / np.sin(np.where(turns, turn, 1.0))[:, None]
         angle = np.arctan2((axis * across).sum(axis=1), (axis * self.axis0).sum(axis=1))
-        result: Floats = np.where(turns, np.clip(angle / np.where(turns, turn, 1.0), 0.0, 1.0), guess)
+        result: Floats = np.where(turns, within(angle / np.where(turns, turn, 1.0), 0.0, 1.0), guess)
         return result
 
     def _arc_project(self, arc: Ints, tip: Floats, guess: Floats) -> Floats:

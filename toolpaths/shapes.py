@@ -14,7 +14,8 @@ always gives, `#names` is `len(self.names)`, `##nodes` the length of each item o
 `...` any shape. Fields that are None are passed over; a tuple of arrays is `*` and the shape of each. Where
 some are None, the others still share their letters, and so do the arrays of a tuple.
 The type is that of the annotation (`Floats`, `Ints`, `Bools`), or stands before a colon.
-The check is compiled once for each class, when its first value is made.
+The check is compiled once for each class, when more than `COMPILED_FROM` of its values have been made: of most
+classes a small program makes fewer, and compiling takes as long as fifty checks part by part.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache, partial
+from types import CodeType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -34,6 +37,8 @@ if TYPE_CHECKING:
 Owner = TypeVar("Owner", bound=type)
 Table = TypeVar("Table", bound="DataclassInstance")
 TABLE = "__arrays__"
+COMPILED_FROM = 12
+"""values of a class that are checked part by part before the check is compiled"""
 _LETTER = re.compile(r"[A-Za-z]\w*")
 _ANNOTATED = re.compile(r"\b(?:(Floats|Ints|Bools)|NDArray\[np\.(\w+)\])")
 _HELD = re.compile(r"(#+)([\w.]+)")
@@ -74,14 +79,21 @@ def arrays(**shapes: str) -> Callable[[Owner], Owner]:
     def marked(cls: Owner) -> Owner:
         own: Callable[[Any], None] | None = getattr(cls, "__post_init__", None)
         table = {**getattr(cls, TABLE, {}), **shapes}
-        check: list[Callable[[Any], None]] = []
+        check: Callable[[Any], None] | None = None
+        fields: list[_Field] = []
+        made = 0
 
         def __post_init__(self: Any) -> None:
+            nonlocal check, fields, made
             if own is not None:
                 own(self)
-            if not check:
-                check.append(_compiled(_in_order(table, type(self))))
-            check[0](self)
+            if check is not None:
+                check(self)
+                return
+            fields, made = fields or _in_order(table, type(self)), made + 1
+            if made > COMPILED_FROM:
+                check = _compiled(fields)
+            (check or partial(_by_parts, fields))(self)
 
         setattr(cls, TABLE, table)
         cls.__post_init__ = __post_init__  # type: ignore[attr-defined]  # any class may be given one
@@ -127,6 +139,50 @@ def _field(name: str, text: str, annotation: str) -> _Field:
         kind = _NAMED.get(found[1] or "", found[2] or "").rstrip("_")
     parts = tuple(shape.removeprefix("*").split())
     return _Field(name, None if parts == ("...",) else parts, kind, "None" in annotation, shape.startswith("*"))
+
+
+def _by_parts(fields: list[_Field], self: Any) -> None:
+    """The check of a class as it stands, for the first values: what `_compiled` does."""
+    held, lengths = self.__dict__, dict[str, int]()
+    for f in fields:
+        value, kind = held[f.name], np.dtype(f.kind) if f.kind else None
+        if value is None and (f.optional or f.several):
+            continue
+        made = []
+        for one in value if f.several else (value,):
+            a = _as_type(one, kind, self, f.name)
+            if f.parts is not None and not _fits(a.shape, f.parts, lengths, self):
+                _fail(self, fields)
+            if a.flags.writeable:
+                a = a.view()
+                a.setflags(write=False)
+            made.append(a)
+        held[f.name] = tuple(made) if f.several else made[0]
+
+
+def _fits(shape: tuple[int, ...], parts: tuple[str, ...], lengths: dict[str, int], self: Any) -> bool:
+    """Whether a shape is what its parts say; letters that are not known yet get their `lengths`."""
+    if any("##" in part for part in parts):
+        return shape == _wanted(self, parts, lengths)
+    if len(shape) != len(parts):
+        return False
+    for part, length in zip(parts, shape, strict=True):
+        if part == "_":
+            continue
+        wanted = lengths.setdefault(part, length) if part.isidentifier() else _number(part, self, lengths)
+        if length != wanted:
+            return False
+    return True
+
+
+def _number(part: str, self: Any, lengths: Mapping[str, int]) -> int:
+    """The length that a part counts."""
+    return int(eval(_code_of(part), {"self": self, **lengths}))
+
+
+@cache
+def _code_of(part: str) -> CodeType:
+    return compile(_expression(part), part, "eval")
 
 
 def _compiled(fields: list[_Field]) -> Callable[[Any], None]:
@@ -240,7 +296,7 @@ def _wanted(self: Any, parts: tuple[str, ...] | None, lengths: Mapping[str, int]
         elif part == "_" or set(_LETTER.findall(_HELD.sub("", part))) - set(lengths):
             found.append(part)
         else:
-            found.append(int(eval(_expression(part), {"self": self, **lengths})))
+            found.append(_number(part, self, lengths))
     return tuple(found)
 
 

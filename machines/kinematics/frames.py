@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.rotations import cross
 
 
 def reference_x(axis: Floats) -> Floats:
@@ -24,12 +25,12 @@ def reference_x(axis: Floats) -> Floats:
 def tool_x(axis: Floats, spin: Floats) -> Floats:
     """The tool's own x direction (N, 3) at a spin (N,) about the unit `axis` (N, 3); undoes `spin_about`."""
     reference = reference_x(axis)
-    return np.asarray(np.cos(spin)[:, None] * reference + np.sin(spin)[:, None] * np.cross(axis, reference))
+    return np.asarray(np.cos(spin)[:, None] * reference + np.sin(spin)[:, None] * cross(axis, reference))
 
 
 def spin_about(axis: Floats, tool_x: Floats) -> Floats:
     """Angle (N,) rad about the unit `axis` (N, 3) from `reference_x(axis)` to `tool_x` (N, 3)."""
     reference = reference_x(axis)
-    side = np.cross(axis, reference)
+    side = cross(axis, reference)
     result: Floats = np.arctan2(np.sum(side * tool_x, axis=1), np.sum(reference * tool_x, axis=1))
     return result

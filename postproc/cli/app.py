@@ -40,7 +40,7 @@ from postproc.cli.shared.console import (
     report,
     shown_errors,
 )
-from postproc.cli.shared.group import Group
+from postproc.cli.shared.group import Group, only_called
 from postproc.cli.shared.guard import guarded
 from postproc.cli.shared.options import (
     Allow,
@@ -320,7 +320,7 @@ def run_command(arguments: Sequence[str]) -> Ran:
     sys.argv = ["postproc", *arguments]
     try:
         with redirect_stderr(said), redirect_stdout(io.StringIO()):
-            code = guarded(lambda: app(list(arguments), prog_name="postproc"))
+            code = guarded(lambda: only_called(app, arguments)(list(arguments), prog_name="postproc"))
     finally:
         sys.argv = own
     return Ran(code, tuple(line for line in said.getvalue().splitlines() if line.strip()))

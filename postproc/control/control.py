@@ -22,6 +22,7 @@ from machines.machine import Machine
 from postproc.control.planes import Plane
 from postproc.control.rollover import Rollover, parked
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.rotations import cross
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -317,6 +318,6 @@ def tool_frames(kin: Kinematics, q: Floats) -> Floats:
     """(N, 3, 3): columns are the tool's own x, y and z (its axis) in the table frame at joints q (N, J)."""
     _, axis, spin = kin.pose(q)
     first = reference_x(axis)
-    second = np.cross(axis, first)
+    second = cross(axis, first)
     c, s = np.cos(spin)[:, None], np.sin(spin)[:, None]
     return np.stack([c * first + s * second, c * second - s * first, axis], axis=2)

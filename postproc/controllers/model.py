@@ -317,4 +317,14 @@ def builtin_files() -> Mapping[str, Path]:
 
 def load_controller(source: str | Path) -> tuple[ControllerFile | None, list[Diagnostic]]:
     """The controller of a built-in name or a path."""
-    return load_toml(source, ControllerFile, builtin=builtin_files(), kind="controller")
+    if str(source) not in builtin_files():
+        return load_toml(source, ControllerFile, builtin=builtin_files(), kind="controller")
+    spec, found = _of_package(str(source))
+    return spec, [*found]
+
+
+@cache
+def _of_package(name: str) -> tuple[ControllerFile | None, tuple[Diagnostic, ...]]:
+    """A controller of a built-in name: its files stay as they are while a process runs, and controllers do."""
+    spec, found = load_toml(name, ControllerFile, builtin=builtin_files(), kind="controller")
+    return spec, tuple(found)

@@ -12,7 +12,6 @@ from machines.machine import Machine
 from postproc.cycle_time.blocks import Cause, MotionBlocks
 from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.kinds import own_share
-from postproc.cycle_time.linuxcnc import Settings, linuxcnc
 from postproc.cycle_time.lookahead import lookahead
 from postproc.cycle_time.model import ASSUMED, PARAMETERS, CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes
@@ -80,6 +79,8 @@ def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
         runs_up = np.where(starts, factor * model.spindle_time, 0.0)
         blocks = replace(blocks, pauses=replace(p, seconds=p.seconds + runs_up))
     if model.kind == "linuxcnc":
+        from postproc.cycle_time.linuxcnc import Settings, linuxcnc  # its segments, which other models do without
+
         return linuxcnc(blocks, Settings(cycle=model.servo_cycle, override=model.override, rapid=model.rapid))
     if model.kind == "control":
         from postproc.cycle_time.control import control  # SciPy, which other models do without

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +14,8 @@ from postproc.base.group_rows import groups
 from postproc.joints.direct import joints_inside
 from postproc.joints.joint_path import reachable_axes
 from postproc.joints.lattice import PoseRun
-from postproc.joints.open_parameters import planned_parameters
 from postproc.joints.plan import JointPreferences, RunSolution, plan_runs
 from postproc.joints.refined_moves import Refined, cut, with_rewinds
-from postproc.joints.run_roads import ParameterCurve, RunRoad, together
 from postproc.joints.singular_detours import Led, SingularPassage, lead_past, whole
 from postproc.joints.spin import held_joints
 from postproc.reference.moves import Moves
@@ -25,6 +24,9 @@ from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
+
+if TYPE_CHECKING:
+    from postproc.joints.run_roads import ParameterCurve, RunRoad
 
 AXIS_SHARE = 0.2
 """share of the axis tolerance that may go into moving an axis onto the set the machine can reach"""
@@ -115,7 +117,11 @@ class _Part:
     @property
     def parameters(self) -> Floats | None:
         """(N, F) at the poses; None where the machine leaves nothing open."""
-        return together(self.opened, len(self.kin.open_parameters), self.places) if self.opened else None
+        if not self.opened:
+            return None
+        from postproc.joints.run_roads import together
+
+        return together(self.opened, len(self.kin.open_parameters), self.places)
 
 
 def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves: Moves, run_options: RunOptions,
@@ -215,6 +221,8 @@ def _run(part: _Part, moves: Moves, run_options: RunOptions, home: Floats) -> Po
 
 def _opened(machine: Machine, parts: list[_Part], moves: Moves, run_options: RunOptions) -> list[_Part]:
     """The runs with what the machine leaves open planned, cut where it changes."""
+    from postproc.joints.open_parameters import planned_parameters
+
     curves = planned_parameters([_road(part, moves) for part in parts], machine, run_options.singular_distance,
                                 run_options.spin, run_options.split)
     made = [replace(part, opened=own, places=tuple(curve.measure for curve in own))
@@ -223,6 +231,8 @@ def _opened(machine: Machine, parts: list[_Part], moves: Moves, run_options: Run
 
 
 def _road(part: _Part, moves: Moves) -> RunRoad:
+    from postproc.joints.run_roads import RunRoad
+
     rows, led, asked = part.rows[1:][part.led.parent], part.led, moves.spin[part.rows]
     with np.errstate(invalid="ignore", divide="ignore"):
         time = np.where(moves.seconds[rows] > 0.0, moves.seconds[rows] * (led.u1 - led.u0),

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as FilePath
 from types import UnionType
+from typing import TYPE_CHECKING
 
 from machines.loader import load as load_machine
 from machines.machine import Machine
@@ -21,7 +22,6 @@ from postproc.pipeline.free_spin import with_spin_needed
 from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.native_splines import as_arcs, asked_splines, held_near, with_cubics
 from postproc.pipeline.next_modes import with_next_modes
-from postproc.pipeline.optimised import optimised
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
 from postproc.pipeline.stages import staged
@@ -34,16 +34,12 @@ from postproc.verification.neighbour_files import NeighbourFiles, unfinished
 from postproc.verification.read_back import other_axes, other_setup, read_back
 from postproc.verification.second_witness import second_witness
 from postproc.verification.stated_numbers import check_header, stated_smoothing
-from postproc.verification.tool_table import (
-    MeasuredLength,
-    measured_lengths,
-    read_tool_table,
-    with_allowed,
-    with_measured,
-)
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors, read_value
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import Toolpath
+
+if TYPE_CHECKING:
+    from postproc.verification.tool_table import MeasuredLength
 
 
 def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str | FilePath = "linuxcnc",
@@ -84,8 +80,11 @@ def _converted(start: PostResult, progress: Progress | None, clock: ProgramClock
 
     def stages(begun: PostResult) -> PostResult:
         return _stages(begun, progress)
-    return optimised(start, stages, clock) if clock is not None and start.options.optimise else (
-        with_compared_feeds(start, stages, clock))
+    if clock is None or not start.options.optimise:
+        return with_compared_feeds(start, stages, clock)
+    from postproc.pipeline.optimised import optimised
+
+    return optimised(start, stages, clock)
 
 
 def _loaded(controller: str | FilePath, machine: Machine | str | FilePath, setup: SetupFile | str | FilePath | None,
@@ -212,6 +211,8 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         return replace(begun, diagnostics=tuple(found))
     asked, at_gauge = start.asked or start.setup, job.setup
     if tool_table:
+        from postproc.verification.tool_table import measured_lengths, read_tool_table, with_measured
+
         measured, more = measured_lengths(read_tool_table(tool_table, spec), job, str(tool_table))
         begun, found, asked = replace(begun, measured=tuple(measured)), [*found, *more], with_measured(asked, measured)
         if has_errors(more):
@@ -236,6 +237,8 @@ def _with_allowed(measured: tuple[MeasuredLength, ...], comparison: Comparison |
                   with_gauge_lengths: Callable[[], tuple[Comparison | None, list[Diagnostic]]],
                   ) -> tuple[MeasuredLength, ...]:
     """Lengths at the machine with what the program takes: from what is proved with them, else with gauge lengths."""
+    from postproc.verification.tool_table import with_allowed
+
     if comparison is not None and not failed:
         return tuple(with_allowed(list(measured), comparison.lengths, False))
     other, found = with_gauge_lengths()

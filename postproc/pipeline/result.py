@@ -14,7 +14,6 @@ from postproc.control.modes import Refused
 from postproc.controllers.model import ControllerFile
 from postproc.job.job import Job
 from postproc.path.model import JointPath
-from postproc.planning.planned import PlannedMotion
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from postproc.correction.compensation import ErrorCorrection
     from postproc.correction.written_deviation import AfterFormatting
     from postproc.orientation.plans.choice import OrientationChoice
+    from postproc.planning.planned import PlannedMotion
     from postproc.verification.tool_table import MeasuredLength
     from postproc.witness.evidence import Testimony
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from postproc.job.job import Job
 from postproc.pipeline.result import PostResult
-from postproc.planning.pass_geometry import stops_of
-from postproc.planning.smoothed_moves import Smoothed, smoothed_moves
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, Severity, info, warning
-from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.units import DEG
+
+if TYPE_CHECKING:
+    from postproc.planning.smoothed_moves import Smoothed
 
 ExcludedPasses = frozenset[tuple[int, int]]
 """passes that are not smoothed, as `Smoothed.ranges`"""
@@ -38,6 +39,10 @@ def written_moves(job: Job, shares: dict[str, float],
 
 
 def _smoothed(job: Job, shares: dict[str, float], left: ExcludedPasses) -> Smoothed:
+    from postproc.planning.pass_geometry import stops_of
+    from postproc.planning.smoothed_moves import smoothed_moves
+    from toolpaths.smoothing.smooth import Tolerance
+
     bound = job.rounding
     return smoothed_moves(job.moves, Tolerance(shares["points"], shares["axis_points"] * DEG),
                           stops_of(job.toolpath, job.moves),

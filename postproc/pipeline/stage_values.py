@@ -18,7 +18,6 @@ from postproc.job.job import Job
 from postproc.path.model import JointPath
 from postproc.path.rewinds import RetractPlan
 from postproc.pipeline.smoothed_stages import ExcludedPasses
-from postproc.planning.planned import PlannedMotion
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from postproc.correction.compensation import ErrorCorrection
     from postproc.correction.written_deviation import AfterFormatting
     from postproc.orientation.plans.choice import OrientationChoice
+    from postproc.planning.planned import PlannedMotion
     from postproc.witness.evidence import Testimony
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from postproc.base.progress import Progress
 from postproc.compile.compile import compile_program, writing_of
@@ -44,22 +44,25 @@ from postproc.pipeline.stage_values import (
     handed_on,
 )
 from postproc.pipeline.tolerance_shares import tolerance_shares
-from postproc.planning.planned import PlannedMotion, planned_motion
-from postproc.planning.planned_errors import PlannedCorrection, on_written, planned_correction
 from postproc.planning.planned_source import limits_not_kept, shifted_moves, source_of
 from postproc.readback.comparison.slow_moves import with_fingerprint
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
 from postproc.setup.system import with_system
-from postproc.verification.planned_words import check_planned
 from postproc.verification.proof_text import with_statement
 from postproc.verification.read_back import read_back
 from postproc.verification.second_witness import second_witness
 from postproc.verification.stated_numbers import check_header, stated_smoothing
 from postproc.writing.unwritable import floating_taps, unwritable
 from postproc.writing.writers import writer_for
+from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.units import DEG
+
+if TYPE_CHECKING:
+    from postproc.planning.planned import PlannedMotion
+    from postproc.planning.planned_errors import PlannedCorrection
+    from postproc.readback.comparison.compare import Comparison
 
 DiagnosticList = list[Diagnostic]
 _STRETCH = 1_000_000
@@ -187,8 +190,12 @@ def checked(made: CorrectedStage, progress: Progress | None) -> tuple[CheckedSta
 
 def planned(made: CheckedStage, progress: Progress | None) -> tuple[PlannedStage, DiagnosticList]:
     """What the passes allow under the limits of the axes, with --feed planned."""
-    correction = planned_correction(made.job, made.compensation, made.path)
     job = made.job
+    if job.options.feed != "planned":
+        return handed_on(PlannedStage, made, motion=None), limits_not_kept(job)
+    from postproc.planning.planned_errors import planned_correction
+
+    correction = planned_correction(job, made.compensation, made.path)
     motion, found = plan_motion(job, made.moves, made.nominal or made.path, correction)
     if motion is None or made.nominal is not None or not job.controller.feed.limited_jerk:
         return handed_on(PlannedStage, made, motion=motion), found
@@ -201,14 +208,15 @@ def plan_motion(job: Job, moves: Moves, path: JointPath,
     """The motion of a path within the limits of axes and tools; None without --feed planned."""
     if job.options.feed != "planned":
         return None, limits_not_kept(job)
+    from postproc.planning.planned import planned_motion
+
     return planned_motion(source_of(job, moves, path, correction, limited_jerk=job.controller.feed.limited_jerk))
 
 
 def compiled(made: PlannedStage, progress: Progress | None) -> tuple[CompiledStage, DiagnosticList]:
     """Canonical words, rounded, with feeds, commands, cycles and sections; what the control cannot write is refused."""
     job, motion, compensation = made.job, made.motion, made.compensation
-    feeds_planned = None if motion is None else PlannedFeeds(on_written(compensation, motion.needed),
-                                                             made.options.merge_feeds)
+    feeds_planned = None if motion is None else PlannedFeeds(_needed(made, motion), made.options.merge_feeds)
     program, feeds, found = compile_program(job, made.moves, made.path, feeds_planned,
                                             None if compensation is None else compensation.apart)
     found += unwritable(made.controller, program, made.toolpath.cycles, made.toolpath.file,
@@ -259,8 +267,7 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
     found = [*found, *check_header(made.text, job, "")]
     found += [] if comparison is None else stated_smoothing(comparison, job, "")
     if comparison is not None and made.motion is not None and not has_errors(found):
-        found = [*found, *check_planned(made.path, made.moves, on_written(made.compensation, made.motion.needed),
-                                        made.options.merge_feeds, comparison, job)]
+        found = [*found, *_against_plan(made, made.motion, comparison)]
     if comparison is not None and not has_errors(found):
         witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison,
                                        b"" if made.files else made.text)
@@ -272,6 +279,20 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
 
     left = after_formatting(value)
     return replace(value, after_formatting=left), [*found, *beyond_bound(left, job)]
+
+
+def _needed(made: PlannedStage, motion: PlannedMotion) -> Floats:
+    """(K,) least s of each block that is written, by the plan."""
+    from postproc.planning.planned_errors import on_written
+
+    return on_written(made.compensation, motion.needed)
+
+
+def _against_plan(made: WrittenStage, motion: PlannedMotion, comparison: Comparison) -> DiagnosticList:
+    """Errors of F words that do not carry the plan."""
+    from postproc.verification.planned_words import check_planned
+
+    return check_planned(made.path, made.moves, _needed(made, motion), made.options.merge_feeds, comparison, made.job)
 
 
 def stated(made: VerifiedStage, progress: Progress | None) -> tuple[VerifiedStage, DiagnosticList]:

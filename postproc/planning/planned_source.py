@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from postproc.feedrate.limits import ToolLimits
 from postproc.job.job import Job
 from postproc.path.model import JointPath
-from postproc.planning.pass_geometry import stops_of
-from postproc.planning.planned import Source, tool_limits
-from postproc.planning.planned_errors import PlannedCorrection
 from postproc.reference.events import compensation_states
 from postproc.reference.moves import Moves
 from postproc.setup.model import TOOL_LIMITS
 from toolpaths.arrays import Bools
 from toolpaths.diagnostics import Diagnostic, warning
-from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.toolpath import Kind
+
+if TYPE_CHECKING:
+    from postproc.feedrate.limits import ToolLimits
+    from postproc.planning.planned import Source
+    from postproc.planning.planned_errors import PlannedCorrection
 
 OFF = 40
 """state of CUTCOM"""
@@ -25,6 +27,10 @@ OFF = 40
 def source_of(job: Job, moves: Moves, path: JointPath, correction: PlannedCorrection | None = None,
               override: float = 1.0, limited_jerk: bool = True) -> Source:
     """The source of the planned motion of a job's path; `correction`, `override` and `limited_jerk` as of `Source`."""
+    from postproc.planning.pass_geometry import stops_of
+    from postproc.planning.planned import Source
+    from toolpaths.smoothing.smooth import Tolerance
+
     return Source(path, moves, job.machine, job.kinematics, Tolerance(job.options.tolerance, job.axis_tolerance),
                   stops_of(job.toolpath, moves), job.toolpath.file, correction, override, limits_by_tool(job),
                   limited_jerk)
@@ -45,13 +51,21 @@ def shifted_moves(job: Job, moves: Moves) -> Bools:
 
 def limits_by_tool(job: Job) -> dict[int, ToolLimits]:
     """Limits by index of the tool, of those that have one."""
-    found = {k: tool_limits(job.setup.tools.get(str(job.number_of(k)))) for k in range(len(job.toolpath.tools))}
+    from postproc.planning.planned import tool_limits
+
+    found = {k: tool_limits(job.setup.tools[str(job.number_of(k))]) for k in _limited(job)}
     return {k: limits for k, limits in found.items() if limits is not None}
+
+
+def _limited(job: Job) -> list[int]:
+    """Tools that have limits in the set-up, by their index."""
+    tools = {k: job.setup.tools.get(str(job.number_of(k))) for k in range(len(job.toolpath.tools))}
+    return [k for k, tool in tools.items() if tool is not None and tool.limited]
 
 
 def limits_not_kept(job: Job) -> list[Diagnostic]:
     """A warning where tools of the CL file have limits in the set-up and the feeds are not planned."""
-    numbers = sorted({job.number_of(k) for k in limits_by_tool(job)})
+    numbers = sorted({job.number_of(k) for k in _limited(job)})
     if not numbers:
         return []
     return [warning("setup.tool_limits", f"{', '.join(TOOL_LIMITS[:-1])} and {TOOL_LIMITS[-1]} of "

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from postproc.base.version import VERSION
 from postproc.pipeline.result import VerifyResult
-from postproc.proof.file import AGAIN, ENDING, HashedFile, ProofFile, options_of, read_proof
-from postproc.proof.hashes import FileHash, Hashes, ProofInput, sha256
+from postproc.proof.file import AGAIN, HashedFile, ProofFile, options_of, read_proof
+from postproc.proof.hashes import FileHash, Hashes, ProofInput, proof_place, sha256
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
 from toolpaths.input_files import STANDARD_INPUT, is_regular, read_input
 
@@ -37,11 +37,6 @@ class Kept:
             return (f"{Path(self.file).name}: CL file, set-up, machine, controller, error model and program are those of "
                     "the proof")
         return f"{Path(self.file).name}: not as in the proof: {', '.join(_NAMES.get(key, key) for key in self.changed)}"
-
-
-def proof_place(gcode: Path) -> Path:
-    """Where the proof of a program stands."""
-    return gcode.with_name(gcode.name + ENDING)
 
 
 def compared(result: VerifyResult, inputs: dict[ProofInput, Hashes],

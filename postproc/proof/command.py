@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from postproc.base.options import Options
 from postproc.pipeline.result import PostResult, VerifyResult
-from postproc.proof.changes import Kept, compared, proof_place
-from postproc.proof.file import proof_text
-from postproc.proof.hashes import Hashes, ProofInput, input_hashes
+from postproc.proof.hashes import Hashes, ProofInput, input_hashes, proof_place
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, warning
 from toolpaths.input_files import is_regular, reason, shown
+
+if TYPE_CHECKING:
+    from postproc.proof.changes import Kept
 
 
 def hashed(machine: str, controller: str, options: Options) -> dict[ProofInput, Hashes] | None:
@@ -34,6 +36,8 @@ def kept(result: PostResult, machine: str, controller: str, wanted: bool, known:
         return {}, [warning("proof.older", "the proof file there is of an older program",
                             file=str(place), hint="convert with --proof to write it again, or remove it")
                     ] if is_regular(place) else []
+    from postproc.proof.file import proof_text
+
     try:
         now = input_hashes(machine, controller, result.options)
     except (OSError, ValueError) as fault:
@@ -53,4 +57,6 @@ def _moved(why: str, output: Path) -> Diagnostic:
 def compared_with(result: VerifyResult, machine: str, controller: str,
                   proof: str) -> tuple[Kept | None, list[Diagnostic]]:
     """See `changes.compared`."""
+    from postproc.proof.changes import compared
+
     return compared(result, hashed(machine, controller, result.options) or {}, proof)

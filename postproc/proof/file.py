@@ -19,8 +19,6 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.units import DEG
 
-ENDING = ".proof.json"
-"""behind the name of the program"""
 OWN = "of_this_file"
 """key of the SHA-256 of all else that the file says"""
 AGAIN = "convert again with --proof"

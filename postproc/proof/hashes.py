@@ -1,4 +1,4 @@
-"""SHA-256 of the bytes of every file that a conversion reads: its bases, tables and meshes included."""
+"""SHA-256 of the bytes of every file that a conversion reads, its bases, tables and meshes too; where its proof stands."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from postproc.controllers.model import builtin_files
 from postproc.setup.files import file_keys, seen_from_here, value_at
 from toolpaths.input_files import read_input
 
+ENDING = ".proof.json"
+"""behind the name of the program"""
 Hashes = tuple["FileHash", ...]
 ProofInput = Literal["program", "cl_file", "setup", "machine", "controller", "error_model"]
 
@@ -26,6 +28,11 @@ class FileHash:
 
     file: str
     sha256: str
+
+
+def proof_place(gcode: Path) -> Path:
+    """Where the proof of a program stands."""
+    return gcode.with_name(gcode.name + ENDING)
 
 
 def sha256(data: bytes) -> str:

@@ -1,8 +1,8 @@
-"""The writer of each dialect."""
+"""The writer of each dialect; one is imported where its dialect is written."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from postproc.compile.program import Program
 from postproc.controllers.model import ControllerFile, WriterName
@@ -27,16 +27,47 @@ def writer_for(controller: ControllerFile, program: Program, cycles: tuple[Cycle
         levels: the control's own smoothing of operations by name, where it is another
         subprograms: each operation becomes a subprogram of the file, where the controller has such
     """
-    from postproc.writing.fanuc import FanucWriter
-    from postproc.writing.haas import HaasWriter
-    from postproc.writing.heidenhain import KlartextWriter
+    places = [("", work_offset)] if isinstance(work_offset, str) else work_offset
+    writer = _WRITERS[controller.writer]()
+    return writer(controller, program, cycles, length_offsets, smoothing, places, axis_smoothing, name, subprograms, stock,
+                  levels)
+
+
+def _iso() -> type[Writer]:
     from postproc.writing.iso import IsoWriter
+
+    return IsoWriter
+
+
+def _linuxcnc() -> type[Writer]:
     from postproc.writing.linuxcnc import LinuxcncWriter
+
+    return LinuxcncWriter
+
+
+def _fanuc() -> type[Writer]:
+    from postproc.writing.fanuc import FanucWriter
+
+    return FanucWriter
+
+
+def _haas() -> type[Writer]:
+    from postproc.writing.haas import HaasWriter
+
+    return HaasWriter
+
+
+def _siemens() -> type[Writer]:
     from postproc.writing.siemens import SiemensWriter
 
-    writers: dict[WriterName, type[Writer]] = {
-        "iso": IsoWriter, "linuxcnc": LinuxcncWriter, "fanuc": FanucWriter, "haas": HaasWriter, "siemens": SiemensWriter,
-        "heidenhain": KlartextWriter}
-    places = [("", work_offset)] if isinstance(work_offset, str) else work_offset
-    return writers[controller.writer](controller, program, cycles, length_offsets, smoothing, places, axis_smoothing,
-                                      name, subprograms, stock, levels)
+    return SiemensWriter
+
+
+def _heidenhain() -> type[Writer]:
+    from postproc.writing.heidenhain import KlartextWriter
+
+    return KlartextWriter
+
+
+_WRITERS: dict[WriterName, Callable[[], type[Writer]]] = {
+    "iso": _iso, "linuxcnc": _linuxcnc, "fanuc": _fanuc, "haas": _haas, "siemens": _siemens, "heidenhain": _heidenhain}

@@ -6,13 +6,15 @@ import dataclasses
 import importlib
 import pkgutil
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 import pytest
 
+from toolpaths import shapes
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
 from toolpaths.shapes import TABLE, arrays, declared, rows_of
 
@@ -111,7 +113,7 @@ def test_arrays_become_read_only_and_are_not_copied() -> None:
         made.tip[0] = 1.0
 
 
-@pytest.mark.parametrize(("changed", "said"), [
+WRONG: list[tuple[dict[str, Any], str]] = [
     ({"line": np.zeros(3, int)}, "Value.line has shape (3,), expected (4,)"),
     ({"tip": np.zeros((4, 2))}, "Value.tip has shape (4, 2), expected (N, 3)"),
     ({"tip": np.zeros(3)}, "Value.tip has shape (3,), expected (N, 3)"),
@@ -132,11 +134,48 @@ def test_arrays_become_read_only_and_are_not_copied() -> None:
     ({"some": np.array([1])}, "Value.some holds int64, expected bool"),
     ({"kind": np.array([1, 300])}, "Value.kind holds 300, out of the range of int8"),
     ({"parts": (np.full((2, 3), "x"),)}, "Value.parts holds <U1, expected float64"),
-])
+]
+
+
+@pytest.mark.parametrize(("changed", "said"), WRONG)
 def test_a_shape_or_type_that_does_not_fit_names_class_and_field(changed: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError) as fault:
         replace(value(), **changed)
     assert str(fault.value) == said
+
+
+def both_checks() -> tuple[Callable[[Value], None], Callable[[Value], None]]:
+    """Part by part and compiled."""
+    fields = shapes._in_order(getattr(Value, TABLE), Value)
+    return partial(shapes._by_parts, fields), shapes._compiled(fields)
+
+
+def unchecked_value(**changed: Any) -> Value:
+    made = object.__new__(Value)
+    made.__dict__.update({**vars(value()), **changed})
+    return made
+
+
+@pytest.mark.parametrize(("changed", "said"), WRONG)
+def test_first_values_are_checked_as_all_others_are(changed: dict[str, Any], said: str) -> None:
+    for check in both_checks():
+        with pytest.raises(ValueError) as fault:
+            check(unchecked_value(**changed))
+        assert str(fault.value) == said
+
+
+@pytest.mark.parametrize("changed", [{}, {"more": [1, 2], "pairs": np.ones((2, 2)), "some": [True]},
+                                     {"tip": [[1, 2, 3]] * 4},
+                                     {"parts": (np.zeros((2, 3)),) * 2, "grid": np.zeros((2, 2, 2))}])
+def test_both_checks_leave_the_same_value(changed: dict[str, Any]) -> None:
+    found = [unchecked_value(**changed) for _ in both_checks()]
+    for check, one in zip(both_checks(), found, strict=True):
+        check(one)
+    for name, here in vars(found[0]).items():
+        there = getattr(found[1], name)
+        for a, b in zip(*(v if isinstance(v, tuple) else (v,) for v in (here, there)), strict=True):
+            assert type(a) is type(b) and np.array_equal(a, b)
+            assert not isinstance(a, np.ndarray) or (a.dtype == b.dtype and not a.flags.writeable and not b.flags.writeable)
 
 
 def test_numbers_that_lose_nothing_become_the_type_of_the_field() -> None:

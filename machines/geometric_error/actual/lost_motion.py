@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, within
 from toolpaths.shapes import arrays
 
 GRAIN = 5e-5, 1e-6
@@ -37,13 +37,12 @@ class PlaySteps:
 
     def then(self, after: PlaySteps) -> PlaySteps:
         """These, then those."""
-        low, high = (np.clip(bound + after.shift, after.low, after.high) for bound in (self.low, self.high))
+        low, high = (within(bound + after.shift, after.low, after.high) for bound in (self.low, self.high))
         return PlaySteps(self.shift + after.shift, low, high)
 
     def at(self, approach: Floats) -> Floats:
         """The approach direction after them."""
-        result: Floats = np.clip(approach + self.shift, self.low, self.high)
-        return result
+        return within(approach + self.shift, self.low, self.high)
 
     def rows(self, part: slice) -> PlaySteps:
         """Some of the rows."""

@@ -8,7 +8,7 @@ from collections.abc import Hashable, Sequence
 import numpy as np
 
 from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, TableCurve
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, within
 
 
 class Bank(ABC):
@@ -69,7 +69,7 @@ class FourierBank(Bank):
     def at(self, x: Floats, direction: Floats | float) -> Floats:
         """See the base class."""
         first, count = self.first, self.values.shape[1] // 2
-        phase = (np.clip(x, *first.range) - first.origin) * (2.0 * np.pi / first.period)
+        phase = (within(x, *first.range) - first.origin) * (2.0 * np.pi / first.period)
         waves = np.ones((1 + 2 * count, len(x)))
         if count:
             c, s = waves[1], waves[1 + count] = np.cos(phase), np.sin(phase)
@@ -88,7 +88,7 @@ class PolynomialBank(Bank):
 
     def at(self, x: Floats, direction: Floats | float) -> Floats:
         """See the base class."""
-        t = (np.clip(x, *self.first.range) - self.first.origin) / self.first.scale
+        t = (within(x, *self.first.range) - self.first.origin) / self.first.scale
         result: Floats = np.repeat(self.values[:, -1:], len(x), axis=1)
         for column in self.values.T[-2::-1]:
             result = result * t + column[:, None]
@@ -108,7 +108,7 @@ class LinearBank(Bank):
     def at(self, x: Floats, direction: Floats | float) -> Floats:
         """See the base class."""
         inside = self.first.inside(x)
-        row = np.clip(np.searchsorted(self.x, inside, side="right") - 1, 0, len(self.x) - 2)
+        row = within(np.searchsorted(self.x, inside, side="right") - 1, 0, len(self.x) - 2)
         found = self.y[:, row] + self.slope[:, row] * (inside - self.x[row])
         return found if not self.first.both else _shared(found, direction)
 
@@ -132,6 +132,6 @@ class SplineBank(Bank):
 
 def _shared(found: Floats, direction: Floats | float) -> Floats:
     """(C, N) of values (2 C, N), forwards and backwards by turns, by shares of the approach direction."""
-    share = 0.5 * (1.0 + np.clip(direction, -1.0, 1.0))
+    share = 0.5 * (1.0 + within(direction, -1.0, 1.0))
     result: Floats = found[1::2] + share * (found[0::2] - found[1::2])
     return result

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from machines.geometric_error.tables.choices import TableRule
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, within
 from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ class TableCurve(Curve):
         if self.period:
             result: Floats = self.x[0] + np.mod(x - self.x[0], self.period)
             return result
-        return np.clip(x, self.x[0], self.x[-1])
+        return within(x, self.x[0], self.x[-1])
 
     def closed(self, values: Floats) -> tuple[Floats, Floats]:
         """Positions (M or M + 1,) and values that go with them, the first repeated one period on."""

@@ -4,6 +4,8 @@ warnings; defaults of the job file."""
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from copy import copy
 from functools import cache
 from shutil import get_terminal_size
 from typing import Annotated, Any, Literal
@@ -91,6 +93,16 @@ class Group(TyperGroup):
     def list_commands(self, ctx: object) -> list[str]:
         """Names in the order of the journey."""
         return sorted(self.commands, key=lambda name: ORDER.index(name) if name in ORDER else len(ORDER))
+
+
+def only_called(app: typer.Typer, arguments: Sequence[str]) -> typer.Typer:
+    """The application with the one command that is called, so that the options of no other are built; with all of them where
+    the first argument names none."""
+    name = arguments[0] if arguments else ""
+    one = copy(app)
+    one.registered_commands = [c for c in app.registered_commands if name == (c.name or getattr(c.callback, "__name__", ""))]
+    one.registered_groups = [g for g in app.registered_groups if name == g.name]
+    return one if one.registered_commands or one.registered_groups else app
 
 
 def _plainly(param: object) -> None:

@@ -1,8 +1,8 @@
-"""The reader of each dialect."""
+"""The reader of each dialect; one is imported where its dialect is read."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 from machines.choices import Stop
@@ -19,13 +19,38 @@ def reader_for(controller: ControllerFile, letters: tuple[str, ...], home: Float
     """The reader of the dialect that the controller file's writer writes; `home` (J,): machine coordinates, mm, degrees;
     `stop`: what stops switch off where the machine file says it; `rolls`: modulo axes by joint; `clamps`: codes of the
     clamps that programs work, by axis."""
-    from postproc.readback.dialects.fanuc import FanucReader
-    from postproc.readback.dialects.haas import HaasReader
+    return _READERS[controller.writer]()(letters, controller, home, stop, rolls, clamps)
+
+
+def _iso() -> type[Reader]:
     from postproc.readback.dialects.iso import IsoReader
-    from postproc.readback.dialects.klartext import KlartextReader
+
+    return IsoReader
+
+
+def _fanuc() -> type[Reader]:
+    from postproc.readback.dialects.fanuc import FanucReader
+
+    return FanucReader
+
+
+def _haas() -> type[Reader]:
+    from postproc.readback.dialects.haas import HaasReader
+
+    return HaasReader
+
+
+def _siemens() -> type[Reader]:
     from postproc.readback.dialects.siemens import SiemensReader
 
-    readers: dict[WriterName, type[Reader]] = {
-        "iso": IsoReader, "linuxcnc": IsoReader, "fanuc": FanucReader, "haas": HaasReader, "siemens": SiemensReader,
-        "heidenhain": KlartextReader}
-    return readers[controller.writer](letters, controller, home, stop, rolls, clamps)
+    return SiemensReader
+
+
+def _heidenhain() -> type[Reader]:
+    from postproc.readback.dialects.klartext import KlartextReader
+
+    return KlartextReader
+
+
+_READERS: dict[WriterName, Callable[[], type[Reader]]] = {
+    "iso": _iso, "linuxcnc": _iso, "fanuc": _fanuc, "haas": _haas, "siemens": _siemens, "heidenhain": _heidenhain}

@@ -14,8 +14,9 @@ from machines.geometric_error.actual.lost_motion import GRAIN, PlaySteps
 from machines.geometric_error.actual.model import ErrorModel
 from postproc.correction.error_sampling import changes, looks_between
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import BlockPoses, alike, begins
+from postproc.readback.execution.poses import FEW, BlockPoses, alike, begins
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.shapes import arrays
 
 ARC = 2
 LOOKS = 16
@@ -38,12 +39,21 @@ class ActualBlockPoses(BlockPoses):
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t, errors in, by the approach direction that
         each axis last moved."""
-        near, q, approach = self._at(motion, rows, t)
-        tip, axis = np.empty((len(rows), 3)), np.empty((len(rows), 3))
-        for number in np.unique(motion.tool[rows]).tolist():
-            k = np.flatnonzero(motion.tool[rows] == number)
+        for asked, ahead in self._together:
+            if asked is rows and (k := ahead.number(t)) >= 0:
+                if not ahead.poses:
+                    tools = np.tile(motion.tool[rows], len(ahead.times))
+                    made = self._aimed(tools, ahead.near, ahead.q, ahead.approach)
+                    ahead.poses.extend(a.reshape(len(ahead.times), len(rows), 3) for a in made)
+                return ahead.poses[0][k], ahead.poses[1][k]
+        return self._aimed(motion.tool[rows], *self._at(motion, rows, t))
+
+    def _aimed(self, tools: Ints, near: Floats, q: Floats, approach: Floats) -> tuple[Floats, Floats]:
+        """(tip, axis) (K, 3) with tools (K,) at joints (K, J), their approach directions (K, J), near poses (K, 6)."""
+        tip, axis = np.empty((len(tools), 3)), np.empty((len(tools), 3))
+        for k, (number,) in alike(tools):
             actual = self.actual(number)
-            tip[k], axis[k], _ = actual.place(actual.coordinates(q[k], near[k]), approach[k])
+            tip[k], axis[k] = actual.aim(actual.coordinates(q[k], near[k]), approach[k])
         return tip, axis
 
     def _at(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats, Floats]:
@@ -60,11 +70,13 @@ class ActualBlockPoses(BlockPoses):
 
     def look_ahead(self, motion: Motion, rows: Ints, times: Sequence[float | Floats]) -> None:
         """See `BlockPoses`."""
-        if len(times) <= PLACES and 0 < len(rows) * len(times) <= AT_ONCE:
+        self._together.clear()
+        if 0 < len(rows) * len(times) <= (AT_ONCE if len(times) <= PLACES else FEW):
             shares = np.concatenate([np.broadcast_to(np.asarray(t), len(rows)) for t in times])
             found = self._at(motion, np.tile(rows, len(times)), shares)
             pose, q, approach = (part.reshape(len(times), len(rows), -1) for part in found)
             self._seen[:] = [(rows, t, (pose[k], q[k], approach[k])) for k, t in enumerate(times)]
+            self._together.append((rows, _Together(times, *found)))
 
     def joints(self, motion: Motion, rows: Ints, t: float | Floats) -> Floats:
         """See `BlockPoses`."""
@@ -73,6 +85,10 @@ class ActualBlockPoses(BlockPoses):
 
     @cached_property
     def _seen(self) -> list[tuple[Ints, float | Floats, tuple[Floats, Floats, Floats]]]:
+        return []
+
+    @cached_property
+    def _together(self) -> list[tuple[Ints, _Together]]:
         return []
 
     def nominal(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
@@ -210,6 +226,23 @@ class ActualBlockPoses(BlockPoses):
     def _of(self, before: Floats, q: Floats) -> PlaySteps:
         step = np.nan_to_num((q - before)[:, self._bidirectional])
         return PlaySteps.of(step, self.model.axes.gaps(self.control.machine.axis_names, q, self._bidirectional))
+
+
+@dataclass(frozen=True, eq=False)
+@arrays(near="M 6", q="M J", approach="M J")
+class _Together:
+    """Places looked ahead at, one fraction of the blocks after the other: nominal poses (M, 6), joints (M, J), their
+    approach directions; `poses`: tips and axes (times, K, 3), once they are asked for."""
+
+    times: Sequence[float | Floats]
+    near: Floats
+    q: Floats
+    approach: Floats
+    poses: list[Floats] = field(default_factory=list)
+
+    def number(self, t: float | Floats) -> int:
+        """Of a fraction among `times`; -1 for another."""
+        return next((k for k, time in enumerate(self.times) if time is t), -1)
 
 
 def _turning(before: Floats, middle: Floats, after: Floats) -> Floats:

@@ -20,7 +20,7 @@ from postproc.readback.execution.frames_loop import in_frames, on_table
 from postproc.readback.text.canonical import WordMeaning
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.rotations import angle_between, whole_turns
+from toolpaths.rotations import angle_between, cross, whole_turns
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -129,7 +129,7 @@ def tool_frame(kin: Kinematics, q: Floats) -> Floats:
     """(3, 3) columns are the tool's x, y, z seen from the table at joints q (J,), upside down too."""
     _, axis, spin = kin.pose(q[None, :])
     x = tool_x(axis, spin)
-    return np.stack([x[0], np.cross(axis[0], x[0]), axis[0]], axis=1)
+    return np.stack([x[0], cross(axis[0], x[0]), axis[0]], axis=1)
 
 
 def frame_of(law: WordMeaning, control: Control | None, length: float, position: Floats, at: tuple[str, int],

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from machines.geometric_error.actual.error_rates import ErrorRates, joined, pivot_rates, standing_arm
 from machines.kinematics.base import Kinematics
 from postproc.base.group_rows import groups
 from postproc.control.control import Control
@@ -17,6 +17,9 @@ from postproc.readback.execution import assembly
 from postproc.readback.execution.execute import Motion
 from toolpaths.arrays import Bools, Floats, Ints, repeated, taken
 from toolpaths.shapes import arrays
+
+if TYPE_CHECKING:
+    from machines.geometric_error.actual.error_rates import ErrorRates
 
 SAMPLES = (0.2, 0.4, 0.6, 0.8, 1.0)
 """where each block is looked at; other places than those that linearising looks at"""
@@ -137,12 +140,16 @@ class BlockPoses:
 
     def error_rates(self, motion: Motion, rows: Ints, q: Floats, reach: Floats) -> ErrorRates:
         """How fast what the machine adds to the law may change near joints q (K, J) that move by up to `reach` (K, J)."""
+        from machines.geometric_error.actual.error_rates import joined, pivot_rates
+
         frames = motion.frame[rows], motion.tool[rows]
         return joined((k, pivot_rates(self.kinematics(tool), motion.frames[frame].kinematics, q[k]))
                       for k, (frame, tool) in alike(*frames))
 
     def arm(self, motion: Motion, rows: Ints, q: Floats) -> Floats:
         """(K,) mm from the tip to the farthest turning axis at q (K, J), and while the tip stands on the part."""
+        from machines.geometric_error.actual.error_rates import standing_arm
+
         result = np.zeros(len(rows))
         for k, (tool,) in alike(motion.tool[rows]):
             result[k] = standing_arm(self.kinematics(tool), q[k])

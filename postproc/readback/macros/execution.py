@@ -6,23 +6,23 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from dataclasses import replace as changed
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from postproc.readback.macros.expressions import MacroFault
-from postproc.readback.macros.fanuc import FanucMacros
-from postproc.readback.macros.held import Held
-from postproc.readback.macros.klartext import KlartextMacros, klartext_rows
-from postproc.readback.macros.linuxcnc import LinuxCncMacros
-from postproc.readback.macros.siemens import SiemensMacros
-from postproc.readback.macros.siemens_rows import siemens_rows
-from postproc.readback.macros.sources import Cleaned, ProgramFiles, word_rows
 from postproc.readback.text.canonical import Files, placed
 from postproc.readback.text.words import lines_of, plain
 from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shapes import arrays
+
+if TYPE_CHECKING:
+    from postproc.readback.macros.fanuc import FanucMacros
+    from postproc.readback.macros.held import Held
+    from postproc.readback.macros.klartext import KlartextMacros
+    from postproc.readback.macros.linuxcnc import LinuxCncMacros
+    from postproc.readback.macros.siemens import SiemensMacros
+    from postproc.readback.macros.sources import Cleaned, ProgramFiles
 
 ToolsNumbered = Callable[[bytes, str], tuple[bytes, list[Diagnostic]]]
 MacroLanguage = Literal["fanuc", "haas", "linuxcnc", "siemens", "klartext"]
@@ -86,11 +86,15 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
 
     Work is bounded: `held.most` blocks. `numbered` puts numbers in the place of the names of tools.
     """
-    rows: dict[MacroLanguage, Cleaned] = {"siemens": siemens_rows, "klartext": klartext_rows}
+    from postproc.readback.macros.expressions import MacroFault
+    from postproc.readback.macros.siemens import SiemensMacros
+    from postproc.readback.macros.sources import ProgramFiles
+
+    rows = _rows_of(language)
 
     def cleaned(text: bytes, name: str) -> tuple[list[str], list[Diagnostic]]:
         text, found = (text, []) if language == "siemens" else numbered(text, name)
-        made, more = rows.get(language, word_rows)(text, name)
+        made, more = rows(text, name)
         return made, [*found, *more]
     if language == "siemens" and (curve := _POLYNOMIAL.search(data.upper())):
         fault = MacroFault("gcode.curve", "a polynomial (POLY, PO) in a program with variables, jumps or frames is not "
@@ -120,11 +124,28 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
 
 def _run(language: MacroLanguage, sources: ProgramFiles,
          held: Held) -> FanucMacros | LinuxCncMacros | SiemensMacros | KlartextMacros:
+    """The interpreter of a language; all are imported where a program needs one."""
+    from postproc.readback.macros.fanuc import FanucMacros
+    from postproc.readback.macros.klartext import KlartextMacros
+    from postproc.readback.macros.linuxcnc import LinuxCncMacros
+    from postproc.readback.macros.siemens import SiemensMacros
+
     if language == "linuxcnc":
         return LinuxCncMacros(sources, held)
     if language == "siemens":
         return SiemensMacros(sources, held)
     return KlartextMacros(sources, held) if language == "klartext" else FanucMacros(sources, held, language == "haas")
+
+
+def _rows_of(language: MacroLanguage) -> Cleaned:
+    """The blocks of a text, as its language has them."""
+    from postproc.readback.macros.klartext import klartext_rows
+    from postproc.readback.macros.siemens_rows import siemens_rows
+    from postproc.readback.macros.sources import word_rows
+
+    if language == "siemens":
+        return siemens_rows
+    return klartext_rows if language == "klartext" else word_rows
 
 
 def in_source(found: list[Diagnostic], program: PlainProgram) -> list[Diagnostic]:

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import typer
 from typer.testing import CliRunner, Result
 
 from postproc.cli.app import app, main
+from postproc.cli.shared.group import only_called
 from tests.postproc.kit import HEAD, SAMPLES, TOOLS
 from toolpaths.cl.text.dialects import DIALECTS
 
@@ -217,6 +219,35 @@ def test_help_is_instant_and_lists_the_commands() -> None:
                          text=True, check=True, timeout=30)
     assert all(word in got.stdout for word in ("convert", "verify", "inspect", "trace", "machine", "controller"))
     assert not re.search(r"\| +(numpy|numba|pydantic)\s*$", got.stderr, re.MULTILINE)
+
+
+NOT_NEEDED = (
+    "numba", "scipy", "rich", "ruckig", "toppra", "trimesh", "toolpaths.smoothing", "toolpaths.cl.systems.nci",
+    "toolpaths.cl.systems.freecad", "toolpaths.cl.systems.step_nc", "machines.geometric_error.actual",
+    "machines.kinematics.legs", "postproc.feedrate", "postproc.planning.planned", "postproc.correction",
+    "postproc.readback.macros.siemens",
+    "postproc.readback.macros.klartext", "postproc.readback.macros.fanuc", "postproc.readback.dialects.siemens",
+    "postproc.readback.dialects.klartext", "postproc.readback.dialects.haas", "postproc.writing.siemens",
+    "postproc.writing.heidenhain", "postproc.cycle_time.linuxcnc", "postproc.proof.file", "postproc.pipeline.optimised",
+    "postproc.joints.run_roads", "postproc.verification.tool_table")
+"""modules and packages that a small conversion for a serial machine and one control does without"""
+
+
+def test_a_small_conversion_imports_what_it_needs(tmp_path: Path) -> None:
+    got = subprocess.run([sys.executable, "-X", "importtime", "-m", "postproc", "convert", str(SAMPLES / "five_faces.cls"),
+                          "-m", "mikron-ucp710", "-c", "fanuc-30i", "-o", str(tmp_path / "part.nc")],
+                         capture_output=True, text=True, check=True, timeout=60)
+    loaded = {line.rpartition("|")[2].strip() for line in got.stderr.splitlines()}
+    assert "postproc.readback.dialects.fanuc" in loaded and [name for name in NOT_NEEDED if not find_spec(name)] == []
+    assert loaded & set(NOT_NEEDED) == set()
+
+
+def test_the_command_that_is_called_is_built_alone() -> None:
+    root = typer.main.get_command(app)
+    for name in root.commands:
+        assert list(typer.main.get_command(only_called(app, [name, "--help"])).commands) == [name]
+    for arguments in ([], ["--help"], ["--version"], ["convrt"]):
+        assert only_called(app, arguments) is app
 
 
 def test_help_lists_commands_from_convert_to_files_and_cuts_none_short() -> None:

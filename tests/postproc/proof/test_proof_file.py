@@ -20,8 +20,8 @@ from postproc.base.header_words import PENDING
 from postproc.cli.app import app
 from postproc.controllers.model import builtin_files, load_controller
 from postproc.proof import command
-from postproc.proof.file import ENDING, digest, read_proof
-from postproc.proof.hashes import input_hashes
+from postproc.proof.file import digest, read_proof
+from postproc.proof.hashes import ENDING, input_hashes
 from postproc.readback.text.words import plain
 from postproc.verification import proof_text as text
 from postproc.witness.evidence import Testimony as Said

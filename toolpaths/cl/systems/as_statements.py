@@ -10,6 +10,8 @@ from toolpaths.cl.text.scan import Points
 from toolpaths.cl.text.statements import Statement, StatementList, statement_of
 
 UP = (0.0, 0.0, 1.0)
+EXPORTED = "(Exported by FreeCAD)"
+"""header of the files that FreeCAD writes"""
 
 
 class AsStatements:

@@ -12,10 +12,9 @@ from __future__ import annotations
 import math
 import re
 
-from toolpaths.cl.systems.as_statements import AsStatements, signed
+from toolpaths.cl.systems.as_statements import EXPORTED, AsStatements, signed
 from toolpaths.cl.text.log import DiagnosticLog
 
-EXPORTED = "(Exported by FreeCAD)"
 _COMMENT = re.compile(r"\(([^()]*)\)|;(.*)")
 _WORD = re.compile(r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)", re.IGNORECASE)
 _BEGIN = re.compile(r"begin operation:\s*(.*)", re.IGNORECASE)

@@ -6,9 +6,7 @@ import re
 from dataclasses import dataclass
 
 from toolpaths.choices import DialectName
-from toolpaths.cl.systems.freecad import EXPORTED, FreeCadReader
-from toolpaths.cl.systems.nci import NciReader
-from toolpaths.cl.systems.step_nc import StepNcReader
+from toolpaths.cl.systems.as_statements import EXPORTED, AsStatements
 from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.scan import Points
 from toolpaths.cl.text.source import text_of
@@ -57,10 +55,16 @@ def read_form(plain: bytes, given: DialectName | None, log: DiagnosticLog) -> Fo
     if found is None or found[0] not in FORMS:
         return None
     text = text_of(plain)
-    if found[0] == "nci":
-        said = NciReader(log).read(text)
-    elif found[0] == "freecad":
-        said = FreeCadReader(text, log).read()
-    else:
-        said = StepNcReader(text, log).read()
+    said = _said(found[0], text, log)
     return Form(*found, said.program, said.points(), plain.count(b"\n") + (not plain.endswith(b"\n")))
+
+
+def _said(form: DialectName, text: str, log: DiagnosticLog) -> AsStatements:
+    """A text of one of the forms, by its reader; all are imported where a file needs one."""
+    from toolpaths.cl.systems.freecad import FreeCadReader
+    from toolpaths.cl.systems.nci import NciReader
+    from toolpaths.cl.systems.step_nc import StepNcReader
+
+    if form == "nci":
+        return NciReader(log).read(text)
+    return (FreeCadReader if form == "freecad" else StepNcReader)(text, log).read()
