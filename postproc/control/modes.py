@@ -112,8 +112,8 @@ class OutputModes:
 
     @property
     def tip_from_home(self) -> bool:
-        """True where the mode by the tip takes the length register itself, and its end cancels it: it is then entered and left
-        at the height of home, so that no length changes near the part."""
+        """True where the mode by the tip takes the length register itself, and its end cancels it: it is then entered and
+        left at the height of home, so that no length changes near the part."""
         mode = self.controller.modes.tcp
         return mode is not None and self.control.base != "tcp" and mode.length == "off" and any(
             "{register}" in block for block in mode.enter)

@@ -194,8 +194,8 @@ def _travel(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bo
 def _changes_length(modes: OutputModes, before: _Stand, after: WordFrame) -> bool:
     """True where one of two modes takes the length register itself: the tool goes by home, where its length may change."""
     laws = before.frame.control.law, after.control.law
-    return before.pose is not None and before.frame is not after and "tcp" in laws and modes.tip_from_home and has_retract_axis(
-        modes.base.control)
+    lifts = modes.tip_from_home and has_retract_axis(modes.base.control)
+    return lifts and before.pose is not None and before.frame is not after and "tcp" in laws
 
 
 def _risen(modes: OutputModes, before: WordFrame, link: Link) -> Floats:
