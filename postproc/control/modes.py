@@ -104,12 +104,19 @@ class OutputModes:
         mode = self.controller.modes.tcp
         return WordFrame(_with_arcs(control, mode))
 
-    @property
-    def plane_from_home(self) -> bool:
-        """True where a tilted plane is stated at the height of home on travel from there, since no length may be in force
-        where it is stated."""
+    def from_home(self, law: InterpolationMode) -> bool:
+        """True where a mode is entered at the height of home on travel from there: a tilted plane where no length may be in
+        force when it is stated, the mode by the tip where it takes the length itself."""
         mode = self.controller.modes.tilted
-        return mode is not None and mode.length == "off"
+        return self.tip_from_home if law == "tcp" else law == "tilted" and mode is not None and mode.length == "off"
+
+    @property
+    def tip_from_home(self) -> bool:
+        """True where the mode by the tip takes the length register itself, and its end cancels it: it is then entered and
+        left at the height of home, so that no length changes near the part."""
+        mode = self.controller.modes.tcp
+        return mode is not None and self.control.base != "tcp" and mode.length == "off" and any(
+            "{register}" in block for block in mode.enter)
 
     @property
     def tcp_code(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from postproc.path.links import Link, Pose, SafeSpace, has_retract_axis, plan_li
 from postproc.path.model import FEED, TRAVERSE, JointPath
 from postproc.path.rewinds import RetractPlan
 from postproc.path.solved_runs import SolvedRun, SolvedRuns, solved_runs
-from postproc.path.zero_entry import ZeroEntry, cost, needed, zero_entry
+from postproc.path.zero_entry import BELOW_HOME, ZeroEntry, cost, needed, zero_entry
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Floats, Ints, as_slice, taken
 from toolpaths.diagnostics import Diagnostic, has_errors, info
@@ -156,8 +156,9 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
         done |= add_home_links(out, base, space, runs, moves, linked)
     for run, there in zip(runs.each, done.tolist(), strict=True):
         modes = run.modes
-        first, by_home, end = run.first, run.first in road.home_rows, run.last - 1
-        before, pose = stand, Pose(moves.tip[end], runs.axis[end], runs.q[end], run.frame.control)
+        first, end, before = run.first, run.last - 1, stand
+        by_home = first in road.home_rows or _changes_length(modes, before, run.frame)
+        pose = Pose(moves.tip[end], runs.axis[end], runs.q[end], run.frame.control)
         stand = _Stand(pose, run.frame, run.kin)
         if there:
             continue
@@ -173,10 +174,10 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
             entry = zero_entry(modes.control, modes.tcp.control, run.kin, space, link)
             longer.append(entry.seconds)
             link = replace(link, clear=link.clear and entry.clear)
-        down = by_home and run.frame.control.law == "tilted" and modes.plane_from_home and has_retract_axis(travel.control)
+        down = by_home and modes.from_home(run.frame.control.law) and has_retract_axis(travel.control)
         leaving = road.modes.at(before.frame.control.place).base
         _add_link(out, moves, first, link, _Legs(before.frame, leaving if by_home else travel, travel, run.frame, before.kin,
-                                                 run.kin, before.pose, entry, down))
+                                                 run.kin, before.pose, entry, down, _risen(modes, before.frame, link)))
         if not link.clear:
             found.append(faults.no_path(modes.control.machine, moves, first, road.file))
         if progress:
@@ -188,6 +189,26 @@ def _travel(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bo
     """The frame of the path between the safe planes: that of the tip where it is so on both sides, at one place."""
     stays = before is after and after.control.law == "tcp" and not by_home
     return before if stays else modes.base
+
+
+def _changes_length(modes: OutputModes, before: _Stand, after: WordFrame) -> bool:
+    """True where one of two modes takes the length register itself: the tool goes by home, where its length may change."""
+    laws = before.frame.control.law, after.control.law
+    lifts = modes.tip_from_home and has_retract_axis(modes.base.control)
+    return lifts and before.pose is not None and before.frame is not after and "tcp" in laws
+
+
+def _risen(modes: OutputModes, before: WordFrame, link: Link) -> Floats:
+    """Joints (0 or 1, J) below home, in the mode that cancels the length where it ends: on a link by home the last block
+    before that, with room for tools that are longer at the machine."""
+    control, stays = modes.base.control, np.zeros((0, link.home.shape[-1]))
+    if not (modes.tip_from_home and before.control.law == "tcp" and has_retract_axis(control)) or not len(link.home):
+        return stays
+    axis = control.machine.retract_axis
+    up = link.home[:1].copy()
+    rise = up[0, axis] - link.retract[-1, axis] if len(link.retract) else 0.0
+    up[0, axis] -= np.sign(rise) * BELOW_HOME
+    return up if abs(rise) > BELOW_HOME else stays
 
 
 def _with_axes(curves: Curves, axis0: Floats, axis1: Floats) -> Curves:
@@ -209,7 +230,9 @@ class _Legs:
     entry: ZeroEntry | None = None
     """where the mode that it goes to is entered with the tables at zero"""
     down: bool = False
-    """the travel down from home, the last of `Link.index`, is in the plane that it goes to"""
+    """the travel down from home, the last of `Link.index`, is in the mode that it goes to"""
+    risen: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    """joints (0 or 1, J) up to which the tool rises in the mode that it comes from"""
 
 
 def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs) -> None:
@@ -219,7 +242,7 @@ def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs)
     the rotary axes are stated, whether they turn or not.
     """
     if legs.start is not None:
-        _leg(out, legs.before, legs.kin_before, legs.start.q, link.retract, row)
+        _leg(out, legs.before, legs.kin_before, legs.start.q, _with_rise(link, legs.risen), row)
     out.link(legs.home, link.home, row, not legs.home.control.tip_law, link.home_state)
     out.begin[row] = out.count
     if legs.entry is not None:
@@ -246,6 +269,11 @@ def _add_link(out: PathBuilder, moves: Moves, row: int, link: Link, legs: _Legs)
     out.link(legs.after, link.approach, row, code=np.full(n, FEED, dtype=np.int8), seconds=seconds)
 
 
+def _with_rise(link: Link, risen: Floats) -> Floats:
+    """Joints (K, J) of the retract, and of the rise to below home."""
+    return np.concatenate([link.retract, risen]) if len(risen) else link.retract
+
+
 def _leg(out: PathBuilder, frame: WordFrame, kin: Kinematics, begin: Floats, q: Floats, row: int) -> None:
     """Blocks (K, J) along the tool axis in rapid, at feed where rapids would leave the line."""
     code = rapid_codes(frame.control, kin, np.concatenate([begin[None], q[:-1]]) if len(q) else q, q, *LEG)
@@ -258,5 +286,5 @@ def _add_end(out: PathBuilder, modes: OutputModes, stand: _Stand, space: SafeSpa
         return
     out.ended, modes = 1, modes.at(stand.frame.control.place)
     link = plan_link(modes.base.control, stand.kin, stand.kin, space, stand.pose, None, True)
-    _leg(out, stand.frame, stand.kin, stand.pose.q, link.retract, row)
+    _leg(out, stand.frame, stand.kin, stand.pose.q, _with_rise(link, _risen(modes, stand.frame, link)), row)
     out.link(modes.base, link.home, row, not modes.base.control.tip_law, link.home_state)

@@ -4,9 +4,8 @@ FANUC A-79348E p. 19 (and B-63783EN-1 p. 1116; Mitsubishi M700V p. 477): the pro
 table at switch-on, and "the angle of the table's rotary axis represents the initial state of the programming
 coordinate system". Read one direction the frame is that of the part, turned with the table by its scale; read
 in the other direction it is the work offset's frame, unturned, at the angle at which the table stands. With
-the tables at zero both are one: so the mode is entered there, at the height of home, and the tables turn in
-    it, the slides standing as nearly as straight paths of the tip
-let them.
+the tables at zero both are one: so the mode is entered there, at the height of home, and the tables turn in it, the slides
+standing as nearly as straight paths of the tip let them.
 """
 
 from __future__ import annotations
@@ -28,8 +27,8 @@ from toolpaths.units import DEG
 
 _CHORD = 10.0 * DEG
 """turn of one block: the slides then leave their place by less than half a percent of the distance to the rotary axis"""
-_BELOW = 1.0
-"""mm below the end of travel, for what rounded words of the tip make of the slides"""
+BELOW_HOME = 10.0
+"""mm between the end of travel and words of the tip at the height of home: by so much may tools be longer at the machine"""
 _ZERO = 1e-9
 """rad"""
 _PLACES = np.linspace(0.0, 1.0, 9)
@@ -95,10 +94,10 @@ def zero_entry(base: Control, tcp: Control, kin: Kinematics, space: SafeSpace, l
 
 
 def _beyond(tcp: Control, kin: Kinematics, q: Floats, machine: Machine, axis: int, sign: float) -> float:
-    """mm by which an axis would come nearer to the end of its travel than `_BELOW` between joints q (K, J)."""
+    """mm by which an axis would come nearer to the end of its travel than `BELOW_HOME` between joints q (K, J)."""
     limit = machine.limits.upper[axis] if sign > 0.0 else machine.limits.lower[axis]
     worst = max(float((sign * (at[:, axis] - limit)).max()) for at in tcp.bent(q[:-1], q[1:], _PLACES, kin))
-    return worst + _BELOW
+    return worst + BELOW_HOME
 
 
 def _seconds(machine: Machine, q: Floats) -> float:

@@ -7,19 +7,26 @@ import re
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Floats
 from toolpaths.cl.biarcs import DENSER, FLAT, biarcs, plane_of
 from toolpaths.cl.build import ToolpathBuilder, Triple
+from toolpaths.cl.spline_chords import (
+    DEGREE,
+    cubic_points,
+    de_boor,
+    knots_of,
+    places_of,
+    spline_points,
+    width_of,
+)
 from toolpaths.cl.text.statements import COMMENT, TEXT, Statement, Word, words_of
 from toolpaths.toolpath import Role
 
 SPLINE_CHORD = 0.001
 """mm: a spline is followed by arcs, or chords, no further from it than this where no tolerance is given"""
-SPLINE_SHARE = 0.25
+SPLINE_SHARE = 0.4
 """of the tolerance, else; what they may be off is no part of what the program may be off them (`Toolpath.spline_slack`)"""
-_DEGREE = 3
-_MOST_CHORDS = 10000
-_LEAST_CHORDS, _TURNS = 4, 1.2
+_TURNS = 1.2
 _LEAST_PLACES = 16
 """of a span, that arcs are compared at"""
 _STANDS = 1e-6
@@ -241,15 +248,15 @@ def spline_arcs(control: Floats, inner: Floats, chord: float,
     axis, radius, direction in which it begins, or () for a line; [] where it lies in no plane, has a corner or turns
     back. `before`: splines of the file so far."""
     plane = plane_of(control, FLAT * chord)
-    knots = _knots(inner)
-    if plane is None or (np.unique(inner[:-1], return_counts=True)[1] >= _DEGREE).any():
+    knots = knots_of(inner)
+    if plane is None or (np.unique(inner[:-1], return_counts=True)[1] >= DEGREE).any():
         return []
     u, v, normal = plane
     flat = (control - control[0]) @ np.stack([u, v], axis=1)
-    at = _places(control, knots, chord / DENSER**2, _LEAST_PLACES)
-    points = np.concatenate([flat[:1], de_boor(flat, knots, at, _DEGREE)])
-    slope = _DEGREE * np.diff(flat, axis=0) / _width(knots, len(flat), _DEGREE)[:, None]
-    tangent = de_boor(slope, knots[1:-1], np.append(0.0, at), _DEGREE - 1)
+    at = places_of(control, knots, chord / DENSER**2, _LEAST_PLACES)
+    points = np.concatenate([flat[:1], de_boor(flat, knots, at, DEGREE)])
+    slope = DEGREE * np.diff(flat, axis=0) / width_of(knots, len(flat), DEGREE)[:, None]
+    tangent = de_boor(slope, knots[1:-1], np.append(0.0, at), DEGREE - 1)
     size = np.linalg.norm(tangent, axis=1)
     if not size.min() > _STANDS * size.max():
         return []
@@ -263,74 +270,6 @@ def spline_arcs(control: Floats, inner: Floats, chord: float,
                    *(math.copysign(1.0, turn) * (out[0] * v - out[1] * u)).tolist())
         result.append((*end.tolist(), arc))
         begin = np.array([x, y])
-    return result
-
-
-def spline_points(control: Floats, inner: Floats, chord: float) -> Floats:
-    """Points (M, 3) after the first of a clamped cubic on [0, 1] whose chords keep within `chord` of it.
-
-    control (n, 3); inner (n - 3,): the inner knots and 1. The number of chords of a span of length h is
-    h sqrt(max |C''| / (8 chord)), the bound of linear interpolation.
-    """
-    knots = _knots(inner)
-    return de_boor(control, knots, _places(control, knots, chord), _DEGREE)
-
-
-def cubic_points(control: Floats, inner: Floats, chord: float) -> tuple[Floats, Bools]:
-    """Points (M, 3) as of `spline_points`, of chords of equal steps between knots, their numbers powers of two; which (M,)
-    are at a knot. Pieces that bend have four chords at least, so that their points show that they are cubics."""
-    knots = _knots(inner)
-    at = _places(control, knots, chord)
-    breaks = np.unique(knots)
-    counts = np.diff(np.searchsorted(at, breaks, side="right"))
-    counts = np.where(counts > 1, np.maximum(2 ** np.ceil(np.log2(np.maximum(counts, 1))).astype(int), _LEAST_CHORDS), 1)
-    at = np.concatenate([np.linspace(a, c, n + 1)[1:] for a, c, n in zip(breaks, breaks[1:], counts, strict=False)])
-    return de_boor(control, knots, at, _DEGREE), np.isin(at, breaks)
-
-
-def _knots(inner: Floats) -> Floats:
-    """All knots of a clamped cubic on [0, 1], of the inner ones and 1."""
-    return np.concatenate([np.zeros(_DEGREE + 1), inner, np.ones(_DEGREE)])
-
-
-def _places(control: Floats, knots: Floats, chord: float, least: int = 1) -> Floats:
-    """(M,) parameters after the first between which chords keep within `chord`, at least so many to a span."""
-    breaks = np.unique(knots)
-    bend = _second_derivatives(control, knots, breaks)
-    steps = np.ceil(np.diff(breaks) * np.sqrt(bend / (8.0 * chord)))
-    counts = np.clip(steps, least, _MOST_CHORDS).astype(int)
-    return np.concatenate([np.linspace(a, c, n + 1)[1:] for a, c, n in zip(breaks, breaks[1:], counts, strict=False)])
-
-
-def _width(knots: Floats, count: int, degree: int) -> Floats:
-    """(count - 1,) widths that differences of control points are divided by; 1 where knots coincide."""
-    width = knots[degree + 1:degree + count] - knots[1:count]
-    return np.where(width > 0.0, width, 1.0)
-
-
-def _second_derivatives(control: Floats, knots: Floats, breaks: Floats) -> Floats:
-    """Greatest |C''| in each span between breaks: C'' is linear there, so that its ends decide."""
-    points, degree = control, _DEGREE
-    for _ in range(2):
-        points = degree * np.diff(points, axis=0) / _width(knots, len(points), degree)[:, None]
-        knots, degree = knots[1:-1], degree - 1
-    inside = np.concatenate([breaks[:-1], breaks[:-1] + (1.0 - 1e-9) * np.diff(breaks)])
-    size = np.linalg.norm(de_boor(points, knots, inside, degree), axis=1).reshape(2, -1)
-    result: Floats = size.max(axis=0)
-    return result
-
-
-def de_boor(control: Floats, knots: Floats, at: Floats, degree: int) -> Floats:
-    """Points (M, 3) of the B-spline at parameters (M,), by de Boor's recursion (The NURBS Book, A3.1)."""
-    span = np.clip(np.searchsorted(knots, at, side="right") - 1, degree, len(control) - 1)
-    d = control[span[:, None] + np.arange(-degree, 1)]
-    for level in range(1, degree + 1):
-        for j in range(degree, level - 1, -1):
-            low = knots[span + j - degree]
-            high = knots[span + j + 1 - level]
-            t = np.where(high > low, (at - low) / np.where(high > low, high - low, 1.0), 0.0)[:, None]
-            d[:, j] = (1.0 - t) * d[:, j - 1] + t * d[:, j]
-    result: Floats = d[:, degree]
     return result
 
 

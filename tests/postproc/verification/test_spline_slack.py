@@ -85,11 +85,11 @@ def test_what_splines_take_is_counted_however_they_are_read(tmp_path: Path) -> N
 
 def test_the_program_keeps_the_rest_of_the_tolerance() -> None:
     result = made(2.0, 0.1)
-    assert result.job is not None and result.job.options.tolerance == pytest.approx(0.075)
+    assert result.job is not None and result.job.options.tolerance == pytest.approx(0.06)
     lines = result.text.splitlines()
     k = next(n for n, line in enumerate(lines) if line.startswith("X") and n > len(lines) // 2)
     word = lines[k].split()[0]
-    for by, bad in ((0.06, False), (0.085, True)):
+    for by, bad in ((0.045, False), (0.07, True)):
         lines[k] = lines[k].replace(word, f"X{float(word[1:]) + by:.4f}")
         found = read_back("\n".join(lines).encode(), result.job, "")[1]
         assert bool([d for d in found if d.code == "verify.tip"]) == bad

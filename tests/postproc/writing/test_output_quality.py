@@ -6,6 +6,7 @@ import re
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import machines
@@ -172,10 +173,28 @@ def test_a_plane_is_stated_at_home_on_travel_from_home(index: str) -> None:
             assert "G43" in blocks[k + 2 * block.startswith("G68.2")]
         above = "G43" in block or (above and "G53 G0 Z250." not in block)
     planes = sum(block.startswith("G68.2") for block in blocks)
-    assert planes > 3 and cancelled == (0 if index == "home" else 2)
+    assert planes > 3 and cancelled == (0 if index == "home" else 1)  # the mode by the tip goes by home all the same
     alone = [blocks[k - 1] for k, block in enumerate(blocks) if block == "G69" and k and blocks[k - 1] == "G49"]
     assert len(alone) == (1 if index == "home" else 2)  # that of the safe start
     assert ("5006#6 TOS" in result.text) == (index == "plane" or "G43.4" in result.text)
+
+
+@pytest.mark.covering
+@pytest.mark.parametrize("output", ["auto", "tcp"])
+@pytest.mark.parametrize(("controller", "machine"), [("fanuc-30i", "mikron-ucp710"), ("haas-ngc", "trunnion-bc"),
+                                                     ("fanuc-30i", "trunnion-bc")])
+def test_the_mode_by_the_tip_begins_and_ends_at_the_height_of_home(controller: str, machine: str, output: str) -> None:
+    """G43.4 and G234 take the length, G49 ends them: neither stands near the part, with the part off the rotary axes."""
+    result = postproc.convert(indexed(), machines.load(machine), controller, SETUP, Options(output=output))
+    assert result.ok and result.path is not None, [str(d) for d in result.diagnostics]
+    path, lift = result.path, result.machine.retract_axis
+    height = result.machine.home[lift] - path.q[:, lift]
+    law = np.array([frame.control.law == "tcp" for frame in path.frames])[path.frame]
+    begins, ends = np.flatnonzero(~law[:-1] & law[1:]), np.flatnonzero(law[:-1] & ~law[1:])
+    assert len(begins) and len(begins) == len(ends)
+    assert height[begins].max() <= 10.0 + 1e-9 and np.abs(height[ends] - 10.0).max() < 1e-9
+    blocks = strip(result.text).split("\n")
+    assert sum(block.startswith(("G43.4", "G234")) for block in blocks) == len(begins)
 
 
 def test_haas_indexes_at_home_unless_the_set_up_says_otherwise() -> None:

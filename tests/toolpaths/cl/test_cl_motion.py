@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from toolpaths.cl.curves import de_boor, spline_points
 from toolpaths.cl.read import ReadResult, read_bytes
+from toolpaths.cl.spline_chords import de_boor, spline_points
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import FeedMode, Kind, Role, Toolpath
 
@@ -201,10 +201,11 @@ def _gap(q: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
 def test_a_bezier_span_equals_its_polynomial() -> None:
     control = np.array([[0, 0, 0], [1, 3, 0], [4, 1, 2], [6, 0, 1.0]])
     points = spline_points(control, np.array([1.0]), 1e-3)
-    t = np.linspace(0, 1, len(points) + 1)[1:, None]
+    t = np.array([next(r.real for r in np.roots([x3, x2, 3.0, -x]) if abs(r.imag) < 1e-9 and -1e-9 < r.real < 1.0 + 1e-9)
+                  for x3, x2, x in ((-3.0, 6.0, x) for x in points[:, 0].tolist())])[:, None]  # x = 3 t + 6 t2 - 3 t3
     want = (1 - t) ** 3 * control[0] + 3 * t * (1 - t) ** 2 * control[1] + 3 * t ** 2 * (1 - t) * control[2] \
         + t ** 3 * control[3]
-    assert points == pytest.approx(want, abs=1e-12)
+    assert points == pytest.approx(want, abs=1e-9) and (np.diff(t[:, 0]) > 0.0).all()
 
 
 def test_frames_of_nx() -> None:
