@@ -188,7 +188,7 @@ class LegsModel(KinematicsModel):
             yield from stray_keys(leg, leg.drive, ("legs", name))
         yield from rail_problems(list(self.drives.values()), self.clearance)
         for name, leg in self.drives.items():
-            yield from _letter(name, ("legs", name), ROTARY + LINEAR if leg.drive == "arm" else LINEAR, leg.drive)
+            yield from _letter(name, ("legs", name), ROTARY + LINEAR, leg.drive)
             yield from _direction(leg.direction, ("legs", name, "direction"))
             if leg.drive == "arm" and not 0.0 < np.linalg.norm(leg.arm) < 1e6:
                 yield KeyProblem("machine.geometry", ("legs", name), f"the arm of leg {name} is {list(leg.arm)}",

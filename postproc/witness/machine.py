@@ -286,9 +286,9 @@ def _on_bar(leg: dict[str, Any], bars: dict[str, dict[str, Any]]) -> dict[str, A
 
 
 def turning(table: dict[str, Any], letters: tuple[str, ...]) -> Array:
-    """(J,) True for letters that count degrees: A, B, C, and arms of legs whatever their letter."""
-    arms = {name for name, leg in legs_of(table.get("kinematics", {})).items() if leg.get("drive") == "arm"}
-    return np.array([name in "ABC" or name in arms for name in letters])
+    """(J,) True for letters that count degrees: arms of legs whatever their letter, A, B, C that drive no leg."""
+    legs = legs_of(table.get("kinematics", {}))
+    return np.array([legs[name].get("drive") == "arm" if name in legs else name in "ABC" for name in letters])
 
 
 def kinematics_of(table: dict[str, Any]) -> Chain | Rods | None:
