@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
 from machines.models import JOINTS_ARE_AXES
 from toolpaths.units import DEG
@@ -80,14 +81,16 @@ def _unit(machine: Machine, joint: int) -> float:
 
 
 def _traj(machine: Machine) -> dict[str, str]:
-    """No path is slower than its axes: a largest feed would hold back rapids too."""
-    limits, linear = machine.limits, ~np.array(machine.rotary)
+    """No path is slower than its axes: a largest feed would hold back rapids too. Axes A, B, C are ANGULAR whatever moves
+    them, all others LINEAR."""
+    limits, linear = machine.limits, np.array([name not in ROTARY for name in machine.axis_names])
+    units = np.array([_unit(machine, j) for j in range(len(linear))])
     result = {"COORDINATES": " ".join(_coordinates(machine)), "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree"}
-    for kind, some, unit in (("LINEAR", linear, 1.0), ("ANGULAR", ~linear, 1.0 / DEG)):
+    for kind, some in (("LINEAR", linear), ("ANGULAR", ~linear)):
         if not some.any():
             continue
         for what, of_axes in (("VELOCITY", limits.velocity), ("ACCELERATION", limits.acceleration)):
-            fast = float(np.hypot.reduce(of_axes[some])) * unit
+            fast = float(np.hypot.reduce((of_axes * units)[some]))
             result |= {f"DEFAULT_{kind}_{what}": repr(fast), f"MAX_{kind}_{what}": repr(fast)}
     return result
 

@@ -69,6 +69,7 @@ class RunPlan:
         events: passages by singular directions, with the moves (first, last) of each
         solutions: of the runs of the CL file, in order, without their joints, which are in `q`
         parameters: (R, F) what the machine leaves open, as it was planned
+        split_seconds: see `ParameterCurve.seconds`
     """
 
     refined: Refined
@@ -79,6 +80,7 @@ class RunPlan:
     events: tuple[tuple[int, int, SingularPassage], ...]
     solutions: tuple[RunSolution, ...]
     parameters: Floats
+    split_seconds: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -280,7 +282,8 @@ def _together(moves: Moves, parts: list[_Part], found: list[RunSolution], run_op
         singular, moved, left = (np.insert(x, rows + 1, x[rows]) for x in (singular, moved, left))
     events = tuple((int(p.rows[1 + e.first]), int(p.rows[1 + e.last]), e) for p in parts for e in p.led.events)
     solutions = tuple(replace(s, q=q[:0], singular=singular[:0]) for s in found)
-    return RunPlan(refined, q, singular, moved, left, events, solutions, parameters)
+    split = next((curve.seconds for part in parts for curve in part.opened if curve.seconds), ())
+    return RunPlan(refined, q, singular, moved, left, events, solutions, parameters, split)
 
 
 def _joined(moves: Moves, parts: list[_Part]) -> tuple[Floats, Floats]:
