@@ -75,6 +75,9 @@ def least_seconds(path: JointPath, control: Control, asked: Floats, step: Floats
     if arc.any():
         top = asked / cutting[control.xyz].min()
         needed = np.where(arc & np.isfinite(top), np.nan_to_num(path.seconds) * top, needed)
+    if control.machine.by_drives is not None:
+        own = control.machine.by_drives.cutting_limits.velocity
+        needed = np.maximum(needed, control.machine.kinematics.drive_seconds(joints, path.q, own))
     return np.asarray(needed)
 
 

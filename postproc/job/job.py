@@ -249,6 +249,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`:
     output modes that "auto" passes over. What arcs and chords in the place of splines take is off its tolerance."""
     options, found = without_splines(options, toolpath)
+    machine = machine.on_control() if controller.kinematics.modules else machine
     records, diagnostics = job_records(toolpath, machine, controller, setup, options.setup)
     toolpath = records.toolpath
     diagnostics += [*found, *work_offset(controller, setup, options), *called_tools(controller, options.setup),
