@@ -275,7 +275,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     moves, diagnostics = with_held_tools(moves.placed(placement), toolpath, machine, setup), diagnostics + found
     tip_law = machine.control_kinematics is not None and controller.kinematics.modules
     origin = placement.points(np.array([frame.origin]))[0]
-    largest = controller.arcs.largest_radius if controller.arcs.enabled else 0.0
+    largest = controller.arcs.largest_radius if controller.arcs.enabled and machine.by_drives is None else 0.0
     law: InterpolationMode = "tcp" if tip_law else "axes"
     own, pivots = control_kinematics(machine, setup, options)
     geometric, found = _error_model(machine, options)
@@ -334,12 +334,16 @@ def _error_model(machine: Machine, options: Options) -> tuple[ErrorModel | None,
         return None, []
     from machines.geometric_error.files.loader import load_checked
 
-    model, found = load_checked(options.error_model, machine)
+    model, found = load_checked(options.error_model, machine.by_drives or machine)
     if model is not None and model.corrected_by == "control":
         found = [*found, info("compensation.control", f'the geometric errors {model.name} are left to the control, as their '
                               'file says (corrected_by = "control"): the program does not correct them, and is proved on '
                               "the machine without them", file=options.error_model,
                               hint='corrected_by = "post", if the control has no such model in force')]
+    if model is not None and model.corrected_by == "post" and machine.by_drives is not None:
+        return None, [*found, error("error-model.machine", f"the control runs the kinematics of {machine.name}: words of the tip "
+                                    "hold no error of its legs", file=options.error_model, hint='convert for a machine file based '
+                                    'on it with module = "trivkins" under [control], whose programs hold the drives')]
     return model, found
 
 

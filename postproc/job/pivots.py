@@ -24,7 +24,7 @@ def control_kinematics(machine: Machine, setup: SetupFile,
     if not setup.control_pivots:
         return None, []
     kin = machine.kinematics
-    letters = [j.name for j in kin.chain if j.rotary]
+    letters = [j.name for j in kin.chain if j.rotary and machine.by_drives is None]
     unknown = [k for k in setup.control_pivots if k not in letters]
     if not letters or unknown:
         return None, [error("setup.pivot", f"[control_pivots.{k}]: {machine.name} has no such rotary axis",

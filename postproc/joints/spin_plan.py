@@ -46,6 +46,8 @@ STRAIGHT = 0.2 * DEG
 """that blocks may leave the smooth spin by"""
 SAME = 1e-5
 """mm, rad and direction cosines: what is nearer is round-off"""
+FAR = 1e6
+"""margins that count as none, of axes without an end"""
 CHUNK, COMPILE_FROM = 512, 200_000
 
 
@@ -229,7 +231,7 @@ def _price(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats], machine: Mac
         declared = len("xyz") + int(kin.workspace.tilt[0] < kin.workspace.tilt[1])  # box and tilt: no spin leaves them
         bad |= ~(found.values[:, :declared] >= -SAME).all(axis=1)
         margin = np.hstack([margin, (found.values / np.where(found.angular, NEAR_RAD, NEAR_MM))[:, declared:]])
-    margin = np.nan_to_num(margin, nan=-1.0)
+    margin = np.minimum(np.nan_to_num(margin, nan=-1.0), FAR)
     price = (1.0 / (1.0 + np.maximum(margin, 0.0)) ** 2).max(axis=1)
     away = kin.singular_distance(some)
     bad |= (margin < 0.0).any(axis=1) | ~(away >= least).all(axis=1)
