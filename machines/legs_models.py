@@ -157,8 +157,8 @@ class LegsModel(KinematicsModel):
         return space if moves else replace(space, lower=space.lower * flat + 0.0, upper=space.upper * flat + 0.0)
 
     def control(self, module: str) -> ControlKinematics:
-        """Pins of LinuxCNC's genhexkins or rotarydeltakins, or of lineardeltakins, where the machine is one: three slides X, Y, Z
-        and no carrier.
+        """Pins of LinuxCNC's genhexkins or rotarydeltakins, or of lineardeltakins, where the machine is one: three slides
+        X, Y, Z and no carrier.
 
         Raises:
             ValueError: where it is none; the message says what the module needs.
@@ -171,8 +171,8 @@ class LegsModel(KinematicsModel):
             found = made(machine.loops, machine.gauge)
             at = machine.legs_at[list(found.order)].tolist()
             zero = found.zero[list(found.order)]
-            return ControlKinematics(module, found.pins, found.tool_length_pin, legs=replace(found, order=tuple(at), zero=zero),
-                                     axes=TipAxes.of(machine))
+            found = replace(found, order=tuple(at), zero=zero)
+            return ControlKinematics(module, found.pins, found.tool_length_pin, legs=found, axes=TipAxes.of(machine))
         if tuple(self.drives) != ("X", "Y", "Z") or self.carriers or {leg.drive for leg in legs} != {"slide"} \
                 or set(self.freedoms) != set("xyz"):
             raise ValueError(f"module {module!r} is not known for this machine; a platform free in x y z on slides X, Y, Z "

@@ -204,10 +204,10 @@ class Machine:
             return self
         axes = replace(control.axes, travel=np.column_stack([self.limits.lower, self.limits.upper]))
         home, own = axes.axes_at(self.home[None])[0], self.limits
-        *limits, cutting = axis_limits(axes, home, np.stack([own.velocity, own.acceleration, own.jerk,
+        velocity, acceleration, jerk, cutting = axis_limits(axes, home, np.stack([own.velocity, own.acceleration, own.jerk,
                                                              self.cutting_limits.velocity]))
         ends = np.where(axes.rotary, np.pi, np.inf)
-        made = Limits(-ends, ends, *limits, own.assumed)
+        made = Limits(-ends, ends, velocity, acceleration, jerk, own.assumed)
         return replace(self, kinematics=axes, axis_names=axes.axis_names, rotary=axes.rotary, limits=made, stated=made,
                        home=home, retract_axis=-1, turns=(), clamps=(), by_drives=self,
                        cutting_velocity=tuple(cutting.tolist()) if self.cutting_velocity else ())

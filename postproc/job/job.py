@@ -341,9 +341,10 @@ def _error_model(machine: Machine, options: Options) -> tuple[ErrorModel | None,
                               "the machine without them", file=options.error_model,
                               hint='corrected_by = "post", if the control has no such model in force')]
     if model is not None and model.corrected_by == "post" and machine.by_drives is not None:
-        return None, [*found, error("error-model.machine", f"the control runs the kinematics of {machine.name}: words of the tip "
-                                    "hold no error of its legs", file=options.error_model, hint='convert for a machine file based '
-                                    'on it with module = "trivkins" under [control], whose programs hold the drives')]
+        return None, [*found, error(
+            "error-model.machine", f"the control runs the kinematics of {machine.name}: words of the tip hold no error of "
+            "its legs", file=options.error_model, hint='convert for a machine file based on it with module = "trivkins" '
+            "under [control]: its programs hold the drives")]
     return model, found
 
 

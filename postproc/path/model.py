@@ -37,7 +37,7 @@ class JointPath:
         rewinds (W,): moves before or in which the tool is drawn back to unwind an axis
         events: passages by singular directions: first and last move, and what was done
         opened: what the machine leaves open, as it was planned: name, least and greatest, rad or mm
-        split_seconds: s of the joints with carriers and platform as planned, and with the carriers alone; () without carriers
+        split_seconds: s of the joints with carriers and platform as planned, and with the carriers alone; () without
     """
 
     q: Floats

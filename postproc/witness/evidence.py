@@ -58,7 +58,8 @@ class ExecutedBlocks:
     """E blocks of a program as its reader has executed them.
 
     Attributes:
-        letters: of the joints, words: of the columns of `steps`; joints (E, J) at the end of every block, mm and rad; start (J,)
+        letters: of the joints, words: of the columns of `steps`
+        joints (E, J) at the end of every block, mm and rad; start (J,)
         line, code (E,): line of the program; 0 rapid, 1 feed, 2 arc; straight (E,): True where joints go straight
         sweep (E,): rad of arcs, NaN; feed (E,): F word in force, degrees, or lengths of which each is `unit` (E,) mm,
             per minute, or 1/min where `inverse` (E,)

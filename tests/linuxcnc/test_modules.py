@@ -25,7 +25,7 @@ from tests.linuxcnc import outputs
 from tests.linuxcnc.config import MODULES
 from tests.machines.error_models import joints
 from tests.machines.kinematics.test_legs import ARMS
-from tests.postproc.control.test_tip_programs_of_legs import LINEAR_DELTA
+from tests.postproc.control.test_tip_programs_of_legs import CRANKS, HEXAPOD, LINEAR_DELTA, LOW, TILTED
 from tests.postproc.kit import good, setup_of, toolpath
 from toolpaths.arrays import Floats
 
@@ -110,28 +110,25 @@ def test_lineardeltakins_gives_the_slides_of_a_linear_delta(legs: bool, tmp_path
     assert np.abs(inverse("lineardeltakins", pins, np.column_stack([tip, 0.0 * tip]), 3) - ours).max() < SAME
 
 
-HEXAPOD, CRANKS = 'base = "hexapod"\n[control]\nmodule = "genhexkins"\n', 'base = "rotary-delta"\n[control]\nmodule = "rotarydeltakins"\n'
-UPRIGHT = ("RAPID", "GOTO/-40,-20,30", "FEDRAT/MMPM,1200", "GOTO/-40,-20,0", "GOTO/40,-20,0", "GOTO/40,20,5", "RAPID", "GOTO/40,20,30")
-TILTED = ("RAPID", "GOTO/-40,-20,40,0,0,1", "FEDRAT/MMPM,1200", "GOTO/-40,-20,0,0,0,1", "GOTO/40,-20,0,0.2,0.1,0.9746794",
-          "GOTO/40,20,5,-0.1,0.15,0.9836158", "RAPID", "GOTO/40,20,50,-0.1,0.15,0.9836158")
+UPRIGHT = ("RAPID", "GOTO/-40,-20,30", "FEDRAT/MMPM,1200", "GOTO/-40,-20,0", "GOTO/40,-20,0", "GOTO/40,20,5", "RAPID",
+           "GOTO/40,20,30")
 
 
 @pytest.mark.parametrize(("text", "module", "cuts"), [(HEXAPOD, "genhexkins", TILTED), (CRANKS, "rotarydeltakins", UPRIGHT)])
 def test_the_module_moves_the_drives_of_a_tip_program_as_ours(text: str, module: str, cuts: tuple[str, ...],
                                                               tmp_path: Path) -> None:
-    """Every block of a program, between its ends too, with the pins, zeros and order of joints that the machine's files have."""
+    """Every block of a program, between its ends too, with the pins, zeros and order of joints that the files have."""
     (tmp_path / "own.toml").write_text(text)
     machine = machines.load(tmp_path / "own.toml")
     control = machine.control_kinematics
     assert control is not None and control.legs is not None
-    setup = setup_of("[part]\norigin = [0, 0, -230]\n[tools.1]\ngauge_length = 80\n[clearance]\nmargin = 20\n")
-    result = good(postproc.convert(toolpath(*cuts), machine, "linuxcnc", setup))
+    result = good(postproc.convert(toolpath(*cuts), machine, "linuxcnc", setup_of(LOW)))
     assert "(words: tool-centre-point control)" in result.text
     motion, poses = outputs.read(result)[1], result.comparison.poses
     pins = {key.split(".", 1)[1]: value for key, value in control.pins.items()}
     rows = np.flatnonzero(motion.register >= 0)
     for share in (0.3, 1.0):
-        words = motion.end[rows - 1] + share * (motion.end[rows] - motion.end[rows - 1]) if share < 1.0 else motion.end[rows]
+        words = motion.end[rows - 1] + share * (motion.end[rows] - motion.end[rows - 1])
         ours = result.machine.kinematics.drives(poses.joints(motion, rows, share))[:, list(control.legs.order)]
         held = pins | ({"tool-offset": 80.0} if control.tool_length_pin else {})
         theirs = inverse(module, held, np.pad(words, ((0, 0), (0, 6 - words.shape[1]))), ours.shape[1])

@@ -101,9 +101,11 @@ def test_joint_program_equals_the_joints_that_lineardeltakins_commands(standstil
     assert len(theirs) == 6 and apart.max() < 0.51e-4
 
 
-@pytest.mark.parametrize(("base", "module", "turns"), [("hexapod", "genhexkins", True), ("rotary-delta", "rotarydeltakins", False)])
-def test_drives_at_rest_under_modules_with_axes_of_their_own(standstill, tmp_path: Path, base: str, module: str, turns: bool) -> None:
-    """Programmed positions with a tool of 80 mm, by the exported INI and HAL: LinuxCNC's joints there are the drives' of ours."""
+@pytest.mark.parametrize(("base", "module", "turns"), [("hexapod", "genhexkins", True),
+                                                       ("rotary-delta", "rotarydeltakins", False)])
+def test_drives_at_rest_under_modules_with_axes_of_their_own(standstill, tmp_path: Path, base: str, module: str,
+                                                             turns: bool) -> None:
+    """Programmed positions with a tool of 80 mm, by the exported INI and HAL: LinuxCNC's joints are those of our drives."""
     own = tmp_path / "own.toml"
     own.write_text(f'base = "{base}"\n[control]\nmodule = "{module}"\n')
     machine = machines.load(own)

@@ -1,9 +1,10 @@
 """Platforms on legs that modules of LinuxCNC describe: their pins, joints and zero, or why they are none of theirs.
 
-Sources: genhexkins.c, rotarydeltakins-common.h of LinuxCNC 2.9 (src/emc/kinematics), kins(9). genhexkins has six struts whose
-joints are their lengths, any base and platform. rotarydeltakins has three cranks at -90, 30 and 150 degrees about z, arms
-outwards at 0 and downwards with growing angles, parallel rods to a platform whose point is in the plane of its joints; its zero is
-in the plane of the cranks' axes. pentakins has struts that end on rings about the tool, which no joint of a platform does.
+Sources: genhexkins.c, rotarydeltakins-common.h of LinuxCNC 2.9 (src/emc/kinematics), kins(9). genhexkins has six struts
+whose joints are their lengths, any base and platform. rotarydeltakins has three cranks at -90, 30 and 150 degrees about z,
+arms outwards at 0 and downwards with growing angles, parallel rods to a platform whose point is in the plane of its joints;
+its zero is in the plane of the cranks' axes. pentakins has struts that end on rings about the tool, which no joint of a
+platform does.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """A platform on legs as a control sees it that runs its kinematics: axes X, Y, Z are the gauge point, A, B, C its turns.
 
-LinuxCNC's modules take a pose x, y, z, a, b, c with R = Rz(c) Ry(b) Rx(a) (`pmRpyMatConvert`; genhexkins.c), straight in these
-axes between two blocks. So the machine is a chain X Y Z C B A to the program, without pivots; its drives follow, and their
-travel, their speeds, clearances and singular positions are those of the legs.
+LinuxCNC's modules take a pose x, y, z, a, b, c with R = Rz(c) Ry(b) Rx(a) (`pmRpyMatConvert`; genhexkins.c), straight in
+these axes between two blocks. So the machine is a chain X Y Z C B A to the program, without pivots; its drives follow, and
+their travel, their speeds, clearances and singular positions are those of the legs.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class TipAxes(Serial):
     # ---- drives --------------------------------------------------------------------------------------------
 
     def drives(self, q: Floats) -> Floats:
-        """Joints (N, K) of the legs at axes q (N, J); NaN where they do not reach. By whatever tool: q is the gauge point's."""
+        """See the base class: joints (N, K) of the legs, NaN where they do not reach; with any tool."""
         gauge = as_points(q, self.joints, "q")
         tip, axis, spin = (self if self.tool_length == 0.0 else self.with_tool(0.0)).pose(gauge)
         return np.asarray(self.legs.inverse(tip, axis, spin if "c" in self.legs.loops.turns else 0.0)[0])
@@ -62,7 +62,7 @@ class TipAxes(Serial):
     def axes_at(self, drives: Floats) -> Floats:
         """Axes (N, J) of joints (N, K) of the legs."""
         tip, axis, spin = self.legs.pose(drives)
-        return np.column_stack([tip, self._angles(axis, spin)])
+        return np.column_stack([tip, self._turns_of(axis, spin)])
 
     def drive_rates(self, q: Floats) -> Floats:
         """(N, K, J) how fast the drives go per axis at axes q (N, J), by differences."""
@@ -86,7 +86,7 @@ class TipAxes(Serial):
         longest = np.nan_to_num(np.abs(np.diff(own, axis=0)) / velocity).max(axis=(0, 2), initial=0.0)
         return np.asarray((len(LOOKS) - 1) * longest)
 
-    def _angles(self, axis: Floats, spin: Floats) -> Floats:
+    def _turns_of(self, axis: Floats, spin: Floats) -> Floats:
         """(N, 0 or 3) a, b, c of the platform that gives a tool its axis (N, 3) and spin (N,)."""
         if not self._turns:
             return np.empty((len(axis), 0))
@@ -102,7 +102,7 @@ class TipAxes(Serial):
         axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
         spins = np.broadcast_to(np.asarray(spin, dtype=np.float64), len(tip))
         reached = np.isfinite(self.legs.with_tool(self.tool_length).inverse(tip, axis, spins)[0]).all(axis=1)
-        q = np.column_stack([tip + self.tool_length * axis, self._angles(axis, spins)])
+        q = np.column_stack([tip + self.tool_length * axis, self._turns_of(axis, spins)])
         return np.asarray(np.where(reached[:, None], q, np.nan)[None])
 
     @property
@@ -179,7 +179,7 @@ class TipAxes(Serial):
 
 
 def axis_limits(axes: TipAxes, home: Floats, of_drives: Floats) -> list[Floats]:
-    """(J,) for each row of limits (L, K) of the drives: what an axis may do alone at home (J,) with none of them beyond its own."""
+    """(J,) for each row of limits (L, K) of the drives: what an axis alone may do at home (J,) with all inside theirs."""
     rates = np.maximum(np.abs(axes.drive_rates(home[None])[0]), STILL)
     return [np.asarray((row[:, None] / rates).min(axis=0)) for row in of_drives]
 

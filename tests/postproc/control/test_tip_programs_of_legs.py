@@ -83,8 +83,10 @@ def test_a_hexapod_has_no_such_module(tmp_path: Path) -> None:
 HEXAPOD, CRANKS = ('base = "hexapod"\n[control]\nmodule = "genhexkins"\n',
                    'base = "rotary-delta"\n[control]\nmodule = "rotarydeltakins"\n')
 LOW = "[part]\norigin = [0, 0, -230]\n[tools.1]\ngauge_length = 80\n[clearance]\nmargin = 20\n"
-TILTED = ("LOADTL/1", "SPINDL/RPM,1000,CLW", "RAPID", "GOTO/-40,-20,40,0,0,1", "FEDRAT/MMPM,1200", "GOTO/-40,-20,0,0,0,1",
-          "GOTO/40,-20,0,0.2,0.1,0.9746794", "GOTO/40,20,5,-0.1,0.15,0.9836158", "RAPID", "GOTO/40,20,50,-0.1,0.15,0.9836158")
+TILTED = ("LOADTL/1", "SPINDL/RPM,1000,CLW", "RAPID", "GOTO/-40,-20,40,0,0,1", "FEDRAT/MMPM,1200",
+          "GOTO/-40,-20,0,0,0,1",
+          "GOTO/40,-20,0,0.2,0.1,0.9746794", "GOTO/40,20,5,-0.1,0.15,0.9836158", "RAPID",
+          "GOTO/40,20,50,-0.1,0.15,0.9836158")
 
 
 def written(folder: Path, text: str, cuts: tuple[str, ...], more: str = "", **options: object) -> PostResult:
@@ -100,8 +102,8 @@ def test_a_hexapod_under_genhexkins_gets_turns_of_its_platform(tmp_path: Path) -
     assert result.witness is not None and result.witness.own_kinematics and not result.witness.findings
     assert "pivots" not in result.text and "X40 A-5.8579 B11.537 C-0.5923\n" in result.text
     a, b, c = np.radians([-5.8579, 11.537, -0.5923])
-    axis = [np.cos(c) * np.sin(b) * np.cos(a) + np.sin(c) * np.sin(a), np.sin(c) * np.sin(b) * np.cos(a) - np.cos(c) * np.sin(a),
-            np.cos(b) * np.cos(a)]
+    axis = [np.cos(c) * np.sin(b) * np.cos(a) + np.sin(c) * np.sin(a),
+            np.sin(c) * np.sin(b) * np.cos(a) - np.cos(c) * np.sin(a), np.cos(b) * np.cos(a)]
     assert axis == pytest.approx(np.array([0.2, 0.1, 0.9746794]) / np.linalg.norm([0.2, 0.1, 0.9746794]), abs=2e-6)
 
 
@@ -135,14 +137,17 @@ def test_errors_of_legs_are_not_corrected_in_words_of_the_tip(tmp_path: Path) ->
 
 def test_the_spin_is_planned_under_genhexkins_too(tmp_path: Path) -> None:
     result = good(written(tmp_path, HEXAPOD, TILTED, "[joints]\nspin = 20\n"))
-    assert result.path is not None and result.path.opened == (("spin", pytest.approx(np.radians(20)), pytest.approx(np.radians(20))),)
+    turn = pytest.approx(np.radians(20))
+    assert result.path is not None and result.path.opened == (("spin", turn, turn),)
     assert result.witness is not None and not result.witness.findings
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
-    ("root = -1", "root = 1", "elbows outside"), ("angles = [-90, 30, 150]", "angles = [-80, 30, 150]", "at one radius and height"),
-    ("[kinematics.workspace]", "[kinematics.legs.A]\ndrive = \"arm\"\npoint = [0, -300, 800]\ndirection = [1, 0, 0]\narm = [0, -350, 0]\n"
-     "joint = [0, -100, 0]\nrod = 790\nroot = -1\nrods = [[80, 0, 0], [-80, 0, 0]]\n[kinematics.workspace]", "rods of one length")])
+    ("root = -1", "root = 1", "elbows outside"),
+    ("angles = [-90, 30, 150]", "angles = [-80, 30, 150]", "at one radius and height"),
+    ("[kinematics.workspace]", '[kinematics.legs.A]\ndrive = "arm"\npoint = [0, -300, 800]\ndirection = [1, 0, 0]\n'
+     "arm = [0, -350, 0]\njoint = [0, -100, 0]\nrod = 790\nroot = -1\nrods = [[80, 0, 0], [-80, 0, 0]]\n"
+     "[kinematics.workspace]", "rods of one length")])
 def test_cranks_that_the_module_cannot_be_are_refused(old: str, new: str, words: str, tmp_path: Path) -> None:
     text = Path("machines/data/rotary-delta.toml").read_text("utf-8").replace(old, new)
     (tmp_path / "own.toml").write_text(text.replace("[control]", '[control]\nmodule = "rotarydeltakins"'), "utf-8")

@@ -108,7 +108,8 @@ def test_programs_hold_all_joints_and_are_proved(mode: str) -> None:
 
 
 def test_a_control_without_words_for_an_axis_says_so(tmp_path: Path) -> None:
-    text = Path("machines/data/macro-micro.toml").read_text("utf-8").replace('"A", "B"', '"Q", "B"').replace("axes.A]", "axes.Q]")
-    (tmp_path / "own.toml").write_text(text, "utf-8")
-    result = convert(toolpath("RAPID", "GOTO/0,0,0"), tmp_path / "own.toml", setup=setup_of("[tools.1]\ngauge_length = 80\n"))
+    text = Path("machines/data/macro-micro.toml").read_text("utf-8").replace('"A", "B"', '"Q", "B"')
+    (tmp_path / "own.toml").write_text(text.replace("axes.A]", "axes.Q]"), "utf-8")
+    setup = setup_of("[tools.1]\ngauge_length = 80\n")
+    result = convert(toolpath("RAPID", "GOTO/0,0,0"), tmp_path / "own.toml", setup=setup)
     assert not result.ok and "write.axis_letters" in codes(result.diagnostics)
