@@ -166,9 +166,9 @@ class Compared:
 @dataclass(frozen=True)
 class NotCompared:
     """What was not compared, and why: everything, the machine's kinematics (poses are then those of the read-back), the
-    spindle, linking moves, or a record of the CL file by its text. `line` of the CL file, 0 for none."""
+    spindle, or a record of the CL file by its text. `line` of the CL file, 0 for none."""
 
-    what: Literal["all", "kinematics", "spindle", "record", "choice of tool axes", "text", "linking moves"]
+    what: Literal["all", "kinematics", "spindle", "record", "choice of tool axes", "text"]
     why: str
     line: int = 0
 
