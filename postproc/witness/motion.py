@@ -106,8 +106,8 @@ def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_ang
     """Blocks off their path that are no retract, approach or move clear of what is cut; rapids in cuts and the reverse.
 
     Rapids that turn the tool axis by more than `link_angle` (degrees) have to be clear, or on such a line, themselves;
-    where they are dog-legs (`bent`) they may be fed if the set-up asks for that; `flat`: none has to be clear, they go straight
-    from cut to cut, or by home."""
+    where they are dog-legs (`bent`) they may be fed if the set-up asks for that; `flat`: none has to be clear, they go
+    straight from cut to cut, or by home."""
     good = w.on_path()
     step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
     moved = np.sqrt((step * step).sum(axis=1))
@@ -137,10 +137,9 @@ def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_ang
                           "off the path of the CL file")
     rest = bad[~np.isin(bad, cuts)]
     if flat:
-        links = rest[(w.code[rest] == 0) | (bent and fed_rapids)]
-        astray = links[_astray(w, links, bent)]
-        found += _finding(w, astray, lines, "clearance", "motion that the CL file does not command leaves the straight line from "
-                          "cut to cut, or by home")
+        links = rows[((w.code[rows] == 0) | (bent and fed_rapids)) & ~np.isin(rows, cuts)]
+        found += _finding(w, links[_astray(w, links, bent)], lines, "clearance", "motion that the CL file does not command "
+                          "leaves the straight line from cut to cut, or by home")
         rest = rest[~np.isin(rest, links)]
     return found + _finding(w, rest, lines, "clearance", "motion that the CL file does not command comes nearer to what is "
                             "cut than the margin of the set-up")
