@@ -135,10 +135,12 @@ class ExecutedBlocks:
 
 
 FindingCode = Literal["position", "path", "kind", "clearance", "arc", "hole", "feed", "velocity", "tool", "length",
-                      "spindle", "coolant", "compensation", "rest", "limits", "offset", "turning", "clamp", "errors", "rods"]
+                      "spindle", "coolant", "compensation", "rest", "limits", "offset", "turning", "clamp", "errors", "rods",
+                      "spin"]
 """what is found to differ; `witness.` with it is the code of the error"""
 Aspect = Literal["positions", "arcs", "holes", "feeds", "length registers", "tools", "spindle states", "coolant states",
-                 "cutter compensation", "rests and stops", "work offset", "turns of modulo axes", "clamps", "curves"]
+                 "cutter compensation", "rests and stops", "work offset", "turns of modulo axes", "clamps", "curves",
+                 "turns of tools about themselves"]
 
 
 @dataclass(frozen=True)

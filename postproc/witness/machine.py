@@ -143,6 +143,17 @@ class Rods:
     def misfit(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array, length: Array) -> Array:
         """(N,) mm: the worst of rods off their length, and of the axis off what the platform can do (times
         1000); infinite where the foot of a rod stands on the wrong side of it."""
+        return self._placed(q, letters, tip, axis, length)[0]
+
+    def spins(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array, length: Array) -> Array:
+        """(N,) rad that the rods turn a tool about itself from where the least turn of the platform has it."""
+        platform = self._placed(q, letters, tip, axis, length)[1]
+        side = (least_turns(axis)[:, :, 0] * platform[:, :, 1]).sum(axis=1)
+        return np.asarray(np.arctan2(-side, (least_turns(axis)[:, :, 0] * platform[:, :, 0]).sum(axis=1)))
+
+    def _placed(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array,
+                length: Array) -> tuple[Array, Array]:
+        """(what `misfit` gives, the platform (N, 3, 3))."""
         turn = self.sense * q[:, letters.index(self.rotary)] if self.rotary else np.zeros(len(q))
         if self.carries == "part":
             back = rotations(_UP, -turn)
@@ -161,7 +172,8 @@ class Rods:
             off, _ = self._legs(q, letters, gauge, platform, reach, axis)
         off = self._middles(off)
         aside = np.abs((gauge - apply(platform, reach + self.pivot)) * self.held).max(axis=1)
-        return np.asarray(np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0))
+        worst = np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0)
+        return np.asarray(worst), platform
 
     def _middles(self, off: Array) -> Array:
         """Of pairs that errors may twist, the mean of both rods."""

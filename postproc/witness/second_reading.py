@@ -123,6 +123,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     faults, sides = check_sides(w, c, case)
     found += faults
     found += _misfits(poses)
+    faults, held = _held_spins(w, c, case, np.flatnonzero(w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM))))
+    found += faults
     (faults, turned), (others, curves) = check_turning(case, executed), check_curves(case, executed)
     found += [*faults, *others]
     feeding = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
@@ -137,7 +139,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     counts: dict[Aspect, int] = {
         "positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()), "holes": holes, "feeds": feeds,
         **states, "cutter compensation": sides, "rests and stops": rests, "work offset": zeros,
-        "turns of modulo axes": turned, "clamps": clamped, "curves": curves}
+        "turns of modulo axes": turned, "clamps": clamped, "curves": curves,
+        "turns of tools about themselves": held}
     return found, worst, counts, silent
 
 
@@ -159,6 +162,22 @@ def _zero(case: Case, c: Commanded, place: tuple[Array, Array], poses: Poses) ->
 
 def _arriving(axis: Array) -> str:
     return "" if axis[2] == 1.0 else f" along ({axis[0]:.6f}, {axis[1]:.6f}, {axis[2]:.6f})"
+
+
+def _held_spins(w: Walked, c: Commanded, case: Case, rows: Array) -> tuple[list[Finding], int]:
+    """Cuts with a tool that `keeps_spin` whose platform turns it about itself; how many blocks were compared."""
+    e, machine, tools = w.poses.executed, w.poses.machine, case.setup.get("tools", {})
+    keeps = [int(n) for n, tool in tools.items() if (tool or {}).get("keeps_spin")]
+    rows = rows[np.isin(e.tool[rows], keeps)]
+    if not len(rows) or not isinstance(machine, Rods) or machine.turns != "abc":
+        return [], 0
+    spins = np.abs(machine.spins(w.poses.joints(rows, 1.0), e.letters, w.tip[rows], w.axis[rows], w.poses.lengths(rows)))
+    bad = np.flatnonzero(~(spins <= case.axis_tolerance))
+    if not len(bad):
+        return [], len(rows)
+    k = int(rows[bad[0]])
+    said = f"the tool is turned by {np.degrees(spins[bad[0]]):.4f} degrees about itself, and keeps_spin holds it"
+    return [Finding("spin", said, int(c.line[w.targets.row[w.owner[k]]]), int(e.line[k]), len(bad))], len(rows)
 
 
 def _misfits(poses: Poses) -> list[Finding]:

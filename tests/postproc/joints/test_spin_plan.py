@@ -16,6 +16,7 @@ from machines.machine import Machine
 from postproc.joints.run_roads import ParameterCurve
 from postproc.joints.spin_loop import cheapest_spins
 from postproc.pipeline.result import PostResult
+from postproc.verification.second_witness import second_witness
 from postproc.witness.machine import rods
 from tests.machines.random_slides import poses_over_workspace
 from tests.postproc.kit import codes, convert, good, setup_of, toolpath
@@ -131,6 +132,17 @@ def test_a_tool_that_keeps_its_spin_is_not_turned() -> None:
     free = good(convert(toolpath("RAPID", *LEVEL), "hexapod",
                         setup=setup_of(f'[joints]\nspin = 25\n{LENGTH}keeps_spin = true\n')))
     assert free.path is not None and free.path.opened[0][1:] == (0.0, 0.0)
+
+
+def test_the_second_witness_holds_the_spin_of_a_tool_that_keeps_it() -> None:
+    """A program made for a round tool turned by 25 degrees, held against the set-up of one that is not round."""
+    path, kept = toolpath("RAPID", *LEVEL), setup_of(f"{LENGTH}keeps_spin = true\n")
+    turned = good(convert(path, "hexapod", setup=setup_of(f"[joints]\nspin = 25\n{LENGTH}")))
+    assert turned.job is not None and turned.comparison is not None
+    found = second_witness(path.source, kept, turned.options, turned.job, turned.comparison)[1]
+    assert any(d.code == "witness.spin" and "25.0" in d.message for d in found), [str(d) for d in found]
+    held = good(convert(path, "hexapod", setup=kept))
+    assert held.witness is not None and "turns of tools about themselves" in [one.what for one in held.witness.compared]
 
 
 def test_the_second_witness_finds_the_spin_by_the_rods_alone() -> None:
