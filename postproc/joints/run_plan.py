@@ -47,6 +47,7 @@ class RunOptions:
         spin: rad, the turn of the tool about itself that is asked for where the machine leaves it open; None: planned
         singular_distance: that is kept
         split: False where the platform rests on carriers that do all
+        drawn: (tips (N, 3), axes (N, 3)) -> tips (N, 3) where linking moves draw the tool back to, at the least; None: nowhere
     """
 
     preferences: JointPreferences
@@ -57,6 +58,7 @@ class RunOptions:
     spin: float | None = None
     singular_distance: float = 0.0
     split: bool = True
+    drawn: Callable[[Floats, Floats], Floats] | None = None
 
 
 @dataclass(frozen=True)
@@ -218,7 +220,7 @@ def _run(part: _Part, moves: Moves, run_options: RunOptions, home: Floats) -> Po
 def _opened(machine: Machine, parts: list[_Part], moves: Moves, run_options: RunOptions) -> list[_Part]:
     """The runs with what the machine leaves open planned, cut where it changes."""
     curves = planned_parameters([_road(part, moves) for part in parts], machine, run_options.singular_distance,
-                                run_options.spin, run_options.split)
+                                run_options.spin, run_options.split, run_options.drawn)
     made = [replace(part, opened=own, places=tuple(curve.measure for curve in own))
             for part, own in zip(parts, curves, strict=True)]
     return [_cut(part, np.max([curve.parts() for curve in part.opened], axis=0)) for part in made]
