@@ -47,7 +47,7 @@ class RunOptions:
         spin: rad, the turn of the tool about itself that is asked for where the machine leaves it open; None: planned
         singular_distance: that is kept
         split: False where the platform rests on carriers that do all
-        drawn: (tips (N, 3), axes (N, 3)) -> tips (N, 3) where linking moves draw the tool back to, at the least; None: nowhere
+        drawn: (tips (N, 3), axes (N, 3)) -> tips (N, 3) where linking moves draw the tool back to at least; None: nowhere
     """
 
     preferences: JointPreferences

@@ -170,7 +170,8 @@ def test_the_spin_lets_the_tool_be_drawn_back_too(tip: list[float], axis: list[f
     machine = replace(whole, limits=replace(whole.limits, lower=np.full(6, 150.0), upper=np.full(6, 420.0)))
     kin, at, up = machine.kinematics.with_tool(60.0).with_free_spin(), np.array(tip), np.array(axis)
     none = np.zeros((1, 3))
-    curves = Curves(at[None], at[None] + [[4.0, 0.0, 0.0]], up[None], up[None], np.zeros(1, dtype=bool), none, none, np.zeros(1))
+    curves = Curves(at[None], at[None] + [[4.0, 0.0, 0.0]], up[None], up[None], np.zeros(1, dtype=bool), none, none,
+                    np.zeros(1))
     road = RunRoad(kin, np.concatenate([at, up]), curves, np.array([0.4]), np.nan)
 
     def drawn(tips: Floats, axes: Floats) -> Floats:
