@@ -14,6 +14,15 @@ ALLOWED = 0.1
 """share of the tip tolerance that a pivot may be off by"""
 
 
+def errors_of_drives(machine: Machine, corrects: bool, options: Options) -> list[Diagnostic]:
+    """An error where a program is to correct errors of legs, and its words are the tip's."""
+    if machine.by_drives is None or not corrects:
+        return []
+    return [error("error-model.machine", f"the control runs the kinematics of {machine.name}: words of the tip hold no "
+                  "error of its legs", file=options.error_model, hint='convert for a machine file based on it with module = '
+                  '"trivkins" under [control]: its programs hold the drives')]
+
+
 def control_kinematics(machine: Machine, setup: SetupFile,
                        options: Options) -> tuple[Kinematics | None, list[Diagnostic]]:
     """(the kinematics with the set-up's [control_pivots], None where it states none; pivots that differ from

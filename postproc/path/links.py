@@ -239,7 +239,7 @@ def _standing(kin: Kinematics, q: Floats) -> Pose:
 
 def _carried_there(machine: Machine, kin: Kinematics, tip: Floats, axis: Floats, near: Floats) -> Floats:
     """Joints (N, J) of poses, the nearest to `near` (N, J); where a platform on redundant carriers would leave its
-    workspace, they go half of the way to where it rests, or all of it."""
+    workspace, they go to where it rests, or half as far."""
     q = nearest_solution(kin, tip, axis, near)
     open_to = [name in kin.axis_names for name in kin.open_parameters]
     if not any(open_to) or _inside(q, machine):

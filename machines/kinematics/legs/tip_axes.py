@@ -37,10 +37,19 @@ class TipAxes(Serial):
     Attributes:
         legs: the machine by its drives, at the gauge point
         travel: (K, 2) of the drives, mm or rad
+        workspace, clearance_parts, singular_names: of the legs
     """
 
     legs: OnLegs = field(kw_only=True)
     travel: Floats = field(kw_only=True)
+    workspace: Workspace | None = field(init=False)
+    clearance_parts: ClearanceParts | None = field(init=False)
+    singular_names: tuple[str, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("workspace", "clearance_parts", "singular_names"):
+            object.__setattr__(self, name, getattr(self.legs, name))
 
     @classmethod
     def of(cls, legs: OnLegs) -> Self:
@@ -135,15 +144,11 @@ class TipAxes(Serial):
         """False (N,): the spin is asked for, not free."""
         return np.zeros(len(q), dtype=np.bool_)
 
-    def places_apart(self) -> None:  # type: ignore[override]  # no axis of the chain turns the tool about one direction
-        """See the base class: None."""
+    def places_apart(self) -> Floats | None:
+        """See the base class: no axis of the chain turns the tool about one direction."""
+        return None
 
     # ---- singular positions, clearances, errors ------------------------------------------------------------
-
-    @property
-    def singular_names(self) -> tuple[str, ...]:  # type: ignore[override]  # nothing assigns it
-        """See the base class: of the legs."""
-        return self.legs.singular_names
 
     def singular_distance(self, q: Floats) -> Floats:
         """See the base class."""
@@ -153,16 +158,6 @@ class TipAxes(Serial):
         """See the base class: the least at LOOKS of each move."""
         seen = [self.singular_distance(q[:-1] + t * (q[1:] - q[:-1])) for t in LOOKS]
         return np.asarray(np.min(seen, axis=0)) if len(q) > 1 else np.zeros((0, len(self.singular_names)))
-
-    @property
-    def clearance_parts(self) -> ClearanceParts | None:  # type: ignore[override]  # nothing assigns it
-        """See the base class."""
-        return self.legs.clearance_parts
-
-    @property
-    def workspace(self) -> Workspace | None:  # type: ignore[override]  # nothing assigns it
-        """See the base class."""
-        return self.legs.workspace
 
     def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """See the base class."""

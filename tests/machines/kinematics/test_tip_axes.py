@@ -1,4 +1,4 @@
-"""A platform as the axes of its control's kinematics: one pose by axes and by drives, rates, limits of axes from the drives'."""
+"""A platform as the axes of its control's kinematics: one pose by axes and by drives, rates, limits of axes."""
 
 from __future__ import annotations
 
