@@ -56,7 +56,7 @@ def _letters(kin: Kinematics) -> Iterator[KeyProblem]:
         yield _problem(f"axis_names {kin.axis_names} and rotary {kin.rotary} do not go together, one letter a joint")
         return
     for letter, rotary, drive in zip(kin.axis_names, kin.rotary, kin.drives_tip, strict=True):
-        allowed = (ROTARY + LINEAR if drive else ROTARY) if rotary else LINEAR  # a crank may have any letter
+        allowed = ROTARY + LINEAR if drive else ROTARY  # a crank or slide that moves the tip may have any letter
         if len(letter) != 1 or letter not in allowed:
             yield _problem(f"{letter!r} is not a letter of a {'rotary' if rotary else 'linear'} axis, allowed: "
                            f"{' '.join(allowed)}")

@@ -14,7 +14,9 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.chain import LINEAR, ROTARY
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import FREEDOMS, Loops
+from machines.kinematics.legs.module_pins import MODULES
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.tip_axes import TipAxes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
 from machines.leg_layouts import BoundedVector, DriveModel, StarLayout, stray_keys
@@ -155,12 +157,22 @@ class LegsModel(KinematicsModel):
         return space if moves else replace(space, lower=space.lower * flat + 0.0, upper=space.upper * flat + 0.0)
 
     def control(self, module: str) -> ControlKinematics:
-        """Pins of LinuxCNC's lineardeltakins, where the machine is one: three slides X, Y, Z and no carrier.
+        """Pins of LinuxCNC's genhexkins or rotarydeltakins, or of lineardeltakins, where the machine is one: three slides
+        X, Y, Z and no carrier.
 
         Raises:
             ValueError: where it is none; the message says what the module needs.
         """
         legs = list(self.drives.values())
+        if (made := MODULES.get(module)) is not None:
+            if self.carriers or self.rotary is not None:
+                raise ValueError(f"{module} has no other axes than those of the legs")
+            machine = self._on_legs()
+            found = made(machine.loops, machine.gauge)
+            at = machine.legs_at[list(found.order)].tolist()
+            zero = found.zero[list(found.order)]
+            found = replace(found, order=tuple(at), zero=zero)
+            return ControlKinematics(module, found.pins, found.tool_length_pin, legs=found, axes=TipAxes.of(machine))
         if tuple(self.drives) != ("X", "Y", "Z") or self.carriers or {leg.drive for leg in legs} != {"slide"} \
                 or set(self.freedoms) != set("xyz"):
             raise ValueError(f"module {module!r} is not known for this machine; a platform free in x y z on slides X, Y, Z "
@@ -188,7 +200,7 @@ class LegsModel(KinematicsModel):
             yield from stray_keys(leg, leg.drive, ("legs", name))
         yield from rail_problems(list(self.drives.values()), self.clearance)
         for name, leg in self.drives.items():
-            yield from _letter(name, ("legs", name), ROTARY + LINEAR if leg.drive == "arm" else LINEAR, leg.drive)
+            yield from _letter(name, ("legs", name), ROTARY + LINEAR, leg.drive)
             yield from _direction(leg.direction, ("legs", name, "direction"))
             if leg.drive == "arm" and not 0.0 < np.linalg.norm(leg.arm) < 1e6:
                 yield KeyProblem("machine.geometry", ("legs", name), f"the arm of leg {name} is {list(leg.arm)}",

@@ -14,6 +14,8 @@ from machines.choices import BoughtOption, Park, Rapids, RolloverRule, Stop
 from machines.figures import Document
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
+from machines.kinematics.legs.module_pins import ModulePins
+from machines.kinematics.legs.tip_axes import TipAxes, axis_limits
 from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
@@ -107,6 +109,7 @@ class ControlKinematics:
 
     `module` and `pins` name LinuxCNC's module and its HAL pins; `tool_length_pin` receives the tool length. `idle` are
     letters of joints that the module has and the machine has not, `sum_to` the pins that a sum of both connects (out, to).
+    `legs`: the module as it stands for a platform on legs whose drives are other axes than those of its program, `axes`.
     """
 
     module: str
@@ -114,6 +117,8 @@ class ControlKinematics:
     tool_length_pin: str = ""
     idle: str = ""
     sum_to: tuple[str, str] = ("", "")
+    legs: ModulePins | None = None
+    axes: TipAxes | None = None
 
 
 @dataclass(frozen=True)
@@ -151,6 +156,7 @@ class Machine:
         certificate: file that proves that the declared workspace is reached and free of singular positions, "" where that
             was sampled, or nobody asks it of the machine
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
+        by_drives: the machine as its drives move it, where this one has the axes of the control's kinematics (`on_control`)
     """
 
     name: str
@@ -167,6 +173,7 @@ class Machine:
     file: str = ""
     stop: Stop | Literal[""] = ""
     stated: Limits | None = None
+    by_drives: Machine | None = None
     turns: tuple[Turns, ...] = ()
     clamps: tuple[ClampCodes, ...] = ()
     length_register: int = 0
@@ -186,6 +193,24 @@ class Machine:
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
         object.__setattr__(self, "clamps", self.clamps or (ClampCodes(),) * len(self.axis_names))
+
+    def on_control(self) -> Machine:
+        """The machine with the axes that the module of its control has, where those are not its drives; else as it is.
+
+        Axes go as fast as one alone may at home without a drive above its own limits.
+        """
+        control = self.control_kinematics
+        if control is None or control.axes is None or self.by_drives is not None:
+            return self
+        axes = replace(control.axes, travel=np.column_stack([self.limits.lower, self.limits.upper]))
+        home, own = axes.axes_at(self.home[None])[0], self.limits
+        velocity, acceleration, jerk, cutting = axis_limits(axes, home, np.stack([own.velocity, own.acceleration, own.jerk,
+                                                             self.cutting_limits.velocity]))
+        ends = np.where(axes.rotary, np.pi, np.inf)
+        made = Limits(-ends, ends, velocity, acceleration, jerk, own.assumed)
+        return replace(self, kinematics=axes, axis_names=axes.axis_names, rotary=axes.rotary, limits=made, stated=made,
+                       home=home, retract_axis=-1, turns=(), clamps=(), by_drives=self,
+                       cutting_velocity=tuple(cutting.tolist()) if self.cutting_velocity else ())
 
     @cached_property
     def cutting_limits(self) -> Limits:

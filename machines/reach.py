@@ -69,7 +69,7 @@ def reach(kinematics: Kinematics, q: Floats, near: Floats | None = None) -> Marg
     for first in range(0, len(q), BLOCK):
         part = slice(first, first + BLOCK)
         hint = near[part] if near is not None and near.ndim == 2 else near
-        blocks.append(checks.values(kinematics.rig(q[part], hint)))
+        blocks.append(np.hstack([checks.values(kinematics.rig(q[part], hint)), kinematics.drive_margins_at(q[part])]))
     values = np.concatenate(blocks) if blocks else np.empty((0, len(checks.names)))
     return Margins(checks.names, checks.angular, checks.of_box, values)
 
@@ -114,9 +114,10 @@ class _Checks:
             self.middle, self.legs, self.clearance = parts.middle_rig(), parts.legs, parts.clearance
             self.leg_names = parts.leg_names
             self.columns += [*self._stops(), *self._bars()]
-        self.names = tuple(name for name, _, _ in self.columns)
-        self.angular = np.array([angular for _, angular, _ in self.columns], dtype=np.bool_)
-        self.of_box = np.arange(len(self.columns)) < len("xyz")
+        named = [*((name, angular) for name, angular, _ in self.columns), *kinematics.drive_margins]
+        self.names = tuple(name for name, _ in named)
+        self.angular = np.array([angular for _, angular in named], dtype=np.bool_)
+        self.of_box = np.arange(len(named)) < len("xyz")
 
     def values(self, rig: ClearanceGeometry) -> Floats:
         """(N, M)"""

@@ -102,7 +102,7 @@ def parameters(model: ErrorModel, wanted: Sequence[str] = ()) -> dict[str, Found
     arcsec), at: the position that a value of a table is of, "X -300", "X -300 +" with its approach direction ("" for all
     others)."""
     sigma = np.zeros(len(model.names)) if model.covariance is None else np.sqrt(np.diag(model.covariance))
-    units = ["arcsec" if angular(name) else "um" for name in model.names]
+    units = ["arcsec" if angular(name, model.rods) else "um" for name in model.names]
     places = _places(model)
     return {name: {"value": float(v / UNITS[u]), "sigma": float(s / UNITS[u]) if s > 0.0 else None, "unit": u,
                    "at": places.get(name, "")}

@@ -46,9 +46,9 @@ def _inexpressible(machine: Machine, model: MachineModel, own: dict[str, str] | 
     strange = [name for name in machine.axis_names if name not in LETTERS]
     if strange:
         return f"it has no axes {', '.join(strange)}"
-    if own is None:
+    if own is None and (machine.control_kinematics is None or machine.control_kinematics.axes is None):
         return f"no module of it has the kinematics of kind {model.kinematics.kind!r}"
-    if "STRUCTURE" not in own and machine.control_kinematics is None:
+    if "STRUCTURE" not in (own or {}) and machine.control_kinematics is None:
         return "[control] names no module of LinuxCNC that has the kinematics of its joints"
     return ""
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
 from machines.models import JOINTS_ARE_AXES
 from toolpaths.units import DEG
@@ -24,8 +25,9 @@ Sections = dict[str, dict[str, str]]
 
 def letters(machine: Machine) -> str:
     """Axis letters of programs: the joints' own, or tip coordinates where the control owns the kinematics."""
-    if machine.control_kinematics is None:
-        return "".join(machine.axis_names)
+    control = machine.control_kinematics
+    if control is None or control.axes is not None:
+        return "".join(machine.on_control().axis_names)
     return "XYZ" + "".join(name for name, turns in zip(machine.axis_names, machine.rotary, strict=True) if turns)
 
 
@@ -48,6 +50,7 @@ def joints(machine: Machine) -> int:
 
 def ini_sections(machine: Machine, name: str) -> Sections:
     """The INI of a machine; other files by `name`."""
+    machine = machine.by_drives or machine
     result: Sections = {
         "EMC": {"VERSION": "1.1", "MACHINE": machine.description, "DEBUG": "0"},
         "DISPLAY": {"DISPLAY": "axis", "MAX_FEED_OVERRIDE": "1.2"}, "TASK": {"TASK": "milltask", "CYCLE_TIME": "0.001"},
@@ -57,18 +60,27 @@ def ini_sections(machine: Machine, name: str) -> Sections:
         "EMCIO": {"EMCIO": "io", "CYCLE_TIME": "0.01", "TOOL_TABLE": f"{name}.tbl"},
         "TRAJ": _traj(machine),
         "KINS": {"KINEMATICS": " ".join(module_words(machine)), "JOINTS": str(joints(machine))}}
-    for j, home in enumerate(machine.home):
-        unit = _unit(machine, j)
-        result[f"JOINT_{j}"] = {"TYPE": "ANGULAR" if machine.rotary[j] else "LINEAR", **_limits(machine, j, travel=True),
-                                **_homing(float(home * unit))}
+    for number, (j, more) in enumerate(_joints(machine)):
+        home = float((machine.home[j] + more) * _unit(machine, j))
+        result[f"JOINT_{number}"] = {"TYPE": "ANGULAR" if machine.rotary[j] else "LINEAR",
+                                     **_limits(machine, j, travel=True, more=more), **_homing(home)}
     for k, letter in enumerate(_idle(machine)):
         result[f"JOINT_{len(machine.axis_names) + k}"] = {"TYPE": "LINEAR", **_still(machine), **_homing(0.0)}
         result[f"AXIS_{letter}"] = _still(machine)
+    moved = machine.on_control()
     for axis in letters(machine):
-        joint = machine.axis_names.index(axis) if axis in machine.axis_names else 0
-        own = {"WRAPPED_ROTARY": "1"} if axis in machine.axis_names and machine.turns[joint].modulo else {}
-        result[f"AXIS_{axis}"] = _limits(machine, joint, travel=machine.control_kinematics is None) | own
+        joint = moved.axis_names.index(axis) if axis in moved.axis_names else 0
+        own = {"WRAPPED_ROTARY": "1"} if axis in moved.axis_names and moved.turns[joint].modulo else {}
+        result[f"AXIS_{axis}"] = _limits(moved, joint, travel=machine.control_kinematics is None) | own
     return result
+
+
+def _joints(machine: Machine) -> list[tuple[int, float]]:
+    """(joint of the machine, mm or rad that it counts more) of each joint of the module."""
+    control = machine.control_kinematics
+    if control is None or control.legs is None:
+        return [(j, 0.0) for j in range(len(machine.axis_names))]
+    return list(zip(control.legs.order, control.legs.zero.tolist(), strict=True))
 
 
 def _idle(machine: Machine) -> str:
@@ -80,14 +92,17 @@ def _unit(machine: Machine, joint: int) -> float:
 
 
 def _traj(machine: Machine) -> dict[str, str]:
-    """No path is slower than its axes: a largest feed would hold back rapids too."""
-    limits, linear = machine.limits, ~np.array(machine.rotary)
+    """No path is slower than its axes: a largest feed would hold back rapids too. Axes A, B, C are ANGULAR whatever moves
+    them, all others LINEAR."""
+    moved = machine.on_control()
+    limits, linear = moved.limits, np.array([name not in ROTARY for name in moved.axis_names])
+    units = np.array([_unit(moved, j) for j in range(len(linear))])
     result = {"COORDINATES": " ".join(_coordinates(machine)), "LINEAR_UNITS": "mm", "ANGULAR_UNITS": "degree"}
-    for kind, some, unit in (("LINEAR", linear, 1.0), ("ANGULAR", ~linear, 1.0 / DEG)):
+    for kind, some in (("LINEAR", linear), ("ANGULAR", ~linear)):
         if not some.any():
             continue
         for what, of_axes in (("VELOCITY", limits.velocity), ("ACCELERATION", limits.acceleration)):
-            fast = float(np.hypot.reduce(of_axes[some])) * unit
+            fast = float(np.hypot.reduce((of_axes * units)[some]))
             result |= {f"DEFAULT_{kind}_{what}": repr(fast), f"MAX_{kind}_{what}": repr(fast)}
     return result
 
@@ -103,13 +118,13 @@ def _still(machine: Machine) -> dict[str, str]:
             "MAX_ACCELERATION": repr(float(machine.limits.acceleration[0]))}
 
 
-def _limits(machine: Machine, joint: int, travel: bool) -> dict[str, str]:
-    """Limits of a joint or of the axis of the same letter; tip coordinates have no travel of their own."""
+def _limits(machine: Machine, joint: int, travel: bool, more: float = 0.0) -> dict[str, str]:
+    """Limits of a joint, which the module counts `more`, or of an axis; tip coordinates have no travel of their own."""
     limits, scale = machine.limits, _unit(machine, joint)
     result = {}
     for key, bound in (("MIN_LIMIT", limits.lower), ("MAX_LIMIT", limits.upper)):
         if travel and np.isfinite(bound[joint]):
-            result[key] = _number(bound[joint] * scale)
+            result[key] = _number((bound[joint] + more) * scale)
     for key, of_axes in (("VELOCITY", limits.velocity), ("ACCELERATION", limits.acceleration), ("JERK", limits.jerk)):
         result[f"MAX_{key}"] = _number(of_axes[joint] * scale)
     return result

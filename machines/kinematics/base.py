@@ -307,6 +307,24 @@ class Kinematics(ABC):
         return ClearanceGeometry(gauge, np.zeros(len(q)), none, none, gauge, axis)
 
     @property
+    def drive_margins(self) -> tuple[tuple[str, bool], ...]:
+        """(name, True for rad) of each drive whose travel is none of a joint: of machines whose joints are the axes of the
+        control's own kinematics."""
+        return ()
+
+    def drive_margins_at(self, q: Floats) -> Floats:
+        """(N, D) what is left of the travel of those drives at joints q (N, J)."""
+        return np.zeros((len(q), 0))
+
+    def drives(self, q: Floats) -> Floats:
+        """Joints of those drives at joints q (N, J); without them q itself."""
+        return q
+
+    def drive_seconds(self, q0: Floats, q1: Floats, velocity: Floats) -> Floats:
+        """(N,) s that those drives take at least at their velocities (D,) along even moves q0 -> q1 (N, J)."""
+        return np.zeros(len(q0))
+
+    @property
     def leg_geometry(self) -> LegGeometry | None:
         """The legs as plain numbers, of a platform that hangs on legs; None of any other machine."""
         return None

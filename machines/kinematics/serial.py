@@ -240,7 +240,7 @@ class Serial(Kinematics):
         """See the base class."""
         return replace(self, chain=tuple(replace(j, point=points[j.name]) if j.name in points else j for j in self.chain))
 
-    def places_apart(self) -> Floats:
+    def places_apart(self) -> Floats | None:
         """See the base class."""
         axis = self.nearest_axis(np.array([[0.1, 0.2, 1.0], [-0.3, 0.15, 1.0]]))
         return np.asarray(self.inverse(np.zeros((2, 3)), axis)[0])

@@ -62,7 +62,8 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                       feeds.mode[keep], path.plane[keep], path.ccw[keep], contour.center[keep], path.home[keep],
                       np.isnan(path.u[keep]), moves.row[path.move[keep]], line,
                       placed, kept_holes, job.grid.places, sections, skip[keep], cubics.numbers()[keep], cubics.curves,
-                      control.rolls, control.machine.home * control.unit)
+                      control.rolls, control.machine.home * control.unit,
+                      tuple(a for a, turns in zip(control.machine.axis_names, control.machine.rotary, strict=True) if turns))
     found += [*refused, *long_turns(program, toolpath.file)]
     program = with_smoothing(program, job.smoothing, toolpath)
     program = with_clamps(program, control.machine, controller.plane_turns)

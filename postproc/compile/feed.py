@@ -66,6 +66,8 @@ def plan_feeds(path: JointPath, control: Control, step: Floats, asked: Floats, p
 def least_seconds(path: JointPath, control: Control, asked: Floats, step: Floats) -> Floats:
     """(K,) s that the velocities of the axes ask of each block, by its joints and by its rounded words, step (K, J)."""
     joints = np.concatenate([control.machine.home[None, :], path.q[:-1]])
+    if (drives := control.machine.by_drives) is not None:  # no arcs, and the limits of the axes follow from theirs
+        return control.machine.kinematics.drive_seconds(joints, path.q, drives.cutting_limits.velocity)
     cutting, rapid = control.machine.cutting_limits.velocity, control.machine.limits.velocity
     velocity = cutting if cutting is rapid else np.where((path.code == TRAVERSE)[:, None], rapid, cutting)
     travel = np.abs(path.q - joints)

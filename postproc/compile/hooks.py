@@ -98,7 +98,7 @@ def indexing_moves(program: Program) -> tuple[dict[int, int], dict[int, int]]:
     """CL lines by the first block that may turn a rotary axis between two cuts, and by the block behind the last one.
 
     A tilted plane belongs to the indexing that it follows."""
-    rotary = [j for j, letter in enumerate(program.letters) if letter in ROTARY]
+    rotary = [j for j, letter in enumerate(program.letters) if letter in ROTARY and letter in program.turning]
     cut = cutting(program)
     turns = np.flatnonzero(turning(program, rotary) & ~cut) if rotary else np.zeros(0, dtype=np.int64)
     if not len(turns):

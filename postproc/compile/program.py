@@ -123,6 +123,7 @@ class Program:
             from begin and end of the block
         rolls: modulo axes by column; `words` count their turns, the text does not
         begins (J,): words of the machine's home
+        turning: letters whose words are degrees; A, B and C may be slides of a platform on legs
         sections: in order, the first begins at block 0 in the law that the control starts with
     """
 
@@ -148,6 +149,7 @@ class Program:
     curves: Floats = field(default_factory=lambda: np.zeros((0, 3, 2)))
     rolls: dict[int, Rollover] = field(default_factory=dict)
     begins: Floats = field(default_factory=lambda: np.zeros(0))
+    turning: tuple[str, ...] = ("A", "B", "C")
 
     def __post_init__(self) -> None:
         if not len(self.skip):

@@ -217,7 +217,8 @@ class Control:
         kin = self.machine.kinematics
         if self.base == "tcp":
             offset = np.zeros(kin.joints)
-            offset[self.xyz] = self.origin
+            own = self.machine.control_kinematics
+            offset[self.xyz] = self.origin - (own.legs.origin if own is not None and own.legs is not None else 0.0)
             return offset
         if not kin.straight_slides:
             return np.zeros(kin.joints)

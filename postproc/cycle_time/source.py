@@ -88,6 +88,7 @@ def executed_program(data: bytes, machine: Machine, controller: ControllerFile, 
                      unknown_length: float = 0.0) -> tuple[ExecutedProgram | None, list[Diagnostic]]:
     """A program executed; None and why where it cannot be. Arguments as of `from_gcode`."""
     controller = with_shop(controller, machine, setup)
+    machine = machine.on_control() if controller.kinematics.modules else machine
     origins, found = _origins(setup, machine)
     if has_errors(found):
         return None, found

@@ -21,7 +21,7 @@ from postproc.controllers.model import ControllerFile
 from postproc.job.held_tools import with_held_tools
 from postproc.job.index_moves import indexed, plane_changes
 from postproc.job.length_words import words_depend_on_length
-from postproc.job.pivots import control_kinematics
+from postproc.job.pivots import control_kinematics, errors_of_drives
 from postproc.job.places import Place, at_all, modes_at, places_of
 from postproc.job.program_names import program_number, work_offset
 from postproc.job.rapids import safe_rapids
@@ -249,6 +249,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     """The job (its path has plain records, see `plain_records`), or None and why there is none; `refused`:
     output modes that "auto" passes over. What arcs and chords in the place of splines take is off its tolerance."""
     options, found = without_splines(options, toolpath)
+    machine = machine.on_control() if controller.kinematics.modules else machine
     records, diagnostics = job_records(toolpath, machine, controller, setup, options.setup)
     toolpath = records.toolpath
     diagnostics += [*found, *work_offset(controller, setup, options), *called_tools(controller, options.setup),
@@ -272,10 +273,8 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += [*found, *_default_feed(toolpath, setup)]
     moves, found = limited_feeds(moves, toolpath, machine.largest_feed)
     moves, diagnostics = with_held_tools(moves.placed(placement), toolpath, machine, setup), diagnostics + found
-    tip_law = machine.control_kinematics is not None and controller.kinematics.modules
-    origin = placement.points(np.array([frame.origin]))[0]
-    largest = controller.arcs.largest_radius if controller.arcs.enabled else 0.0
-    law: InterpolationMode = "tcp" if tip_law else "axes"
+    largest = controller.arcs.largest_radius if controller.arcs.enabled and machine.by_drives is None else 0.0
+    law: InterpolationMode = "tcp" if machine.control_kinematics and controller.kinematics.modules else "axes"
     own, pivots = control_kinematics(machine, setup, options)
     geometric, found = _error_model(machine, options)
     diagnostics += [*pivots, *found]
@@ -283,10 +282,10 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     diagnostics += found
     corrects = geometric is not None and geometric.corrected_by == "post"  # tables that are corrected do not stand at zero
     entry = "table" if corrects or controller.modes.tcp is None else controller.modes.tcp.frame
-    control = Control(machine, law, origin, largest, law, entry_frame=entry, own_kinematics=own,
-                      rapids=machine.rapids or controller.kinematics.rapids, feed_rule=controller.feed.length,
-                      degree_is_inch=controller.degree_is_inch, helix_planes=controller.arcs.helix_planes,
-                      rolls=rolls, standing=places[0].standing,
+    control = Control(machine, law, placement.points(np.array([frame.origin]))[0], largest, law, entry_frame=entry,
+                      own_kinematics=own, rapids=machine.rapids or controller.kinematics.rapids,
+                      feed_rule=controller.feed.length, degree_is_inch=controller.degree_is_inch,
+                      helix_planes=controller.arcs.helix_planes, rolls=rolls, standing=places[0].standing,
                       measured=0.0 if setup.output.tool_call else measured_length(toolpath, setup))
     diagnostics += [*_measured(control, controller, moves.axis, setup, options), *upside_down(
         moves.axis[moves.kind != Kind.RAPID], machine.home_axis, placement, options.setup)]
@@ -333,13 +332,14 @@ def _error_model(machine: Machine, options: Options) -> tuple[ErrorModel | None,
         return None, []
     from machines.geometric_error.files.loader import load_checked
 
-    model, found = load_checked(options.error_model, machine)
+    model, found = load_checked(options.error_model, machine.by_drives or machine)
     if model is not None and model.corrected_by == "control":
         found = [*found, info("compensation.control", f'the geometric errors {model.name} are left to the control, as their '
                               'file says (corrected_by = "control"): the program does not correct them, and is proved on '
                               "the machine without them", file=options.error_model,
                               hint='corrected_by = "post", if the control has no such model in force')]
-    return model, found
+    refused = errors_of_drives(machine, model is not None and model.corrected_by == "post", options)
+    return None if refused else model, [*found, *refused]
 
 
 def _refused(toolpath: Toolpath) -> list[Diagnostic]:
@@ -396,5 +396,5 @@ def _unused_tools(job: Job) -> list[Diagnostic]:
     """Tools of the set-up that the CL file never loads."""
     used = {str(t.number) for t in job.toolpath.tools} | {str(c.number) for c in tool_changes(job.toolpath)}
     unused = [f"T{number}" for number in job.setup.tools if number not in used]
-    return [info("setup.tool_unused", f"the CL file does not use {', '.join(unused)} of the set-up",
-                 file=job.options.setup)] if unused else []
+    said = f"the CL file does not use {', '.join(unused)} of the set-up"
+    return [info("setup.tool_unused", said, file=job.options.setup)] if unused else []

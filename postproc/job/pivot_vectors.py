@@ -31,7 +31,7 @@ class PivotVector:
 
 def pivot_vectors(machine: Machine) -> tuple[PivotVector, ...]:
     """The vectors of table and head; () for machines without a chain of axes, or with none that turns."""
-    rotary = [j for j in machine.kinematics.chain if j.rotary]
+    rotary = [j for j in machine.kinematics.chain if j.rotary and machine.by_drives is None]
     if not rotary:
         return ()
     carried = _carrying(machine)

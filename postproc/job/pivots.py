@@ -14,6 +14,15 @@ ALLOWED = 0.1
 """share of the tip tolerance that a pivot may be off by"""
 
 
+def errors_of_drives(machine: Machine, corrects: bool, options: Options) -> list[Diagnostic]:
+    """An error where a program is to correct errors of legs, and its words are the tip's."""
+    if machine.by_drives is None or not corrects:
+        return []
+    return [error("error-model.machine", f"the control runs the kinematics of {machine.name}: words of the tip hold no "
+                  "error of its legs", file=options.error_model, hint='convert for a machine file based on it with module = '
+                  '"trivkins" under [control]: its programs hold the drives')]
+
+
 def control_kinematics(machine: Machine, setup: SetupFile,
                        options: Options) -> tuple[Kinematics | None, list[Diagnostic]]:
     """(the kinematics with the set-up's [control_pivots], None where it states none; pivots that differ from
@@ -24,7 +33,7 @@ def control_kinematics(machine: Machine, setup: SetupFile,
     if not setup.control_pivots:
         return None, []
     kin = machine.kinematics
-    letters = [j.name for j in kin.chain if j.rotary]
+    letters = [j.name for j in kin.chain if j.rotary and machine.by_drives is None]
     unknown = [k for k in setup.control_pivots if k not in letters]
     if not letters or unknown:
         return None, [error("setup.pivot", f"[control_pivots.{k}]: {machine.name} has no such rotary axis",

@@ -9,13 +9,17 @@ from toolpaths.diagnostics import Diagnostic, error
 
 
 def scaled_angles(controller: ControllerFile, machine: Machine, file: str) -> list[Diagnostic]:
-    """An error where cranks have letters that a control takes for lengths and the program is in inches: it would scale their
-    degrees."""
-    letters = [name for name, turns in zip(machine.axis_names, machine.rotary, strict=True) if turns and name not in ROTARY]
-    if not letters or controller.format.units == "mm":
+    """An error where cranks have letters that a control takes for lengths, or slides such as it takes for angles, and the
+    program is in inches: it would scale their degrees, or leave their lengths as they are."""
+    if controller.format.units == "mm":
         return []
-    return [error("output.units", f"words of {', '.join(letters)} are degrees, and controls scale words of that letter in "
-                  "programs in inches", file=file, hint='write [output] units = "mm" in the set-up')]
+    named = list(zip(machine.axis_names, machine.rotary, strict=True))
+    cranks = [name for name, turns in named if turns and name not in ROTARY]
+    slides = [name for name, turns in named if not turns and name in ROTARY]
+    said = [f"words of {', '.join(letters)} are {what}" for letters, what in (
+        (cranks, "degrees, and controls scale words of that letter in programs in inches"),
+        (slides, "lengths, and controls do not scale words of that letter in programs in inches")) if letters]
+    return [error("output.units", text, file=file, hint='write [output] units = "mm" in the set-up') for text in said]
 
 
 def other_units(controller: ControllerFile, file: str) -> list[Diagnostic]:

@@ -25,12 +25,13 @@ def planned(plan: RunPlan, machine: Machine, moves: Moves, file: str) -> list[Di
     return [*_rewinds(plan, machine, moves, file), *_events(plan, machine, moves, file), *_choices(plan, moves, file)]
 
 
-def opened(parameters: Sequence[tuple[str, float, float]]) -> str:
-    """What became of open parameters (name, least, greatest; rad or mm), in words."""
+def opened(parameters: Sequence[tuple[str, float, float]], seconds: Sequence[float] = ()) -> str:
+    """What became of open parameters (name, least, greatest; rad or mm), in words; `seconds` as of `ParameterCurve`."""
     turned = [f"the tool is turned about its own axis by {low / DEG:.3f} to {high / DEG:.3f} degrees"
               for name, low, high in parameters if name == SPIN]
     carried = [f"{name} {low:.3f} to {high:.3f}" for name, low, high in parameters if name != SPIN]
-    return ", ".join([*turned, *([f"the platform is carried by {', '.join(carried)} mm"] if carried else [])])
+    gain = f" (joints {seconds[0]:.2f} s; by the carriers alone {seconds[1]:.2f} s)" if seconds else ""
+    return ", ".join([*turned, *([f"the platform is carried by {', '.join(carried)} mm{gain}"] if carried else [])])
 
 
 def _rewinds(plan: RunPlan, machine: Machine, moves: Moves, file: str) -> list[Diagnostic]:

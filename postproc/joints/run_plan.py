@@ -49,6 +49,7 @@ class RunOptions:
         spin: rad, the turn of the tool about itself that is asked for where the machine leaves it open; None: planned
         singular_distance: that is kept
         split: False where the platform rests on carriers that do all
+        drawn: (tips (N, 3), axes (N, 3)) -> tips (N, 3) where linking moves draw the tool back to at least; None: nowhere
     """
 
     preferences: JointPreferences
@@ -59,6 +60,7 @@ class RunOptions:
     spin: float | None = None
     singular_distance: float = 0.0
     split: bool = True
+    drawn: Callable[[Floats, Floats], Floats] | None = None
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,7 @@ class RunPlan:
         events: passages by singular directions, with the moves (first, last) of each
         solutions: of the runs of the CL file, in order, without their joints, which are in `q`
         parameters: (R, F) what the machine leaves open, as it was planned
+        split_seconds: see `ParameterCurve.seconds`
     """
 
     refined: Refined
@@ -81,6 +84,7 @@ class RunPlan:
     events: tuple[tuple[int, int, SingularPassage], ...]
     solutions: tuple[RunSolution, ...]
     parameters: Floats
+    split_seconds: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -224,7 +228,7 @@ def _opened(machine: Machine, parts: list[_Part], moves: Moves, run_options: Run
     from postproc.joints.open_parameters import planned_parameters
 
     curves = planned_parameters([_road(part, moves) for part in parts], machine, run_options.singular_distance,
-                                run_options.spin, run_options.split)
+                                run_options.spin, run_options.split, run_options.drawn)
     made = [replace(part, opened=own, places=tuple(curve.measure for curve in own))
             for part, own in zip(parts, curves, strict=True)]
     return [_cut(part, np.max([curve.parts() for curve in part.opened], axis=0)) for part in made]
@@ -290,7 +294,8 @@ def _together(moves: Moves, parts: list[_Part], found: list[RunSolution], run_op
         singular, moved, left = (np.insert(x, rows + 1, x[rows]) for x in (singular, moved, left))
     events = tuple((int(p.rows[1 + e.first]), int(p.rows[1 + e.last]), e) for p in parts for e in p.led.events)
     solutions = tuple(replace(s, q=q[:0], singular=singular[:0]) for s in found)
-    return RunPlan(refined, q, singular, moved, left, events, solutions, parameters)
+    split = next((curve.seconds for part in parts for curve in part.opened if curve.seconds), ())
+    return RunPlan(refined, q, singular, moved, left, events, solutions, parameters, split)
 
 
 def _joined(moves: Moves, parts: list[_Part]) -> tuple[Floats, Floats]:

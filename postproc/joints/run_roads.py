@@ -62,6 +62,8 @@ class ParameterCurve:
         straight: rad or mm that blocks, along which the parameters go nearly evenly, may leave the curve by
         round: True for a cubic B-spline with these control values at even nodes, which runs through its ends; False for
             straight lines between them
+        seconds: s that the joints of the whole program take with these carriers at the programmed feed, and with carriers
+            that do all; () of curves that are no split
     """
 
     measure: Floats
@@ -71,6 +73,7 @@ class ParameterCurve:
     grain: float
     straight: float
     round: bool = False
+    seconds: tuple[float, ...] = ()
 
     def parts(self) -> Ints:
         """(N,) parts that each curve of the road is to be cut into: a part of a share of its length leaves the parabola by

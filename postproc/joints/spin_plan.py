@@ -12,7 +12,7 @@ out is a proposal: the stages that check reach and deviation bound it as any pat
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,15 +46,18 @@ STRAIGHT = 0.2 * DEG
 """that blocks may leave the smooth spin by"""
 SAME = 1e-5
 """mm, rad and direction cosines: what is nearer is round-off"""
+FAR = 1e6
+"""margins that count as none, of axes without an end"""
 CHUNK, COMPILE_FROM = 512, 200_000
 
 
 @dataclass(frozen=True)
-@arrays(tip="N 3", axis="N 3", parameters="N F", seconds="N", link="N", steps="N", held="N", tool="int64: N")
+@arrays(tip="N 3", axis="N 3", above="N 3", parameters="N F", seconds="N", link="N", steps="N", held="N", tool="int64: N")
 class _Nodes:
     """Places of all roads in a row.
 
     Attributes:
+        above: (N, 3) where a linking move draws the tool back to from there, `tip` where there is none
         seconds: (N,) s from the one before, at the programmed feed
         link: (N,) True where a road begins
         steps: (N,) steps of the road from the one before
@@ -65,6 +68,7 @@ class _Nodes:
 
     tip: Floats
     axis: Floats
+    above: Floats
     parameters: Floats
     seconds: Floats
     link: Bools
@@ -74,20 +78,22 @@ class _Nodes:
 
 
 def planned_spins(roads: Sequence[RunRoad], others: Sequence[Sequence[ParameterCurve]], machine: Machine, least: float,
-                  fixed: float | None) -> list[ParameterCurve]:
+                  fixed: float | None,
+                  drawn: Callable[[Floats, Floats], Floats] | None = None) -> list[ParameterCurve]:
     """The spin along every road.
 
     Args:
         others: the curves of each road's other open parameters
         least: distance from singular positions that the set-up states
         fixed: rad, the one spin that is asked for; None: planned
+        drawn: as of `RunOptions`: where a road begins and ends the tool has to come there too, with the same spin
     """
     total = sum(float(road.steps[-1]) for road in roads)
     grain = max(GRAIN, total / MOST_NODES)
     places = [np.linspace(0.0, road.steps[-1], max(int(np.ceil(road.steps[-1] / grain)), 1) + 1 if len(road.curves) else 1)
               for road in roads]
     kins = list({id(road.kin): road.kin for road in roads}.values())
-    nodes = _nodes(roads, others, places, kins, fixed)
+    nodes = _nodes(roads, others, places, kins, fixed, drawn)
     column = columns_of(kins[0], True)[0]
     cuts = np.cumsum([len(own) for own in places])[:-1]
     spins = list(_tried(nodes, kins, machine, least, column).T)
@@ -115,7 +121,7 @@ def _at_times(clock: RoadClock, others: Sequence[Sequence[ParameterCurve]], spin
 
 
 def _nodes(roads: Sequence[RunRoad], others: Sequence[Sequence[ParameterCurve]], places: list[Floats],
-           kins: list[Kinematics], fixed: float | None) -> _Nodes:
+           kins: list[Kinematics], fixed: float | None, drawn: Callable[[Floats, Floats], Floats] | None) -> _Nodes:
     tips, axes, parameters, seconds = [], [], [], []
     for road, curves, own in zip(roads, others, places, strict=True):
         tip, axis = road.at(road.steps, own)
@@ -130,7 +136,10 @@ def _nodes(roads: Sequence[RunRoad], others: Sequence[Sequence[ParameterCurve]],
     counts = [len(own) for own in places]
     held = np.repeat([road.held if np.isfinite(road.held) or fixed is None else fixed for road in roads], counts)
     index = {id(kin): k for k, kin in enumerate(kins)}
-    return _Nodes(np.concatenate(tips), np.concatenate(axes), np.concatenate(parameters), np.concatenate(seconds),
+    tip, axis = np.concatenate(tips), np.concatenate(axes)
+    ends = np.concatenate([(np.arange(n) == 0) | (np.arange(n) == n - 1) for n in counts])
+    above = tip if drawn is None else np.where(ends[:, None], drawn(tip, axis), tip)
+    return _Nodes(tip, axis, above, np.concatenate(parameters), np.concatenate(seconds),
                   np.concatenate([np.arange(n) == 0 for n in counts]),
                   np.concatenate([np.diff(own, prepend=own[0]) for own in places]), held,
                   np.repeat([index[id(road.kin)] for road in roads], counts))
@@ -210,6 +219,12 @@ def _looked_at(grid: Floats, nodes: _Nodes, kins: list[Kinematics], machine: Mac
         found = kin.inverse_with(tip, axis, parameters)[0]
         q[rows] = found.reshape(len(rows), count, -1)
         cost[rows] = _price(kin, found, (tip, axis), machine, least).reshape(len(rows), count) * weight[rows, None]
+        links = rows[(nodes.above[rows] != nodes.tip[rows]).any(axis=1)]
+        if len(links):
+            at = np.repeat(np.isin(rows, links), count)
+            pose = np.repeat(nodes.above[links], count, axis=0), axis[at]
+            lifted = kin.inverse_with(*pose, parameters[at])[0]
+            cost[links] += _price(kin, lifted, pose, machine, least).reshape(len(links), count)
     return q, cost
 
 
@@ -229,7 +244,7 @@ def _price(kin: Kinematics, q: Floats, pose: tuple[Floats, Floats], machine: Mac
         declared = len("xyz") + int(kin.workspace.tilt[0] < kin.workspace.tilt[1])  # box and tilt: no spin leaves them
         bad |= ~(found.values[:, :declared] >= -SAME).all(axis=1)
         margin = np.hstack([margin, (found.values / np.where(found.angular, NEAR_RAD, NEAR_MM))[:, declared:]])
-    margin = np.nan_to_num(margin, nan=-1.0)
+    margin = np.minimum(np.nan_to_num(margin, nan=-1.0), FAR)
     price = (1.0 / (1.0 + np.maximum(margin, 0.0)) ** 2).max(axis=1)
     away = kin.singular_distance(some)
     bad |= (margin < 0.0).any(axis=1) | ~(away >= least).all(axis=1)

@@ -42,11 +42,12 @@ def planned_split(roads: Sequence[RunRoad], machine: Machine, divided: bool = Tr
                                  for stretch in STRETCHES * divided)]
     made = [(clock.seconds(machine, _spread(values, columns, len(kin.open_parameters))), stretch, values)
             for stretch, values in tried if values is not None]
-    _, stretch, values = min(made, key=lambda one: one[0])
+    least, stretch, values = min(made, key=lambda one: one[0])
+    both = (least, made[0][0])
     if not np.isfinite(stretch):  # the platform rests: exactly, and not only at the times that were looked at
-        return [_resting(road, own, columns) for road, own in zip(roads, clock.of_poses, strict=True)]
+        return [_resting(road, own, columns, both) for road, own in zip(roads, clock.of_poses, strict=True)]
     grain = max(stretch / GRAINS, clock.step)
-    return [ParameterCurve(own, clock.times, values, columns, grain, STRAIGHT) for own in clock.of_poses]
+    return [ParameterCurve(own, clock.times, values, columns, grain, STRAIGHT, seconds=both) for own in clock.of_poses]
 
 
 def _spread(values: Floats, columns: tuple[int, ...], count: int) -> Floats:
@@ -56,10 +57,10 @@ def _spread(values: Floats, columns: tuple[int, ...], count: int) -> Floats:
     return result
 
 
-def _resting(road: RunRoad, measure: Floats, columns: tuple[int, ...]) -> ParameterCurve:
+def _resting(road: RunRoad, measure: Floats, columns: tuple[int, ...], both: tuple[float, float]) -> ParameterCurve:
     """The carriers with the platform at rest at every pose: no curve between has to be cut."""
     values = rest(road.kin, *road.at(measure, measure))[:, columns]
-    return ParameterCurve(measure, measure, np.nan_to_num(values), columns, np.inf, np.inf)
+    return ParameterCurve(measure, measure, np.nan_to_num(values), columns, np.inf, np.inf, seconds=both)
 
 
 def _middle(clock: RoadClock, columns: tuple[int, ...]) -> Floats:

@@ -94,7 +94,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst, start.kin.open_parameters)
     diagnostics += joint_faults.planned(plan, machine, given, file)
     if path.opened:
-        diagnostics.append(info("joints.opened", joint_faults.opened(path.opened), file=file))
+        diagnostics.append(info("joints.opened", joint_faults.opened(path.opened, path.split_seconds), file=file))
     diagnostics += cost(modes.tcp_code, longer, file)
     return path, faults.merged(diagnostics) + faults.off_line(path.code, path.u, path.move, path.seconds,
                                                               given, file, rapids_as_feed)
@@ -112,7 +112,8 @@ def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count:
                      worst_tip=float(worst[0]), worst_axis=float(worst[1]), frames=tuple(out.frames),
                      rewinds=parts.origin[parts.rewind], events=plan.events,
                      opened=tuple((name, float(column.min()), float(column.max()))
-                                  for name, column in zip(names, plan.parameters.T, strict=False)))
+                                  for name, column in zip(names, plan.parameters.T, strict=False)),
+                     split_seconds=plan.split_seconds)
 
 
 def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,

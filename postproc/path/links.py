@@ -194,8 +194,8 @@ def _link(control: Control, kin0: Kinematics, kin1: Kinematics, space: SafeSpace
     if kin1.plane is not None:
         return _in_plane(control, kin0, kin1, space, before, after, by_home)
     none = np.zeros((0, kin0.joints))
-    up0 = _above(kin0, space, before, turning, share) if before is not None else None
-    up1 = _above(kin1, space, after, turning, share) if after is not None else None
+    up0 = _above(control.machine, kin0, space, before, turning, share) if before is not None else None
+    up1 = _above(control.machine, kin1, space, after, turning, share) if after is not None else None
     retract = none if before is None or up0 is None else _leg(before.law or control, kin0, before, up0)
     approach = none if after is None or up1 is None else _leg(after.law or control, kin1, up1, after)
     slack = 0.5 * share * space.margin
@@ -237,7 +237,22 @@ def _standing(kin: Kinematics, q: Floats) -> Pose:
     return Pose(tip[0], axis[0], q)
 
 
-def _above(kin: Kinematics, space: SafeSpace, pose: Pose, turning: bool, share: float) -> Pose:
+def _carried_there(machine: Machine, kin: Kinematics, tip: Floats, axis: Floats, near: Floats) -> Floats:
+    """Joints (N, J) of poses, the nearest to `near` (N, J); where a platform on redundant carriers would leave its
+    workspace, they go to where it rests, or half as far."""
+    q = nearest_solution(kin, tip, axis, near)
+    open_to = [name in kin.axis_names for name in kin.open_parameters]
+    if not any(open_to) or _inside(q, machine):
+        return q
+    stands, rests = kin.parameters_at(near), kin.parameters_at(kin.inverse(tip, axis)[0])
+    for share in (0.5, 1.0):
+        other = kin.inverse_with(tip, axis, np.where(open_to, stands + share * (rests - stands), stands))[0]
+        if _inside(other, machine):
+            return np.asarray(other)
+    return q
+
+
+def _above(machine: Machine, kin: Kinematics, space: SafeSpace, pose: Pose, turning: bool, share: float) -> Pose:
     """The pose lifted along its tool axis to its safe plane; left where it is already above."""
     rise = RISE if turning else 0.0
     lift = space.plane(pose.axis, turning, share) + rise - float(pose.axis @ (pose.tip - space.centre))
@@ -245,7 +260,7 @@ def _above(kin: Kinematics, space: SafeSpace, pose: Pose, turning: bool, share: 
     if pose.law is not None and pose.law.law == "tilted":
         q = kin.at_tip(tip[None, :], pose.q[None, :], pose.law.slides)[0]
     else:
-        q = nearest_solution(kin, tip[None, :], pose.axis[None, :], pose.q[None, :])[0]
+        q = _carried_there(machine, kin, tip[None, :], pose.axis[None, :], pose.q[None, :])[0]
     return Pose(tip, pose.axis, q, pose.law)
 
 
@@ -302,13 +317,13 @@ def _from_home(control: Control, begin: Floats, up: Pose) -> tuple[Floats, Bools
 def _index(control: Control, kin: Kinematics, space: SafeSpace, begin: Floats, up: Pose, floor: float,
            slack: float) -> tuple[Floats, bool]:
     """Joints from `begin` to the pose above, through points over the centre where the straight path comes too near."""
-    lifted = _lifted(kin, space, begin, floor, slack)
+    lifted = _lifted(control.machine, kin, space, begin, floor, slack)
     for count in _STEPS:
         t = np.arange(1, count + 1) / (count + 1)
         near = begin + t[:, None] * (up.q - begin)
         if count:
             _, axes = kin.forward(near)
-            near = nearest_solution(kin, space.centre + (floor + RISE) * axes, axes, near)
+            near = _carried_there(control.machine, kin, space.centre + (floor + RISE) * axes, axes, near)
         q = np.concatenate([near, up.q[None, :]])
         start = begin[None, :] if lifted is None else lifted[None, :]
         if np.isfinite(q).all() and stays_clear(control, kin, space, np.concatenate([start, q]), slack):
@@ -316,13 +331,13 @@ def _index(control: Control, kin: Kinematics, space: SafeSpace, begin: Floats, u
     return up.q[None, :], False
 
 
-def _lifted(kin: Kinematics, space: SafeSpace, q: Floats, floor: float, slack: float) -> Floats | None:
+def _lifted(machine: Machine, kin: Kinematics, space: SafeSpace, q: Floats, floor: float, slack: float) -> Floats | None:
     """Joints with the tool drawn back along its axis to above the safe plane, None where it is clear already."""
     tip, axis = kin.forward(q[None, :])
     if bool(space.clear(tip, axis, slack)[0]):
         return None
     lift = floor + RISE - float(axis[0] @ (tip[0] - space.centre))
-    return np.asarray(nearest_solution(kin, tip + lift * axis, axis, q[None, :])[0])
+    return np.asarray(_carried_there(machine, kin, tip + lift * axis, axis, q[None, :])[0])
 
 
 def stays_clear(control: Control, kin: Kinematics, space: SafeSpace, q: Floats, slack: float) -> bool:

@@ -37,6 +37,7 @@ class JointPath:
         rewinds (W,): moves before or in which the tool is drawn back to unwind an axis
         events: passages by singular directions: first and last move, and what was done
         opened: what the machine leaves open, as it was planned: name, least and greatest, rad or mm
+        split_seconds: s of the joints with carriers and platform as planned, and with the carriers alone; () without
     """
 
     q: Floats
@@ -59,6 +60,7 @@ class JointPath:
     rewinds: Ints
     events: tuple[tuple[int, int, SingularPassage], ...]
     opened: tuple[tuple[str, float, float], ...] = ()
+    split_seconds: tuple[float, ...] = ()
 
     def __len__(self) -> int:
         return len(self.q)

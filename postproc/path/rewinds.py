@@ -16,7 +16,7 @@ from machines.machine import Machine
 from postproc.control.control import Control
 from postproc.joints.plan import JointPreferences
 from postproc.joints.run_plan import RunOptions
-from postproc.path.links import Link, Pose, SafeSpace, plan_link
+from postproc.path.links import MARGINS, RISE, Link, Pose, SafeSpace, plan_link
 from postproc.setup.joints import Joints
 from postproc.setup.model import Placement, RewindSettings, SetupFile
 from toolpaths.arrays import Floats, box_corners
@@ -46,13 +46,20 @@ class RetractPlan:
         spin = self.joints.spin
         return RunOptions(self.preferences, self.rewind.allowed, feed, partial(self._away, speed, feed or speed),
                           axis_tolerance, None if isinstance(spin, str) else spin * DEG, self.joints.singular_distance,
-                          self.joints.carriers == "planned")
+                          self.joints.carriers == "planned", None if self.space.in_plane else self._drawn)
 
     def _away(self, rapid: float, feed: float, tip: Floats, axis: Floats) -> Floats:
         """Time (N,) s to draw back from poses (N, 3) to the sphere about what is cut, and to come down again."""
         height = ((tip - self.space.centre) * axis).sum(axis=1)
         top = self.space.planes(axis, np.ones(len(axis), dtype=np.bool_))
         return np.asarray(np.maximum(top - height, 0.0) * (1.0 / rapid + 1.0 / feed))
+
+    def _drawn(self, tip: Floats, axis: Floats) -> Floats:
+        """Poses (N, 3) drawn back to the nearest planes that linking moves may use."""
+        height = ((tip - self.space.centre) * axis).sum(axis=1)
+        share = 1.0 if self.space.distance is not None else MARGINS[-1]
+        top = self.space.planes(axis, np.ones(len(axis), dtype=np.bool_), share) + RISE
+        return np.asarray(tip + np.maximum(top - height, 0.0)[:, None] * axis)
 
     def link(self, control: Control, kin: Kinematics, before: Pose | None, after: Pose) -> Link:
         """The path from a pose back to it with other joints."""

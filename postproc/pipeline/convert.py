@@ -106,6 +106,7 @@ def _begun(path: Toolpath, machine: Machine, controller: str | FilePath, spec: C
            options: Options, diagnostics: tuple[Diagnostic, ...]) -> PostResult:
     """The beginning of a conversion with its path, the part standing by the file's absolute frame."""
     stood, found = standing(setup, path, options.setup)
+    machine = machine.on_control() if spec.kinematics.modules else machine
     return PostResult("", options, machine, spec, FilePath(controller).stem, stood, (*diagnostics, *found), path,
                       source=path.source, asked=setup)
 

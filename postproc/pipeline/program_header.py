@@ -38,7 +38,7 @@ def header_lines(made: CompiledStage) -> list[str]:
     if made.motion is not None:
         header.append(feeds_line())
     header += [f"T{number}: {what}, of the set-up" for number, what in job.stated]
-    header += [opened(made.path.opened)] * bool(made.path.opened)
+    header += [opened(made.path.opened, made.path.split_seconds)] * bool(made.path.opened)
     header += [*_tip_frame(made), *_corrections(made), *_orientations(made), *pivot_lines(job, made.program),
                *_tools(job), *cutcom_lines(job, made.program)]
     if made.toolpath.name:

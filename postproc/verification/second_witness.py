@@ -65,8 +65,12 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
     """The motion of a program, read back, as plain arrays."""
     motion, control = comparison.executed[1], job.control
     every = np.arange(len(motion))
-    degrees = _units(job.machine)
-    joints = motion.end / degrees if control.base != "tcp" else poses.joints(motion, every, 1.0)
+    degrees, machine = _units(job.machine), _by_drives(job.machine)
+
+    def driven(q: Floats) -> Floats:
+        return q if machine is job.machine else job.machine.kinematics.drives(q)
+
+    joints = motion.end / degrees if control.base != "tcp" else driven(poses.joints(motion, every, 1.0))
     straight = (motion.code != 2) & (motion.frame == 0) & (control.base != "tcp")
     if control.rapids == "dog-leg":
         straight &= motion.code != 0
@@ -74,7 +78,7 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
     def joints_at(rows: Ints, t: float | Floats) -> Floats:
         if isinstance(t, np.ndarray) and not t.any() and control.base != "tcp":
             return begins(motion, rows) / degrees
-        return poses.joints(motion, rows, t)
+        return driven(poses.joints(motion, rows, t))
 
     def poses_at(rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         if isinstance(t, float) and t == 1.0:
@@ -91,9 +95,10 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
     by_tip = np.asarray(motion.frame > 0) | (control.base == "tcp")
     lengthless = np.array([f.law == "axes" for f in motion.frames])[motion.frame]
     lengthless = lengthless & (not control.length_on_z) & (not job.controller.keeps_length)
-    start = motion.start / degrees if control.base != "tcp" else job.machine.home
-    return ExecutedBlocks(job.machine.axis_names, joints, start, motion.line, motion.code, np.asarray(straight),
-                          arc_sweeps(motion, control), motion.feed, motion.inverse, motion.unit, by_tip, control.feed_rule,
+    start = motion.start / degrees if control.base != "tcp" else machine.home
+    return ExecutedBlocks(machine.axis_names, job.machine.axis_names, joints, start, motion.line, motion.code,
+                          np.asarray(straight), arc_sweeps(motion, control), motion.feed,
+                          motion.inverse, motion.unit, by_tip, control.feed_rule,
                           control.degree_is_inch, job.controller.feed.arc_inverse == "radius", motion.compensation,
                           motion.radius, motion.contour, stops_of(comparison), motion.tool, motion.spindle, motion.rpm,
                           motion.coolant, motion.dwell, motion.pitch, motion.hole, motion.register, lengthless,
@@ -127,6 +132,11 @@ def offset_joints(control: Control) -> Floats | None:
         return None
     return np.asarray(np.where(np.isin(np.arange(len(control.unit)), control.rotary), control.zero,
                                control.work_offset / _units(control.machine)))
+
+
+def _by_drives(machine: Machine) -> Machine:
+    """As its file has it, where the axes of programs are those of the control's kinematics."""
+    return machine.by_drives or machine
 
 
 def _units(machine: Machine) -> Floats:
@@ -218,12 +228,13 @@ def _case(source: ClSource, setup: SetupFile, options: Options, job: Job, compar
     """What the witness is given of a program at one place."""
     control, words, curves = job.control_at(place), job.controller.codes, len(comparison.executed[0].curves) > 0
     errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})
-    return Case(source.data, machine_tables(job.machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
+    machine = _by_drives(job.machine)
+    return Case(source.data, machine_tables(machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
                 *errors, "{register}" in words.length_offset, "{register}" in words.compensation_left,
                 sum(bit for bit, code in ((1, words.flood), (2, words.mist), (4, words.through), (8, words.air)) if code),
                 program=as_bytes(program) if control.rolls or job.machine.clamp_codes or curves else b"",
                 clamps={a: (c.clamp, c.unclamp) for a, c in job.machine.clamp_codes.items()} if program else {},
                 modulo={job.machine.axis_names[j]: roll.rule for j, roll in control.rolls.items()},
-                origin=control.origin, limits=limits_as_used(job.machine), work_offset=offset_joints(control),
+                origin=control.origin, limits=limits_as_used(machine), work_offset=offset_joints(control),
                 chosen=job.toolpath.axis if options.orient != "keep" else None)

@@ -35,12 +35,12 @@ def lengths_of(e: ExecutedBlocks) -> tuple[Array, Array]:
     for first in range(0, len(e), _CHUNK):
         rows = np.arange(first, min(first + _CHUNK, len(e)))
         step = e.steps(rows)
-        linear = (np.abs(step[:, [name not in "ABC" for name in e.letters]]) > _STILL).any(axis=1)
+        linear = (np.abs(step[:, [name not in "ABC" for name in e.words]]) > _STILL).any(axis=1)
         unit[rows] = np.where(linear, e.unit[rows], 1.0)
         if e.degree_is_inch:
-            step = step * np.where([name in "ABC" for name in e.letters], unit[rows, None], 1.0)
-        length[rows] = np.where(e.by_tip[rows], _first_of(np.where(np.abs(step) > _STILL, step, 0.0), e.letters, _KINDS),
-                                _by_rule(step, e.letters, e.rule))
+            step = step * np.where([name in "ABC" for name in e.words], unit[rows, None], 1.0)
+        length[rows] = np.where(e.by_tip[rows], _first_of(np.where(np.abs(step) > _STILL, step, 0.0), e.words, _KINDS),
+                                _by_rule(step, e.words, e.rule))
     arcs = np.flatnonzero((e.code == 2) & np.isfinite(e.sweep))
     if len(arcs):
         length[arcs], unit[arcs] = _arc_lengths(e, arcs), e.unit[arcs]

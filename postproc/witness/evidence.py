@@ -58,7 +58,8 @@ class ExecutedBlocks:
     """E blocks of a program as its reader has executed them.
 
     Attributes:
-        letters: of the joints; joints (E, J) at the end of every block, mm and rad; start (J,)
+        letters: of the joints, words: of the columns of `steps`
+        joints (E, J) at the end of every block, mm and rad; start (J,)
         line, code (E,): line of the program; 0 rapid, 1 feed, 2 arc; straight (E,): True where joints go straight
         sweep (E,): rad of arcs, NaN; feed (E,): F word in force, degrees, or lengths of which each is `unit` (E,) mm,
             per minute, or 1/min where `inverse` (E,)
@@ -79,6 +80,7 @@ class ExecutedBlocks:
     """
 
     letters: tuple[str, ...]
+    words: tuple[str, ...]
     joints: Array
     start: Array
     line: Array
@@ -133,10 +135,12 @@ class ExecutedBlocks:
 
 
 FindingCode = Literal["position", "path", "kind", "clearance", "arc", "hole", "feed", "velocity", "tool", "length",
-                      "spindle", "coolant", "compensation", "rest", "limits", "offset", "turning", "clamp", "errors", "rods"]
+                      "spindle", "coolant", "compensation", "rest", "limits", "offset", "turning", "clamp", "errors", "rods",
+                      "spin"]
 """what is found to differ; `witness.` with it is the code of the error"""
 Aspect = Literal["positions", "arcs", "holes", "feeds", "length registers", "tools", "spindle states", "coolant states",
-                 "cutter compensation", "rests and stops", "work offset", "turns of modulo axes", "clamps", "curves"]
+                 "cutter compensation", "rests and stops", "work offset", "turns of modulo axes", "clamps", "curves",
+                 "turns of tools about themselves"]
 
 
 @dataclass(frozen=True)
@@ -164,9 +168,9 @@ class Compared:
 @dataclass(frozen=True)
 class NotCompared:
     """What was not compared, and why: everything, the machine's kinematics (poses are then those of the read-back), the
-    spindle, linking moves, or a record of the CL file by its text. `line` of the CL file, 0 for none."""
+    spindle, or a record of the CL file by its text. `line` of the CL file, 0 for none."""
 
-    what: Literal["all", "kinematics", "spindle", "record", "choice of tool axes", "text", "linking moves"]
+    what: Literal["all", "kinematics", "spindle", "record", "choice of tool axes", "text"]
     why: str
     line: int = 0
 

@@ -143,6 +143,17 @@ class Rods:
     def misfit(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array, length: Array) -> Array:
         """(N,) mm: the worst of rods off their length, and of the axis off what the platform can do (times
         1000); infinite where the foot of a rod stands on the wrong side of it."""
+        return self._placed(q, letters, tip, axis, length)[0]
+
+    def spins(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array, length: Array) -> Array:
+        """(N,) rad that the rods turn a tool about itself from where the least turn of the platform has it."""
+        platform = self._placed(q, letters, tip, axis, length)[1]
+        side = (least_turns(axis)[:, :, 0] * platform[:, :, 1]).sum(axis=1)
+        return np.asarray(np.arctan2(-side, (least_turns(axis)[:, :, 0] * platform[:, :, 0]).sum(axis=1)))
+
+    def _placed(self, q: Array, letters: tuple[str, ...], tip: Array, axis: Array,
+                length: Array) -> tuple[Array, Array]:
+        """(what `misfit` gives, the platform (N, 3, 3))."""
         turn = self.sense * q[:, letters.index(self.rotary)] if self.rotary else np.zeros(len(q))
         if self.carries == "part":
             back = rotations(_UP, -turn)
@@ -161,7 +172,8 @@ class Rods:
             off, _ = self._legs(q, letters, gauge, platform, reach, axis)
         off = self._middles(off)
         aside = np.abs((gauge - apply(platform, reach + self.pivot)) * self.held).max(axis=1)
-        return np.asarray(np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0))
+        worst = np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0)
+        return np.asarray(worst), platform
 
     def _middles(self, off: Array) -> Array:
         """Of pairs that errors may twist, the mean of both rods."""
@@ -286,9 +298,9 @@ def _on_bar(leg: dict[str, Any], bars: dict[str, dict[str, Any]]) -> dict[str, A
 
 
 def turning(table: dict[str, Any], letters: tuple[str, ...]) -> Array:
-    """(J,) True for letters that count degrees: A, B, C, and arms of legs whatever their letter."""
-    arms = {name for name, leg in legs_of(table.get("kinematics", {})).items() if leg.get("drive") == "arm"}
-    return np.array([name in "ABC" or name in arms for name in letters])
+    """(J,) True for letters that count degrees: arms of legs whatever their letter, A, B, C that drive no leg."""
+    legs = legs_of(table.get("kinematics", {}))
+    return np.array([legs[name].get("drive") == "arm" if name in legs else name in "ABC" for name in letters])
 
 
 def kinematics_of(table: dict[str, Any]) -> Chain | Rods | None:

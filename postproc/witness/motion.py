@@ -21,6 +21,8 @@ STILL = 0.01
 FULL, LEAST = 0.45, 0.04
 """shares of the margin that linking moves keep: where travel allows, and where it does not"""
 EXACT = 1e-6
+LINK = 0.01
+"""mm that links may leave their straight line by on a machine that cannot lift the tool"""
 
 
 class Walked:
@@ -104,7 +106,8 @@ def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_ang
     """Blocks off their path that are no retract, approach or move clear of what is cut; rapids in cuts and the reverse.
 
     Rapids that turn the tool axis by more than `link_angle` (degrees) have to be clear, or on such a line, themselves;
-    where they are dog-legs (`bent`) they may be fed if the set-up asks for that; `flat`: no rapid has to be clear."""
+    where they are dog-legs (`bent`) they may be fed if the set-up asks for that; `flat`: none has to be clear, they go
+    straight from cut to cut, or by home."""
     good = w.on_path()
     step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
     moved = np.sqrt((step * step).sum(axis=1))
@@ -132,9 +135,42 @@ def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_ang
         k = int(cuts[0])
         found += _finding(w, cuts, lines, "path", f"the tool is {w.away[k]:.6f} mm and {np.degrees(w.tilt[k]):.6f} degrees "
                           "off the path of the CL file")
-    rest = bad[~np.isin(bad, cuts) & ~(flat & ((w.code[bad] == 0) | (bent and fed_rapids)))]
+    rest = bad[~np.isin(bad, cuts)]
+    if flat:
+        links = rows[((w.code[rows] == 0) | (bent and fed_rapids)) & ~np.isin(rows, cuts)]
+        found += _finding(w, links[_astray(w, links, bent)], lines, "clearance", "motion that the CL file does not command "
+                          "leaves the straight line from cut to cut, or by home")
+        rest = rest[~np.isin(rest, links)]
     return found + _finding(w, rest, lines, "clearance", "motion that the CL file does not command comes nearer to what is "
                             "cut than the margin of the set-up")
+
+
+def _astray(w: Walked, rows: Array, bent: bool) -> Array:
+    """(K,) True for blocks of links that are not on the straight line to their target from where the path was left, nor on
+    those to home and from there; rapids that are dog-legs (`bent`) at their ends alone."""
+    m, near = len(w.targets), w.tolerance[0] + EXACT + LINK
+    to, ends, begins = np.minimum(w.owner[rows], m - 1), w.owner[rows] >= m, w.owner[rows] == 0
+    left = np.maximum.accumulate(np.where(w.on_path(), np.arange(len(w.owner)), 0))[rows]
+    begin = np.zeros(1, np.int64)
+    home, axis = w.poses.at(begin, 0.0)
+    home = home + (w.poses.lengths(begin) - w.poses.lengths(rows))[:, None] * axis  # of each tool
+    start = np.where(begins[:, None], home, w.tip[left])
+    goals = [np.where(ends[:, None], home, goal) for goal in (w.targets.tip[to], w.targets.start[to])]
+    astray = np.zeros(len(rows), bool)
+    for t in (0.25, 0.5, 0.75, 1.0):
+        tip = w.poses.at(rows, t)[0]
+        off = [_off_segment(tip, a, b) for goal in goals for a, b in ((start, goal), (start, home), (home, goal))]
+        astray |= ~(np.min(off, axis=0) <= near) & ((w.code[rows] > 0) | (not bent) | (t == 1.0))
+    return astray
+
+
+def _off_segment(tip: Array, begin: Array, end: Array) -> Array:
+    """(K,) mm from straight lines between two points."""
+    span = end - begin
+    size = np.einsum("ni,ni->n", span, span)
+    share = np.einsum("ni,ni->n", tip - begin, span) / np.where(size > 0.0, size, 1.0)
+    rest = tip - begin - np.clip(share, 0.0, 1.0)[:, None] * span
+    return np.asarray(np.sqrt((rest * rest).sum(axis=1)))
 
 
 def _turned_in_rapid(w: Walked, angle: float) -> Array:

@@ -27,7 +27,6 @@ from postproc.witness.turning import check_turning
 
 ZERO = 1e-6
 """mm that reckoning may move the zero of the work offset"""
-PASSED = NotCompared("linking moves", "in the one plane of the machine, as [clearance] in_plane says")
 
 
 def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
@@ -107,10 +106,9 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     w.measure()
     clearance = case.setup.get("clearance") or {}
     flat = clearance.get("in_plane") is True and isinstance(rods := kinematics_of(table), Rods) and rods.flat
-    margin, link_angle = float(clearance.get("margin", 50.0)), float(clearance.get("link_angle", 5.0))
     if not len(lost):
-        found += check_path(w, c.line, cut, margin, link_angle, case.bent_rapids, table,
-                            bool((case.setup.get("output") or {}).get("rapids_as_feed")), flat)
+        found += check_path(w, c.line, cut, float(clearance.get("margin", 50.0)), float(clearance.get("link_angle", 5.0)),
+                            case.bent_rapids, table, bool((case.setup.get("output") or {}).get("rapids_as_feed")), flat)
         found += check_arcs(w, turns, c.line)
     faults, rests = check_rests(w, c, match) if not len(lost) else ([], 0)
     found += faults
@@ -124,8 +122,9 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     faults, sides = check_sides(w, c, case)
     found += faults
     found += _misfits(poses)
-    (faults, turned), (others, curves) = check_turning(case, executed), check_curves(case, executed)
-    found += [*faults, *others]
+    checks = check_turning(case, executed), check_curves(case, executed), _held_spins(w, c, case)
+    (_, turned), (_, curves), (_, held) = checks
+    found += [fault for faults, _ in checks for fault in faults]
     feeding = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
     faults, clamped = check_clamps(case, executed, w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
     found += faults
@@ -138,8 +137,8 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     counts: dict[Aspect, int] = {
         "positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()), "holes": holes, "feeds": feeds,
         **states, "cutter compensation": sides, "rests and stops": rests, "work offset": zeros,
-        "turns of modulo axes": turned, "clamps": clamped, "curves": curves}
-    return found, worst, counts, [*silent, *[PASSED] * flat]
+        "turns of modulo axes": turned, "clamps": clamped, "curves": curves, "turns of tools about themselves": held}
+    return found, worst, counts, silent
 
 
 def _zero(case: Case, c: Commanded, place: tuple[Array, Array], poses: Poses) -> tuple[list[Finding], int]:
@@ -160,6 +159,22 @@ def _zero(case: Case, c: Commanded, place: tuple[Array, Array], poses: Poses) ->
 
 def _arriving(axis: Array) -> str:
     return "" if axis[2] == 1.0 else f" along ({axis[0]:.6f}, {axis[1]:.6f}, {axis[2]:.6f})"
+
+
+def _held_spins(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], int]:
+    """Cuts with a tool that `keeps_spin` whose platform turns it about itself; how many blocks were compared."""
+    e, machine, tools = w.poses.executed, w.poses.machine, case.setup.get("tools", {})
+    keeps = [int(n) for n, tool in tools.items() if (tool or {}).get("keeps_spin")]
+    rows = np.flatnonzero(w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM)) & np.isin(e.tool, keeps))
+    if not len(rows) or not isinstance(machine, Rods) or machine.turns != "abc":
+        return [], 0
+    spins = np.abs(machine.spins(w.poses.joints(rows, 1.0), e.letters, w.tip[rows], w.axis[rows], w.poses.lengths(rows)))
+    bad = np.flatnonzero(~(spins <= case.axis_tolerance))
+    if not len(bad):
+        return [], len(rows)
+    k = int(rows[bad[0]])
+    said = f"the tool is turned by {np.degrees(spins[bad[0]]):.4f} degrees about itself, and keeps_spin holds it"
+    return [Finding("spin", said, int(c.line[w.targets.row[w.owner[k]]]), int(e.line[k]), len(bad))], len(rows)
 
 
 def _misfits(poses: Poses) -> list[Finding]:

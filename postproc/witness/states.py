@@ -144,9 +144,10 @@ def _needed(w: Walked, rows: Array, slow: Array, pace: Array, table: dict[str, A
         step = w.tip[here] - w.tip[np.maximum(here - 1, 0)]
         q, most = w.poses.before(here), np.sqrt((step * step).sum(axis=1)) * pace[w.owner[here]]
         most = np.maximum(most, 60.0 * w.length[here] / largest_feed(table))
-        for t in (0.25, 0.5, 0.75, 1.0):
-            after = w.poses.joints(here, t)
-            most = np.maximum(most, 4.0 * (np.abs(after - q) / speed).max(axis=1))
+        parts = 4 if w.poses.executed.words == w.poses.executed.letters else 8  # drives of a control's own kinematics bend
+        for t in (np.arange(parts) + 1.0).tolist():
+            after = w.poses.joints(here, t / parts)
+            most = np.maximum(most, parts * (np.abs(after - q) / speed).max(axis=1))
             q = after
         np.add.at(result, w.owner[here], most)
     return result

@@ -10,7 +10,6 @@ from itertools import chain
 import numpy as np
 
 from machines.hooks import filled
-from machines.kinematics.chain import ROTARY
 from postproc.compile.clamps import CLAMP, UNCLAMP
 from postproc.compile.hooks import HOOK
 from postproc.compile.program import PER_MINUTE, Command, Hole
@@ -155,7 +154,7 @@ class Writer(WriterState, ABC):
         """Rotary axes with words of a full turn or more, which a control may roll over."""
         p = self.program
         far = np.flatnonzero(((np.abs(p.words) >= FULL_TURN) & p.write & ~p.home[:, None]).any(axis=0)).tolist()
-        return [p.letters[j] for j in far if p.letters[j] in ROTARY and j not in p.rolls]
+        return [p.letters[j] for j in far if p.letters[j] in p.turning and j not in p.rolls]
 
     def numbered(self, block: str) -> str:
         """The block with its number where the controller numbers blocks; the sign of the block switch stays in front."""

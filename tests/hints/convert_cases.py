@@ -170,7 +170,7 @@ _OUTPUT = [
         START + CUT,
         "take a controller that has the letter",
         Edit(COMMAND, "linuxcnc", "siemens-840d"),
-        machine="macro-micro",
+        m=machine_text("macro-micro").replace('"A", "B"', '"Q", "B"').replace("axes.A]", "axes.Q]"),
         setup=LENGTH + "[part]\norigin = [0.0, 0.0, -250.0]\n",
     ),
     convert(

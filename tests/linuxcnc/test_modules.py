@@ -18,12 +18,15 @@ import numpy as np
 import pytest
 
 import machines
+import postproc
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.loader import load_checked
+from tests.linuxcnc import outputs
 from tests.linuxcnc.config import MODULES
 from tests.machines.error_models import joints
 from tests.machines.kinematics.test_legs import ARMS
-from tests.postproc.control.test_tip_programs_of_legs import LINEAR_DELTA
+from tests.postproc.control.test_tip_programs_of_legs import CRANKS, HEXAPOD, LINEAR_DELTA, LOW, TILTED
+from tests.postproc.kit import good, setup_of, toolpath
 from toolpaths.arrays import Floats
 
 pytestmark = pytest.mark.skipif(not Path(MODULES, "genhexkins.so").exists() or shutil.which("gcc") is None,
@@ -45,10 +48,17 @@ def host() -> ctypes.CDLL:
     return found
 
 
+@cache
+def loaded(module: str) -> ctypes.CDLL:
+    host()
+    library = ctypes.CDLL(str(Path(MODULES, f"{module}.so")))
+    assert library.rtapi_app_main() == 0
+    return library
+
+
 def inverse(module: str, pins: dict[str, float], poses: Floats, count: int) -> Floats:
     """(N, count) joints that the module gives for poses (N, 6): x, y, z in mm, a, b, c in degrees."""
-    own, library = host(), ctypes.CDLL(str(Path(MODULES, f"{module}.so")))
-    assert library.rtapi_app_main() == 0
+    own, library = host(), loaded(module)
     for name, value in pins.items():
         pin = own.host_pin(f"{module}.{name}".encode())
         assert pin, name
@@ -98,3 +108,30 @@ def test_lineardeltakins_gives_the_slides_of_a_linear_delta(legs: bool, tmp_path
     ours = kin.inverse(tip, np.tile([0.0, 0.0, 1.0], (200, 1)))[0]
     pins = {key.split(".", 1)[1]: value for key, value in control.pins.items()}
     assert np.abs(inverse("lineardeltakins", pins, np.column_stack([tip, 0.0 * tip]), 3) - ours).max() < SAME
+
+
+UPRIGHT = ("RAPID", "GOTO/-40,-20,30", "FEDRAT/MMPM,1200", "GOTO/-40,-20,0", "GOTO/40,-20,0", "GOTO/40,20,5", "RAPID",
+           "GOTO/40,20,30")
+
+
+@pytest.mark.parametrize(("text", "module", "cuts"), [(HEXAPOD, "genhexkins", TILTED), (CRANKS, "rotarydeltakins", UPRIGHT)])
+def test_the_module_moves_the_drives_of_a_tip_program_as_ours(text: str, module: str, cuts: tuple[str, ...],
+                                                              tmp_path: Path) -> None:
+    """Every block of a program, between its ends too, with the pins, zeros and order of joints that the files have."""
+    (tmp_path / "own.toml").write_text(text)
+    machine = machines.load(tmp_path / "own.toml")
+    control = machine.control_kinematics
+    assert control is not None and control.legs is not None
+    result = good(postproc.convert(toolpath(*cuts), machine, "linuxcnc", setup_of(LOW)))
+    assert "(words: tool-centre-point control)" in result.text
+    motion, poses = outputs.read(result)[1], result.comparison.poses
+    pins = {key.split(".", 1)[1]: value for key, value in control.pins.items()}
+    rows = np.flatnonzero(motion.register >= 0)
+    for share in (0.3, 1.0):
+        words = motion.end[rows - 1] + share * (motion.end[rows] - motion.end[rows - 1])
+        ours = result.machine.kinematics.drives(poses.joints(motion, rows, share))[:, list(control.legs.order)]
+        held = pins | ({"tool-offset": 80.0} if control.tool_length_pin else {})
+        theirs = inverse(module, held, np.pad(words, ((0, 0), (0, 6 - words.shape[1]))), ours.shape[1])
+        angles = np.array(machine.rotary)[list(control.legs.order)]
+        assert np.abs(theirs - np.where(angles, np.degrees(ours), ours + control.legs.zero)).max() < SAME
+    assert result.witness is not None and not result.witness.findings

@@ -101,6 +101,25 @@ def test_joint_program_equals_the_joints_that_lineardeltakins_commands(standstil
     assert len(theirs) == 6 and apart.max() < 0.51e-4
 
 
+@pytest.mark.parametrize(("base", "module", "turns"), [("hexapod", "genhexkins", True),
+                                                       ("rotary-delta", "rotarydeltakins", False)])
+def test_drives_at_rest_under_modules_with_axes_of_their_own(standstill, tmp_path: Path, base: str, module: str,
+                                                             turns: bool) -> None:
+    """Programmed positions with a tool of 80 mm, by the exported INI and HAL: LinuxCNC's joints are those of our drives."""
+    own = tmp_path / "own.toml"
+    own.write_text(f'base = "{base}"\n[control]\nmodule = "{module}"\n')
+    machine = machines.load(own)
+    control, axes = machine.control_kinematics, machine.on_control().kinematics.with_tool(80.0)
+    assert control is not None and control.legs is not None
+    tip = np.random.default_rng(3).uniform([-60, -60, -250], [60, 60, -200], (6, 3))
+    axis = np.array([[0.1, 0.2, 1.0], [-0.2, 0.1, 1.0], [0.0, 0.0, 1.0]] * 2) if turns else np.tile([0.0, 0.0, 1.0], (6, 1))
+    q = axes.inverse(tip, axis)[0]
+    words = np.column_stack([tip - control.legs.origin, np.degrees(q[:, 3:])])
+    theirs = standstill(machine, words, 80.0)
+    ours = axes.drives(q)[:, list(control.legs.order)]
+    assert np.abs(theirs - np.where(machine.rotary, np.degrees(ours), ours + control.legs.zero)).max() < TIGHT
+
+
 @pytest.mark.parametrize("module", ["lineardeltakins", "trivkins"])
 def test_the_tool_of_a_delta_stays_on_the_path(simulate, tmp_path: Path, module: str) -> None:
     own = tmp_path / "own.toml"

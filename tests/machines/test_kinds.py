@@ -217,7 +217,7 @@ def test_the_contract_is_held_against_a_file_that_is_loaded(tmp_path, monkeypatc
     ("return Scissors(self.arm, self.rail)", "return 7", "build gives a int, expected a Kinematics"),
     ("return Scissors(self.arm, self.rail)", "raise OSError('no')", "builds no kinematics: OSError: no"),
     ("def forward(", "def forwards(", "builds no kinematics: TypeError: Can't instantiate abstract class"),
-    ('axis_names = ("X", "Y", "Z")', 'axis_names = ("X", "Y", "C")', "'C' is not a letter of a linear axis"),
+    ('axis_names = ("X", "Y", "Z")', 'axis_names = ("X", "Y", "D")', "'D' is not a letter of a linear axis"),
     ('    axis_names = ("X", "Y", "Z")', "    names = ()", "has no attribute 'axis_names'")])
 def test_a_model_that_gives_no_kinematics_is_refused(tmp_path, monkeypatch, old: str, new: str,
                                                      words: str) -> None:

@@ -72,7 +72,8 @@ class LegFrame:
         """No errors: the parameters that there are."""
         count = [int(np.sum(self.leg[:r] == k)) + 1 for r, k in enumerate(self.leg)]
         names = tuple(f"{self.letters[k]}{number}" for k, number in zip(self.leg, count, strict=True))
-        return replace(RodErrors.none(self.letters, names), drive=np.zeros(len(self.letters)))
+        arms = tuple(name for name, arm in zip(self.letters, self.machine.legs.arm, strict=True) if arm)
+        return replace(RodErrors.none(self.letters, names), drive=np.zeros(len(self.letters)), arms=arms)
 
     def loops(self, errors: RodErrors) -> Loops:
         """Every rod as a leg of its own, with its errors: joints (N, K) of the machine drive them as q[:, leg]."""

@@ -48,6 +48,7 @@ class RodErrors:
         legs, rods: names of the legs, and of the rods ("X1", "X2" ...)
         pairs: (K,) mm, half the distance of the rods of each leg where the machine file gives none, else empty
         drive: (K,) by which the drive stands farther than it counts, mm or rad, of kind "legs"; else empty
+        arms: legs whose drive counts an angle, by whatever letter
     """
 
     rail: Floats
@@ -59,6 +60,7 @@ class RodErrors:
     rods: tuple[str, ...]
     pairs: tuple[float, ...] = ()
     drive: Floats = field(default_factory=lambda: np.zeros(0))
+    arms: tuple[str, ...] = ()
 
     @classmethod
     def none(cls, legs: tuple[str, ...], rods: tuple[str, ...], pairs: tuple[float, ...] = ()) -> Self:

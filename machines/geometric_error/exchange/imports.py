@@ -174,7 +174,7 @@ def with_covariance(model: ErrorModel, path: Path) -> tuple[ErrorModel | None, l
     matrix, found = read_covariance(path, names, ("", 0))
     if matrix is None:
         return None, found
-    scale = [UNITS["arcsec" if angular(name) else "um"] for name in names]
+    scale = [UNITS["arcsec" if angular(name, model.rods) else "um"] for name in names]
     return replace(model, covariance=matrix * np.outer(scale, scale)), []
 
 

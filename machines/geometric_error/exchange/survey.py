@@ -126,7 +126,7 @@ def _legs(rods: RodErrors | None) -> dict[str, Any]:
         return {}
     found: dict[str, Any] = {}
     for name, value in zip(rods.names, rods.values, strict=True):
-        turn = angular(name)
+        turn = angular(name, rods)
         kind = name.split(".")[1]
         size = abs(float(value)) / (ARCSEC if turn else UM)
         if size > found.get(kind, {"largest": -1.0})["largest"]:
@@ -149,7 +149,7 @@ def _covariance(model: ErrorModel) -> dict[str, Any] | None:
     if model.covariance is None:
         return None
     sigma = np.sqrt(np.diag(model.covariance))
-    turn = np.array([angular(name) for name in model.names], dtype=np.bool_)
+    turn = np.array([angular(name, model.rods) for name in model.names], dtype=np.bool_)
     correlated = bool(np.count_nonzero(model.covariance - np.diag(np.diag(model.covariance))))
     return {"correlated": correlated, "without": [n for n, s in zip(model.names, sigma, strict=True) if s == 0.0],
             "largest_um": float(sigma[~turn].max(initial=0.0)) / UM,

@@ -63,7 +63,7 @@ def _uncertainty_lines(model: ErrorModel, stem: str, files: dict[str, str]) -> l
     groups: dict[str, dict[str, float]] = {}
     for name, value in zip(model.names, np.sqrt(variance), strict=True):
         whole = name if model.axes.names == [] or name in model.axes.constants else name.split("[")[0].split(".")[0]
-        groups.setdefault(whole, {})[name] = float(value / UNITS[ANGLE if angular(name) else LENGTH])
+        groups.setdefault(whole, {})[name] = float(value / UNITS[ANGLE if angular(name, model.rods) else LENGTH])
     lines = ["", "[sigma]"]
     for whole, given in groups.items():
         one = {whole: next(iter(given.values()))} if np.ptp(list(given.values())) <= 1e-12 else given
@@ -159,7 +159,7 @@ def _leg_lines(rods: RodErrors) -> list[str]:
                   for what in ("carriage", "platform")]
         lines.append(f"length = {_list(rods.length[mine] / length)}")
         if len(rods.drive):
-            lines.append(f"drive = {_number(rods.drive[k] / (angle if leg in ROTARY else length))}")
+            lines.append(f"drive = {_number(rods.drive[k] / (angle if leg in rods.arms else length))}")
     return lines
 
 

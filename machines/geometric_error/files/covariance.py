@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from machines.geometric_error.actual.model import ErrorModel
+from machines.geometric_error.actual.rods import RodErrors
 from machines.geometric_error.files.file_models import ErrorFileModel
 from machines.geometric_error.tables.csv_table import UNITS, read_text
 from machines.geometric_error.tables.names import parse
-from machines.kinematics.chain import ROTARY
 from machines.user_file import UserFile, nearest
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, Severity, error
@@ -25,22 +25,22 @@ MOST = 12_000
 """parameters whose covariance is held: 1.2 GB"""
 
 
-def angular(name: str) -> bool:
-    """True for parameters in rad."""
+def angular(name: str, rods: RodErrors | None = None) -> bool:
+    """True for parameters in rad, of a machine with these rods."""
     part = name.split(".")[-2] if name.count(".") > 1 else ""
     if part:
         return part == "guide"
     if name.endswith(".drive"):
-        return name[0] in ROTARY
+        return rods is not None and name.split(".")[0] in rods.arms
     if "]." in name:
         return name.rsplit(".", 1)[1].startswith("r")
     known = parse(name.split("[")[0].split(".")[0])
     return known is not None and known.angular
 
 
-def units(names: list[str], model: ErrorFileModel) -> Floats:
+def units(names: list[str], model: ErrorFileModel, rods: RodErrors | None) -> Floats:
     """(P,) mm or rad per unit of the file."""
-    return np.array([UNITS[model.angle_unit if angular(name) else model.length_unit] for name in names])
+    return np.array([UNITS[model.angle_unit if angular(name, rods) else model.length_unit] for name in names])
 
 
 def covariance_of(model: ErrorModel, file: UserFile,
@@ -59,7 +59,7 @@ def covariance_of(model: ErrorModel, file: UserFile,
     if checked.covariance is not None:
         origin = file.origin(("covariance", "table"))
         path = Path(origin.file).parent / checked.covariance.table
-        scale = units(names, checked)
+        scale = units(names, checked, model.rods)
         matrix, found = read_covariance(path, names, (origin.file, origin.line))
         return (model if matrix is None else replace(model, covariance=matrix * np.outer(scale, scale))), found
     sigma = np.zeros(len(names))
@@ -69,7 +69,7 @@ def covariance_of(model: ErrorModel, file: UserFile,
         if not mine:
             found.append(file.problem("error-model.sigma", ("sigma", prefix), f"no parameter begins with {prefix!r}",
                                       nearest(prefix, names)))
-    return replace(model, covariance=np.diag((sigma * units(names, checked)) ** 2)), found
+    return replace(model, covariance=np.diag((sigma * units(names, checked, model.rods)) ** 2)), found
 
 
 def read_covariance(path: Path, names: list[str],
@@ -167,7 +167,7 @@ def _checked(matrix: Floats, path: Path, names: list[str]) -> tuple[Floats | Non
 
 def write_covariance(model: ErrorModel) -> str:
     """The text of a covariance table of a model, in the units of its file."""
-    scale = np.array([UNITS["arcsec" if angular(name) else "um"] for name in model.names])
+    scale = np.array([UNITS["arcsec" if angular(name, model.rods) else "um"] for name in model.names])
     matrix = np.zeros((len(scale), len(scale))) if model.covariance is None else model.covariance
     rows = (f"{name}," + ",".join(f"{x:.12g}" for x in row)
             for name, row in zip(model.names, matrix / np.outer(scale, scale), strict=True))

@@ -62,7 +62,7 @@ def _curve(name: ErrorName, curve: Curve) -> str:
 
 
 def _rods(rods: RodErrors) -> list[str]:
-    unit = np.array([ANGLE if angular(name) else LENGTH for name in rods.names])
+    unit = np.array([ANGLE if angular(name, rods) else LENGTH for name in rods.names])
     return [f"rods {' '.join(rods.rods)}", _text(rods.pairs), _text(rods.values / unit)]
 
 

@@ -52,7 +52,7 @@ def too_large(model: ErrorModel) -> list[TooLarge]:
     found = [TooLarge(("components", str(c.name)), largest(c.curve), c.name.angular) for c in model.axes.components]
     found += [TooLarge(("location", name), abs(value), angular(name)) for name, value in model.axes.constants.items()]
     if model.rods is not None:
-        found += [TooLarge(("legs", name.split(".")[0].rstrip("12"), name), abs(value), angular(name))
+        found += [TooLarge(("legs", name.split(".")[0].rstrip("12"), name), abs(value), angular(name, model.rods))
                   for name, value in zip(model.rods.names, model.rods.values.tolist(), strict=True)]
     if model.map is not None:
         found += [TooLarge(("map", "table", name), float(np.abs(model.map.table[..., k]).max()), k >= 3)

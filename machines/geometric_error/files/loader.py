@@ -227,7 +227,7 @@ class _Loader:
             return None
         frame = rod_frame(kinematics, pairs)
         zero = RodErrors.none(slides, rod_names(frame, slides), pairs)
-        parts = {what: np.array(getattr(zero, what)) for what in DIMENSIONS}
+        parts: dict[str, Any] = {what: np.array(getattr(zero, what)) for what in DIMENSIONS}
         self._dimensions(parts, slides, frame.leg)
         for letter, given in self.checked.legs.items():
             if given.drive:

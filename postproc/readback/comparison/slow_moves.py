@@ -259,14 +259,16 @@ def _least(motion: Motion, executed: BlockPoses, cutting: Bools) -> Floats:
     cutting block."""
     control: Control = executed.control
     every, result = np.flatnonzero(cutting), np.zeros(len(motion))
-    velocity, largest = control.machine.cutting_limits.velocity, control.machine.largest_feed
+    kin, drives = control.machine.kinematics, control.machine.by_drives or control.machine
+    velocity, largest = drives.cutting_limits.velocity, control.machine.largest_feed
+    places = np.linspace(0.0, 1.0, 5 if drives is control.machine else 9)
     if np.isfinite(largest):
         result = np.where(cutting, block_lengths(motion, control)[0] / largest, 0.0)
     for first in range(0, len(every), CHUNK):
         rows = every[first:first + CHUNK]
-        q = executed.joints(motion, rows, 0.0)
-        for t in (0.25, 0.5, 0.75, 1.0):
-            after = executed.joints(motion, rows, t)
-            result[rows] = np.fmax(result[rows], 4.0 * (np.abs(after - q) / velocity).max(axis=1))
+        q = kin.drives(executed.joints(motion, rows, 0.0))
+        for t in places[1:].tolist():
+            after = kin.drives(executed.joints(motion, rows, t))
+            result[rows] = np.fmax(result[rows], (len(places) - 1) * (np.abs(after - q) / velocity).max(axis=1))
             q = after
     return result

@@ -83,9 +83,9 @@ def test_carriers_of_a_redundant_machine_bring_its_platform_to_rest() -> None:
     kin = opened("macro-micro", 130.0, False)
     tip, axis, _ = places(kin)
     q = kin.inverse(tip, axis)[0]
-    np.testing.assert_allclose(kin.rig(q).place[:, :2], np.tile(kin.workspace.middle[:2], (len(q), 1)), atol=1e-9)
+    np.testing.assert_allclose(kin.rig(q).place, np.tile(kin.workspace.middle, (len(q), 1)), atol=1e-9)
     room = kin.parameters_apart
-    np.testing.assert_array_equal(room, 0.5 * (kin.workspace.upper - kin.workspace.lower)[:2])
+    np.testing.assert_array_equal(room, 0.5 * (kin.workspace.upper - kin.workspace.lower))
 
 
 @pytest.mark.parametrize("name", ["mikron-ucp710", "h4a-c-table", "uranesx", "planar-delta-z"])
@@ -101,7 +101,7 @@ def test_a_machine_without_redundancy_leaves_nothing_open(name: str) -> None:
 def test_six_axes_leave_the_spin_open_where_it_is_asked_for() -> None:
     kin = machines.load("hexapod").kinematics
     assert kin.open_parameters == () and kin.with_free_spin().open_parameters == (SPIN,)
-    assert machines.load("macro-micro").kinematics.with_free_spin().open_parameters == (SPIN, "X", "Y")
+    assert machines.load("macro-micro").kinematics.with_free_spin().open_parameters == (SPIN, "X", "Y", "Z")
 
 
 def test_carriers_that_move_where_another_does_are_refused(tmp_path: Path) -> None:

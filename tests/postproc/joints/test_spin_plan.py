@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,18 @@ import pytest
 import machines
 import postproc
 from machines.machine import Machine
-from postproc.joints.run_roads import ParameterCurve
+from machines.reach import reach
+from postproc.joints.run_roads import ParameterCurve, RunRoad
 from postproc.joints.spin_loop import cheapest_spins
+from postproc.joints.spin_plan import planned_spins
 from postproc.pipeline.result import PostResult
+from postproc.verification.second_witness import second_witness
 from postproc.witness.machine import rods
 from tests.machines.random_slides import poses_over_workspace
 from tests.postproc.kit import codes, convert, good, setup_of, toolpath
+from toolpaths.arrays import Floats
 from toolpaths.compiled import compiled
+from toolpaths.shape import Curves
 from toolpaths.toolpath import Toolpath
 
 LEANING = ["MULTAX/ON", "RAPID", "GOTO/-139,-24,-80,0.20167,-0.45442,0.86766", "GOTO/-139.88,-23.71,-94.74",
@@ -133,6 +139,17 @@ def test_a_tool_that_keeps_its_spin_is_not_turned() -> None:
     assert free.path is not None and free.path.opened[0][1:] == (0.0, 0.0)
 
 
+def test_the_second_witness_holds_the_spin_of_a_tool_that_keeps_it() -> None:
+    """A program made for a round tool turned by 25 degrees, held against the set-up of one that is not round."""
+    path, kept = toolpath("RAPID", *LEVEL), setup_of(f"{LENGTH}keeps_spin = true\n")
+    turned = good(convert(path, "hexapod", setup=setup_of(f"[joints]\nspin = 25\n{LENGTH}")))
+    assert turned.job is not None and turned.comparison is not None
+    found = second_witness(path.source, kept, turned.options, turned.job, turned.comparison)[1]
+    assert any(d.code == "witness.spin" and "25.0" in d.message for d in found), [str(d) for d in found]
+    held = good(convert(path, "hexapod", setup=kept))
+    assert held.witness is not None and "turns of tools about themselves" in [one.what for one in held.witness.compared]
+
+
 def test_the_second_witness_finds_the_spin_by_the_rods_alone() -> None:
     """Up to 70 degrees off what it starts from, and what is put in where the tool is not there."""
     kin = machines.load("hexapod").kinematics.with_tool(60.0)
@@ -143,3 +160,26 @@ def test_the_second_witness_finds_the_spin_by_the_rods_alone() -> None:
     assert witness.misfit(q, kin.axis_names, tip, axis, length).max() < 1e-6
     for way in 0.005 * np.eye(3):
         assert witness.misfit(q, kin.axis_names, tip + way, axis, length).min() > 1e-4
+
+
+@pytest.mark.parametrize(("tip", "axis"), [([70.35, 63.34, -94.95], [0.278274, 0.245122, 0.928697]),
+                                           ([34.31, -141.49, -141.77], [0.379676, 0.038278, 0.924327])])
+def test_the_spin_lets_the_tool_be_drawn_back_too(tip: list[float], axis: list[float]) -> None:
+    """The spin that is best at the part does not reach 60 mm above it; the planned one does."""
+    whole = machines.load("hexapod")
+    machine = replace(whole, limits=replace(whole.limits, lower=np.full(6, 150.0), upper=np.full(6, 420.0)))
+    kin, at, up = machine.kinematics.with_tool(60.0).with_free_spin(), np.array(tip), np.array(axis)
+    none = np.zeros((1, 3))
+    curves = Curves(at[None], at[None] + [[4.0, 0.0, 0.0]], up[None], up[None], np.zeros(1, dtype=bool), none, none,
+                    np.zeros(1))
+    road = RunRoad(kin, np.concatenate([at, up]), curves, np.array([0.4]), np.nan)
+
+    def drawn(tips: Floats, axes: Floats) -> Floats:
+        return tips + 60.0 * axes
+
+    reached = []
+    for back in (None, drawn):
+        spin = planned_spins([road], [()], machine, 0.05, None, back)[0].values[:1]
+        q = kin.inverse_with((at + 60.0 * up)[None], up[None], spin)[0]
+        reached.append(bool(((q >= 150.0) & (q <= 420.0)).all()) and bool((reach(kin, q).values >= 0.0).all()))
+    assert reached == [False, True]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -52,7 +53,7 @@ def test_the_platform_stays_in_its_room_and_the_carriers_in_their_travel(lean: f
 
 def test_the_split_takes_less_time_than_the_carriers_alone_and_moves_them_gently() -> None:
     machine, roads = gantry(), [road(wave(), 250.0)]
-    clock, columns = clock_of(roads, 1000.0), [machine.axis_names.index(a) for a in "XY"]
+    clock, columns = clock_of(roads, 1000.0), [machine.axis_names.index(a) for a in "XYZ"]
     split, alone = (planned_split(roads, machine, divided)[0] for divided in (True, False))
     seconds = [clock.seconds(machine, one.at(clock.times)) for one in (split, alone)]
     assert seconds[0] < 0.8 * seconds[1]
@@ -69,6 +70,25 @@ def test_a_path_beyond_the_gantry_is_reached_by_the_platform() -> None:
     assert (q <= gantry().limits.upper).all() and np.isfinite(q).all()
 
 
+@pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i"])
+def test_nine_linear_axes_are_words_of_every_control(controller: str) -> None:
+    """X, Y, Z carry, A, B, C, U, V, W are slides, in mm; the gantry lifts the tool where the platform alone would not."""
+    path = toolpath("RAPID", "GOTO/-60,0,30", "FEDRAT/MMPM,6000", "GOTO/-60,0,0", "GOTO/60,10,4", "RAPID", "GOTO/60,10,30")
+    result = good(convert(path, "macro-micro", controller, setup=setup_of(
+        "[part]\norigin = [0, 150, -270]\n[clearance]\nmargin = 300\n[tools.1]\ngauge_length = 80\n")))
+    assert result.witness is not None and not result.witness.findings and result.path is not None
+    z = result.path.q[:, result.machine.axis_names.index("Z")]
+    assert np.ptp(z[np.isfinite(result.path.u)]) < 20.0 < np.ptp(z) and "beyond" not in result.text
+    reach = result.machine.kinematics.with_tool(80.0).rig(result.path.q).place[:, 2]
+    assert (reach <= 550.0 + 1e-6).all()
+
+
+def test_lengths_of_letters_for_angles_are_not_scaled_in_inches() -> None:
+    setup = setup_of('[output]\nunits = "inch"\n[part]\norigin = [0, 150, -270]\n[tools.1]\ngauge_length = 80\n')
+    result = convert(toolpath("RAPID", "GOTO/0,0,0"), "macro-micro", setup=setup)
+    assert not result.ok and any("words of A, B, C are lengths" in d.message for d in result.diagnostics)
+
+
 @pytest.mark.parametrize("mode", ["planned", "rest"])
 def test_programs_hold_all_joints_and_are_proved(mode: str) -> None:
     x = np.linspace(-300.0, 300.0, 60)
@@ -82,9 +102,14 @@ def test_programs_hold_all_joints_and_are_proved(mode: str) -> None:
     carried = result.path.q[np.isfinite(result.path.u)][:, [result.machine.axis_names.index(a) for a in "XY"]]
     leaves = np.ptp(carried[:, 1])
     assert leaves > 49.0 if mode == "rest" else leaves < 15.0
-    assert [name for name, _, _ in result.path.opened] == ["X", "Y"]
+    assert [name for name, _, _ in result.path.opened] == ["X", "Y", "Z"]
+    split, alone = result.path.split_seconds
+    assert (split < 0.9 * alone) == (mode == "planned") and f"alone {alone:.2f} s" in result.text
 
 
-def test_a_control_without_words_for_so_many_axes_says_so() -> None:
-    result = convert(toolpath("RAPID", "GOTO/0,0,0"), "macro-micro", setup=setup_of("[tools.1]\ngauge_length = 80\n"))
+def test_a_control_without_words_for_an_axis_says_so(tmp_path: Path) -> None:
+    text = Path("machines/data/macro-micro.toml").read_text("utf-8").replace('"A", "B"', '"Q", "B"')
+    (tmp_path / "own.toml").write_text(text.replace("axes.A]", "axes.Q]"), "utf-8")
+    setup = setup_of("[tools.1]\ngauge_length = 80\n")
+    result = convert(toolpath("RAPID", "GOTO/0,0,0"), tmp_path / "own.toml", setup=setup)
     assert not result.ok and "write.axis_letters" in codes(result.diagnostics)

@@ -45,7 +45,33 @@ def test_links_go_straight_in_the_plane_and_the_proof_names_them() -> None:
     off -= (off @ along)[:, None] * along
     assert len(first) > 2 and np.abs(off).max() < 0.02 and np.abs(tips[:, 2] + 110.0).max() < 1e-9
     np.testing.assert_allclose(tips[[0, -1]], ends, atol=1e-6)
-    assert result.comparison.worst_tip < 0.01 and "linking moves (in the one plane" in as_text(result, "p.ngc")
+    assert result.comparison.worst_tip < 0.01 and "not compared" not in as_text(result, "p.ngc")
+
+
+def test_a_link_that_leaves_its_line_is_found_by_the_second_witness(tmp_path: Path) -> None:
+    """One crank 0.4 degrees off in the middle of the way from home."""
+    lines = planar().text.splitlines()
+    k = next(i for i, line in enumerate(lines) if line.startswith("S")) + 3
+    a, b = (float(word[1:]) for word in lines[k].split())
+    lines[k] = f"A{a + 0.4:.4f} B{b:.4f}"
+    (tmp_path / "p.ngc").write_text("\n".join(lines) + "\n")
+    result = postproc.verify(tmp_path / "p.ngc", path(), machine("planar-delta"), "linuxcnc", setup=setup_of(IN_PLANE))
+    found = result.diagnostics
+    assert any(d.code == "witness.clearance" and "straight line" in d.message for d in found), [str(d) for d in found]
+
+
+def test_tools_of_their_own_lengths_each_work_in_their_own_plane() -> None:
+    """The tip of a tool that is 10 mm longer stands 10 mm lower; between them the tool goes home in its own plane."""
+    two = ("LOADTL/1", "SPINDL/RPM,1000,CLW", "RAPID", "GOTO/-50,-40,0", "FEDRAT/MMPM,600", "GOTO/-46,-40,0", "LOADTL/2",
+           "SPINDL/RPM,1000,CLW", "RAPID", "GOTO/-46,-36,-10", "FEDRAT/MMPM,600", "GOTO/-50,-36,-10")
+    setup = setup_of(IN_PLANE.replace("110.0\n", "110.0\n[tools.2]\ngauge_length = 120.0\n", 1))
+    result = good(convert(toolpath(*two), "planar-delta", setup=setup))
+    assert result.witness is not None and not result.witness.findings and result.comparison.worst_tip < 0.01
+    level = toolpath(*(line.replace(",-10", ",0") for line in two))
+    refused = convert(level, "planar-delta", setup=setup)
+    assert "reach.plane" in codes(refused.diagnostics)
+    assert good(convert(level, "planar-delta-z", setup=setup_of(
+        TOOL.replace("110.0\n", "110.0\n[tools.2]\ngauge_length = 120.0\n", 1)))).witness is not None
 
 
 def test_without_the_key_the_program_is_refused_and_its_links_are_found(tmp_path: Path) -> None:
