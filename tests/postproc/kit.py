@@ -19,6 +19,7 @@ import postproc
 import toolpaths
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile, load_setup
+from tests.margins import looked_at
 from tests.postproc.plain_executor import Peer, Step
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Toolpath
@@ -102,7 +103,8 @@ def good(result: PostResult) -> PostResult:
 @cache
 def sample(file: str, name: str, controller: str = "linuxcnc") -> PostResult:
     """A sample, of those with many sides alike a few, converted with the gauge lengths of its set-up."""
-    return good(convert(few_sides(file), name, controller))
+    with looked_at():
+        return good(convert(few_sides(file), name, controller))
 
 
 def codes(diagnostics: object) -> set[str]:

@@ -163,8 +163,8 @@ def test_every_machine_is_analysed(name: str, monkeypatch: pytest.MonkeyPatch) -
 
     With few boxes: what more of them prove is in test_extremes_and_maps.py.
     """
-    monkeypatch.setattr(extremes, "MOST", 300)
-    monkeypatch.setattr(extremes, "FEW", 300)
+    monkeypatch.setattr(extremes, "MOST", 60)
+    monkeypatch.setattr(extremes, "FEW", 60)
     found = analyse(machines.load(name))
     assert found["axes"] == list(machines.load(name).axis_names) and found["reachable_box_mm"] is not None
 
