@@ -1,7 +1,7 @@
 """By how much the lengths of tools may differ is not looked at by conversions in these rooms, where no test sees it.
 
-It is a sixth of a conversion. Where it is made and proved (`postproc/verification`) and in all other rooms (every machine and
-control, reports, commands, hints, pages) it is looked at, and in what rooms share (`kit.sample`).
+It is a sixth of a conversion. It is looked at where it is made and proved (`postproc/verification`), in all other rooms
+(every machine and control, reports, commands, hints, pages), and in what rooms share (`kit.sample`).
 """
 
 from __future__ import annotations
