@@ -162,8 +162,7 @@ def test_a_place_that_only_its_links_make_worse_is_not_taken() -> None:
     setup, found = load_setup(SAMPLES / "delta.setup.toml")
     assert setup is not None and not found
     limits = PlacementLimits(x=(-100.0, 100.0), turns=[0.0])
-    lines = (SAMPLES / "test_part.cls").read_text("utf-8").splitlines()
-    path, _ = toolpaths.read_bytes("\n".join([*lines[:217], lines[-1], ""]))
+    path, _ = toolpaths.read(SAMPLES / "test_part.cls")
     choice, more = place(path, machine(DELTA), setup.model_copy(update={"placement": limits}))
     assert choice is not None, more
     assert min(one.seconds for one in choice.known) < choice.found.now.seconds
