@@ -47,20 +47,21 @@ LINES = {"h4a_dome.cls": 160, "blade.cls": 300, "bicubic.cls": 400, "indexed_4ax
 """lines of samples with many points alike"""
 
 
-def few_lines(name: str, sides: Sequence[int] | None = None) -> str:
+def few_lines(name: str, sides: Sequence[int] | None = None, lines: int = 0) -> str:
     """The text of `few_sides`, or with other operations."""
     head, *operations = re.split(r"(?m)^(?=TOOL PATH/)", (SAMPLES / name).read_text())
     if sides and "LOAD/TOOL" not in operations[sides[0]]:
         load = re.findall(r"LOAD/TOOL.*\n", "".join(operations[:sides[0]]))[-1]
         operations[sides[0]] = operations[sides[0]].replace("SPINDL/", f"{load}SPINDL/", 1)
-    lines = (head + "".join(operations[k] for k in sides or SIDES.get(name, range(len(operations))))).splitlines()
-    return "\n".join(lines if len(lines) <= LINES.get(name, len(lines)) else [*lines[:LINES[name]], "FINI"]) + "\n"
+    text = (head + "".join(operations[k] for k in sides or SIDES.get(name, range(len(operations))))).splitlines()
+    most = lines or LINES.get(name, len(text))
+    return "\n".join(text if len(text) <= most else [*text[:most], "FINI"]) + "\n"
 
 
 @cache
-def few_sides(name: str, sides: tuple[int, ...] | None = None) -> Toolpath:
+def few_sides(name: str, sides: tuple[int, ...] | None = None, lines: int = 0) -> Toolpath:
     """A CL sample, of those with many sides alike some `SIDES` under their own head, of long ones as many `LINES`."""
-    path, found = toolpaths.read_bytes(few_lines(name, sides), file=name)
+    path, found = toolpaths.read_bytes(few_lines(name, sides, lines), file=name)
     assert not has_errors(found), [str(d) for d in found]
     return path
 
