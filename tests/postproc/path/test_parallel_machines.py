@@ -81,6 +81,7 @@ def test_words_are_the_letters_of_the_machine() -> None:
 # ---- what does not fit is refused --------------------------------------------------------------------------
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize(("file", "name", "code", "words"), [
     ("five_faces.cls", "h4a-c-table", "reach.axis", "45.0000 degrees away"),
     ("tool_axis_tour.apt", "h4a-c-table", "reach.axis", "15.0000 degrees away"),
