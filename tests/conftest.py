@@ -8,8 +8,9 @@ from functools import cache
 
 import pytest
 
-from tests import compile_once, cover, environment, one_command, rewrite_once, tiers
+from tests import compile_once, cover, environment, machines_once, one_command, rewrite_once, tiers
 from tests.linuxcnc import interpreter, simulator
+from tests.margins import lengths_looked_at_where_they_are_seen
 from tests.processor_time import (
     pytest_addoption,
     pytest_runtest_protocol,
@@ -18,12 +19,13 @@ from tests.processor_time import (
     pytest_testnodedown,
 )
 
-__all__ = ["environment", "pytest_addoption", "pytest_runtest_protocol", "pytest_sessionfinish", "pytest_terminal_summary",
-           "pytest_testnodedown"]
+__all__ = ["environment", "lengths_looked_at_where_they_are_seen", "pytest_addoption", "pytest_runtest_protocol",
+           "pytest_sessionfinish", "pytest_terminal_summary", "pytest_testnodedown"]
 
 # Files that are imported make no garbage worth looking for.
 gc.disable()
 rewrite_once.install()
+machines_once.install()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

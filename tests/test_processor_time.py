@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from tests.processor_time import COLLECTION, OF_A_FILE, OF_A_TEST, by_file, too_dear, yardstick
+from tests.processor_time import (
+    BUDGET,
+    COLLECTION,
+    OF_A_FILE,
+    OF_A_TEST,
+    SLACK,
+    USUAL,
+    by_file,
+    too_dear,
+    too_long,
+    yardstick,
+)
 
 EVEN = {COLLECTION: 20.0} | {f"tests/f{k}.py::test_{n}": 0.5 for k in range(100) for n in range(10)}
 
@@ -22,6 +33,14 @@ def test_a_dear_file_and_a_dear_test_are_named() -> None:
 
 def test_the_start_of_the_workers_is_no_test() -> None:
     assert too_dear(EVEN | {COLLECTION: 500.0}) == []
+
+
+def test_a_run_that_takes_far_more_than_its_budget_is_named_on_slow_processors_and_on_fast_ones() -> None:
+    """As many seconds as a yard takes longer are no fault; a yard that work disturbed is not the one that counts."""
+    for times_slower in (0.5, 1.0, 3.0):
+        yards = [times_slower * USUAL] * 4 + [9.0 * USUAL]
+        assert too_long({"a": times_slower * BUDGET}, yards) == []
+        assert "budget is 480 s" in too_long({"a": 1.01 * SLACK * times_slower * BUDGET}, yards)[0]
 
 
 def test_the_yardstick_takes_some_time_and_not_much() -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 import shlex
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.main import get_command
@@ -49,9 +51,15 @@ def commands(text: str) -> list[list[str]]:
     return found
 
 
+@cache
+def tree() -> Any:
+    """All commands."""
+    return get_command(app)
+
+
 def wrong(words: list[str]) -> str:
     """What a command line has that there is not; "" where it is one."""
-    group = get_command(app)
+    group = tree()
     while hasattr(group, "commands"):
         if not words or words[0] not in group.commands:
             return "" if words[:1] in ([], ["--help"], ["--version"]) else f"no command {words[:1]}"

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from machines.certificate import search
 from machines.geometric_error.exchange import survey
+from machines.layouts import search as layouts
 from tests.explained_codes import DATA
 from tests.hints.case import HintCase, called
 from tests.hints.cases import CASES
@@ -30,8 +32,12 @@ def remedies(hints: list[str]) -> list[str]:
 
 @pytest.fixture(autouse=True)
 def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a model of errors does at each of many places changes figures of `errors check`, and no hint."""
+    """What a model of errors does at each of many places changes figures of `errors check`, and no hint; so do the boxes
+    after which a certificate gives up, and the layouts that are tried."""
     monkeypatch.setattr(survey, "PLACES", 500)
+    monkeypatch.setattr(search, "MOST", 6_000)
+    for name, value in (("RESTARTS", 1), ("ROUNDS", 12), ("CROWD", 6), ("GRID", (3, 3, 2, 1))):
+        monkeypatch.setattr(layouts, name, value)
 
 
 @pytest.mark.parametrize("case", CASES, ids=[f"{c.code}-{k}" for k, c in enumerate(CASES)])

@@ -54,6 +54,7 @@ def test_what_is_not_found_once_is_an_error(function: str, old: str) -> None:
         place_of(function, old)
 
 
+@pytest.mark.covering(count=12)
 @pytest.mark.parametrize("name", [*SEVEN, *MORE])
 def test_the_conversion_refuses_a_planted_fault(name: str) -> None:
     case = CASES[{**SEVEN, **MORE}[name]]

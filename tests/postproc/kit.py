@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,6 +20,7 @@ import postproc
 import toolpaths
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile, load_setup
+from tests.margins import looked_at
 from tests.postproc.plain_executor import Peer, Step
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Toolpath
@@ -39,16 +41,27 @@ def toolpath(*lines: str, head: list[str] | None = None) -> Toolpath:
 
 
 SIDES = {"five_faces.cls": (0, 1, 2), "five_tilted.cls": (0, 1, 2), "h4a_indexed.cls": (0, 1, 4, 5),
-         "h4a_dome.cls": (0,)}
+         "h4a_dome.cls": (0,), "indexed_4axis.cls": (0, 1, 4, 5, 8)}
 """operations of samples with many sides alike that show each kind of work"""
+LINES = {"h4a_dome.cls": 160, "blade.cls": 300, "bicubic.cls": 400, "indexed_4axis.cls": 300}
+"""lines of samples with many points alike"""
+
+
+def few_lines(name: str, sides: Sequence[int] | None = None, lines: int = 0) -> str:
+    """The text of `few_sides`, or with other operations."""
+    head, *operations = re.split(r"(?m)^(?=TOOL PATH/)", (SAMPLES / name).read_text())
+    if sides and "LOAD/TOOL" not in operations[sides[0]]:
+        load = re.findall(r"LOAD/TOOL.*\n", "".join(operations[:sides[0]]))[-1]
+        operations[sides[0]] = operations[sides[0]].replace("SPINDL/", f"{load}SPINDL/", 1)
+    text = (head + "".join(operations[k] for k in sides or SIDES.get(name, range(len(operations))))).splitlines()
+    most = lines or LINES.get(name, len(text))
+    return "\n".join(text if len(text) <= most else [*text[:most], "FINI"]) + "\n"
 
 
 @cache
-def few_sides(name: str) -> Toolpath:
-    """A CL sample, of those with many sides alike some `SIDES` under their own head."""
-    head, *operations = re.split(r"(?m)^(?=TOOL PATH/)", (SAMPLES / name).read_text())
-    text = head + "".join(operations[k] for k in SIDES.get(name, range(len(operations))))
-    path, found = toolpaths.read_bytes(text, file=name)
+def few_sides(name: str, sides: tuple[int, ...] | None = None, lines: int = 0) -> Toolpath:
+    """A CL sample, of those with many sides alike some `SIDES` under their own head, of long ones as many `LINES`."""
+    path, found = toolpaths.read_bytes(few_lines(name, sides, lines), file=name)
     assert not has_errors(found), [str(d) for d in found]
     return path
 
@@ -102,7 +115,8 @@ def good(result: PostResult) -> PostResult:
 @cache
 def sample(file: str, name: str, controller: str = "linuxcnc") -> PostResult:
     """A sample, of those with many sides alike a few, converted with the gauge lengths of its set-up."""
-    return good(convert(few_sides(file), name, controller))
+    with looked_at():
+        return good(convert(few_sides(file), name, controller))
 
 
 def codes(diagnostics: object) -> set[str]:

@@ -1,8 +1,7 @@
 """What the analysis gives: transmission, singularity, reachable box, tilt; printed figures are in tests/laws."""
 
 import json
-from functools import cache, partial
-from typing import Any
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,6 +9,8 @@ from typer.testing import CliRunner, Result
 
 import machines
 import machines.analysis.extremes as extremes
+import machines.analysis.report as report
+import machines.analysis.transmission as transmission
 from machines.analysis.box import reachable_box, reached
 from machines.analysis.directions import tilts
 from machines.analysis.report import analyse
@@ -112,7 +113,7 @@ def test_the_workspace_of_uranesx_is_proved_free_of_singular_points() -> None:
     assert grid_step_that_proves(kinematics.on_rods, floor=1000.0) is None
 
 
-def test_the_command_proves_it_and_says_for_which_machines() -> None:
+def test_the_command_proves_it_and_says_for_which_machines(few: None) -> None:
     def run(*words: str) -> Result:
         return CliRunner().invoke(app, ["machine", "analyse", *words, "--json", "-"])
     found = json.loads(run("uranesx", "--singular-above", "100").stdout)
@@ -144,27 +145,24 @@ def test_reachable_box_of_a_serial_machine_is_its_travel() -> None:
         np.testing.assert_allclose(found["reachable_box_mm"][letter], [lower, upper], atol=1e-3)
 
 
-@cache
-def analysed(name: str) -> dict[str, Any]:
-    """Figures of a built-in machine."""
-    return analyse(machines.load(name))
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few boxes and points: what more of them prove is in test_extremes_and_maps.py."""
+    for module, name, value in ((report, "GRID", (5, 5, 5, 3)), (report, "COARSE", (3, 3, 3, 2)),
+                                (extremes, "MOST", 60), (extremes, "FEW", 60), (transmission, "ROUNDS", 4)):
+        monkeypatch.setattr(module, name, value)
 
 
 @pytest.mark.parametrize("name", ["uranesx", "h4a-c-table"])
-def test_report_has_its_units_in_its_keys(name: str) -> None:
-    found = analysed(name)
+def test_report_has_its_units_in_its_keys(name: str, few: None) -> None:
+    found = analyse(machines.load(name))
     assert found["condition_number"]["worst"] > 1.0 and found["reachable_box_mm"] is not None
     assert set(found["workspace_mm"]) == set("xyz")
 
 
 @pytest.mark.parametrize("name", machines.names())
-def test_every_machine_is_analysed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Unlimited axes included; the box is there for all that reach their middle with the tool as at home.
-
-    With few boxes: what more of them prove is in test_extremes_and_maps.py.
-    """
-    monkeypatch.setattr(extremes, "MOST", 300)
-    monkeypatch.setattr(extremes, "FEW", 300)
+def test_every_machine_is_analysed(name: str, few: None) -> None:
+    """Unlimited axes included; the box is there for all that reach their middle with the tool as at home."""
     found = analyse(machines.load(name))
     assert found["axes"] == list(machines.load(name).axis_names) and found["reachable_box_mm"] is not None
 

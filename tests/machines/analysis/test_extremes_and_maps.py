@@ -31,6 +31,7 @@ SAME = {"condition_number": condition_number,
         "speed_transmission": speed_transmission, "force_transmission": force_transmission}
 
 
+@pytest.mark.covering
 @pytest.mark.parametrize("key", MEASURES)
 @pytest.mark.parametrize("name", ["uranesx", "rotary-delta", "planar-delta-z", "hexaslide-coplanar"])
 def test_nothing_found_by_other_code_is_above_what_is_proved(name: str, key: str) -> None:

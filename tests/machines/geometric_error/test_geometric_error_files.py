@@ -150,6 +150,7 @@ def test_faults_of_tables(tmp_path: Path, old: str, new: str, code: str, line: i
     assert first.lines == (() if line is None else (line,))
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("name", ["mikron-ucp710", "nutating-head", "uranesx", "h4a-c-table"])
 def test_a_written_model_reads_back_the_same(tmp_path: Path, name: str) -> None:
     machine = machines.load(name)

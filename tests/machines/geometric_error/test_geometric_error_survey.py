@@ -26,6 +26,7 @@ from toolpaths.units import DEG
 SAMPLES = Path(__file__).parents[3] / "samples" / "errors"
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize(("name", "over"), [("mill-3axis", ""), ("mill-4axis", "XYZA"), ("uranesx", ""),
                                             ("h4a-spindle-axis", "")])
 def test_a_map_of_all_coordinates_loses_as_much_everywhere_as_inside(name: str, over: str) -> None:

@@ -46,6 +46,7 @@ def places(name: str, n: int) -> tuple[Kinematics, Bare, np.ndarray]:
     return m.kinematics, Bare(m.kinematics), q
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("name", NAMES)
 def test_rates_by_differences(name: str) -> None:
     known, bare, q = places(name, 400)

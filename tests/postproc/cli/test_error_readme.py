@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 import machines
 from machines.geometric_error import load
+from machines.geometric_error.exchange import survey
 from postproc.cli.app import app
 
 ROOT = Path(__file__).parents[3]
@@ -29,6 +30,8 @@ ADJACENT = {"x.comp": "-100 -100.002 -100.001\n0 0 0.001\n100 100.003 100.004\n"
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """What the commands name; models are looked at in few places."""
+    monkeypatch.setattr(survey, "PLACES", 1000)
     for file in SAMPLES.iterdir():
         shutil.copy(file, tmp_path)
     shutil.copy(SAMPLES / "mikron-ucp710.toml", tmp_path / "errors.toml")

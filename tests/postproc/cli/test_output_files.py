@@ -99,6 +99,7 @@ def test_machine_and_controller_files_are_not_replaced(shop: Path) -> None:
         assert got.exit_code == 2 and "the output would replace the" in got.stderr.replace("\n", " ")
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_header_has_names_and_no_places(tmp_path: Path, controller: str) -> None:
     """Not of machine, controller, set-up, error model or CL file; the set-up is known by its fingerprint."""

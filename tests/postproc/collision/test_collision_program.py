@@ -208,6 +208,7 @@ def test_verify_finds_what_a_program_touches(tmp_path: Path) -> None:
     assert "X80" in block_at or "Z" in block_at
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table", "trunnion-bc", "fork-head-ab"])
 def test_a_turning_axis_is_bounded_between_the_points(tmp_path: Path, name: str) -> None:
     """The tip stands still while the axis turns by 40 degrees: a wire is met only on the path."""

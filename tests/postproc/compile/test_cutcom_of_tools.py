@@ -53,6 +53,7 @@ def errors(found: list[Diagnostic]) -> list[str]:
     return [d.code for d in found if d.severity is Severity.ERROR]
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("controller", NAMES)
 def test_the_head_says_what_the_register_holds(controller: str) -> None:
     wear, radius, none = (folded(good(made(controller, kind)).text) for kind in ("wear", "radius", "none"))
@@ -69,6 +70,7 @@ def test_the_diameter_of_the_set_up_stands_before_that_of_the_cl_file() -> None:
     assert "d1 holds 6.0000 mm" in head and "5.0000 mm" not in head
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("controller", NAMES)
 def test_the_words_are_the_path_of_the_cl_file(controller: str) -> None:
     plain = bare(good(made(controller, "")).text)
@@ -108,6 +110,7 @@ def test_a_tool_without_cutcom_may_say_what_it_likes() -> None:
     assert "CUTCOM" not in good(result).text
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("controller", NAMES)
 def test_each_tool_has_its_own(controller: str) -> None:
     """The first tool of a file cuts under compensation, the second as its centre goes; then the other way round."""

@@ -74,7 +74,7 @@ def steps_of(ends: BlockEnds) -> Floats:
     *((lossy, False) for lossy in (1, 2, 3)), *(pytest.param(lossy, True, marks=pytest.mark.slow) for lossy in (1, 2, 3))])
 def test_the_walk_interpreted_and_compiled_is_the_one_of_numpy(lossy: int, made: bool,
                                                                monkeypatch: pytest.MonkeyPatch) -> None:
-    ends = random_ends(np.random.default_rng(lossy), 400, lossy, 8.7e-5)
+    ends = random_ends(np.random.default_rng(lossy), 200, lossy, 8.7e-5)
     plain, approaches = walk_by_numpy.walk(ends)
     monkeypatch.setattr(walking, "chosen", lambda function, *_: function)
     fast = as_it_stands = walking.walk(ends)

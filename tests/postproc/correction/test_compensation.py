@@ -26,10 +26,11 @@ from postproc.correction.reversals import LOOSE
 from postproc.pipeline.convert import verify
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import load_setup
+from tests.postproc.kit import few_sides
 from toolpaths.units import DEG
 
 SAMPLES = Path("samples")
-TURNS = 4
+TURNS = 7
 """into how many parts the spiral is cut, of which the first is converted"""
 ERRORS = SAMPLES / "errors"
 MIKRON = str(ERRORS / "mikron-ucp710.toml")
@@ -135,9 +136,8 @@ def test_points_are_added_only_where_they_are_needed_and_keep_time_and_order() -
 
 
 def test_planned_feeds_go_with_corrected_blocks() -> None:
-    path, found = toolpaths.read(SAMPLES / "tool_axis_tour.apt")
     options = Options(setup=str(SAMPLES / "tools.setup.toml"), error_model=MIKRON, feed="planned")
-    result = postproc.convert(path, "mikron-ucp710", "linuxcnc", options=options, diagnostics=found)
+    result = postproc.convert(few_sides("tool_axis_tour.apt", lines=60), "mikron-ucp710", "linuxcnc", options=options)
     assert result.ok and result.path is not None and result.compensation is not None and result.nominal is not None
     owner, part = result.compensation.owner, result.compensation.part
     assert len(owner) == len(part) == len(result.path)

@@ -66,6 +66,7 @@ def verified(program: Path, model: Path, controller: str = "linuxcnc") -> Result
     return run("verify", program, program.with_suffix(".apt"), *common(controller), "--error-model", model)
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_every_controller_keeps_the_fingerprint(controller: str, model: Path) -> None:
     program = written(model, controller)

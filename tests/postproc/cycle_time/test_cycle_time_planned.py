@@ -9,20 +9,19 @@ import numpy as np
 import pytest
 
 import postproc
-import toolpaths
 from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.estimate import estimate, timed, total
 from postproc.cycle_time.planned import planned_times, with_seconds
 from postproc.cycle_time.source import from_conversion
 from postproc.pipeline.result import PostResult
-from tests.postproc.kit import SAMPLES, TOOLS, toolpath
+from tests.postproc.kit import TOOLS, few_sides, toolpath
 from tests.postproc.time_kit import model
 
 
 @cache
 def converted(name: str, machine: str, **options: object) -> PostResult:
-    path, found = toolpaths.read(SAMPLES / name)
-    result = postproc.convert(path, machine, "linuxcnc", TOOLS, postproc.Options(**options), found)
+    path = few_sides(name, (1, 2) if name == "pocket.cls" else None)
+    result = postproc.convert(path, machine, "linuxcnc", TOOLS, postproc.Options(**options))
     assert result.ok, result.diagnostics
     return result
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from postproc.cli.app import app
 from postproc.cycle_time.toppra_check import check
-from tests.postproc.kit import SAMPLES, convert, good, toolpath
+from tests.postproc.kit import convert, few_lines, good, toolpath
 from tests.postproc.planning.test_planned_feed import wave
 from toolpaths.diagnostics import DiagnosticError
 
@@ -49,7 +49,8 @@ def test_without_toppra_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_command_line(tmp_path: Path) -> None:
-    got = CliRunner().invoke(app, ["time", str(SAMPLES / "pocket.cls"), "-m", "mill-3axis", "--check", "toppra", "--json",
+    (tmp_path / "contour.cls").write_text(few_lines("pocket.cls", (1,)))
+    got = CliRunner().invoke(app, ["time", str(tmp_path / "contour.cls"), "-m", "mill-3axis", "--check", "toppra", "--json",
                                    "-"])
     assert got.exit_code == 0, got.stderr
     figures = json.loads(got.stdout)["check"]

@@ -182,6 +182,7 @@ def test_errors_are_corrected_at_every_place() -> None:
     assert [block for block in body(result.text) if block in ("G54", "G57", "G69")] == ["G69", "G57", "G69"]
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("control", CONTROLS)
 def test_faces_of_a_tombstone(control: str) -> None:
     """The slides go the same places on every face, the table stands at its turn."""
@@ -191,6 +192,7 @@ def test_faces_of_a_tombstone(control: str) -> None:
         assert np.abs(cuts(result, k) - first - [0.0, 0.0, 0.0, 90.0 * k]).max() < NEAR
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("control", CONTROLS)
 def test_registers_of_faces_as_they_are_touched_off(control: str) -> None:
     """With the tables turned every register holds the same, and the words of X, Y, Z are the same on every face."""
@@ -206,6 +208,7 @@ def test_registers_of_faces_as_they_are_touched_off(control: str) -> None:
     assert "places.measured" in codes(wrong.diagnostics) or "output.mode" in codes(wrong.diagnostics)
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("control", CONTROLS)
 def test_five_axes_in_every_mode(control: str) -> None:
     faces = [{**TWO[0], "turn": {"C": 90.0}}, {**TWO[1], "origin": (60.0, 20.0, 10.0)}]

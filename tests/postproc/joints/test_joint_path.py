@@ -80,6 +80,7 @@ def seconds(q: np.ndarray, limits: Limits, start: np.ndarray) -> float:
     return float((np.abs(np.diff(q, axis=0, prepend=start[None])) / limits.velocity).max(axis=1).sum())
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("name", ["mikron-ucp710", "head-table", "fork-head-ab", "nutating-head"])
 def test_best_track_of_all_branches_and_windings(name: str) -> None:
     """Random spirals away from the pole: inside travel where any track is, and none is faster."""

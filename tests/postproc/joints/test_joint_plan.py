@@ -159,6 +159,7 @@ def random_case(name: str, rng: np.random.Generator) -> tuple[list[PoseRun], Lim
     return runs, replace(m.limits, lower=lower, upper=upper), np.append(np.zeros(3), rng.uniform(-3, 3, 2))
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("name", NAMES)
 def test_as_cheap_as_the_search_over_every_state(name: str) -> None:
     """Travel so short that many cases need rewinds, or cannot be done at all."""

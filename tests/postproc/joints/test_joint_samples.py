@@ -54,6 +54,7 @@ def test_script_reproduces_the_files(tmp_path: Path) -> None:
         assert f"`{name}`" in readme
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize(("name", "machine", "setup", "rewinds"), [
     ("singular_pass", "mikron-ucp710", "tools.setup.toml", 0), ("full_sphere", "mikron-ucp710", "tools.setup.toml", 0),
     ("turned_over", "mikron-ucp710", "joints/turned_over.setup.toml", 0),

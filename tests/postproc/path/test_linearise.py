@@ -79,6 +79,7 @@ def random_lines(name: str, count: int, seed: int) -> Curves:
     return lines(start, end, a0, a1)
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("name", MACHINES)
 def test_random_moves_stay_inside_the_tolerance_between_points(name: str) -> None:
     curves = random_lines(name, 12, 11)

@@ -104,8 +104,8 @@ def test_bound_is_never_below_dense_truth(name: str, law: str) -> None:
     """Whole moves, far too long to pass, and the pieces that linearising makes of them."""
     kin = machine(name).kinematics.with_tool(80.0)
     control = Control(machine(name), law, np.zeros(3))
-    curves, q0, q1 = curves_for(name, 40, 9)
-    assert len(curves) >= 15
+    curves, q0, q1 = curves_for(name, 24, 9)
+    assert len(curves) >= 9
     n = len(curves)
     for near in (1e9, 1e-9):
         stretch = CurveBlocks(curves, np.zeros(n), np.ones(n), q0, q1, kin.forward(q0), kin.forward(q1))
@@ -148,7 +148,7 @@ def test_bound_holds_on_arcs_with_a_turning_axis() -> None:
     name, rng = "mikron-ucp710", np.random.default_rng(2)
     kin = machine(name).kinematics
     control = Control(machine(name), "axes", np.zeros(3))
-    for _ in range(3):
+    for _ in range(2):
         normal, center, radius = tilted(rng.uniform(0, 40), rng.uniform(0, 360)), rng.uniform(-20, 20, 3), rng.uniform(3, 30)
         e1 = unit(np.cross(normal, [0.3, 0.8, 0.1]))
         e2, sweep, rise = np.cross(normal, e1), rng.uniform(1, 8), rng.uniform(-5, 5)

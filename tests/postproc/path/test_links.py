@@ -100,6 +100,7 @@ def test_random_pairs_of_faces(name: str, tool_change: bool) -> None:
     assert done >= 3
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize(("file", "name"), [("five_faces.cls", "mikron-ucp710"), ("five_tilted.cls", "head-table"),
                                             ("five_faces.cls", "fork-head-ab"), ("indexed_4axis.cls", "mill-4axis")])
 def test_links_of_the_samples(file: str, name: str) -> None:

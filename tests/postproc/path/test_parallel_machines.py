@@ -59,9 +59,9 @@ def test_bicubic_on_uranesx() -> None:
 
 
 @pytest.mark.parametrize(("name", "file", "moves"), [
-    (H4A[0], "h4a_dome.cls", 780), (H4A[1], "h4a_indexed.cls", 20),
+    (H4A[0], "h4a_dome.cls", 130), (H4A[1], "h4a_indexed.cls", 20),
     pytest.param(H4A[0], "pocket.cls", 80, marks=pytest.mark.slow),
-    pytest.param(H4A[1], "h4a_dome.cls", 780, marks=pytest.mark.slow),
+    pytest.param(H4A[1], "h4a_dome.cls", 130, marks=pytest.mark.slow),
     pytest.param(H4A[0], "h4a_indexed.cls", 20, marks=pytest.mark.slow)])
 def test_five_axes_on_both_h4a(name: str, file: str, moves: int) -> None:
     result = sample(file, name, "h4a")
@@ -81,6 +81,7 @@ def test_words_are_the_letters_of_the_machine() -> None:
 # ---- what does not fit is refused --------------------------------------------------------------------------
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize(("file", "name", "code", "words"), [
     ("five_faces.cls", "h4a-c-table", "reach.axis", "45.0000 degrees away"),
     ("tool_axis_tour.apt", "h4a-c-table", "reach.axis", "15.0000 degrees away"),

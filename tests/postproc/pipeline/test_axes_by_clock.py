@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import toolpaths
 from postproc.base.options import Options, Orientation
 from postproc.base.program_time import ProgramTime
 from postproc.cycle_time.conversion import program_clock
@@ -39,16 +38,13 @@ def test_auto_is_never_slower_than_keep(controller: str) -> None:
 @pytest.mark.parametrize("own", [True, False])
 def test_the_choice_obeys_the_clock(own: bool) -> None:
     """A clock by which the axes of the CL file are slow, and one by which all others are."""
-    path, found = toolpaths.read(SAMPLES / "test_part.cls")
-
     def clock(result: PostResult, band: bool = False) -> ProgramTime:
         plans = result.choice.plans if result.choice is not None else {}
         seconds = 50.0 if (plans["auto"].states == plans["keep"].states) is own else 100.0
         moves = np.ones(len(result.job.moves) if result.job else 0)
         return ProgramTime(seconds, (seconds, seconds), 10.0, "clock of the test", moves)
 
-    made = convert(path, machine("mikron-ucp710"), "linuxcnc", options=Options(orient="auto"), diagnostics=found,
-                   clock=clock)
+    made = convert(strips(), machine("mikron-ucp710"), "linuxcnc", SETUP, Options(orient="auto"), clock=clock)
     assert made.ok and made.choice is not None
     assert (made.choice.plans["auto"].states == made.choice.plans["keep"].states) is own
     assert made.choice.gain == (0.0 if own else 50.0)

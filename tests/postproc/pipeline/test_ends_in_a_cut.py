@@ -12,6 +12,7 @@ CUT = ("PARTNO RIM\nUNITS/MM\nLOADTL/1\nSPINDL/RPM,18000,CLW\nFEDRAT/MMPM,600\nR
        "GOTO/10,0,5,0,.5,.8660254\nGOTO/30,0,5,0,.5,.8660254\n")
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("control", CONTROLS)
 def test_the_retract_is_no_cut(control: str) -> None:
     good(convert(toolpaths.read_bytes(CUT + "FINI\n")[0], "fork-head-ab", control))

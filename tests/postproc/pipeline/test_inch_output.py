@@ -71,6 +71,7 @@ def test_the_same_motion_as_in_mm(file: Path, controller: str) -> None:
     assert inch.witness.not_compared == mm.witness.not_compared and len(inch.witness.compared) == len(mm.witness.compared)
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("controller", CONTROLS)
 def test_inches_are_stated_and_nothing_is_left_in_mm(controller: str) -> None:
     mm, inch = both(SAMPLES / "pocket.cls", controller)

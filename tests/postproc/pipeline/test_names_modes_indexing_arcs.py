@@ -39,6 +39,7 @@ def test_a_mode_without_compensation_or_cycles_is_named(controller: str) -> None
     assert "in output mode tcp" in noted.message and "--output-mode" in noted.hint
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640"])
 def test_a_turn_on_the_spot_is_not_slow(controller: str) -> None:
     """Straight up half-way: C turns by 90 degrees there, which the feed of the tip knows nothing of."""

@@ -63,6 +63,7 @@ def refusing(monkeypatch: pytest.MonkeyPatch, bad: Callable[[frames.Law, np.ndar
     monkeypatch.setattr(frames, "_wrong_pose", wrong)
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("controller", CONTROLS)
 def test_a_part_that_is_turned_over_converts_on_every_control(controller: str) -> None:
     result = casting(controller)

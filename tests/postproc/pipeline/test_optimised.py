@@ -35,8 +35,8 @@ def made(controller: str, **options: Any) -> PostResult:
     return convert(swing(), machine("mikron-ucp710"), controller, options=Options(**options), clock=program_clock())
 
 
-@pytest.mark.parametrize("controller", ["linuxcnc", "siemens-840d", *(
-    pytest.param(name, marks=pytest.mark.slow) for name in ("heidenhain-tnc640", "haas-ngc"))])
+@pytest.mark.parametrize("controller", ["linuxcnc", *(
+    pytest.param(name, marks=pytest.mark.slow) for name in ("siemens-840d", "heidenhain-tnc640", "haas-ngc"))])
 def test_nothing_is_slower_and_what_is_gained_adds_up(controller: str) -> None:
     plain, best = made(controller), made(controller, optimise=True)
     assert plain.ok and best.ok and best.optimised is not None, [str(d) for d in best.diagnostics]

@@ -66,6 +66,7 @@ def test_trailing_records_act_after_the_retract() -> None:
 TILTED = ",0,0.5,0.866025404"
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("machine", ["linuxcnc-xyzac-trt", "fork-head-ab", "head-table", "nutating-head", "mikron-ucp710"])
 def test_a_full_circle_on_a_tilted_face(machine: str) -> None:
     text = (f"MULTAX/ON\nRAPID\nGOTO/10,0,20{TILTED}\nFEDRAT/250,MMPM\nGOTO/10,0,0{TILTED}\n"
@@ -78,6 +79,7 @@ def test_a_full_circle_on_a_tilted_face(machine: str) -> None:
     assert machine == "mikron-ucp710" or (around[:, 0].min() < -9.9 and len(around) > 40)
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("machine", ["linuxcnc-xyzac-trt", "fork-head-ab", "head-table", "mikron-ucp710"])
 def test_a_helix_of_several_turns_on_a_tilted_face(machine: str) -> None:
     text = ("TOOL PATH/A,TOOL,T\nTLDATA/MILL,10.0,0.0,75.0,0.0,0.0\nMSYS/0,0,0,1,0,0,0,0.866025404,-0.5\nLOAD/TOOL,1\n"

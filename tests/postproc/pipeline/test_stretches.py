@@ -40,6 +40,7 @@ def all_of(result: PostResult) -> dict[str, object]:
     return parts
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize(("name", "controller"), CASES, ids=str)
 def test_short_stretches_change_nothing(name: str, controller: str, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = all_of(good(made(name, controller)))

@@ -17,7 +17,7 @@ from postproc.pipeline.result import PostResult
 LINE = ("UNITS/MM\nLOADTL/1\nSPINDL/3000,RPM,CLW\nFEDRAT/{},MMPM\nRAPID\nGOTO/-160,0,20\nGOTO/-160,0,0\nGOTO/160,0,0\n"
         "FINI\n")
 PERIOD, HEIGHT = 8.0, 0.015
-MOST = 61
+MOST = 41
 """lines of a sample"""
 
 

@@ -20,7 +20,7 @@ from postproc.pipeline.result import PostResult
 from postproc.planning.pass_geometry import pass_geometry, stops_of
 from postproc.planning.planned import joint_limits
 from postproc.planning.steady_feed import CORNER
-from tests.postproc.kit import SAMPLES, Step, convert, execute, good, goto, machine, toolpath
+from tests.postproc.kit import SAMPLES, Step, convert, execute, few_lines, good, goto, machine, toolpath
 from toolpaths.arrays import Floats
 from toolpaths.smoothing.smooth import Smooth, Tolerance
 
@@ -155,7 +155,8 @@ def test_smooth_leaves_corners_arcs_and_lone_lines() -> None:
 
 def test_command_line(tmp_path: Path) -> None:
     out = tmp_path / "p.ngc"
-    arguments = ["convert", str(SAMPLES / "bicubic.cls"), "-m", "mill-3axis", "-c", "linuxcnc", "-o", str(out)]
+    (tmp_path / "bicubic.cls").write_text(few_lines("bicubic.cls"))
+    arguments = ["convert", str(tmp_path / "bicubic.cls"), "-m", "mill-3axis", "-c", "linuxcnc", "-o", str(out)]
     got = CliRunner().invoke(app, [*arguments, "--feed", "planned", "--merge-feeds", "10", "--smooth", "--json", "-"])
     assert got.exit_code == 0, got.stderr
     assert json.loads(got.stdout)["tolerance_shares"]["points"] > 0.0

@@ -59,6 +59,7 @@ def executed(result: PostResult, strict: bool = True) -> tuple[float, float, flo
     return seconds, worst, planned
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("name", PATHS)
 def test_a_jerk_limited_control_takes_the_plans_time(name: str) -> None:
     result = waves(*PATHS[name])

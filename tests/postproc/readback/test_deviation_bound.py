@@ -75,6 +75,7 @@ ARITHMETIC = 1e-12
 """mm: what two ways to one place may differ by"""
 
 
+@pytest.mark.covering(count=5)
 @pytest.mark.parametrize("which", PROGRAMS, ids="-".join)
 def test_no_place_of_a_block_is_farther_off_than_the_bound_and_the_bound_is_near(which):
     result = good(program(*which))

@@ -74,6 +74,7 @@ def numbers(result: PostResult, letters: str, steps: tuple[float, ...],
                 yield f"{i + 1}: {lines[i]} -> {block}", replaced(lines, i, block)
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("case", [*FLAT, *FIVE])
 def test_unspoilt_programs_pass(case: tuple[str, str, str]) -> None:
     result = sample(*case)

@@ -61,6 +61,7 @@ def test_no_cut_under_cutter_compensation(tmp_path: Path) -> None:
     assert [d.code for d in found] == ["output.longest"]
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_parts_in_files_read_back_as_the_part(controller: str, tmp_path: Path) -> None:
     setup = divided(files=True, longest=12)

@@ -10,7 +10,6 @@ import pytest
 from typer.testing import CliRunner
 
 import postproc
-import toolpaths
 from machines.geometric_error import load
 from postproc.base.options import Options
 from postproc.cli.app import app
@@ -19,6 +18,7 @@ from postproc.report.residual_files import contents
 from postproc.report.residuals import ARCSEC, UM, Residuals, residuals
 from postproc.setup.model import SetupFile, load_setup
 from postproc.verification.residual_errors import after_formatting
+from tests.postproc.kit import few_sides
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
@@ -41,10 +41,8 @@ def plate() -> tuple[PostResult, Residuals]:
 
 
 def field(sample: str, machine: str, setup: SetupFile, **options: object) -> tuple[PostResult, Residuals]:
-    path, found = toolpaths.read(f"samples/{sample}")
-    result = postproc.convert(path, machine, "linuxcnc", setup=setup, diagnostics=found,
-                              options=Options(error_model=f"samples/errors/{machine}.toml",
-                                              **options))
+    result = postproc.convert(few_sides(sample), machine, "linuxcnc", setup=setup,
+                              options=Options(error_model=f"samples/errors/{machine}.toml", **options))
     noted = residuals(result)
     assert result.ok and noted is not None, [str(d) for d in result.diagnostics]
     return result, noted

@@ -73,6 +73,7 @@ def test_turning_the_part_is_turning_the_path() -> None:
     assert np.abs(first - second).max() < 3e-4
 
 
+@pytest.mark.covering(count=2)
 @pytest.mark.parametrize("name", ["mikron-ucp710", "trunnion-bc", "head-table", "fork-head-ab"])
 def test_any_placement_brings_the_tool_to_the_part(name: str) -> None:
     """Turned about a slanting line and shifted: own forward kinematics against own matrices."""

@@ -64,6 +64,7 @@ def test_each_tool_has_its_own_and_the_rest_that_of_output(name: str, controller
     assert [d.code for d in other.diagnostics if d.severity is Severity.ERROR] == ["verify.setup", "verify.state"]
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize(("controller", "name"),
                          list(zip(CONTROLLERS, ("head-table", "mikron-ucp710") * 3, strict=True)))
 def test_without_either_it_is_refused_and_the_hint_helps(name: str, controller: str, tmp_path: Path) -> None:

@@ -96,6 +96,7 @@ def test_margins_are_those_of_executed_programs(name: str, monkeypatch: pytest.M
     assert found is not None and found.lengths == result.comparison.lengths
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_all_tools_at_their_margins_at_once(name: str) -> None:
     """What one tool may differ by does not depend on the others."""

@@ -51,6 +51,7 @@ def test_speeds_have_no_decimals_that_no_spindle_keeps(controller: str, asked: f
     assert abs(float(speed) - asked) <= allowed
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("controller", CONTROLS)
 def test_coolant_and_spindle_are_not_switched_off_and_on_at_one_place(controller: str) -> None:
     plain = flat(controller)

@@ -34,6 +34,7 @@ def three_laws(controller: str, made: SetupFile) -> PostResult:
     return good(convert(path, MACHINE.get(controller, "mikron-ucp710"), controller, setup=made))
 
 
+@pytest.mark.covering(count=3)
 @pytest.mark.parametrize("controller", [*CONTROLLERS, "linuxcnc"])
 def test_every_restart_point_states_offset_units_and_smoothing(controller: str) -> None:
     spec, _ = load_controller(controller)

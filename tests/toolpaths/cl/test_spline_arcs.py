@@ -39,6 +39,7 @@ def path_of(control: Floats, inner: Floats) -> Toolpath:
     return found.toolpath
 
 
+@pytest.mark.covering(count=4)
 @pytest.mark.parametrize("seed", range(12))
 def test_arcs_are_within_a_micrometre_of_the_spline(seed: int) -> None:
     control, inner = curve(seed)
@@ -61,6 +62,7 @@ def test_arcs_are_within_a_micrometre_of_the_spline(seed: int) -> None:
     assert np.abs(path.tip[-1] - control[-1]).max() < 1e-9
 
 
+@pytest.mark.covering(count=4)
 @pytest.mark.parametrize("seed", range(12))
 def test_arcs_go_on_in_the_direction_in_which_the_one_before_ends(seed: int) -> None:
     control, inner = curve(seed)
