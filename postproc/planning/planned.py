@@ -97,6 +97,7 @@ STANDS = 1e-9
 
 
 @dataclass(frozen=True)
+@arrays(by_control="K")
 class PlannedMotion:
     """What is planned of a program: its passes, from rest to rest each.
 
@@ -104,11 +105,13 @@ class PlannedMotion:
         source: what the passes are made from
         strict: no sample of the plans exceeds a limit; else those between its knots may, jerks by some tenths
         made: the passes with their corners blended and their plans; None: made when they are first asked for
+        by_control (K,): least s of each block at which the control can run it by its own rules, where these are known
     """
 
     source: Source
     strict: bool = False
     made: tuple[tuple[PassGeometry, Plan], ...] | None = None
+    by_control: Floats | None = None
 
     @cached_property
     def passes(self) -> tuple[PassGeometry, ...]:
@@ -135,8 +138,8 @@ class PlannedMotion:
     @cached_property
     def needed(self) -> Floats:
         """(K,) least seconds of each block of the Path, 0 where nothing is planned: at the highest speed that the plan has
-        in it, and at which a constant feed keeps the limits of the tool; of a control that limits no jerk and makes its
-        ramps itself, at which a constant feed keeps all limits.
+        in it, by the control's rules where these are known, and at which a constant feed keeps the limits of the tool; of a
+        control that limits no jerk and makes its ramps itself, at which a constant feed keeps all limits.
 
         Raises:
             DiagnosticError: as `passes` and `plans`.
@@ -144,6 +147,10 @@ class PlannedMotion:
         steady = self._steady[1]
         if not self.source.limited_jerk:
             return steady
+        if self.by_control is not None:
+            steady = np.fmax(steady, self.by_control)
+            if not self.source.tools:
+                return steady
         return np.fmax(steady, word_seconds(tuple(zip(self.passes, self.plans, strict=True)), len(self.source.path)))
 
     @cached_property
