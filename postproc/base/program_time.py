@@ -85,7 +85,7 @@ class FeedTimes:
         said = (f"feeds as planned: {now.seconds:.2f} s on this control ({now.model}, 95 % between {now.band[0]:.2f} and "
                 f"{now.band[1]:.2f} s), as programmed {before.seconds:.2f} s; the F words alone state {self.words:.2f} and "
                 f"{self.words_programmed:.2f} s, the plan of the passes {self.plan:.2f} s"
-                + ("" if self.plan == self.ideal else f" by the control's rules, {self.ideal:.2f} s by the axes' limits alone"))
+                + ("" if self.plan == self.ideal else f" by the control's rules, {self.ideal:.2f} s by the axes' alone"))
         if self.kept:
             return [said, "planned feeds take longer on this control, which makes its ramps itself: feeds are as programmed"]
         return [said, *(["planning changes nothing that counts here"] if self.unchanged else [])]

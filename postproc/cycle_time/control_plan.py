@@ -32,8 +32,9 @@ from postproc.pipeline.result import PostResult
 from postproc.verification.planned_words import blocks_of_rows
 from toolpaths.arrays import Floats, Ints
 
-NEAR = 2e-3
-"""by which words are above the plan's highest speeds, so that rounding them takes nothing"""
+NEAR = 0.05
+"""by which words are above the plan's highest speeds: a control that ramps by itself a little otherwise is not held by them
+(3 % of the time with 0.002)"""
 KNOTS = Spacing(dt=5e-4)
 """corners of some hundredths of a millimetre lie between wider knots, and whole passes are slowed down for them"""
 SLOWEST = 1e-9
@@ -72,7 +73,7 @@ def control_plan(made: PostResult, model: CycleTimeModel) -> ControlPlan | None:
         if cut.any():
             ends = np.clip(np.append(path.ends[rows], path.ends[rows[-1] + 1]), room.s[first], room.s[last])
             speeds = _stretch(path, room.between(first, last), settings, ends)
-            seconds += float(speeds.seconds[cut].sum()) + settings.delay
+            seconds += float(speeds.seconds[cut].sum()) + settings.delay + model.stop_time
             needed += _least(cuts[rows][cut], np.diff(ends)[cut], speeds.highest[cut], len(needed))
     return ControlPlan(needed, seconds)
 

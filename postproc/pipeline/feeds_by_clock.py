@@ -1,7 +1,7 @@
 """`--feed planned` next to the programmed feeds, by the time that the control takes for both programs.
 
-The first plan is that of an ideal control: it says where blocks are cut. Where the control's own rules at corners and in bends
-are known, the passes are planned again under these, and the words carry that plan.
+The first plan is that of an ideal control: it says where blocks are cut. Where the control's own rules at corners and in
+bends are known, the passes are planned again under these, and the words carry that plan.
 """
 
 from __future__ import annotations

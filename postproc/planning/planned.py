@@ -37,6 +37,8 @@ from toolpaths.units import DEG
 ORDERS: tuple[MotionOrder, ...] = get_args(MotionOrder)
 BEYOND = 0.002
 """share of a limit that round-off of derivatives may take; `steady_feed.ROUNDING` keeps half of it free"""
+STRAIGHT, CORNER_TURN = 1e-3, 0.5
+"""rad between blocks that a control takes as points of one curve"""
 SHORTEST = 0.005
 """mm or degrees that a part of a block goes at least, in the axis that goes farthest: 50 steps of the usual words"""
 
@@ -182,7 +184,8 @@ class PlannedMotion:
         path, made = self.source.path, tuple(zip(self.passes, self.plans, strict=True))
         before = np.concatenate([home[None], path.q[:-1]])
         travel = (np.abs(path.q - before) * unit).max(axis=1, initial=0.0)
-        added = points_between(made, (path.code == FEED) & ~whole[path.move], travel, SHORTEST)
+        fit = (path.code == FEED) & ~whole[path.move] & ~_on_curve((path.q - before) * unit, travel)
+        added = points_between(made, fit, travel, SHORTEST)
         cut = cut_at(path, self.source.moves, self.source.kinematics, home, *added)
         return replace(self, source=replace(self.source, path=cut),
                        made=tuple((with_points(one, added, len(path)), plan) for one, plan in made))
@@ -211,6 +214,15 @@ class PlannedMotion:
         names = (*self.source.machine.axis_names, *(("tool",) if self.source.tools else ()))
         return {name: {f"{order}_s": float(shares.limits[k, j]) for k, order in enumerate(ORDERS)}
                 for j, name in enumerate(names)}
+
+
+def _on_curve(step: Floats, travel: Floats) -> Bools:
+    """(K,) blocks, steps (K, J) between joints, that go on at either end into a block of another direction: points of one
+    curve. A point on the chord between two would be a corner for the control."""
+    u = step / np.maximum(np.linalg.norm(step, axis=1), SHORTEST / 10.0)[:, None]
+    turn = np.linalg.norm(np.diff(u, axis=0), axis=1)
+    bent = (turn > STRAIGHT) & (turn < CORNER_TURN) & (travel[1:] > 0.0) & (travel[:-1] > 0.0)
+    return np.append(bent, False) | np.append(False, bent)
 
 
 @dataclass(frozen=True)
