@@ -37,6 +37,11 @@ StagedWhole = Callable[[PostResult], PostResult]
 """A conversion through all stages"""
 
 
+def measured(clock: ProgramClock, made: PostResult) -> ProgramTime:
+    """The time of a program with its band, by the executed control where its model says how: what is last decided by."""
+    return clock.executed(made) if isinstance(clock, PlanningClock) else clock(made, band=True)
+
+
 def with_compared_feeds(start: PostResult, stages: StagedWhole, clock: ProgramClock | None) -> PostResult:
     """The program with planned feeds, and what they do; the programmed feeds where the control makes its ramps itself and
     planned ones take longer, unless tools have limits of their own, which only planned feeds keep. Other conversions as they
@@ -51,8 +56,7 @@ def with_compared_feeds(start: PostResult, stages: StagedWhole, clock: ProgramCl
     if found is not None:
         carried = stages(replace(start, control_plan=found))
         made = carried if carried.ok else made
-    planned, programmed = (clock.executed(one) if isinstance(clock, PlanningClock) else clock(one, band=True)
-                           for one in (made, plain))
+    planned, programmed = measured(clock, made), measured(clock, plain)
     slower = planned.seconds > programmed.seconds
     kept = not start.controller.feed.limited_jerk and slower and not (made.motion is not None and made.motion.source.tools)
     ideal = 0.0 if made.motion is None else made.motion.seconds

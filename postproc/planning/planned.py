@@ -222,7 +222,7 @@ def _on_curve(step: Floats, travel: Floats) -> Bools:
     u = step / np.maximum(np.linalg.norm(step, axis=1), SHORTEST / 10.0)[:, None]
     turn = np.linalg.norm(np.diff(u, axis=0), axis=1)
     bent = (turn > STRAIGHT) & (turn < CORNER_TURN) & (travel[1:] > 0.0) & (travel[:-1] > 0.0)
-    return np.append(bent, False) | np.append(False, bent)
+    return np.asarray(np.append(bent, False) | np.append(False, bent))
 
 
 @dataclass(frozen=True)
