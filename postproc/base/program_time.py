@@ -33,13 +33,28 @@ class ProgramTime:
 
 
 @dataclass(frozen=True)
+@arrays(needed="K")
+class ControlPlan:
+    """What a control can do of planned passes, by its own rules at corners and in bends.
+
+    Attributes:
+        needed (K,): least s of each block of the path, 0 where nothing is planned
+        seconds: of all passes
+    """
+
+    needed: Floats
+    seconds: float
+
+
+@dataclass(frozen=True)
 class FeedTimes:
     """What planned feeds do on the control, all s.
 
     Attributes:
         programmed, planned: the program with feeds as programmed, and as planned
         words_programmed, words: sums of the times that the F words state, of both
-        plan: the plan's time of all passes
+        plan: time of all passes as planned under the control's own rules; where these are not known, as `ideal`
+        ideal: the same on a control that uses the axes' limits to the full and rounds corners off within the tolerance
         kept: the feeds are as programmed, as planned ones take longer on this control
     """
 
@@ -48,6 +63,7 @@ class FeedTimes:
     words_programmed: float
     words: float
     plan: float
+    ideal: float
     kept: bool
 
     @property
@@ -58,6 +74,7 @@ class FeedTimes:
     def as_dict(self) -> dict[str, object]:
         """As JSON."""
         return {"programmed_s": self.programmed.seconds, "planned_s": self.planned.seconds, "plan_s": self.plan,
+                "ideal_plan_s": self.ideal,
                 "words_programmed_s": self.words_programmed, "words_planned_s": self.words,
                 "programmed_band_s": list(self.programmed.band), "planned_band_s": list(self.planned.band),
                 "model": self.planned.model, "kept": self.kept, "unchanged": self.unchanged}
@@ -67,7 +84,8 @@ class FeedTimes:
         now, before = self.planned, self.programmed
         said = (f"feeds as planned: {now.seconds:.2f} s on this control ({now.model}, 95 % between {now.band[0]:.2f} and "
                 f"{now.band[1]:.2f} s), as programmed {before.seconds:.2f} s; the F words alone state {self.words:.2f} and "
-                f"{self.words_programmed:.2f} s, the plan of the passes {self.plan:.2f} s")
+                f"{self.words_programmed:.2f} s, the plan of the passes {self.plan:.2f} s"
+                + ("" if self.plan == self.ideal else f" by the control's rules, {self.ideal:.2f} s by the axes' alone"))
         if self.kept:
             return [said, "planned feeds take longer on this control, which makes its ramps itself: feeds are as programmed"]
         return [said, *(["planning changes nothing that counts here"] if self.unchanged else [])]

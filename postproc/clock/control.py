@@ -99,24 +99,29 @@ def execute(commanded: CommandedPath, settings: ControlSettings) -> ControlMotio
     Raises:
         ArithmeticError: no end was reached.
     """
-    if settings.corner_step is not None:
-        commanded = sharp(commanded)
-    commanded = replace(commanded, stop=commanded.stop | _turns_back(commanded))
-    path = blended(commanded)
-    delay = 0.0 if settings.smoothing is None else float(settings.smoothing.max())
-    if path.s[-1] <= path.s[0]:
+    path, room = looked_over(commanded, settings)
+    delay = settings.delay
+    if room is None:
         still = np.zeros(1)
         return ControlMotion(path, settings, still, still, still, still, path.ends, 0.0)
-    room = allowed(commanded, path, settings)
     settle = np.zeros((round(delay / settings.cycle), 3))
     parts: list[Floats] = []
     for first, last in zip(room.rests[:-1].tolist(), room.rests[1:].tolist(), strict=True):
-        moved = _between_rests(room, first, last, settings)
+        moved = between_rests(room, first, last, settings)
         parts += [moved, settle + np.array([room.s[last], 0.0, 0.0])]
     parts.append(np.array([[room.s[-1], 0.0, 0.0]]))
     s, v, a = np.concatenate(parts).T
     s = np.maximum.accumulate(np.minimum(s, path.end))
     return ControlMotion(path, settings, s, settings.cycle * np.arange(float(len(s))), v, a, path.ends, delay)
+
+
+def looked_over(commanded: CommandedPath, settings: ControlSettings) -> tuple[BlendedPath, Allowed | None]:
+    """The path that the control makes of what it is given, and what it allows along it; None where nothing moves."""
+    if settings.corner_step is not None:
+        commanded = sharp(commanded)
+    commanded = replace(commanded, stop=commanded.stop | _turns_back(commanded))
+    path = blended(commanded)
+    return path, allowed(commanded, path, settings) if path.s[-1] > path.s[0] else None
 
 
 def _turns_back(commanded: CommandedPath) -> Bools:
@@ -129,7 +134,7 @@ def _turns_back(commanded: CommandedPath) -> Bools:
     return result
 
 
-def _between_rests(room: Allowed, first: int, last: int, settings: ControlSettings) -> Floats:
+def between_rests(room: Allowed, first: int, last: int, settings: ControlSettings) -> Floats:
     """(M, 3) place, speed and acceleration each cycle from one rest to before the next; where a joint's jerk is exceeded in
     a bend the bend is passed more slowly."""
     part = room.between(first, last)

@@ -26,7 +26,7 @@ EVEN, SLIGHT = 1.5, 0.02
 """on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad"""
 BY_CHORD = 0.5
 """power of the chord by which splines are parametrised: centripetal (E. T. Y. Lee, Computer-Aided Design 21, 1989)"""
-PIECE_TURN, MOST_PIECES = 0.02, 24
+PIECE_TURN, MOST_PIECES = 0.005, 96
 """rad that a fitted curve turns from piece to piece, and pieces of a block at most"""
 WIDTHS = 0.01 * 1.3 ** np.arange(30)
 """mm (rad of rotary blocks): widths that are tried, 0.01 to 20"""

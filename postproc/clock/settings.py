@@ -45,3 +45,8 @@ class ControlSettings:
     def jerks(self) -> Floats:
         """(A,) jerks that are planned with."""
         return np.asarray(np.minimum(PLANNED * self.jerk, self.acceleration / STEEPEST))
+
+    @property
+    def delay(self) -> float:
+        """s by which filters hold the axes back."""
+        return 0.0 if self.smoothing is None else float(self.smoothing.max())

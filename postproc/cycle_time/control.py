@@ -54,6 +54,13 @@ def control(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
 def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bools,
            target: Floats) -> tuple[ControlMotion, Ints]:
     """The executed motion, and the block of each piece that was commanded; rests without their time."""
+    path, settings, owner = commanded(blocks, model, form, stops, target)
+    return execute(path, settings), owner
+
+
+def commanded(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bools,
+              target: Floats) -> tuple[CommandedPath, ControlSettings, Ints]:
+    """What the control is given, how it plans, and the block of each piece."""
     points, length, owner = pieces(blocks, form)
     last = np.append(np.diff(owner) > 0, True)
     stated = blocks.tolerance
@@ -69,8 +76,8 @@ def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bool
     weight = path.weight
     step = None if model.corner_step is None else model.corner_step / weight
     smoothing = np.full(len(weight), model.smoothing) if model.smoothing > 0.0 else None
-    return execute(path, ControlSettings(axes.velocity, axes.acceleration, jerk, model.lookahead, model.block_time,
-                                         model.cycle, model.bend_acceleration, model.bend_jerk, step, smoothing)), owner
+    return path, ControlSettings(axes.velocity, axes.acceleration, jerk, model.lookahead, model.block_time, model.cycle,
+                                 model.bend_acceleration, model.bend_jerk, step, smoothing), owner
 
 
 def rests(blocks: MotionBlocks, form: Shape) -> Bools:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from postproc.base.memory import give_back
-from postproc.base.program_time import ProgramTime
+from postproc.base.program_time import ControlPlan, ProgramTime
 from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.model import CycleTimeModel, load_model, model_name
 from postproc.cycle_time.phases import summed
 from postproc.cycle_time.report import as_dict, clock
 from postproc.cycle_time.source import from_conversion
-from postproc.pipeline.feeds_by_clock import ProgramClock
 from postproc.pipeline.result import PostResult
 from toolpaths.diagnostics import read_value
 
@@ -27,13 +27,39 @@ def model_of(result: PostResult, model: str = "") -> CycleTimeModel:
     Raises:
         DiagnosticError: where the file is none.
     """
-    return read_value(load_model(model or model_name(result.controller_name, result.controller.writer))).quick()
+    return _model(result, model).quick()
 
 
-def program_clock(model: str = "") -> ProgramClock:
+def _model(result: PostResult, model: str) -> CycleTimeModel:
+    return read_value(load_model(model or model_name(result.controller_name, result.controller.writer)))
+
+
+@dataclass(frozen=True)
+class ControlClock:
     """The clock of choices: the time of a written program under the model of its controller, or under `model`."""
-    def clock(result: PostResult, band: bool = False) -> ProgramTime:
-        planner = model_of(result, model)
+
+    model: str = ""
+
+    def __call__(self, result: PostResult, band: bool = False) -> ProgramTime:
+        """By the model's formulas; many programs are compared."""
+        return self._time(result, model_of(result, self.model), band)
+
+    def executed(self, result: PostResult) -> ProgramTime:
+        """With its band, the control executed where the model says how."""
+        return self._time(result, _model(result, self.model), band=True)
+
+    def plan(self, made: PostResult) -> ControlPlan | None:
+        """What the control can do of planned passes; None where that is not known."""
+        if made.compensation is not None:
+            return None
+        from postproc.cycle_time.control_plan import control_plan  # SciPy, which other feeds do without
+
+        try:
+            return control_plan(made, _model(made, self.model))
+        except (ValueError, ArithmeticError):
+            return None
+
+    def _time(self, result: PostResult, planner: CycleTimeModel, band: bool) -> ProgramTime:
         blocks = from_conversion(result)
         rows = len(result.comparison.moves) if result.comparison is not None else 0
         if not len(blocks) or blocks.move is None:
@@ -42,7 +68,11 @@ def program_clock(model: str = "") -> ProgramClock:
         known = blocks.move >= 0
         moves = summed(found.timed.seconds[known], blocks.move[known], rows)
         return ProgramTime(found.seconds, found.band, found.lower_bound, f"model {planner.kind}", moves)
-    return clock
+
+
+def program_clock(model: str = "") -> ControlClock:
+    """The clock of choices under the model of a program's controller, or under `model`."""
+    return ControlClock(model)
 
 
 def estimate_of(result: PostResult, model: str = "") -> Estimate | None:

@@ -2,7 +2,8 @@
 
 The planner ranks the axes of each pass as a control would run them that uses every limit to the full. Other controls rank
 them otherwise, so the plans that are best there are written, and timed by the control's model; each pass learns how much
-longer the control takes, and the plans are chosen again, until nothing new is chosen. The fastest program is taken.
+longer the control takes, and the plans are chosen again, until nothing new is chosen. The fastest programs are executed on
+the control, with that of the CL file's axes, and the fastest of these is taken.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ from postproc.base.options import Orientation
 from postproc.base.program_time import ProgramTime
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan, StateTable, plans_of
-from postproc.pipeline.feeds_by_clock import ProgramClock
+from postproc.pipeline.feeds_by_clock import ProgramClock, measured
 from postproc.pipeline.proved_axes import Convert, Proved
 from toolpaths.arrays import Floats
 
+LAST = 3
+"""fastest programs that are executed, besides that of the CL file's axes"""
 TURNS = 4
 """plans chosen again by the times of programs"""
 NAMED: tuple[Orientation, ...] = ("keep", "whole-part", "per-pass")
@@ -50,9 +53,11 @@ def fastest(made: Proved, convert: Convert, clock: ProgramClock) -> Proved:
         if plan.states in known or plan.touches or not _write(first, plan, convert, clock, known):
             break
     keep = first.plans["keep"].states
-    best = min(known.values(), key=lambda one: (one.time.seconds, one.plan.states != keep))
-    times: dict[Orientation, ProgramTime] = {name: clock(known[states].made.program, band=True)
-                                             for name, states in _both(keep, best.plan.states) if states in known}
+    order = sorted(known, key=lambda states: (known[states].time.seconds, states != keep))
+    last = {states: measured(clock, known[states].made.program) for states in {keep, *order[:LAST]} & set(known)}
+    best = known[min(last, key=lambda states: (last[states].seconds, states != keep, order.index(states)))]
+    times: dict[Orientation, ProgramTime] = {name: last[states] for name, states in _both(keep, best.plan.states)
+                                             if states in last}
     choice = replace(first, plans=first.plans | {"auto": best.plan}, programs=times, proof=best.made.choice.proof)
     return Proved(choice, best.made.program)
 

@@ -2,7 +2,8 @@
 
 One choice after the other is changed and kept where the written program takes less time on the control's model: output mode
 of all and of each operation, how much of the tolerance the control's smoothing takes from linearising, points moved inside
-the tolerance, feed mode. Nothing is slower than without: what is not faster is not taken.
+the tolerance, feed mode. Nothing is slower than without: what is not faster is not taken, by the model's formulas and then
+by the control, executed.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 
 from postproc.base.options import FeedModeChoice, Options, OutputMode
 from postproc.base.program_time import Optimised, OptimisedStep, ProgramTime
-from postproc.pipeline.feeds_by_clock import ProgramClock, StagedWhole, with_compared_feeds
+from postproc.pipeline.feeds_by_clock import ProgramClock, StagedWhole, measured, with_compared_feeds
 from postproc.pipeline.result import PostResult
 
 _Change = Callable[[PostResult], PostResult]
@@ -32,11 +33,12 @@ MOST = 8
 
 @dataclass(frozen=True)
 class _Best:
-    """The fastest so far: what it is made from, the program, its time."""
+    """The fastest so far: what it is made from, the program, its time by the formulas that rank, and as executed."""
 
     start: PostResult
     made: PostResult
     time: ProgramTime
+    executed: ProgramTime
 
 
 def optimised(start: PostResult, stages: StagedWhole, clock: ProgramClock) -> PostResult:
@@ -49,7 +51,7 @@ def optimised(start: PostResult, stages: StagedWhole, clock: ProgramClock) -> Po
     made = written(start)
     if not made.ok:
         return made
-    search = _Search(_Best(start, made, clock(made)), written, clock)
+    search = _Search(_Best(start, made, clock(made), measured(clock, made)), written, clock)
     search.modes()
     search.smoothing()
     for moved in (True, False):
@@ -60,7 +62,7 @@ def optimised(start: PostResult, stages: StagedWhole, clock: ProgramClock) -> Po
         search.to(f"feed mode {mode}", _options(partial(replace, feed_mode=mode)))
     best = search.best
     made = with_compared_feeds(best.start, stages, clock) if planned and not compared else best.made
-    return replace(made, optimised=Optimised(tuple(search.steps), search.first, best.time, search.tried))
+    return replace(made, optimised=Optimised(tuple(search.steps), search.first, best.executed, search.tried))
 
 
 def _options(change: Callable[[Options], Options]) -> _Change:
@@ -72,7 +74,7 @@ class _Search:
 
     def __init__(self, best: _Best, stages: StagedWhole, clock: ProgramClock) -> None:
         self.best, self.stages, self.clock = best, stages, clock
-        self.first, self.tried, self.steps = best.time, 0, list[OptimisedStep]()
+        self.first, self.tried, self.steps = best.executed, 0, list[OptimisedStep]()
 
     def to(self, what: str, change: _Change) -> float:
         """Tries a choice, and takes it where it is faster; s of its program, infinite where none is written."""
@@ -85,8 +87,10 @@ class _Search:
             return np.inf
         time = self.clock(made)
         if time.seconds < (1.0 - LEAST) * self.best.time.seconds:
-            self.steps.append(OptimisedStep(what, self.best.time.seconds, time.seconds))
-            self.best = _Best(start, made, time)
+            executed = measured(self.clock, made)
+            if executed.seconds < (1.0 - LEAST) * self.best.executed.seconds:
+                self.steps.append(OptimisedStep(what, self.best.executed.seconds, executed.seconds))
+                self.best = _Best(start, made, time, executed)
         return time.seconds
 
     def modes(self) -> None:

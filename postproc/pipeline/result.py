@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from machines.machine import Machine
 from postproc.base.options import Options
-from postproc.base.program_time import FeedTimes, Optimised
+from postproc.base.program_time import ControlPlan, FeedTimes, Optimised
 from postproc.compile.feed import Feeds
 from postproc.compile.program import Program
 from postproc.control.modes import Refused
@@ -73,6 +73,8 @@ class PostResult:
     """what --optimise came to"""
     feed_times: FeedTimes | None = None
     """what planned feeds do on the control, where they were asked for and its clock is known"""
+    control_plan: ControlPlan | None = None
+    """what the control can do of the planned passes, where it is known: the words carry it"""
     refused: Refused = frozenset()
     """(operation, mode) that "auto" has passed over"""
     reached: StageName | Literal[""] = ""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.base.program_time import ControlPlan
 from postproc.compile.feed import Feeds
 from postproc.compile.program import Program
 from postproc.control.modes import Refused
@@ -35,7 +36,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class BegunStage:
     """A conversion before its first stage; `left`: passes that --smooth leaves; `refused`: output
-    modes that "auto" passes over; `diagnostics`: of all stages so far."""
+    modes that "auto" passes over; `control_plan`: the feeds that planned words carry, where they are known already;
+    `diagnostics`: of all stages so far."""
 
     options: Options
     machine: Machine
@@ -49,6 +51,7 @@ class BegunStage:
     asked: SetupFile | None
     left: ExcludedPasses
     refused: Refused
+    control_plan: ControlPlan | None
 
 
 @dataclass(frozen=True)

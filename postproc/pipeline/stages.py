@@ -87,7 +87,7 @@ def staged(result: PostResult, progress: Progress | None = None,
     """A conversion through all stages, up to the first that finds an error; `left`: passes that --smooth leaves."""
     made: Any = BegunStage(result.options, result.machine, result.controller, result.controller_name, result.setup,
                            result.diagnostics, result.toolpath, result.choice, result.source, result.asked, left,
-                           result.refused)
+                           result.refused, result.control_plan)
     for number, stage in enumerate(STAGES):
         made, found = stage.run(made, _named(progress, stage.name, number))
         result = replace(_recorded(result, made, found), reached=stage.name)
@@ -200,6 +200,8 @@ def planned(made: CheckedStage, progress: Progress | None) -> tuple[PlannedStage
     if motion is None or made.nominal is not None or not job.controller.feed.limited_jerk:
         return handed_on(PlannedStage, made, motion=motion), found
     motion = motion.with_points(job.machine.home, job.control.unit, shifted_moves(job, made.moves))
+    if made.control_plan is not None and len(made.control_plan.needed) == len(motion.source.path):
+        motion = replace(motion, by_control=made.control_plan.needed)
     return handed_on(PlannedStage, made, motion=motion, path=motion.source.path), found
 
 

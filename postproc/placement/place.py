@@ -18,7 +18,7 @@ from postproc.job.job import prepare
 from postproc.orientation.candidates.ranking import load_compiler
 from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.path.links import safe_space
-from postproc.pipeline.feeds_by_clock import ProgramClock
+from postproc.pipeline.feeds_by_clock import ProgramClock, measured
 from postproc.placement.bodies import adjacent
 from postproc.placement.oriented_times import OrientedTimer
 from postproc.placement.place_times import TimedPlace, Timer
@@ -214,7 +214,7 @@ class _Proof:
             result = convert(self.toolpath, self.machine, self.controller, here, self.options,
                              progress=self.progress, clock=self.clock)
             why = None if result.ok else max(result.diagnostics, key=lambda d: d.severity)
-            self.done[id(one)] = self.clock(result, band=True) if result.ok else None, why
+            self.done[id(one)] = measured(self.clock, result) if result.ok else None, why
         return self.done[id(one)]
 
     def time(self, one: TimedPlace) -> ProgramTime | None:

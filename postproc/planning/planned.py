@@ -37,6 +37,8 @@ from toolpaths.units import DEG
 ORDERS: tuple[MotionOrder, ...] = get_args(MotionOrder)
 BEYOND = 0.002
 """share of a limit that round-off of derivatives may take; `steady_feed.ROUNDING` keeps half of it free"""
+STRAIGHT, CORNER_TURN = 1e-3, 0.5
+"""rad between blocks that a control takes as points of one curve"""
 SHORTEST = 0.005
 """mm or degrees that a part of a block goes at least, in the axis that goes farthest: 50 steps of the usual words"""
 
@@ -97,6 +99,7 @@ STANDS = 1e-9
 
 
 @dataclass(frozen=True)
+@arrays(by_control="K")
 class PlannedMotion:
     """What is planned of a program: its passes, from rest to rest each.
 
@@ -104,11 +107,13 @@ class PlannedMotion:
         source: what the passes are made from
         strict: no sample of the plans exceeds a limit; else those between its knots may, jerks by some tenths
         made: the passes with their corners blended and their plans; None: made when they are first asked for
+        by_control (K,): least s of each block at which the control can run it by its own rules, where these are known
     """
 
     source: Source
     strict: bool = False
     made: tuple[tuple[PassGeometry, Plan], ...] | None = None
+    by_control: Floats | None = None
 
     @cached_property
     def passes(self) -> tuple[PassGeometry, ...]:
@@ -135,8 +140,8 @@ class PlannedMotion:
     @cached_property
     def needed(self) -> Floats:
         """(K,) least seconds of each block of the Path, 0 where nothing is planned: at the highest speed that the plan has
-        in it, and at which a constant feed keeps the limits of the tool; of a control that limits no jerk and makes its
-        ramps itself, at which a constant feed keeps all limits.
+        in it, by the control's rules where these are known, and at which a constant feed keeps the limits of the tool; of a
+        control that limits no jerk and makes its ramps itself, at which a constant feed keeps all limits.
 
         Raises:
             DiagnosticError: as `passes` and `plans`.
@@ -144,6 +149,10 @@ class PlannedMotion:
         steady = self._steady[1]
         if not self.source.limited_jerk:
             return steady
+        if self.by_control is not None:
+            steady = np.fmax(steady, self.by_control)
+            if not self.source.tools:
+                return steady
         return np.fmax(steady, word_seconds(tuple(zip(self.passes, self.plans, strict=True)), len(self.source.path)))
 
     @cached_property
@@ -175,7 +184,8 @@ class PlannedMotion:
         path, made = self.source.path, tuple(zip(self.passes, self.plans, strict=True))
         before = np.concatenate([home[None], path.q[:-1]])
         travel = (np.abs(path.q - before) * unit).max(axis=1, initial=0.0)
-        added = points_between(made, (path.code == FEED) & ~whole[path.move], travel, SHORTEST)
+        fit = (path.code == FEED) & ~whole[path.move] & ~_on_curve((path.q - before) * unit, travel)
+        added = points_between(made, fit, travel, SHORTEST)
         cut = cut_at(path, self.source.moves, self.source.kinematics, home, *added)
         return replace(self, source=replace(self.source, path=cut),
                        made=tuple((with_points(one, added, len(path)), plan) for one, plan in made))
@@ -204,6 +214,15 @@ class PlannedMotion:
         names = (*self.source.machine.axis_names, *(("tool",) if self.source.tools else ()))
         return {name: {f"{order}_s": float(shares.limits[k, j]) for k, order in enumerate(ORDERS)}
                 for j, name in enumerate(names)}
+
+
+def _on_curve(step: Floats, travel: Floats) -> Bools:
+    """(K,) blocks, steps (K, J) between joints, that go on at either end into a block of another direction: points of one
+    curve. A point on the chord between two would be a corner for the control."""
+    u = step / np.maximum(np.linalg.norm(step, axis=1), SHORTEST / 10.0)[:, None]
+    turn = np.linalg.norm(np.diff(u, axis=0), axis=1)
+    bent = (turn > STRAIGHT) & (turn < CORNER_TURN) & (travel[1:] > 0.0) & (travel[:-1] > 0.0)
+    return np.asarray(np.append(bent, False) | np.append(False, bent))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.slow_moves import Slack, axis_seconds, feed_rounding
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import REPORT, Diagnostic
 from toolpaths.shapes import arrays
 
@@ -31,10 +31,41 @@ class WrittenBlocks:
     @classmethod
     def of(cls, path: JointPath, moves: Moves, needed: Floats) -> WrittenBlocks:
         """Of a path with the least seconds (K,) of each block; `moves` with pecks, as the path names them."""
-        keep = moves.phase != Phase.PECK
-        rows = np.flatnonzero((path.code != TRAVERSE) & (path.u > 0.0) & ~path.home)
-        rows = rows[keep[path.move[rows]] & (moves.hole[path.move[rows]] < 0)]
+        keep, rows = _written_rows(path, moves)
         return cls((np.cumsum(keep) - 1)[path.move[rows]], needed[rows], np.nan_to_num(path.seconds[rows]))
+
+
+def blocks_of_rows(path: JointPath, moves: Moves, comparison: Comparison) -> Ints:
+    """(B,) block of the path that each executed block writes, -1 where its move has not as many of both.
+
+    `path`, `moves`: as they were written.
+    """
+    motion, reference = comparison.executed[1], comparison.moves.without_pecks()
+    count, result = len(reference), np.full(len(motion), -1)
+    keep, written = _written_rows(path, moves)
+    owner = (np.cumsum(keep) - 1)[path.move[written]]
+    rows = np.flatnonzero(_cutting(comparison))
+    own = comparison.owner[rows]
+    here, there = (np.bincount(one, minlength=count) for one in (own, owner))
+    known = (here == there)[own]
+    begin = np.searchsorted(owner, np.arange(count))
+    place = np.arange(len(own)) - np.searchsorted(own, own, side="left")
+    result[rows[known]] = written[(begin[own] + place)[known]]
+    return result
+
+
+def _written_rows(path: JointPath, moves: Moves) -> tuple[Bools, Ints]:
+    """(M,) moves that are no pecks; blocks of the path that cut outside holes."""
+    keep = moves.phase != Phase.PECK
+    rows = np.flatnonzero((path.code != TRAVERSE) & (path.u > 0.0) & ~path.home)
+    return keep, rows[keep[path.move[rows]] & (moves.hole[path.move[rows]] < 0)]
+
+
+def _cutting(comparison: Comparison) -> Bools:
+    """(B,) executed blocks that cut outside holes."""
+    motion, reference = comparison.executed[1], comparison.moves.without_pecks()
+    cutting = (motion.code > 0) & reference.run_by(comparison.owner) & ~motion.hole
+    return np.asarray(cutting & (reference.hole < 0)[np.minimum(comparison.owner, len(reference) - 1)])
 
 
 def check_planned(path: JointPath, moves: Moves, needed: Floats, merge: float, comparison: Comparison,
@@ -48,8 +79,7 @@ def check_planned(path: JointPath, moves: Moves, needed: Floats, merge: float, c
     motion, reference = comparison.executed[1], comparison.moves.without_pecks()
     written, faults = WrittenBlocks.of(path, moves, needed), Faults(job.toolpath.file)
     count = len(reference)
-    cutting = (motion.code > 0) & reference.run_by(comparison.owner) & ~motion.hole
-    cutting &= (reference.hole < 0)[np.minimum(comparison.owner, count - 1)]
+    cutting = _cutting(comparison)
     rows = np.flatnonzero(cutting)
     group, own = _groups(comparison.owner[rows], written.owner, count)
     size = int(max(group.max(initial=0), own.max(initial=0))) + 1

@@ -1,16 +1,17 @@
-"""Words of `--feed planned` executed: under the planner as a control, and on the reference control, next to programmed ones.
+"""Words of `--feed planned` executed on the reference control, in the passes, next to the plan that they carry.
 
-    python tests/benchmarks/bench_planned_words.py
+    python tests/benchmarks/bench_planned_words.py [MODEL]
 
-Ten paths: plan, sums of the words, least time under the words as largest speeds (and under the plan's mean speeds), and
-the model `control` with programmed and planned words.
+Ten paths: the ideal plan, the plan by the control's rules, the words as the control executes them and over that plan, the
+largest shares of velocity, acceleration and jerk (all cycles but 2 %) that its axes use, the same with programmed
+words; then, of the ideal plan on an ideal control, least time under the words as largest speeds, and under mean speeds.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,29 +19,20 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import toolpaths
-from postproc.cycle_time.estimate import timed
-from postproc.cycle_time.model import load_model
-from postproc.cycle_time.source import from_conversion
+from postproc.base.options import FeedSource, Options
+from postproc.cycle_time.conversion import program_clock
+from postproc.pipeline.convert import convert as convert_by_clock
+from postproc.pipeline.feeds_by_clock import ProgramClock
 from postproc.pipeline.result import PostResult
-from tests.postproc.kit import SAMPLES, convert, good
-from tests.postproc.planning.test_word_feeds import JERKY, PATHS, executed, lines_and_corner, waves
-from toolpaths.diagnostics import read_value
+from tests.postproc.kit import SAMPLES, good, machine, tool_setup
+from tests.postproc.planning.test_word_feeds import JERKY, PATHS, executed, lines_and_corner, on_the_control, waves
 
 SAMPLE_PATHS = (("bicubic.cls", "mikron-ucp710"), ("five_tilted.cls", "mikron-ucp710"), ("pocket.cls", "mill-3axis"))
 
 
-def sample(name: str, machine: str) -> Callable[[str], PostResult]:
-    return lambda feed: good(convert(toolpaths.read(SAMPLES / name)[0], machine, JERKY, feed=feed))
-
-
-def of_wave(name: str) -> Callable[[str], PostResult]:
-    return lambda feed: waves(*PATHS[name], feed=feed)
-
-
-def on_the_control(result: PostResult) -> float:
-    """s of the cuts under the model `control`."""
-    blocks, model = from_conversion(result), read_value(load_model("control"))
-    return float(timed(blocks, model.of_machine(result.machine)).seconds[~blocks.rapid].sum())
+def sample(name: str, machine_name: str, feed: FeedSource = "planned", clock: ProgramClock | None = None) -> PostResult:
+    return good(convert_by_clock(toolpaths.read(SAMPLES / name)[0], machine(machine_name), JERKY, tool_setup(),
+                                 Options(feed=feed), clock=clock))
 
 
 def means(result: PostResult) -> PostResult:
@@ -55,19 +47,22 @@ def means(result: PostResult) -> PostResult:
     return replace(result, feeds=replace(result.feeds, seconds=seconds))
 
 
-def main() -> None:
-    paths = {**{name: of_wave(name) for name in PATHS}, "lines and corner": lines_and_corner,
-             **{name: sample(name, machine) for name, machine in SAMPLE_PATHS}}
-    print(f"{'path':18}{'plan s':>9}{'words':>9}{'executed':>10}{'of means':>10}{'worst':>7} | control: programmed, planned")
+def main(model: str) -> None:
+    paths = {**{name: partial(waves, *PATHS[name]) for name in PATHS}, "lines and corner": lines_and_corner,
+             **{name: partial(sample, name, kind) for name, kind in SAMPLE_PATHS}}
+    print(f"{'path':18}{'ideal s':>9}{'plan':>9}{'executed':>10}{'ratio':>8}  v, a, j used {'programmed':>15}"
+          f"{'| ideal words':>15}{'means':>9}")
     for name, make in paths.items():
-        plain, planned = make("programmed"), make("planned")
-        if planned.feeds is None:
-            raise ValueError("no feeds")
-        seconds, worst, plan = executed(planned)
-        print(f"{name:18}{plan:9.3f}{np.nansum(planned.feeds.seconds):9.3f}{seconds:10.3f}"
-              f"{executed(means(planned), strict=False)[0]:10.3f}{worst:7.3f} | {on_the_control(plain):9.3f} "
-              f"{on_the_control(planned):9.3f}", flush=True)
+        made, plain, ideal = make(clock=program_clock(model)), make(feed="programmed"), make()
+        if made.feed_times is None or made.motion is None:
+            raise ValueError("no plan")
+        plan = made.feed_times.plan
+        seconds, used = on_the_control(made, model)
+        before = on_the_control(replace(plain, motion=made.motion), model)[0]
+        print(f"{name:18}{made.feed_times.ideal:9.3f}{plan:9.3f}{seconds:10.3f}{seconds / plan:8.3f}  "
+              f"{used[0]:.2f} {used[1]:.2f} {used[2]:.2f} {before:15.3f}{executed(ideal)[0]:15.3f}"
+              f"{executed(means(ideal), strict=False)[0]:9.3f}", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    main(*(sys.argv[1:] or ["control"]))

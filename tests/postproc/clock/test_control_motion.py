@@ -87,6 +87,17 @@ def test_it_is_not_faster_than_the_planner_on_the_same_path_and_little_slower(se
     assert 0.998 * least <= moved.seconds <= 1.15 * least
 
 
+def test_how_far_points_of_a_curve_stand_apart_changes_little() -> None:
+    """A curve of small curvature through points 0.25 and 2 mm apart, rounded off by 2 um: the same curve to a control."""
+    limits = replace(LIMITS, jerk=np.full(2, 30_000.0))
+
+    def seconds(chord: float) -> float:
+        angle = np.linspace(0.0, 1.5, round(90.0 / chord) + 1)
+        return execute(commanded(60.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1), 0.002, 300.0), limits).seconds
+
+    assert seconds(2.0) == pytest.approx(seconds(0.25), rel=0.04)
+
+
 def test_a_corner_costs_what_logs_of_a_sinumerik_show() -> None:
     """35 ms at F720, 15 ms at F350, passed within 0.01 mm; the machine's jerk is not known: 40 m/s3."""
     settings = replace(LIMITS, acceleration=np.full(2, 5000.0), jerk=np.full(2, 40_000.0), cycle=0.001)

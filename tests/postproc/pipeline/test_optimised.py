@@ -40,7 +40,7 @@ def made(controller: str, **options: Any) -> PostResult:
 def test_nothing_is_slower_and_what_is_gained_adds_up(controller: str) -> None:
     plain, best = made(controller), made(controller, optimise=True)
     assert plain.ok and best.ok and best.optimised is not None, [str(d) for d in best.diagnostics]
-    before, after = (program_clock()(one).seconds for one in (plain, best))
+    before, after = (program_clock().executed(one).seconds for one in (plain, best))
     assert after <= before and best.optimised.after.seconds == after and best.optimised.before.seconds == before
     assert before - after == pytest.approx(sum(one.before - one.after for one in best.optimised.steps), abs=1e-9)
     assert best.optimised.tried > 3 and best.optimised.before.bound <= after

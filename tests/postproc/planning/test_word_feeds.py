@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 import toolpaths
-from postproc.base.options import Options
+from postproc.base.options import FeedSource, Options
 from postproc.controllers.model import load_controller
+from postproc.cycle_time import control
 from postproc.cycle_time.conversion import program_clock
 from postproc.cycle_time.estimate import timed
+from postproc.cycle_time.lookahead import limits
 from postproc.cycle_time.model import load_model
+from postproc.cycle_time.shape import shape
 from postproc.cycle_time.source import from_conversion
 from postproc.feedrate.feed import StepFeed
 from postproc.feedrate.plan import PlannerOptions, plan
 from postproc.path.added_points import cut_at
 from postproc.pipeline.convert import convert as convert_by_clock
+from postproc.pipeline.feeds_by_clock import ProgramClock
 from postproc.pipeline.result import PostResult
 from postproc.planning.word_feeds import LEAST, SPREAD
 from tests.postproc.kit import SAMPLES, convert, good, machine, toolpath
 from tests.postproc.planning.test_planned_feed import wave
 
+REFERENCE = "control"
 JERKY = "fanuc-30i"
 """a control that limits jerk"""
 PATHS = {"wave, fast": ("mikron-ucp710", 160, 9000), "wave, slow": ("mikron-ucp710", 160, 1500),
@@ -30,16 +36,35 @@ PATHS = {"wave, fast": ("mikron-ucp710", 160, 9000), "wave, slow": ("mikron-ucp7
          "nutating head": ("nutating-head", 100, 3000), "trunnion": ("trunnion-bc", 100, 5000)}
 
 
-def waves(name: str, count: int, rate: int, feed: str = "planned", controller: str = JERKY) -> PostResult:
+def waves(name: str, count: int, rate: int, feed: FeedSource = "planned", controller: str = JERKY,
+          clock: ProgramClock | None = None) -> PostResult:
+    """Without a clock the words carry the ideal plan."""
     lines = wave(count)
-    setup = str(SAMPLES / "tools.setup.toml")
-    return good(convert(toolpath("RAPID", lines[0], f"FEDRAT/MMPM,{rate}", *lines[1:]), name, controller, feed=feed,
-                        setup=setup))
+    return good(convert_by_clock(toolpath("RAPID", lines[0], f"FEDRAT/MMPM,{rate}", *lines[1:]), machine(name), controller,
+                                 str(SAMPLES / "tools.setup.toml"), Options(feed=feed), clock=clock))
 
 
-def lines_and_corner(feed: str = "planned") -> PostResult:
-    return good(convert(toolpath("RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,6000", "GOTO/80,0,50", "GOTO/80,60,50",
-                                 "GOTO/20,60,40"), "mill-3axis", JERKY, feed=feed))
+def lines_and_corner(feed: FeedSource = "planned", clock: ProgramClock | None = None) -> PostResult:
+    return good(convert_by_clock(toolpath("RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,6000", "GOTO/80,0,50", "GOTO/80,60,50",
+                                          "GOTO/20,60,40"), machine("mill-3axis"), JERKY, options=Options(feed=feed),
+                                 clock=clock))
+
+
+def on_the_control(result: PostResult, name: str = REFERENCE) -> tuple[float, list[float]]:
+    """(s of the passes as the reference control runs the written words, largest share of velocity, acceleration and jerk
+    that the axes use, jerk but for 2 % of the cycles)."""
+    assert result.motion is not None and result.moves is not None
+    model, _ = load_model(name)
+    assert model is not None
+    model, blocks = model.of_machine(result.machine), from_conversion(result)
+    form = shape(blocks)
+    moved, _ = control.motion(blocks, model, form, control.rests(blocks, form), limits(blocks, form, model)[0])
+    found, used = moved.axes(), moved.settings
+    jerk = np.abs(found.qddd / used.jerk).max(axis=1)
+    shares = [float(np.abs(found.qd / used.velocity).max()), float(np.abs(found.qdd / used.acceleration).max()),
+              float(np.quantile(jerk, 0.98))]
+    own = np.isin(blocks.move, np.concatenate([one.move for one in result.motion.passes])) & ~blocks.rapid
+    return float(timed(blocks, model).seconds[own].sum()), shares
 
 
 def executed(result: PostResult, strict: bool = True) -> tuple[float, float, float]:
@@ -57,6 +82,37 @@ def executed(result: PostResult, strict: bool = True) -> tuple[float, float, flo
             seconds, worst = seconds + run.seconds, max(worst, run.usage().worst)
         planned += made.seconds
     return seconds, worst, planned
+
+
+@cache
+def carried(name: str) -> PostResult:
+    """Words that carry the plan of the reference control."""
+    clock = program_clock(REFERENCE)
+    return waves(*PATHS[name], clock=clock) if name in PATHS else lines_and_corner(clock=clock)
+
+
+@pytest.mark.parametrize("name", ["trunnion", "lines and corner"])
+def test_the_reference_control_runs_the_words_in_the_time_of_its_plan(name: str) -> None:
+    """Within 3 %, its limits kept; on ten paths in `bench_planned_words.py`. The ideal plan is up to a third faster."""
+    result = carried(name)
+    times = result.feed_times
+    assert times is not None and result.control_plan is not None and times.plan > times.ideal
+    seconds, used = on_the_control(result)
+    assert seconds == pytest.approx(times.plan, rel=0.03)
+    assert max(used) <= 1.05, used
+    assert times.planned.seconds <= 1.005 * times.programmed.seconds
+
+
+def test_words_of_neighbours_differ_by_what_the_control_can_change_between_them() -> None:
+    """Both are speeds of one motion, at most 5 % above it: they differ by no more than the axes can accelerate in both."""
+    result = carried("trunnion")
+    assert result.motion is not None and result.feeds is not None and result.path is not None
+    block, seconds = result.motion.passes[0].block, result.feeds.seconds
+    step = np.diff(result.path.q, axis=0, prepend=result.path.q[:1])[block]
+    speed = step / seconds[block, None]
+    allowed = result.machine.limits
+    most = allowed.acceleration * (seconds[block][1:] + seconds[block][:-1])[:, None] + 0.1 * np.abs(speed[1:])
+    assert (np.abs(np.diff(speed, axis=0)) <= 1.1 * most + 0.02 * allowed.velocity).all()
 
 
 @pytest.mark.covering(count=3)
@@ -88,7 +144,7 @@ def test_words_are_near_the_plans_means_and_never_above_its_speeds() -> None:
     moving = speeds.lowest > 0.8 * speeds.highest
     assert (word[moving] <= (1.0 + 3.0 * SPREAD) * speeds.mean[moving]).all() and moving.sum() > 120
     assert (speeds.seconds[moving] > 0.1 * LEAST).all()
-    assert np.nansum(result.feeds.seconds[one.block]) > 0.9 * made.seconds
+    assert np.nansum(result.feeds.seconds[one.block]) > 0.85 * made.seconds
 
 
 def test_points_are_added_where_a_block_spans_its_ramps() -> None:
@@ -126,7 +182,7 @@ def test_both_times_are_reported_and_planned_is_not_slower(controller: str) -> N
     assert spec is not None
     if spec.feed.limited_jerk:
         assert times.planned.seconds <= 1.03 * times.programmed.seconds and not times.kept
-        assert times.words > 0.9 * times.plan > times.words_programmed
+        assert times.plan > times.words > times.words_programmed
     else:
         written = program_clock()(made).seconds
         assert written <= times.programmed.seconds
