@@ -14,7 +14,7 @@ import numpy as np
 from postproc.readback.text.canonical import INCREMENTAL, LAW, OFFSET, REGISTER, Canonical
 from postproc.readback.text.modal import CYCLES, GROUPS, codes, fill
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Ints, among
+from toolpaths.arrays import Ints, among, distinct
 from toolpaths.diagnostics import Diagnostic, error
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def check_stated(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]
     result = []
     for what, relying, stating in _needs(code, reader):
         first = int(stating.min(initial=code.words.lines + 1))
-        bad = np.unique(relying[relying < first])
+        bad = distinct(relying[relying < first])
         if len(bad):
             words = reader.stating[what]
             result.append(error("gcode.unstated", f"nothing states {words} before this block, which depends on it: the "
@@ -70,7 +70,7 @@ def _known(reader: Reader) -> set[str]:
 def _moves(words: Words, axes: tuple[str, ...]) -> Ints:
     """Blocks with words of axes, absolute or relative."""
     letters = [ord(a) + d for a in axes for d in (0, INCREMENTAL)]
-    return np.unique(words.line[among(words.letter, letters)])
+    return distinct(words.line[among(words.letter, letters)])
 
 
 def _undone(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]:
