@@ -212,15 +212,15 @@ def _to_part_frame(b: ToolpathBuilder, rows: PointRows, normal: Floats | None,
         found = b.maps[rows.index[start]]
         if found is None:
             continue
-        rotation, origin = found
+        turn, origin = np.ascontiguousarray(found[0].T), found[1]
         where = slice(start, end)
         local = where if rows.common is None else np.flatnonzero(~rows.common[where]) + start
-        rows.tip[local] = rows.tip[local] @ rotation.T + origin
-        rows.axis[local] = unit(rows.axis[local] @ rotation.T)
+        rows.tip[local] = rows.tip[local] @ turn + origin
+        rows.axis[local] = unit(rows.axis[local] @ turn)
         if normal is not None:
-            normal[local] = unit(normal[local] @ rotation.T)
+            normal[local] = unit(normal[local] @ turn)
         if contact is not None:
-            contact[local] = contact[local] @ rotation.T + origin
+            contact[local] = contact[local] @ turn + origin
 
 
 def _runs(index: Ints) -> list[tuple[int, int]]:
