@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import os
+
 from postproc.cli.shared.guard import guarded
+
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+"""products of many small matrices take fifty times as long where numpy's library hands them out to threads that wait; and
+the bits of larger ones do not depend on how many processors there are"""
 
 
 def command() -> None:
     """The command line."""
+    for name, value in ONE_THREAD.items():
+        os.environ.setdefault(name, value)
     from postproc.cli.app import app
 
     app()
