@@ -28,6 +28,7 @@ gauge_length = 118.4
 HEAD = ("$$ blade of {count} points\nTOOL PATH/{name},TOOL,BALL8\nTLDATA/MILL,8.0000,4.0000,75.0000,0.0000,0.0000\n"
         "MSYS/0.0000,0.0000,0.0000,1.0000000,0.0000000,0.0000000,0.0000000,1.0000000,0.0000000\n"
         "LOAD/TOOL,1\nSPINDL/RPM,9000,CLW\nCOOLNT/ON\n")
+ROW = "GOTO/{:.4f},{:.4f},{:.4f},{:.7f},{:.7f},{:.7f}"
 TAIL = "END-OF-PATH\n"
 CHORD, THICKNESS, TWIST, HEIGHT, CLEAR = 42.0, 9.0, np.radians(28.0), 70.0, 95.0
 """half lengths of a section, mm; twist from root to tip; height; where links go across"""
@@ -59,7 +60,7 @@ def one_pass(count: int, height: float, forth: bool, rng: np.random.Generator) -
     up = out + axis[[0, -1]] * ((CLEAR - out[:, 2]) / axis[[0, -1], 2])[:, None]
     rows = np.vstack((np.hstack((up[:1], axis[:1])), np.hstack((out[:1], axis[:1])), np.hstack((tip, axis)),
                       np.hstack((out[1:], axis[-1:])), np.hstack((up[1:], axis[-1:]))))
-    spelt = [row % tuple(values) for row, values in zip(["GOTO/%.4f,%.4f,%.4f,%.7f,%.7f,%.7f"] * len(rows), rows, strict=True)]
+    spelt = [ROW.format(*values) for values in rows.tolist()]
     feed = rng.choice((1200.0, 1500.0, 1850.0))
     cut = "\n".join(spelt[3:-2])
     return (f"RAPID\n{spelt[0]}\nRAPID\n{spelt[1]}\nFEDRAT/MMPM,{feed / 2:.4f}\n{spelt[2]}\nFEDRAT/MMPM,{feed:.4f}\n{cut}\n"

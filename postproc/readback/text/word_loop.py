@@ -52,7 +52,7 @@ def plain_words(text: Array, powers: Floats) -> tuple[Array, Floats, Ints, Bools
             if text[at] == 46:
                 places = 0
             else:
-                whole = whole * 10 + (text[at] - 48)
+                whole = whole * 10 + (int(text[at]) - 48)
                 digits += 1
                 places += 1 if places >= 0 else 0
             at += 1

@@ -85,7 +85,7 @@ def goto_numbers(c: Bytes, at: int, numbers: Floats, found: int, powers: Floats,
             if c[at] == 46:
                 places = 0
             else:
-                whole = whole * 10 + (c[at] - 48)
+                whole = whole * 10 + (int(c[at]) - 48)
                 digits += 1
                 places += 1 if places >= 0 else 0
             at += 1
