@@ -28,7 +28,7 @@ _HALVINGS, _FOLLOWED = 24, 1e-6
 """of a curve, on the path to its end in a singular direction; rad to which the joints are then known"""
 _UNKNOWN = -2
 _TOGETHER = 20_000
-"""curves that are looked at together: what is known of them on the way stays small"""
+"""curves that are looked at together: what is known of them meanwhile stays small"""
 _NARROW = 1.05
 """a longest step that is known within this factor is known"""
 
@@ -63,8 +63,8 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
         parts.append(found if not first else replace(found, curve=found.curve + first, broken=found.broken + first))
     if len(parts) == 1:
         return parts[0]
-    return CurvePieces(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("curve", "u", "q", "broken")),
-                       max(part.worst_tip for part in parts), max(part.worst_axis for part in parts))
+    curve, u, q, broken = (np.concatenate([getattr(p, name) for p in parts]) for name in ("curve", "u", "q", "broken"))
+    return CurvePieces(curve, u, q, broken, max(p.worst_tip for p in parts), max(p.worst_axis for p in parts))
 
 
 def _linearised(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats, keep: Bools,

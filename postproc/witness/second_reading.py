@@ -83,8 +83,7 @@ def _nothing(why: str, began: float, missing: Sequence[NotCompared] = ()) -> Tes
 def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Array, Array], poses: Poses,
              table: dict[str, object]) -> tuple[list[Finding], tuple[float, float], dict[Aspect, int], list[NotCompared]]:
     rotation, origin = place
-    turn = np.ascontiguousarray(rotation.T)
-    same = bool((rotation == np.eye(3)).all())
+    turn, same = np.ascontiguousarray(rotation.T), bool((rotation == np.eye(3)).all())
     tip = c.tip if same and not origin.any() else c.tip @ turn + origin
     axis = c.axis if same else c.axis @ turn
     centre, normal = c.centre @ turn + origin, c.normal @ turn

@@ -27,7 +27,7 @@ def pays(blocks: int, some: int) -> bool:
 
 @dataclass(frozen=True)
 @arrays(value="N", write="N")
-class Column:
+class WordColumn:
     """One word of blocks N: `prefix` and the value with so many decimals, where `write` (N,) says that it stands."""
 
     prefix: str
@@ -36,7 +36,7 @@ class Column:
     places: int
 
 
-class Pieces:
+class TextPieces:
     """Texts of blocks N before, between and behind their words, each kept once; '' where none is put."""
 
     def __init__(self, blocks: int) -> None:
@@ -63,7 +63,7 @@ class NumberStyle:
     decimal_point: bool
 
 
-def block_text(columns: Sequence[Column], pieces: Pieces, style: NumberStyle) -> str | None:
+def block_text(columns: Sequence[WordColumn], pieces: TextPieces, style: NumberStyle) -> str | None:
     """Lines of blocks N, each with a line feed behind it but the last; a blank that begins one is left out.
 
     None where a number lies so near the middle between two of its decimals that the loop's arithmetic could round it to

@@ -10,7 +10,7 @@ import numpy as np
 from postproc.compile.program import INVERSE, PER_MINUTE, Hole
 from postproc.control.word_arcs import PLANE_AXIS
 from postproc.controllers.cycles import CannedCycle
-from postproc.writing.block_text import Column, Pieces, block_text, certain, pays
+from postproc.writing.block_text import TextPieces, WordColumn, block_text, certain, pays
 from postproc.writing.writer import CHUNK, Writer
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.toolpath import Cycle
@@ -42,7 +42,7 @@ class IsoWriter(Writer):
         feed = None if columns is None else self.feed_column(first, last)
         if columns is None or feed is None:
             return None
-        pieces = Pieces(last - first)
+        pieces = TextPieces(last - first)
         pieces.put_all(0, heads)
         pieces.put_all(1, self.arc_words(first, last))
         text = block_text([*columns, feed], pieces, self.number_style)
@@ -168,7 +168,7 @@ class IsoWriter(Writer):
         rows = stated[stated.searchsorted(begin):stated.searchsorted(end)]
         return np.append(begin, rows) if end > begin and (not len(rows) or rows[0] != begin) else rows
 
-    def feed_column(self, first: int, last: int) -> Column | None:
+    def feed_column(self, first: int, last: int) -> WordColumn | None:
         """Feed words as numbers; None where some have other decimals, or are not certain to round as their texts do."""
         cutting, _, needed = self.fed
         rows, places = self.stated_feeds(first, last), self.controller.format.feed_decimals
@@ -181,7 +181,7 @@ class IsoWriter(Writer):
             same = np.append(self.feed_text(values.item(0)) == self.feed, rounded[1:] == rounded[:-1])
             write[cutting[rows] - first], value[cutting[rows] - first] = needed[rows] | ~same, values
             self.feed = self.feed_text(values.item(-1))
-        return Column(f"{self.space}F", value, write, places)
+        return WordColumn(f"{self.space}F", value, write, places)
 
     @cached_property
     def fed(self) -> tuple[Ints, Ints, Bools]:

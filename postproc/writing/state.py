@@ -20,7 +20,7 @@ from postproc.controllers.texts import CYCLE_LENGTHS, blocks_of
 from postproc.job.smoothing import Smoothing
 from postproc.path.model import ARC
 from postproc.reference.coolant import CoolantCommand, switching
-from postproc.writing.block_text import Column, NumberStyle
+from postproc.writing.block_text import NumberStyle, WordColumn
 from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Cycle
 
@@ -172,9 +172,9 @@ class WriterState:
             return self.plain(length)
         return self.plain(math.floor(length / self.controller.unit * SHARE + 1e-6) / SHARE)
 
-    def columns(self, at: int, stop: int) -> list[Column] | None:
-        """The axis words of blocks at..stop as numbers; None where some are said in another way."""
-        p, rows, found = self.program, np.arange(at, stop), list[Column]()
+    def columns(self, at: int, stop: int) -> list[WordColumn] | None:
+        """The axis words of blocks at..stop as numbers; None where some are said otherwise."""
+        p, rows, found = self.program, np.arange(at, stop), list[WordColumn]()
         for j, letter in enumerate(p.letters):
             values = self.stated(j, rows)
             if j in p.rolls:
@@ -182,7 +182,7 @@ class WriterState:
                 if roll.rule == "sign" or roll.stated:
                     return None
                 values = roll.words(values, p.before(j)[rows])[0]
-            found.append(Column(self.space + letter, values, p.write[at:stop, j], int(p.decimals[j])))
+            found.append(WordColumn(self.space + letter, values, p.write[at:stop, j], int(p.decimals[j])))
         return found
 
     @property

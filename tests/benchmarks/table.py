@@ -2,9 +2,9 @@
 
     python tests/benchmarks/table.py [POINTS ...] [--machine NAME] [--repeats K] [--page FILE.md]
 
-The files are those of `blade_passes.py`, another seed for each size. Every figure comes from processes of their own, the least
-of K runs in processor time, the interpreter (rs274 on LinuxCNC's output) timed between them. With two sizes the exponents of
-time and memory between them are printed, too.
+The files are those of `blade_passes.py`, another seed for each size. Every figure comes from processes of their own, the
+least of K runs, the interpreter (rs274 on LinuxCNC's output) timed between them. With several sizes the exponents of time
+and memory between them are printed, too.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -94,19 +95,18 @@ def _keep(found: dict[str, Cost], what: str, new: Cost) -> None:
 def table(sizes: list[int], all_found: list[dict[str, Cost]], machine: str) -> list[str]:
     """Lines of a page."""
     lines = ["# Time and memory of long files", "",
-             f"`python tests/benchmarks/table.py {' '.join(map(str, sizes))}`: {machine}, five axes, part off the rotary axes, "
-             f"{os.cpu_count()} processors. Ratios: processor time and wall time of the command over those of LinuxCNC's "
+             f"`python tests/benchmarks/table.py {' '.join(map(str, sizes))}`: {machine}, five axes, part off the rotary "
+             f"axes, {os.cpu_count()} processors. Ratios: processor and wall time of the command over those of LinuxCNC's "
              "`rs274` reading the program, in the same run."]
     for points, found in zip(sizes, all_found, strict=True):
         base = found.get("rs274")
         lines += ["", f"## {points:,} points", "", "| command | processor, s | x rs274 | wall, s | x rs274 | peak, MB |",
                   "|---|---|---|---|---|---|"]
         for what, one in found.items():
-            ratios = [f"{a / b:.2f}" if base else "" for a, b in ((one.used, base.used), (one.wall, base.wall))] if base else ["", ""]
-            lines.append(f"| {what}{'' if one.ok else ' (refused)'} | {one.used:.2f} | {ratios[0]} | {one.wall:.2f} | {ratios[1]} | "
-                         f"{one.peak:.0f} |")
-    for (few, first), (many, last) in zip(zip(sizes, all_found, strict=True), list(zip(sizes, all_found, strict=True))[1:],
-                                          strict=False):
+            used, wall = (f"{one.used / base.used:.2f}", f"{one.wall / base.wall:.2f}") if base else ("", "")
+            lines.append(f"| {what}{'' if one.ok else ' (refused)'} | {one.used:.2f} | {used} | {one.wall:.2f} | {wall} "
+                         f"| {one.peak:.0f} |")
+    for (few, first), (many, last) in pairwise(zip(sizes, all_found, strict=True)):
         lines += ["", f"## Exponents from {few:,} to {many:,} points", "", "| command | time | memory |", "|---|---|---|"]
         grown = math.log(many / few)
         lines += [f"| {what} | {math.log(last[what].used / one.used) / grown:.2f} | "

@@ -314,10 +314,10 @@ def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, 
             d = np.where(level[part], off_level(curve, tip), d)
             tip_off[part] = np.fmax(tip_off[part], without_nan(d, np.inf))
             axis_off[part] = np.fmax(axis_off[part], without_nan(e, np.inf))
-        for k, places in executed.looks(motion, here):
-            tip, axis = executed.poses(motion, here[k], places)
+        for k, shares in executed.looks(motion, here):
+            tip, axis = executed.poses(motion, here[k], shares)
             some = moves.curves(owner[here[k]])
-            d, e, _ = some.deviation(tip, axis, np.minimum(begin[part][k] + places * share[part][k], 1.0), within)
+            d, e, _ = some.deviation(tip, axis, np.minimum(begin[part][k] + shares * share[part][k], 1.0), within)
             d = np.where(level[part][k], off_level(some, tip), d)
             np.fmax.at(tip_off, at + k, np.nan_to_num(d, nan=np.inf))
             np.fmax.at(axis_off, at + k, np.nan_to_num(e, nan=np.inf))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from postproc.writing import block_text, iso
-from postproc.writing.block_text import Column, NumberStyle, Pieces, certain
+from postproc.writing.block_text import NumberStyle, TextPieces, WordColumn, certain
 from tests.postproc.kit import circle, convert, toolpath
 
 STYLES = [NumberStyle(plus, trim, point) for plus in (False, True) for trim in (False, True) for point in (False, True)]
@@ -32,25 +32,25 @@ def by_python(value: float, places: int, style: NumberStyle) -> str:
 @pytest.mark.parametrize("places", [0, 3, 4])
 def test_numbers_are_those_of_the_formatting_of_python(places: int, style: NumberStyle) -> None:
     values = VALUES[np.abs(np.abs(VALUES) * 10.0**places % 1.0 - 0.5) > 1e-6]
-    column = Column(" X", values, np.ones(len(values), dtype=bool), places)
-    found = block_text.block_text([column], Pieces(len(values)), style)
+    column = WordColumn(" X", values, np.ones(len(values), dtype=bool), places)
+    found = block_text.block_text([column], TextPieces(len(values)), style)
     assert found == "\n".join(f"X{by_python(v, places, style)}" for v in values.tolist())
 
 
 @pytest.mark.parametrize("value", [0.0005, 2.5e-4 + 1e-16, 1e14, np.nan, np.inf])
 def test_what_is_not_certain_is_left(value: float) -> None:
-    column = Column("X", np.array([1.0, value]), np.ones(2, dtype=bool), 3)
-    assert block_text.block_text([column], Pieces(2), STYLES[2]) is None or value == 2.5e-4 + 1e-16
+    column = WordColumn("X", np.array([1.0, value]), np.ones(2, dtype=bool), 3)
+    assert block_text.block_text([column], TextPieces(2), STYLES[2]) is None or value == 2.5e-4 + 1e-16
     assert certain(np.array([0.0005, 1.0]), 3) is None and certain(np.array([-2.0006, 1.0]), 3) is not None
 
 
 def test_texts_stand_before_between_and_behind_the_words() -> None:
-    pieces = Pieces(2)
+    pieces = TextPieces(2)
     pieces.put(0, [0], [" G1"])
     pieces.put(1, [1], [" I5"])
     pieces.put(2, [1], [" M9"])
     write = np.array([True, False])
-    columns = [Column(" X", np.array([1.0, 2.0]), ~write, 3), Column(" F", np.array([5.0, 6.0]), write, 0)]
+    columns = [WordColumn(" X", np.array([1.0, 2.0]), ~write, 3), WordColumn(" F", np.array([5.0, 6.0]), write, 0)]
     assert block_text.block_text(columns, pieces, STYLES[2]) == "G1 F5\nX2 I5 M9"
 
 

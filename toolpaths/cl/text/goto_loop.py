@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.compiled import compiled, loop, wanted
 
 Bytes = npt.NDArray[np.uint8]
@@ -16,7 +16,7 @@ _MOST_DIGITS, _MOST_BLANKS = 15, 16
 to the text (IEEE 754); blanks between words of a line"""
 
 
-def lines_at_once(c: Bytes, largest: float) -> tuple[Ints, Ints, Bools, Ints, Floats] | None:
+def lines_at_once(c: Bytes, largest: float) -> tuple[Ints, Ints, Bools, Array, Floats] | None:
     """(where lines begin behind their blanks, where they end, which are plain, how many numbers each of those has, the
     numbers of all); None where a line that begins with GOTO is not plain, or a number needs more care than digits with a
     point, or the text is short."""
@@ -28,7 +28,7 @@ def lines_at_once(c: Bytes, largest: float) -> tuple[Ints, Ints, Bools, Ints, Fl
 
 
 @loop(takes=(("uint8", 1), ("float64", 1), ("float64", 0)))
-def goto_lines(c: Bytes, powers: Floats, largest: float) -> tuple[Ints, Ints, Bools, Ints, Floats, int]:
+def goto_lines(c: Bytes, powers: Floats, largest: float) -> tuple[Ints, Ints, Bools, Array, Floats, int]:
     """As `lines_at_once`, with 1 behind where there is none; `powers` (23,) of ten."""
     rows, commas = 0, 0
     for code in c:
@@ -61,7 +61,7 @@ def goto_lines(c: Bytes, powers: Floats, largest: float) -> tuple[Ints, Ints, Bo
 @loop
 def is_goto(c: Bytes, at: int) -> bool:
     """Whether GOTO stands there in either case; the last character of a text is a line feed."""
-    return ((c[at] & 0xDF) == 71 and (c[at + 1] & 0xDF) == 79 and (c[at + 2] & 0xDF) == 84 and (c[at + 3] & 0xDF) == 79)
+    return bool((c[at] & 0xDF) == 71 and (c[at + 1] & 0xDF) == 79 and (c[at + 2] & 0xDF) == 84 and (c[at + 3] & 0xDF) == 79)
 
 
 @loop
