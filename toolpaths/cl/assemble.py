@@ -212,15 +212,15 @@ def _to_part_frame(b: ToolpathBuilder, rows: PointRows, normal: Floats | None,
         found = b.maps[rows.index[start]]
         if found is None:
             continue
-        turn, origin = np.ascontiguousarray(found[0].T), found[1]
+        rotation, origin = np.asfortranarray(found[0]), found[1]
         where = slice(start, end)
         local = where if rows.common is None else np.flatnonzero(~rows.common[where]) + start
-        rows.tip[local] = rows.tip[local] @ turn + origin
-        rows.axis[local] = unit(rows.axis[local] @ turn)
+        rows.tip[local] = rows.tip[local] @ rotation.T + origin
+        rows.axis[local] = unit(rows.axis[local] @ rotation.T)
         if normal is not None:
-            normal[local] = unit(normal[local] @ turn)
+            normal[local] = unit(normal[local] @ rotation.T)
         if contact is not None:
-            contact[local] = contact[local] @ turn + origin
+            contact[local] = contact[local] @ rotation.T + origin
 
 
 def _runs(index: Ints) -> list[tuple[int, int]]:
