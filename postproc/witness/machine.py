@@ -98,13 +98,8 @@ def rotations(along: Array, angle: Array) -> Array:
 
 def turned(along: Array, angle: Array, v: Array) -> Array:
     """Vectors (N, 3) or (1, 3) turned about a unit vector by angles (N,): `rotations` without their matrices."""
-    x, y, z = along
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if len(angle) and (angle == angle[0]).all():
-        angle = angle[:1]
-    first = v @ np.ascontiguousarray(cross.T)
-    second = first @ np.ascontiguousarray(cross.T)
-    return np.asarray(v + np.sin(angle)[:, None] * first + (1.0 - np.cos(angle))[:, None] * second)
+    angle, first = angle[:1] if len(angle) and (angle == angle[0]).all() else angle, np.cross(along, v)
+    return np.asarray(v + np.sin(angle)[:, None] * first + (1.0 - np.cos(angle))[:, None] * np.cross(along, first))
 
 
 def apply(turns: Array, v: Array) -> Array:

@@ -17,9 +17,7 @@ JOIN = b"\x01"
 _NUMBER = rb"[ \t\x01]*[-+]?(?:\d+\.?\d*|\.\d+)(?:[Ee][-+]?\d+)?[ \t\x01]*"
 _THREE = _NUMBER + rb"," + _NUMBER + rb"," + _NUMBER
 _PLAIN = rb"[ \t]*GOTO[ \t]*/" + _THREE + rb"(?:," + _THREE + rb")?"
-_DIGITS = rb"-?\d++\.\d++"
-_USUAL = rb"GOTO/" + rb",".join([_DIGITS] * 3) + rb"(?:," + rb",".join([_DIGITS] * 3) + rb")?$"
-"""a plain line as most files have it, which is seen at once"""
+_USUAL = rb"GOTO/-?\d++\.\d++(?:,-?\d++\.\d++){2}(?:(?:,-?\d++\.\d++){3})?$"  # as most files have it: soon seen
 _OTHER = re.compile(rb"^(?!" + _USUAL + rb")(?!" + _PLAIN + rb"$)[^\n]*", re.MULTILINE)
 _COMMENT = re.compile(rb"\$\$[^\n]*")
 _GOES_ON = re.compile(rb"(?<!\$)\$(?!\$)([^\n]*)\n(?:[ \t]*\n)*")
