@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 
 from postproc.cli.shared.guard import guarded
@@ -10,11 +11,16 @@ from postproc.cli.shared.guard import guarded
 COLLECTED_FROM = 50_000
 """objects made since the last look for garbage at which there is one; Python's 700 takes 40 ms of a small conversion, where
 nearly all that is made is imported and stays"""
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}
+"""products of many small matrices take fifty times as long where numpy's library hands them out to threads that wait; and
+the bits of larger ones do not depend on how many processors there are"""
 
 
 def command() -> None:
     """The command line."""
     gc.set_threshold(COLLECTED_FROM, *gc.get_threshold()[1:])
+    for name, value in ONE_THREAD.items():
+        os.environ.setdefault(name, value)
     from postproc.cli.app import app
     from postproc.cli.shared.group import only_called
 

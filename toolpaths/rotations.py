@@ -41,7 +41,7 @@ def lengths(v: Floats) -> Floats:
 
 def unit(v: Floats, nowhere: float = np.nan) -> Floats:
     """Unit vectors (..., 3) along v; `nowhere` in all three columns where v is 0."""
-    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    length = lengths(v)[..., None]
     return np.asarray(np.divide(v, length, out=np.full_like(v, nowhere, dtype=np.float64), where=length > 0.0))
 
 

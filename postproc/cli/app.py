@@ -178,7 +178,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         noted, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
         time = estimate_of(result, model)  # all before a file is written
-        values, text = summary.as_dict(result, str(output), time), summary.as_text(result, str(output), time)
+        values = summary.as_dict(result, str(output), time)
+        text = summary.as_text(result, str(output), time, values)
         more = [] if result.ok else _offers(result, path, machine, controller)
         outputs |= pages(page, path, result, known, output.name, time)
         if result.ok:

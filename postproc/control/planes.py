@@ -50,7 +50,7 @@ class Plane:
 
     def to_table(self, xyz: Floats) -> Floats:
         """Points (N, 3) of the plane in the table frame."""
-        result: Floats = xyz @ self.rotation.T + self.origin
+        result: Floats = xyz @ np.ascontiguousarray(self.rotation.T) + self.origin
         return result
 
 

@@ -6,7 +6,7 @@ the next: where a shorter block is never worse than a longer one, no division th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,8 @@ _TURN = 2.0 * np.pi
 _HALVINGS, _FOLLOWED = 24, 1e-6
 """of a curve, on the path to its end in a singular direction; rad to which the joints are then known"""
 _UNKNOWN = -2
+_TOGETHER = 20_000
+"""curves that are looked at together: what is known of them meanwhile stays small"""
 _NARROW = 1.05
 """a longest step that is known within this factor is known"""
 
@@ -54,6 +56,20 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
 
     `keep` (N,) marks curves whose block follows them by itself (kept arcs).
     """
+    parts = []
+    for first in range(0, max(len(curves), 1), _TOGETHER):
+        part = slice(first, first + _TOGETHER)
+        found = _linearised(control, kin, curves.take(part), q0[part], q1[part], keep[part], tolerance, axis_tolerance)
+        parts.append(found if not first else replace(found, curve=found.curve + first, broken=found.broken + first))
+    if len(parts) == 1:
+        return parts[0]
+    curve, u, q, broken = (np.concatenate([getattr(p, name) for p in parts]) for name in ("curve", "u", "q", "broken"))
+    return CurvePieces(curve, u, q, broken, max(p.worst_tip for p in parts), max(p.worst_axis for p in parts))
+
+
+def _linearised(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats, keep: Bools,
+                tolerance: float, axis_tolerance: float) -> CurvePieces:
+    """The same of curves that are looked at together."""
     exact = keep | _straight_already(control, kin, curves, q0, q1)
     if exact.all():
         return CurvePieces(np.arange(len(exact)), np.ones(len(exact)), q1,

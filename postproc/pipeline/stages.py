@@ -10,6 +10,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from postproc.base.progress import Progress
 from postproc.compile.compile import compile_program, writing_of
 from postproc.compile.cycle_refusals import only_canned
@@ -249,14 +251,22 @@ def long_blocks(text: str, most: int, file: str) -> DiagnosticList:
     long, at, before = list[tuple[int, str]](), 0, 0
     while at < len(text):
         stop = text.find("\n", min(at + _STRETCH, len(text) - 1)) + 1 or len(text)
-        lines = text[at:stop].splitlines()
-        long += [(before + n, line) for n, line in enumerate(lines, 1) if len(line) > most]
-        at, before = stop, before + len(lines)
+        some = text[at:stop]
+        if has_longer(some, most):
+            long += [(before + n, line) for n, line in enumerate(some.splitlines(), 1) if len(line) > most]
+        at, before = stop, before + some.count("\n")
     if not long:
         return []
     number, line = long[0]
     return [error("write.line_length", f"block {number} of the program has {len(line)} characters, the controller reads "
                   f"{most}: {line[:60]}", file=file, count=len(long), hint="format.line_length of the controller file")]
+
+
+def has_longer(text: str, most: int) -> bool:
+    """Whether a line of a text has more than `most` characters."""
+    data = text.encode() + b"\n"
+    ends = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
+    return bool((np.diff(ends, prepend=-1) > most + 1).any())
 
 
 def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedStage, DiagnosticList]:

@@ -16,7 +16,7 @@ from postproc.report.places import place_lines, places
 from postproc.report.unwinding import unwinding, unwinding_lines
 from postproc.verification.proof_text import statement
 from postproc.witness.evidence import Testimony
-from toolpaths.arrays import finite
+from toolpaths.arrays import distinct, finite
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
 from toolpaths.toolpath import Toolpath
@@ -160,11 +160,11 @@ def output_modes(result: PostResult) -> dict[str, list[str]]:
     p, toolpath = result.program, result.toolpath
     if p is None:
         return {}
-    section = np.searchsorted([s.first for s in p.sections], np.arange(len(p)), side="right") - 1
     cut = np.flatnonzero((p.code > 0) & ~p.link)
-    pairs = np.unique(np.stack([toolpath.operation[p.row[cut]], section[cut]], axis=1), axis=0)
+    section = np.searchsorted([s.first for s in p.sections], cut, side="right") - 1
+    keys = distinct(toolpath.operation[p.row[cut]].astype(np.int64) * len(p.sections) + section)
     found: dict[str, list[str]] = {}
-    for operation, k in pairs.tolist():
+    for operation, k in zip(*(part.tolist() for part in divmod(keys, len(p.sections))), strict=True):
         name = toolpath.operations[operation].name or f"OPERATION {operation + 1}"
         laws = found.setdefault(name, [])
         if p.sections[k].law not in laws:
@@ -221,11 +221,12 @@ def points_added(result: PostResult) -> int:
     return int((np.isfinite(result.path.u) & (result.path.u < 1.0)).sum())
 
 
-def as_text(result: PostResult, output: str, estimate: Estimate | None = None) -> str:
-    """The summary on standard output; arguments as of `as_dict`."""
+def as_text(result: PostResult, output: str, estimate: Estimate | None = None,
+            figures: dict[str, Any] | None = None) -> str:
+    """The summary on standard output; arguments as of `as_dict`, whose figures are taken where they are known."""
     if not result.ok:
         return f"nothing written; {output} is left as it was" if there_is(output) else "nothing written"
-    d = as_dict(result, output, estimate)
+    d = figures or as_dict(result, output, estimate)
     shares = d["tolerance_shares"]
     splines = f", arcs and chords for splines {shares['splines']:.4f}" if "splines" in shares else ""
     lines = [f"{output}: {d['blocks_out']} blocks from {d['points_in']} points ({d['points_added']} added) for "

@@ -311,7 +311,7 @@ class Placement:
         """Directions (N, 3) in the outer frame."""
         if bool((self.rotation == np.eye(3)).all()):
             return values
-        result: Floats = values @ self.rotation.T
+        result: Floats = values @ np.ascontiguousarray(self.rotation.T)
         return result
 
     def behind(self, inner: Placement) -> Placement:

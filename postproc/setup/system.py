@@ -94,6 +94,8 @@ def with_system(found: list[Diagnostic], frame: Frame, placement: Placement, axe
     Nothing is said of a system that would turn the tool axes `axes` (N, 3) of the moves, in the table frame, to come
     from below.
     """
+    if not any(d.code in BEYOND and d.severity is Severity.ERROR for d in found):
+        return found
     said = _stands(frame, placement)
     upright = placement.inverse().directions(axes) @ np.array(frame.rotation)
     if bool((upright[:, 2] < 0.0).mean() > (axes[:, 2] < 0.0).mean()):

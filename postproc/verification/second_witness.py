@@ -202,6 +202,8 @@ def _order(setup: SetupFile, comparison: Comparison, job: Job) -> list[Diagnosti
     """An error where the cuts do not go from place to place in the order of the set-up: each place once, or once for every
     tool between two changes."""
     motion, count = comparison.executed[1], len(job.places)
+    if count < 2:
+        return []
     cut = np.flatnonzero((motion.code > 0) & (comparison.owner < len(comparison.moves.without_pecks())))
     registers = registers_of(job, reader_for(job.controller, job.machine.axis_names))
     steps = [(int(tool) if setup.order == "tool" else 0, float(offset)) for tool, offset in zip(
@@ -209,7 +211,7 @@ def _order(setup: SetupFile, comparison: Comparison, job: Job) -> list[Diagnosti
     steps = [one for k, one in enumerate(steps) if k == 0 or steps[k - 1] != one]
     groups = [[offset for _, offset in some] for _, some in groupby(steps, key=lambda one: one[0])]
     again = setup.order == "tool"  # a tool may come back behind one that cuts nothing
-    if count < 2 or all(some == registers * (len(some) // count if again else 1) for some in groups):
+    if all(some == registers * (len(some) // count if again else 1) for some in groups):
         return []
     return [error("witness.order", f'second witness: the places are not gone through as order = "{setup.order}" says',
                   file=job.toolpath.file, hint="do not run this program")]

@@ -49,7 +49,7 @@ def lengths_of(e: ExecutedBlocks) -> tuple[Array, Array]:
 
 def _by_rule(step: Array, letters: tuple[str, ...], rule: Literal["xyz-first", "geometry", "all"]) -> Array:
     if rule == "all":
-        return np.asarray(np.sqrt((step * step).sum(axis=1)))
+        return np.asarray(np.sqrt(np.einsum("ni,ni->n", step, step)))
     rest = "".join(name for name in letters if name not in "XYZ")
     return _first_of(step, letters, ("XYZ", rest) if rule == "geometry" else _KINDS)
 
@@ -59,7 +59,7 @@ def _first_of(step: Array, letters: tuple[str, ...], kinds: tuple[str, ...]) -> 
     result = np.zeros(len(step))
     for group in reversed(kinds):
         part = step[:, [name in group for name in letters]]
-        size = np.sqrt((part * part).sum(axis=1))
+        size = np.sqrt(np.einsum("ni,ni->n", part, part))
         result = np.where(size > 0.0, size, result)
     return result
 
@@ -70,7 +70,7 @@ def _arc_lengths(e: ExecutedBlocks, rows: Array) -> Array:
     angle = np.abs(e.sweep[rows])
     chord = end - start
     bow = middle - 0.5 * (start + end)
-    whole, high = np.sqrt((chord * chord).sum(axis=1)), np.sqrt((bow * bow).sum(axis=1))
+    whole, high = np.sqrt(np.einsum("ni,ni->n", chord, chord)), np.sqrt(np.einsum("ni,ni->n", bow, bow))
     with np.errstate(divide="ignore", invalid="ignore"):
         radius = high / (1.0 - np.cos(0.5 * angle))
         rise = np.sqrt(np.maximum(whole**2 - (2.0 * radius * np.sin(0.5 * angle)) ** 2, 0.0))

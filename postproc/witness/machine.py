@@ -64,9 +64,8 @@ class Chain:
         for name in reversed(self.letters):
             value, along = q[:, letters.index(name)], self.direction[name]
             if name in "ABC":
-                turn = rotations(along, value)
-                tip = apply(turn, tip - self.point[name]) + self.point[name]
-                axis = apply(turn, axis)
+                tip = turned(along, value, tip - self.point[name]) + self.point[name]
+                axis = turned(along, value, axis)
             else:
                 tip = tip + value[:, None] * along
         return tip, np.array(np.broadcast_to(axis, tip.shape))
@@ -95,6 +94,12 @@ def rotations(along: Array, angle: Array) -> Array:
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
     return np.asarray(np.eye(3) + s * cross + (1.0 - c) * (cross @ cross))
+
+
+def turned(along: Array, angle: Array, v: Array) -> Array:
+    """Vectors (N, 3) or (1, 3) turned about a unit vector by angles (N,): `rotations` without their matrices."""
+    angle, first = angle[:1] if len(angle) and (angle == angle[0]).all() else angle, np.cross(along, v)
+    return np.asarray(v + np.sin(angle)[:, None] * first + (1.0 - np.cos(angle))[:, None] * np.cross(along, first))
 
 
 def apply(turns: Array, v: Array) -> Array:

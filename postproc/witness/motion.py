@@ -110,7 +110,7 @@ def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_ang
     straight from cut to cut, or by home."""
     good = w.on_path()
     step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
-    moved = np.sqrt((step * step).sum(axis=1))
+    moved = np.sqrt(np.einsum("ni,ni->n", step, step))
     cutting, rapid = is_cut(w.kind) & ~w.gap & ~w.returns, is_rapid(w.kind) & ~w.gap
     found = []
     hurried = cutting & good & (w.code == 0) & (moved > STILL) & (w.kind != BOTTOM)
@@ -229,7 +229,7 @@ def _above(tip: Array, end: Array, axis: Array) -> Array:
     offset = tip - end
     rise = np.maximum(np.einsum("ni,ni->n", offset, axis), 0.0)
     rest = offset - rise[:, None] * axis
-    return np.asarray(np.sqrt((rest * rest).sum(axis=1)))
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", rest, rest)))
 
 
 def _level(w: Walked, rows: Array, to: Array, away: Array, tip: Array, near: float, cut: Cut | None) -> Array:

@@ -82,11 +82,11 @@ def _nothing(why: str, began: float, missing: Sequence[NotCompared] = ()) -> Tes
 def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Array, Array], poses: Poses,
              table: dict[str, object]) -> tuple[list[Finding], tuple[float, float], dict[Aspect, int], list[NotCompared]]:
     rotation, origin = place
-    same = bool((rotation == np.eye(3)).all())
-    tip = c.tip if same and not origin.any() else c.tip @ rotation.T + origin
-    axis = c.axis if same else c.axis @ rotation.T
-    centre, normal = c.centre @ rotation.T + origin, c.normal @ rotation.T
-    splines = {row: points @ rotation.T + origin for row, points in c.splines.items()}
+    turn, same = np.ascontiguousarray(rotation.T), bool((rotation == np.eye(3)).all())
+    tip = c.tip if same and not origin.any() else c.tip @ turn + origin
+    axis = c.axis if same else c.axis @ turn
+    centre, normal = c.centre @ turn + origin, c.normal @ turn
+    splines = {row: points @ turn + origin for row, points in c.splines.items()}
     targets = targets_of(c, tip, axis, centre, normal, splines)
     if not len(targets):
         return [], (0.0, 0.0), {}, []

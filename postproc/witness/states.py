@@ -110,7 +110,7 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], matc
 def _fast_blocks(w: Walked, rows: Array, pace: Array, tolerance: float) -> Array:
     """(K,) True for blocks of cuts whose F word, or whose time, takes the tip farther than `pace` (M,), s/mm, allows."""
     step = w.tip[rows] - w.tip[np.maximum(rows - 1, 0)]
-    length = np.sqrt((step * step).sum(axis=1))
+    length = np.sqrt(np.einsum("ni,ni->n", step, step))
     e, pace = w.poses.executed, pace[w.owner[rows]]
     straight = ~e.inverse[rows] & (np.abs(w.length[rows] - length) < 1e-4 * length) & (length > 1.0)
     by_word = straight & ((e.feed[rows] - 0.1) * e.unit[rows] * pace > 60.0 * ALLOWED)
@@ -142,7 +142,7 @@ def _needed(w: Walked, rows: Array, slow: Array, pace: Array, table: dict[str, A
     if len(here):
         _, speed = limits_of(table, w.poses.executed.letters)
         step = w.tip[here] - w.tip[np.maximum(here - 1, 0)]
-        q, most = w.poses.before(here), np.sqrt((step * step).sum(axis=1)) * pace[w.owner[here]]
+        q, most = w.poses.before(here), np.sqrt(np.einsum("ni,ni->n", step, step)) * pace[w.owner[here]]
         most = np.maximum(most, 60.0 * w.length[here] / largest_feed(table))
         parts = 4 if w.poses.executed.words == w.poses.executed.letters else 8  # drives of a control's own kinematics bend
         for t in (np.arange(parts) + 1.0).tolist():
@@ -387,7 +387,7 @@ def _feed_fault(w: Walked, blocks: Array, cycle: WitnessCycle, rpm: float) -> li
     no axis is at its velocity."""
     feed = cycle.feed * rpm if cycle.per_turn else cycle.feed
     step = w.tip[blocks] - w.tip[np.maximum(blocks - 1, 0)]
-    length = np.sqrt((step * step).sum(axis=1))
+    length = np.sqrt(np.einsum("ni,ni->n", step, step))
     long = (length > 0.1) & (w.seconds[blocks] > 0.0)
     if not math.isfinite(feed) or not long.any():
         return []

@@ -116,7 +116,7 @@ def turns_of(poses: Poses) -> Array:
         q = e.joints_at(rows, share * part)
         points.append(_pose_of(poses, rows, q, share * part))
     cross = np.cross(points[1] - points[0], points[2] - points[1])
-    size = np.sqrt((cross * cross).sum(axis=1))
+    size = np.sqrt(np.einsum("ni,ni->n", cross, cross))
     result[rows] = cross * (np.abs(e.sweep[rows]) / np.where(size > 0.0, size, 1.0))[:, None]
     return result
 
@@ -147,10 +147,10 @@ def off(targets: Targets, i: Array, tip: Array, axis: Array, start: Array, start
 def from_line(tip: Array, start: Array, end: Array) -> Array:
     """(K,) mm from lines between two points."""
     travel, offset = end - start, tip - start
-    length = (travel * travel).sum(axis=1)
-    share = np.clip((offset * travel).sum(axis=1) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
+    length = np.einsum("ni,ni->n", travel, travel)
+    share = np.clip(np.einsum("ni,ni->n", offset, travel) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
     rest = offset - share[:, None] * travel
-    return np.asarray(np.sqrt((rest * rest).sum(axis=1)))
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", rest, rest)))
 
 
 def _from_arc(tip: Array, start: Array, end: Array, centre: Array, normal: Array, sweep: Array) -> Array:
@@ -160,7 +160,7 @@ def _from_arc(tip: Array, start: Array, end: Array, centre: Array, normal: Array
     u, v = first - low[:, None] * normal, here - height[:, None] * normal
     last = end - centre
     w = last - np.einsum("ni,ni->n", last, normal)[:, None] * normal
-    radius, final, size = (np.sqrt((x * x).sum(axis=1)) for x in (u, w, v))
+    radius, final, size = (np.sqrt(np.einsum("ni,ni->n", x, x)) for x in (u, w, v))
     angle = np.arctan2(np.einsum("ni,ni->n", np.cross(u, v), normal), np.einsum("ni,ni->n", u, v)) % (2.0 * np.pi)
     rise = np.einsum("ni,ni->n", end - start, normal)
     best = np.full(len(tip), np.inf)
@@ -175,7 +175,7 @@ def _from_arc(tip: Array, start: Array, end: Array, centre: Array, normal: Array
 def _from_circle(axis: Array, first: Array, last: Array) -> Array:
     """(K,) rad from the great circle between two directions."""
     square = np.cross(first, last)
-    size = np.sqrt((square * square).sum(axis=1))
+    size = np.sqrt(np.einsum("ni,ni->n", square, square))
     ends = np.minimum(_angle(axis, first), _angle(axis, last))
     if not (size > 1e-9).any():
         return ends
@@ -188,7 +188,7 @@ def _from_circle(axis: Array, first: Array, last: Array) -> Array:
 
 def _angle(a: Array, b: Array) -> Array:
     d = a - b
-    return np.asarray(2.0 * np.arcsin(np.minimum(0.5 * np.sqrt((d * d).sum(axis=1)), 1.0)))
+    return np.asarray(2.0 * np.arcsin(np.minimum(0.5 * np.sqrt(np.einsum("ni,ni->n", d, d)), 1.0)))
 
 
 def is_cut(kind: Array) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 from postproc.compile.program import INVERSE, PER_MINUTE, Hole
 from postproc.control.word_arcs import PLANE_AXIS
 from postproc.controllers.cycles import CannedCycle
+from postproc.writing.block_text import TextPieces, WordColumn, block_text, certain, pays
 from postproc.writing.writer import CHUNK, Writer
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.toolpath import Cycle
@@ -24,11 +25,29 @@ class IsoWriter(Writer):
             last = min(first + CHUNK, stop)
             heads = self.heads(first, last)
             self.add_length(heads, first, last)
+            fast = pays(len(self.program), last - first) and not self.program.skip[first]
+            text = self.at_once(heads, first, last) if fast else None
+            if text is not None:
+                yield from text.split("\n") if self.numbers_blocks else (text,)
+                continue
             feeds = self.feeds(first, last)
             arcs = self.arc_words(first, last)
             for head, words, arc, feed in zip(heads, self.axis_words(first, last), arcs, feeds, strict=True):
                 text = f"{head}{words}{arc}{feed}"
                 yield text[1:] if text.startswith(" ") else text
+
+    def at_once(self, heads: list[str], first: int, last: int) -> str | None:
+        """The text of blocks first..last in one pass; None where that cannot be."""
+        columns, before = self.columns(first, last), self.feed
+        feed = None if columns is None else self.feed_column(first, last)
+        if columns is None or feed is None:
+            return None
+        pieces = TextPieces(last - first)
+        pieces.put_all(0, heads)
+        pieces.put_all(1, self.arc_words(first, last))
+        text = block_text([*columns, feed], pieces, self.number_style)
+        self.feed = self.feed if text is not None else before
+        return text
 
     def heads(self, first: int, last: int) -> list[str]:
         """Motion, plane and feed mode codes, '' where they stand already."""
@@ -132,11 +151,8 @@ class IsoWriter(Writer):
     def feeds(self, first: int, last: int) -> list[str]:
         """Feed words, '' where the feed stands already (each block of inverse time states it)."""
         result = [""] * (last - first)
-        cutting, stated, needed = self.fed
-        begin, end = int(cutting.searchsorted(first)), int(cutting.searchsorted(last))
-        rows = stated[stated.searchsorted(begin):stated.searchsorted(end)]
-        if end > begin and (not len(rows) or rows[0] != begin):
-            rows = np.append(begin, rows)
+        cutting, _, needed = self.fed
+        rows = self.stated_feeds(first, last)
         values = self.program.feed[cutting[rows]]
         texts = self.feed_texts(values) if len(rows) > 1 else [self.feed_text(v) for v in values.tolist()]
         for k, text in zip(rows.tolist(), texts, strict=True):
@@ -144,6 +160,28 @@ class IsoWriter(Writer):
                 result[int(cutting[k]) - first] = f"{self.space}F{text}"
             self.feed = text
         return result
+
+    def stated_feeds(self, first: int, last: int) -> Ints:
+        """The first of the blocks that cut, by number (`fed`), and those that may have to state their feed."""
+        cutting, stated, _ = self.fed
+        begin, end = int(cutting.searchsorted(first)), int(cutting.searchsorted(last))
+        rows = stated[stated.searchsorted(begin):stated.searchsorted(end)]
+        return np.append(begin, rows) if end > begin and (not len(rows) or rows[0] != begin) else rows
+
+    def feed_column(self, first: int, last: int) -> WordColumn | None:
+        """Feed words as numbers; None where some have other decimals, or are not certain to round as their texts do."""
+        cutting, _, needed = self.fed
+        rows, places = self.stated_feeds(first, last), self.controller.format.feed_decimals
+        values = self.program.feed[cutting[rows]]
+        write, value = np.zeros(last - first, dtype=bool), np.zeros(last - first)
+        if len(rows):
+            rounded = certain(values, places)
+            if rounded is None or (values < 1.0).any():
+                return None
+            same = np.append(self.feed_text(values.item(0)) == self.feed, rounded[1:] == rounded[:-1])
+            write[cutting[rows] - first], value[cutting[rows] - first] = needed[rows] | ~same, values
+            self.feed = self.feed_text(values.item(-1))
+        return WordColumn(f"{self.space}F", value, write, places)
 
     @cached_property
     def fed(self) -> tuple[Ints, Ints, Bools]:

@@ -20,6 +20,7 @@ from postproc.controllers.texts import CYCLE_LENGTHS, blocks_of
 from postproc.job.smoothing import Smoothing
 from postproc.path.model import ARC
 from postproc.reference.coolant import CoolantCommand, switching
+from postproc.writing.block_text import NumberStyle, WordColumn
 from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Cycle
 
@@ -170,6 +171,25 @@ class WriterState:
         if self.controller.unit == 1.0:
             return self.plain(length)
         return self.plain(math.floor(length / self.controller.unit * SHARE + 1e-6) / SHARE)
+
+    def columns(self, at: int, stop: int) -> list[WordColumn] | None:
+        """The axis words of blocks at..stop as numbers; None where some are said otherwise."""
+        p, rows, found = self.program, np.arange(at, stop), list[WordColumn]()
+        for j, letter in enumerate(p.letters):
+            values = self.stated(j, rows)
+            if j in p.rolls:
+                roll = p.rolls[j]
+                if roll.rule == "sign" or roll.stated:
+                    return None
+                values = roll.words(values, p.before(j)[rows])[0]
+            found.append(WordColumn(self.space + letter, values, p.write[at:stop, j], int(p.decimals[j])))
+        return found
+
+    @property
+    def number_style(self) -> NumberStyle:
+        """How `number_text` writes."""
+        style = self.controller.format
+        return NumberStyle(style.plus_sign, style.trim_zeros, style.decimal_point)
 
     def number_text(self, values: Floats, places: int) -> list[str]:
         """Numbers as text, rounded to `places`, -0 as 0; all at once, which is much faster than one by one."""

@@ -75,7 +75,7 @@ FAULTS = (
     Fault("bound without the bend", "linearising", "_Offset.bound", "tip = self.seen.tip + share * self.bend.tip",
           "tip = self.seen.tip",
           why="the read-back bounds every block again by itself: blocks that are too long are refused"),
-    Fault("arcs are straight already", "linearising", "linearise", "exact = keep | _straight_already",
+    Fault("arcs are straight already", "linearising", "_linearised", "exact = keep | _straight_already",
           "exact = keep | curves.is_arc | _straight_already", ("delta", "rods", "errors flat", "laws linuxcnc")),
     Fault("points in the middle of blocks next to the curve", "linearising", "_Front._tried",
           "tip, axis = self.curves.take(self.index[inner]).at(u1[inner])",

@@ -212,7 +212,7 @@ def _to_part_frame(b: ToolpathBuilder, rows: PointRows, normal: Floats | None,
         found = b.maps[rows.index[start]]
         if found is None:
             continue
-        rotation, origin = found
+        rotation, origin = np.asfortranarray(found[0]), found[1]
         where = slice(start, end)
         local = where if rows.common is None else np.flatnonzero(~rows.common[where]) + start
         rows.tip[local] = rows.tip[local] @ rotation.T + origin

@@ -18,11 +18,11 @@ _NO_BOUND = 1e20
 
 
 @dataclass(frozen=True)
-@arrays(unbounded_rows="U")
+@arrays(unbounded_rows="U", whole="* K")
 class DeviationBound:
     """Upper bounds over all blocks: tip (mm), axis (rad), each with the block (row) that has it, -1 where
     there are none; how many blocks have no bound, because kinematics or law give none (they are only checked
-    at places), and which."""
+    at places), and which; `whole`: tip and axis (2, K) of every block, undivided."""
 
     tip: float
     axis: float
@@ -30,6 +30,7 @@ class DeviationBound:
     axis_row: int
     unbounded: int
     unbounded_rows: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    whole: Floats = field(default_factory=lambda: np.zeros((2, 0)))
 
 
 @dataclass(frozen=True)

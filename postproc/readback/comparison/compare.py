@@ -103,11 +103,11 @@ def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gco
     match, owner = aligned(ends, moves, moves.link, tolerance, axis_tolerance, grain)
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
-    (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match,
-                                                               owner, tolerance)
+    bound = bound_of_blocks(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects)
+    (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match, owner, tolerance,
+                                                               None if job.corrects else bound.whole)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
-    bound = bound_of_blocks(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects)
     if not has_errors(diagnostics):
         diagnostics += _unproved(bound, (tolerance, axis_tolerance), moves, motion, owner, faults)
     if bound.unbounded and job.options.require_proof:
@@ -195,21 +195,46 @@ def _taken_up(job: Job, motion: Motion, tip: Floats) -> Bools:
     return np.asarray((travel <= still) | ((begins | ends) & ~far))
 
 
+FIRST, SURELY = 64, 0.999
+"""blocks of the largest bounds that are looked at first; share of the worst deviation, bounds below which cannot be it"""
 WorstPlace = tuple[float, tuple[int, int]]
 """a deviation and where it is: CL line, program line"""
 
 
 def _farthest(motion: Motion, executed: BlockPoses, moves: Moves, tip: Floats, axis: Floats, match: Ints, owner: Ints,
-              tolerance: float) -> tuple[WorstPlace, WorstPlace]:
-    """The worst deviations of tip and axis, between the points and at them."""
+              tolerance: float, most: Floats | None) -> tuple[WorstPlace, WorstPlace]:
+    """The worst deviations of tip and axis, between the points and at them.
+
+    `most` (2, K): bounds of tip and axis of the blocks that run the moves, None where there are none. In long programs
+    blocks whose bounds are below what others are off by are not looked at: none of them is the worst.
+    """
     rows = np.flatnonzero(moves.run_by(owner))
-    tip_off, axis_off = _deviations(motion, executed, moves, rows, owner, tolerance)
     done = as_slice(np.flatnonzero(match >= 0))
     there = as_slice(match[done])
     visit = lengths(tip[there] - moves.tip[done])
     tilt = angle_between(axis[there], moves.axis[done])
+    places = place_on_moves(motion, executed, rows, owner, moves)
+    off = np.zeros((2, len(rows)))
+
+    def look(k: Ints) -> None:
+        off[:, k] = _deviations(motion, executed, moves, rows[k], owner, tolerance, (places[0][k], places[1][k]))
+    if most is None or len(rows) <= CHUNK:
+        look(np.arange(len(rows)))
+    else:
+        least = _known_limits(most, moves.arc[owner[rows]] >= 0, tolerance)
+        first = np.unique(np.argpartition(-least, FIRST, axis=1)[:, :FIRST])
+        look(first)
+        worst = np.maximum(off[:, first].max(axis=1), [values.max(initial=0.0) for values in (visit, tilt)])
+        look(np.setdiff1d(np.flatnonzero((least >= SURELY * worst[:, None]).any(axis=0)), first, assume_unique=True))
+    tip_off, axis_off = off
     at = (owner[rows], np.arange(len(match))[done]), (rows, match[done])
     return _worst((tip_off, visit), *at, moves, motion), _worst((axis_off, tilt), *at, moves, motion)
+
+
+def _known_limits(most: Floats, arc: Bools, tolerance: float) -> Floats:
+    """(2, K) what deviations of blocks are below at all places: bounds `most` from a place of the line that is within the
+    tolerance of the tip, among which `Curves.deviation` finds the best; nothing of arcs and of blocks farther off."""
+    return np.where(arc | ~(most[0] < tolerance) | np.isnan(most[1]), np.inf, most)
 
 
 def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: Faults) -> Diagnostic:
@@ -232,6 +257,10 @@ def bound_of_blocks(motion: Motion, executed: BlockPoses, moves: Moves, owner: I
     some = as_slice(np.flatnonzero(~level))
     found = deviation_bound(motion, executed, moves, rows[some], owner[rows[some]], begin[some],
                             share[some], allowed, judge)
+    if level.any():
+        whole = np.full((2, len(rows)), np.inf)
+        whole[:, ~level] = found.whole
+        found = replace(found, whole=whole)
     high = rows[level]
     corners = (0.0, 0.5, *executed.corners(motion, high).T) if len(high) else ()
     executed.look_ahead(motion, high, corners)
@@ -261,16 +290,17 @@ def off_level(curve: Curves, tip: Floats) -> Floats:
     return np.asarray(np.maximum(np.maximum(np.minimum(first, last) - height, height - np.maximum(first, last)), 0.0))
 
 
-def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, owner: Ints,
-                within: float) -> tuple[Floats, Floats]:
-    """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move; `within` mm of its tip.
+def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, owner: Ints, within: float,
+                places: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move; `within` mm of its tip;
+    `places`: see `place_on_moves`.
 
     Where rapids are dog-legs, those from hole to hole only keep their height.
     """
     tip_off, axis_off = np.zeros(len(rows)), np.zeros(len(rows))
     if not len(rows):
         return tip_off, axis_off
-    begin, share = place_on_moves(motion, executed, rows, owner, moves)
+    begin, share = places
     level = (moves.phase[owner[rows]] == Phase.POSITION) & executed.bent(motion, rows)
     for at in range(0, len(rows), CHUNK):
         part = slice(at, at + CHUNK)
@@ -284,10 +314,10 @@ def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, 
             d = np.where(level[part], off_level(curve, tip), d)
             tip_off[part] = np.fmax(tip_off[part], without_nan(d, np.inf))
             axis_off[part] = np.fmax(axis_off[part], without_nan(e, np.inf))
-        for k, places in executed.looks(motion, here):
-            tip, axis = executed.poses(motion, here[k], places)
+        for k, shares in executed.looks(motion, here):
+            tip, axis = executed.poses(motion, here[k], shares)
             some = moves.curves(owner[here[k]])
-            d, e, _ = some.deviation(tip, axis, np.minimum(begin[part][k] + places * share[part][k], 1.0), within)
+            d, e, _ = some.deviation(tip, axis, np.minimum(begin[part][k] + shares * share[part][k], 1.0), within)
             d = np.where(level[part][k], off_level(some, tip), d)
             np.fmax.at(tip_off, at + k, np.nan_to_num(d, nan=np.inf))
             np.fmax.at(axis_off, at + k, np.nan_to_num(e, nan=np.inf))

@@ -9,7 +9,7 @@ until bound and worst meet.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -64,10 +64,13 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
     (mm) and axis (rad); `judge`: see `BoundSearch`. Rapids that are dog-legs are bounded piece by piece between corners.
     """
     ends = _Ends(rows, owner, begin, share)
-    worst = BoundSearch(allowed, judge)
+    worst, whole = BoundSearch(allowed, judge), np.zeros((2, len(rows)))
     for at in range(0, len(rows), CHUNK):
         for pieces in _whole(motion, executed, ends, np.arange(at, min(at + CHUNK, len(rows)))):
-            worst.add(pieces, _values(motion, executed, moves, ends, pieces, allowed))
+            values = _values(motion, executed, moves, ends, pieces, allowed)
+            worst.add(pieces, values)
+            for most, bound in zip(whole, (values.tip, values.axis), strict=True):
+                np.maximum.at(most, pieces.k, bound)
     for divided in range(HALVINGS):
         if divided >= _PATIENCE:
             worst.give_up()
@@ -80,7 +83,7 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
         for at in range(0, len(pieces), CHUNK):
             part = pieces.take(slice(at, at + CHUNK))
             worst.add(part, _values(motion, executed, moves, ends, part, allowed))
-    return worst.result(rows)
+    return replace(worst.result(rows), whole=whole)
 
 
 def _whole(motion: Motion, executed: BlockPoses, ends: _Ends, k: Ints) -> list[Pieces]:

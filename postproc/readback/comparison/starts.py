@@ -12,7 +12,7 @@ from postproc.readback.execution.execute import Motion
 from postproc.readback.text.canonical import INCREMENTAL, LAW, Canonical, in_files
 from postproc.readback.text.modal import codes
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Floats, Ints, among
+from toolpaths.arrays import Floats, Ints, among, distinct
 from toolpaths.diagnostics import Diagnostic
 
 
@@ -60,7 +60,7 @@ def _comes_down(words: Words, lift: list[str], machine: Ints, first: int) -> int
 def _stated(words: Words, names: tuple[str, ...], relative: bool) -> Ints:
     """Blocks with words of axes, absolute ones or relative ones too."""
     letters = [ord(a) + d for a in names for d in ((0, INCREMENTAL) if relative else (0,))]
-    return np.unique(words.line[among(words.letter, letters)])
+    return distinct(words.line[among(words.letter, letters)])
 
 
 def _error(code: Canonical, faults: Faults, block: int, message: str, hint: str) -> Diagnostic:

@@ -14,7 +14,7 @@ import numpy as np
 from postproc.readback.text.canonical import INCREMENTAL, LAW, OFFSET, REGISTER, Canonical
 from postproc.readback.text.modal import CYCLES, GROUPS, codes, fill
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Ints, among
+from toolpaths.arrays import Bools, Ints, among, distinct
 from toolpaths.diagnostics import Diagnostic, error
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def check_stated(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]
     result = []
     for what, relying, stating in _needs(code, reader):
         first = int(stating.min(initial=code.words.lines + 1))
-        bad = np.unique(relying[relying < first])
+        bad = distinct(relying[relying < first])
         if len(bad):
             words = reader.stating[what]
             result.append(error("gcode.unstated", f"nothing states {words} before this block, which depends on it: the "
@@ -45,11 +45,11 @@ def _needs(code: Canonical, reader: Reader) -> Iterator[Need]:
     """What the dialect has no fixed state for, without what the controller file says of its start."""
     words, known = code.words, _known(reader)
     moves, machine = _moves(words, reader.axes), codes(words, "G", (53,))[0]
-    work, motion = moves[~np.isin(moves, machine)], fill(*codes(words, "G", GROUPS["motion"]),
+    work, motion = moves[~_among_blocks(words, machine)[moves]], fill(*codes(words, "G", GROUPS["motion"]),
                                                          words.lines, -1.0)
     feeds, cycles = moves[motion[moves] != 0], moves[among(motion[moves], CYCLES)]
     arcs = moves[among(motion[moves], _ARCS)]
-    heights = np.intersect1d(work, _moves(words, ("Z",)))
+    heights = work[_among_blocks(words, _moves(words, ("Z",)))[work]]
     relying = {"motion": moves, "distance": moves, "compensation": moves, "plane": work, "feed_mode": feeds, "level": cycles,
                "arc_distance": arcs, "offset": work, "length": heights}
     for what in reader.stating:
@@ -58,6 +58,13 @@ def _needs(code: Canonical, reader: Reader) -> Iterator[Need]:
         stating = words.pick(OFFSET)[0] if what == "offset" else words.pick(REGISTER)[0] if what == "length" else \
             codes(words, "G", GROUPS[what])[0]
         yield what, relying[what], stating
+
+
+def _among_blocks(words: Words, some: Ints) -> Bools:
+    """Which blocks, by number, are among some of them."""
+    found = np.zeros(words.lines + 2, dtype=bool)
+    found[some] = True
+    return found
 
 
 def _known(reader: Reader) -> set[str]:
@@ -70,7 +77,7 @@ def _known(reader: Reader) -> set[str]:
 def _moves(words: Words, axes: tuple[str, ...]) -> Ints:
     """Blocks with words of axes, absolute or relative."""
     letters = [ord(a) + d for a in axes for d in (0, INCREMENTAL)]
-    return np.unique(words.line[among(words.letter, letters)])
+    return distinct(words.line[among(words.letter, letters)])
 
 
 def _undone(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]:

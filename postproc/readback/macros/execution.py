@@ -36,6 +36,11 @@ _NEEDED = {
         rb"|\bMCALL[ \t]+(?!CYCLE8)[A-Z_]"),
     "klartext": re.compile(rb"DECLARE STRING|FN[ \t]*\d+[ \t]*:"
                            rb"|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}
+_SIGNS_OF: dict[MacroLanguage, tuple[bytes, ...]] = {"fanuc": (b"#", b"[", b"GOTO"), "linuxcnc": (b"#", b"[")}
+_BEGINNINGS: dict[MacroLanguage, tuple[re.Pattern[bytes], ...]] = {
+    "fanuc": (re.compile(rb"M0*(?:99[ \t]*P|198)"), re.compile(rb"G0*(?:10|30|31|52|92|6[567])")),
+    "linuxcnc": (re.compile(rb"G0*(?:10|28|30|52|92)"), re.compile(rb"O\s*[<\d]"))}
+"""one of these stands where `_NEEDED` finds anything: each looked for by its first letter, they are soon absent"""
 _CONTINUED = re.compile(rb"~[ \t]*\n")
 _COMMENT, _STRING = re.compile(rb";[^\n]*"), re.compile(rb'(?<!T=)"[^"\n]*"')
 _SIGNS = re.compile(rb"=[ \t]*[-+]*[ \t]*(?:[A-Z_$(\[]|[\d.]+[ \t]*[-+*/])")
@@ -63,14 +68,17 @@ class PlainProgram:
 
 def needed(data: bytes, language: MacroLanguage, passive: tuple[str, ...] = ()) -> bool:
     """True where a program, comments aside, has what only its execution explains."""
-    form = _NEEDED["fanuc" if language == "haas" else language]
-    text = data.upper()
+    key: MacroLanguage = "fanuc" if language == "haas" else language
+    form, text = _NEEDED[key], data.upper()
     if language == "siemens":
         bare = _COMMENT.sub(b"", text) if b";" in text else text
         bare = _STRING.sub(b"", bare) if b'"' in bare else bare
         bare = _POLYNOMIAL.sub(b" ", bare) if b"PO" in bare else bare
         likely = any(word in bare for word in _WORDS) or _SIGNS.search(bare) or _PARAMETERS.search(bare)
         return bool(likely) and form.search(bare) is not None
+    if key in _SIGNS_OF and not (any(sign in text for sign in _SIGNS_OF[key])
+                                 or any(part.search(text) for part in _BEGINNINGS[key])):
+        return False
     if not form.search(text):
         return False
     if language == "klartext":

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.readback.text.word_loop import words_at_once
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.shapes import arrays
@@ -62,8 +63,9 @@ def tokenise(data: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
     """
     text = plain(data)
     text = text if text.isupper() else text.upper()
-    ends = _tape_marks(text)
-    text = re.sub(rb"(?m)^[ \t]*%[^\n]*", b"", text) if b"%" in text else text
+    marks = _tape_marks(text)
+    ends = _between_blocks(text, marks)
+    text = _without(text, marks)
     text, found = block_delete(text, file)
     words, more = read_words(text, file)
     return words, [*more, *found, *_early_end(ends, file)]
@@ -105,6 +107,10 @@ def read_words(text: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
     """The words of text that holds nothing but letters, each with a number."""
     if not text.endswith(b"\n"):
         text += b"\n"
+    at_once = words_at_once(text)
+    if at_once is not None:
+        letter, value, line, point = at_once
+        return Words(letter, value, line, text.count(b"\n"), point), []
     count = len(text.translate(None, _NO_LETTERS))
     letter, value, line = np.empty(count, dtype=np.uint8), np.empty(count), np.empty(count, dtype=np.int64)
     point = np.zeros(count, dtype=bool)
@@ -152,8 +158,27 @@ def _points(codes: Array, where: Ints) -> Bools:
 
 
 def _tape_marks(text: bytes) -> list[int]:
+    """Where lines that begin with % begin, blanks before it or not."""
+    starts, at = list[int](), text.find(b"%")
+    while at >= 0:
+        begin = text.rfind(b"\n", 0, at) + 1
+        if not text[begin:at].strip(b" \t"):
+            starts.append(begin)
+        at = text.find(b"%", text.find(b"\n", at))  # each line ends with a line feed
+    return starts
+
+
+def _without(text: bytes, starts: list[int]) -> bytes:
+    """The text with empty lines in the place of some."""
+    kept, done = [], 0
+    for begin in starts:
+        kept.append(text[done:begin])
+        done = text.find(b"\n", begin)
+    return b"".join([*kept, text[done:]]) if starts else text
+
+
+def _between_blocks(text: bytes, starts: list[int]) -> list[int]:
     """Lines of % that stand between blocks, where a control stops reading."""
-    starts = [m.start() for m in re.finditer(rb"(?m)^[ \t]*%", text)] if b"%" in text else []
     if not starts:
         return []
     ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == 10)

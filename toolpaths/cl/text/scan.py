@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.cl.text.goto_loop import lines_at_once
 from toolpaths.shapes import arrays
 
 CHUNK = 1 << 22
@@ -115,6 +116,9 @@ class _Lines:
 
 
 def _split(c: Bytes, largest: float) -> _Lines:
+    at_once = lines_at_once(c, largest)
+    if at_once is not None:
+        return _Lines(*at_once)
     ends = np.flatnonzero(c == 10)
     starts = _inked(c, np.concatenate([[0], ends[:-1] + 1]))
     count = np.add.reduceat(c == 44, starts, dtype=np.int32) + 1
@@ -185,12 +189,15 @@ def _joined(c: Bytes) -> tuple[Bytes, Ints]:
         return c, marks
     ends = np.flatnonzero(c == 10)
     line = np.searchsorted(ends, marks)
+    own = _begins_goto(c, _inked(c, np.where(line > 0, ends[line - 1] + 1, 0)))
+    if not own.any():
+        return c, marks[:0]
     starts = _inked(c, np.concatenate([[0], ends[:-1] + 1]))
     strange = np.add.reduceat(~_NUMERIC[c], starts, dtype=np.int32)
     ink = np.append(0, np.cumsum(c > 32))
     after = np.minimum(line + 1, len(ends) - 1)
     good = (strange[line] == 6) & (ink[ends[line]] == ink[marks + 1]) & (line + 1 < len(ends)) \
-        & (strange[after] == 0) & (ink[ends[after]] > ink[starts[after]]) & _begins_goto(c, starts[line])
+        & (strange[after] == 0) & (ink[ends[after]] > ink[starts[after]]) & own
     marks, line = marks[good], line[good]
     joined = c.copy()
     joined[marks] = 32
