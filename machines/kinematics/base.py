@@ -22,6 +22,7 @@ from machines.kinematics import by_samples
 from machines.kinematics.chain import Joint
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceParts
 from machines.kinematics.leg_geometry import LegGeometry
+from machines.kinematics.leg_motion import LegMotion, LegParts
 from machines.kinematics.rod_platform import RodPlatform, Transmission
 from machines.kinematics.taylor import TaylorVector, straight
 from machines.kinematics.workspace import Workspace
@@ -87,6 +88,8 @@ class Kinematics(ABC):
     (product of exponentials, see `Serial`); () of any other"""
     on_rods: RodPlatform | None = None
     """the platform and its rods, where rods carry the tool"""
+    leg_parts: LegParts | None = None
+    """what moves of a platform on legs; None where none carry the tool"""
     transmits: Transmission | None = None
     """how legs pass motion and force on to a platform; None where none carry the tool"""
     clearance_parts: ClearanceParts | None = None
@@ -339,6 +342,14 @@ class Kinematics(ABC):
             ValueError: where the kind does not know it.
         """
         raise ValueError(f"the line of axis {letter} is not known")
+
+    def leg_motion(self, q: Floats, rate: Floats, acceleration: Floats) -> LegMotion:
+        """Legs and platform at joints (N, J) with their rates and accelerations, home mode; where there are `leg_parts`.
+
+        Raises:
+            ValueError: where none carry the tool.
+        """
+        raise ValueError(f"{type(self).__name__} machines have no legs")
 
     def carries_part(self, letter: str) -> bool:
         """True for a rotary axis that stands between the part and the bed, where no structure code says so."""
