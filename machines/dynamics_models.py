@@ -115,9 +115,10 @@ class DynamicsModel(UserModel):
                                  f"its axes are {', '.join(kinds)}")
                 continue
             yield from _stray(name, axis, kinds[name])
-            if axis.force is not None and not (axis.mass or axis.rotor or axis.rods or _inert(axis.inertia) or parts):
-                yield KeyProblem("machine.dynamics", ("dynamics", "axes", name), f"axis {name} has a force and moves no mass",
-                                 "write mass, inertia or rotor")
+            moves = axis.mass or axis.rotor or axis.rods or _inert(axis.inertia) or parts
+            if axis.force is not None and not moves:
+                yield KeyProblem("machine.dynamics", ("dynamics", "axes", name), f"axis {name} has a force and moves no "
+                                 "mass", "write mass, inertia or rotor")
 
 
 def _stray(name: str, axis: AxisMassModel, kind: Collection[str]) -> Iterator[KeyProblem]:

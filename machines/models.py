@@ -268,7 +268,8 @@ class MachineModel(UserModel):
         """The tables that hold figures with a source, or assumed ones."""
         axes = [FigureTable(("axes", name), a.assumed, by_key(a.source)) for name, a in self.axes.items()]
         masses = [] if self.dynamics is None else self.dynamics.figures()
-        return [*self.kinematics.figures(), *axes, *masses, FigureTable(("timing",), self.timing.assumed, by_key(self.timing.source))]
+        timing = FigureTable(("timing",), self.timing.assumed, by_key(self.timing.source))
+        return [*self.kinematics.figures(), *axes, *masses, timing]
 
     def control_kinematics(self) -> ControlKinematics | None:
         """What the control runs; None where joints are the program's axes.
@@ -312,7 +313,7 @@ class MachineModel(UserModel):
 def _moving_parts(kinematics: Kinematics) -> tuple[dict[str, Collection[str]], tuple[str, ...]]:
     """What each axis is, by letter, and of "platform" and "head" those that there are: see `DynamicsModel.problems`."""
     names = kinematics.axis_names
-    found: dict[str, Collection[str]] = {name: () for name in names}
+    found: dict[str, Collection[str]] = dict.fromkeys(names, ())
     if (parts := kinematics.leg_parts) is None:
         return found, ()
     for at, stretches in zip(parts.legs_at, parts.stretches, strict=True):

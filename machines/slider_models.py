@@ -227,7 +227,7 @@ def lineardeltakins(module: str, legs: Legs, joints: Floats) -> ControlKinematic
 
 
 class RotaryModel(UserModel):
-    """`[kinematics.rotary]`: a rotary axis under the part or at the spindle of a platform on legs that tilts about x or y."""
+    """`[kinematics.rotary]`: a rotary axis under the part or at the spindle of a platform that tilts about x or y."""
 
     letter: Literal["A", "B", "C"]
     """name of the axis"""

@@ -78,7 +78,8 @@ def _on_legs(machine: Machine, model: DynamicsModel, parts: LegParts, axes: tupl
         head = _of(model.head)
     elif axis is not None:
         joint = Joint(axis.name, True, axis.direction, axis.point)
-        table = (AxisBody(joint, machine.kinematics.joints - 1, -1.0, _body(model.axes.get(axis.name, NOTHING), joint.point)),)
+        own = _body(model.axes.get(axis.name, NOTHING), joint.point)
+        table = (AxisBody(joint, machine.kinematics.joints - 1, -1.0, own),)
     return LegDynamics(machine.kinematics, parts, masses, _of(model.platform), *axes, head, table)
 
 

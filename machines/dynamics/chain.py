@@ -1,10 +1,10 @@
 """Inverse dynamics of a chain of axes: recursive Newton-Euler from the bed outwards, on the part's side and on the tool's.
 
-Screws and motions are (omega, v) with v at the machine's origin, in the frame of the bed. With V of the axes nearer the bed,
-S the screw of an axis: V' = sum of S q'' + (V x S) q'; a point r of a body has the acceleration v' + omega' x r + omega x (v +
-omega x r). The motor of an axis carries the component along its screw of all forces beyond it. The axes between part and
-bed move bodies against the senses in which they move the tool. Source: Featherstone, Rigid Body Dynamics Algorithms (2008),
-chapter 5; the same forces by a Jacobian: Company 2000, II-28.
+Screws and motions are (omega, v) with v at the machine's origin, in the frame of the bed. With V of the axes nearer the
+bed, S the screw of an axis: V' = sum of S q'' + (V x S) q'; a point r of a body has the acceleration v' + omega' x r +
+omega x (v + omega x r). The motor of an axis carries the component along its screw of all forces beyond it. The axes
+between part and bed move bodies against the senses in which they move the tool. Source: Featherstone, Rigid
+Body Dynamics Algorithms (2008), chapter 5; the same forces by a Jacobian: Company 2000, II-28.
 """
 
 from __future__ import annotations

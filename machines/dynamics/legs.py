@@ -2,9 +2,9 @@
 
 A slender even rod between A and B moves as two half masses at the two Gauss points of its line: their acceleration and what
 they move are linear along it, so the work is exact (A'' and B'' with m/3 and m/6). Halves at the ends (m/2 and 0) are the
-lumped masses of III-15 and III-16. Forces on B and on the platform reach the joints by the platform's rates (J^T of II-28), forces on A by the
-drive's own A'. So F = M q'' + h(q, q') + g(q) of any drives and freedoms. Source: Company 2000, II-25 to II-33 (II-31 and II-33
-as its errata have them), III-13 to III-17.
+lumped masses of III-15 and III-16. Forces on B and on the platform reach the joints by the platform's rates (J^T of II-28),
+forces on A by the drive's own A'. So F = M q'' + h(q, q') + g(q) of any drives and freedoms. Source: Company 2000, II-25 to
+II-33 (II-31 and II-33 as its errata have them), III-13 to III-17.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class LegDynamics(Dynamics):
         if self.head is not None and axis is not None:
             head, f, m = _head(self.head, axis, motion, (q[:, -1], rate[:, -1], acceleration[:, -1]), base)
             force, moment = force + f, moment + m
-        at_drives, drives = self._drives(motion, q, rate, acceleration, base[:, None])
+        at_drives, drives = self._drives(motion, (q, rate, acceleration), base[:, None])
         return PlatformLoads(motion, dot(motion.moved, at_feet) + drives, np.concatenate([force, moment], axis=1),
                              force + at_feet.sum(axis=1) + at_drives, head)
 
@@ -123,18 +123,19 @@ class LegDynamics(Dynamics):
                     at_feet, at_ends = at_feet + on_foot, at_ends + on_end
         return at_feet, at_ends
 
-    def _drives(self, motion: LegMotion, q: Floats, rate: Floats, acceleration: Floats, base: Floats) -> tuple[Floats, Floats]:
+    def _drives(self, motion: LegMotion, joints: tuple[Floats, Floats, Floats], base: Floats) -> tuple[Floats, Floats]:
         """(force (N, 3) on what carries the legs, forces of the drives (N, K)) of carriages and arms themselves."""
         parts, own = self.parts, self.parts.legs_at
+        q, rate, acceleration = (one[:, own] for one in joints)
         slide = ~(parts.arm | parts.stretches)
         f = np.where(slide, self.masses.mass, 0.0)[:, None] * (motion.foot_accelerations + base)
         drives = dot(motion.moved, f)
         for k in np.flatnonzero(parts.arm):
-            w = rotation(parts.directions[k], q[:, own[k]]) @ (self.masses.centres[k] - parts.points[k])
+            w = rotation(parts.directions[k], q[:, k]) @ (self.masses.centres[k] - parts.points[k])
             w = w - (w @ parts.directions[k])[:, None] * parts.directions[k]
             moved = cross(np.broadcast_to(parts.directions[k], w.shape), w)
-            f[:, k] = self.masses.mass[k] * (moved * acceleration[:, own[k], None] - w * rate[:, own[k], None]**2 + base[:, 0])
-            drives[:, k] = dot(moved, f[:, k]) + self.masses.inertia[k] * acceleration[:, own[k]]
+            f[:, k] = self.masses.mass[k] * (moved * acceleration[:, k, None] - w * rate[:, k, None] ** 2 + base[:, 0])
+            drives[:, k] = dot(moved, f[:, k]) + self.masses.inertia[k] * acceleration[:, k]
         return f.sum(axis=1), drives
 
     def _carriers(self, acceleration: Floats, gravity: float, total: Floats) -> Floats:
@@ -175,14 +176,14 @@ class PlatformLoads:
 
 
 def _along(motion: LegMotion, mass: Floats, origin: Floats, offset: Floats, from_end: bool) -> tuple[Floats, Floats]:
-    """Forces on A and B (N, K, 3) of masses (K,) at a fixed distance (K,) along the leg from A, or from B where `from_end`."""
-    e, l = motion.along, motion.spans[:, :, None]
+    """Forces on A and B (N, K, 3) of masses (K,) at a distance (K,) along the leg from A, or from B where `from_end`."""
+    e, span = motion.along, motion.spans[:, :, None]
     apart = motion.end_rates - motion.foot_rates
     stretch, faster = motion.span_rates[:, :, None], motion.span_accelerations[:, :, None]
-    turned = (apart - stretch * e) / l
-    a = (motion.end_accelerations - motion.foot_accelerations - faster * e - 2.0 * stretch * turned) / l
+    turned = (apart - stretch * e) / span
+    a = (motion.end_accelerations - motion.foot_accelerations - faster * e - 2.0 * stretch * turned) / span
     f = mass[:, None] * (origin + offset[:, None] * a)
-    aside = (offset[:, None] / l) * (f - e * dot(f, e)[:, :, None])
+    aside = (offset[:, None] / span) * (f - e * dot(f, e)[:, :, None])
     return (-aside, f + aside) if from_end else (f - aside, aside)
 
 

@@ -8,7 +8,7 @@ gravity would help is given away; counterbalances are in c.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,20 +67,21 @@ class ForceLimits:
         return np.asarray(self.limits * np.maximum(1.0 - self.standing(q), LEAST), dtype=np.float64)
 
 
-def force_limits(machine: Machine, tool_length: float = 0.0, cutting: float = 0.0) -> ForceLimits | None:
-    """Of a machine with a tool of that length; None where the machine file has no limit of a motor, or no masses.
+def force_limits(machine: Machine, kinematics: Kinematics, cutting: float = 0.0) -> ForceLimits | None:
+    """Of a machine; None where the machine file has no limit of a motor, or no masses.
 
     Args:
-        cutting: N at the tip, in the direction that is worst for each motor
+        kinematics: at the tip
+        cutting: N there, in the direction that is worst for each motor
     """
     limits = force_limits_of(machine)
     dynamics = dynamics_of(machine)
     if dynamics is None or not np.isfinite(limits).any():
         return None
-    found = ForceLimits(dynamics, machine.kinematics.with_tool(tool_length), limits, np.full(len(limits), np.inf), cutting * NEWTON)
+    found = ForceLimits(dynamics, kinematics, limits, np.full(len(limits), np.inf), cutting * NEWTON)
     home = machine.home[None]
     unit = np.eye(len(limits))
     own = np.abs(np.stack([dynamics.forces(home, np.zeros_like(home), u[None], 0.0)[0, j] for j, u in enumerate(unit)]))
     with np.errstate(divide="ignore"):
         alone = found.left(home)[0] / own
-    return ForceLimits(dynamics, found.kinematics, limits, alone, found.cutting)
+    return replace(found, acceleration=alone)

@@ -50,8 +50,8 @@ class LegParts:
 
 @dataclass(frozen=True, eq=False)
 @arrays(place="N 3", turn="N 3 3", twist="N 6", acceleration="N 6", rates="N 6 K", arms="N K 3", feet="N K 3",
-        foot_rates="N K 3", foot_accelerations="N K 3", end_rates="N K 3", end_accelerations="N K 3", moved="N K 3", rods="N K 3", spans="N K",
-        span_rates="N K", span_accelerations="N K")
+        foot_rates="N K 3", foot_accelerations="N K 3", end_rates="N K 3", end_accelerations="N K 3", moved="N K 3",
+        rods="N K 3", spans="N K", span_rates="N K", span_accelerations="N K")
 class LegMotion:
     """N states of a platform on K legs, seen from its carriers.
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from postproc.cycle_time.planned import motion_of
 from postproc.feedrate.feed import AllowedFeed
-from postproc.feedrate.limits import JointLimits
+from postproc.feedrate.limits import ForceRows, JointLimits
 from postproc.feedrate.plan import plan_second_order
 from postproc.feedrate.second_order import least_time
 from postproc.pipeline.result import PostResult
@@ -101,9 +101,22 @@ def least_seconds(path: MachinePath, limits: JointLimits, feed: AllowedFeed, s: 
     rows = [constraint.JointVelocityConstraintVarying(velocity),
             constraint.JointAccelerationConstraint(np.stack((-limits.acceleration, limits.acceleration), axis=1),
                                                    discretization_scheme=both)]
+    if limits.forces is not None:
+        rows.append(_force_rows(constraint, limits.forces, path.joints))
     speed = toppra.algorithm.TOPPRA(rows, made(), gridpoints=s / unit, solver_wrapper="seidel").compute_parameterization(
         0.0, 0.0, return_data=True)[1]
     return float(least_time(s / unit, speed**2))
+
+
+def _force_rows(constraint: Any, forces: ForceRows, joints: int) -> Any:
+    """Limits of forces for toppra: |F(q, q', q'')| <= 1 in each joint."""
+    def used(*motion: Floats) -> Floats:
+        q, rate, acceleration = (np.atleast_2d(one) for one in motion)
+        return np.asarray(forces.rows(q, rate, acceleration)[1][0])
+
+    both_ways = np.concatenate([np.eye(joints), -np.eye(joints)])
+    return constraint.SecondOrderConstraint(used, lambda _: both_ways, lambda _: np.ones(2 * joints), joints,
+                                            discretization_scheme=constraint.DiscretizationType.Interpolation)
 
 
 def _toppra() -> tuple[Any, Any]:

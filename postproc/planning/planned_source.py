@@ -27,7 +27,7 @@ def source_of(job: Job, moves: Moves, path: JointPath, correction: PlannedCorrec
     """The source of the planned motion of a job's path; `correction`, `override` and `limited_jerk` as of `Source`."""
     return Source(path, moves, job.machine, job.kinematics, Tolerance(job.options.tolerance, job.axis_tolerance),
                   stops_of(job.toolpath, moves), job.toolpath.file, correction, override, limits_by_tool(job),
-                  limited_jerk)
+                  limited_jerk, cutting_forces(job))
 
 
 def shifted_moves(job: Job, moves: Moves) -> Bools:
@@ -47,6 +47,12 @@ def limits_by_tool(job: Job) -> dict[int, ToolLimits]:
     """Limits by index of the tool, of those that have one."""
     found = {k: tool_limits(job.setup.tools.get(str(job.number_of(k)))) for k in range(len(job.toolpath.tools))}
     return {k: limits for k, limits in found.items() if limits is not None}
+
+
+def cutting_forces(job: Job) -> dict[int, float]:
+    """N at the tip by index of the tool, of those that the set-up gives one."""
+    tools = (job.setup.tools.get(str(job.number_of(k))) for k in range(len(job.toolpath.tools)))
+    return {k: tool.cutting_force for k, tool in enumerate(tools) if tool is not None and tool.cutting_force}
 
 
 def limits_not_kept(job: Job) -> list[Diagnostic]:

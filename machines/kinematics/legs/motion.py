@@ -1,7 +1,8 @@
 """Accelerations of a platform on legs, exact: the closed loops differentiated twice.
 
-With r = B - A, r.r = l^2 gives r.r'' + r'.r' = l'^2 + l l'', and B'' = a + alpha x b + omega x (omega x b), A'' = A_q q'' + A_qq
-q'^2: as Jx (a, alpha) = Jq q'' + what the rates alone do. Source: Company 2000, II-25; II-26 and II-27 take differences there.
+With r = B - A, r.r = l^2 gives r.r'' + r'.r' = l'^2 + l l'', and B'' = a + alpha x b + omega x (omega x b), A'' = A_q q''
++ A_qq q'^2: as Jx (a, alpha) = Jq q'' + what the rates alone do. Source: Company 2000, II-25; II-26 and II-27 take
+differences there.
 """
 
 from __future__ import annotations
