@@ -53,6 +53,11 @@ class ForceLimits:
             first, second = (own(q, rate, acceleration, 0.0) / left for rate, acceleration in ((zero, dq), (dq, d2q)))
         return np.nan_to_num(first), np.nan_to_num(second)
 
+    def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
+        """(N, J) what a motion takes of what is left of each limit; 1: all. 0 of motors without a limit."""
+        with np.errstate(invalid="ignore"):
+            return np.nan_to_num(np.abs(self.dynamics.forces(q, rate, acceleration, 0.0)) / self.left(q))
+
     def standing(self, q: Floats) -> Floats:
         """(N, J) of the limits: what gravity and the force at the tool take of each, standing still."""
         zero = np.zeros_like(q)

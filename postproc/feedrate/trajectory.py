@@ -130,7 +130,7 @@ class JointTrajectory:
         found = [np.abs(values) / getattr(limits, name)
                  for name, values in zip(ORDERS, (self.qd, self.qdd, self.qddd), strict=True)]
         if limits.forces is not None:
-            found[1] = np.maximum(found[1], np.abs(limits.forces.rows(self.q, self.qd, self.qdd)[1]))
+            found[1] = np.maximum(found[1], limits.forces.use(self.q, self.qd, self.qdd))
         return found
 
     def _tool(self, limits: JointLimits) -> Floats:
