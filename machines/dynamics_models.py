@@ -1,4 +1,4 @@
-"""The `[dynamics]` table of a machine file: masses in kg, moments of inertia in kg m2, forces in N, torques in N m."""
+"""The `[dynamics]` and `[stiffness]` tables of a machine file: kg, kg m2, N, N m, N/um."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ Place = tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(g
               Annotated[float, Field(ge=-1e6, le=1e6)]]
 Inertia = Amount | tuple[Amount, Amount, Amount]
 MassFigure = Literal["mass", "centre", "inertia", "rotor", "force", "balance", "rods", "joint", "length"]
+StiffnessFigure = Literal["rod", "joint", "drive", "turn"]
 BodyFigure = Literal["mass", "centre", "inertia"]
 
 
@@ -64,6 +65,33 @@ class AxisMassModel(UserModel):
     """keys of this table whose figure no document states"""
     source: dict[MassFigure, FigureSource] = Field(default_factory=dict)
     """by key: the document of `[sources]` that states its figure, and the place in it"""
+
+
+class StiffnessModel(UserModel):
+    """The `[stiffness]` table: what the parts of the machine yield by; what is left out does not yield."""
+
+    rod: Limit | None = None
+    """N/um of a rod's body along it, of a machine on legs"""
+    joint: Limit | None = None
+    """N/um of each joint of a rod along it"""
+    drive: Limit | None = None
+    """N/um of each drive along its motion, of arms at their ends"""
+    turn: Limit | None = None
+    """N m per mrad of each rotary axis of a machine without legs"""
+    assumed: tuple[StiffnessFigure, ...] = ()
+    """keys of this table whose figure no document states"""
+    source: dict[StiffnessFigure, FigureSource] = Field(default_factory=dict)
+    """by key: the document of `[sources]` that states its figure, and the place in it"""
+
+    def problems(self, on_legs: bool) -> Iterator[KeyProblem]:
+        """Keys of the other kind of machine; rods that do not yield."""
+        for key in ("turn",) if on_legs else ("rod", "joint"):
+            if getattr(self, key) is not None:
+                yield KeyProblem("machine.stiffness", ("stiffness", key), f"{key} is of machines with"
+                                 f"{'out' * on_legs} legs", f"take {key} out")
+        if on_legs and self.rod is None:
+            yield KeyProblem("machine.stiffness", ("stiffness",), "the stiffness of the rods is missing",
+                             "write rod = ... in N/um")
 
 
 OF_LEGS, OF_LENGTHS, OF_CARRIERS = ("rods", "joint"), ("length",), ("under_part",)

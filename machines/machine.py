@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from machines.choices import BoughtOption, Park, Rapids, RolloverRule, Stop
-from machines.dynamics_models import DynamicsModel
+from machines.dynamics_models import DynamicsModel, StiffnessModel
 from machines.figures import Document
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
@@ -152,6 +152,7 @@ class Machine:
         certificate: file that proves that the declared workspace is reached and free of singular positions, "" where that
             was sampled, or nobody asks it of the machine
         dynamics: masses, and what the motors can give; None where the machine file does not say
+        stiffness: what its parts yield by; None likewise
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
 
@@ -185,6 +186,7 @@ class Machine:
     documents: tuple[Document, ...] = ()
     certificate: str = ""
     dynamics: DynamicsModel | None = None
+    stiffness: StiffnessModel | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))

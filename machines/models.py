@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, PrivateAttr
 
 from machines.certificate.lookup import comes_with_package
 from machines.choices import Park, Rapids, RolloverRule, Stop
-from machines.dynamics_models import DynamicsModel
+from machines.dynamics_models import DynamicsModel, StiffnessModel
 from machines.figures import Document, FigureSource, FigureTable, by_key, source_problems
 from machines.hooks import HooksModel
 from machines.key_problem import KeyProblem
@@ -234,6 +234,8 @@ class MachineModel(UserModel):
     """blocks of the shop round tool calls, indexing moves, operations and stops"""
     dynamics: DynamicsModel | None = None
     """masses of what the axes move, and what the motors can give"""
+    stiffness: StiffnessModel | None = None
+    """what rods, joints and drives yield by"""
     sources: dict[str, Document] = Field(default_factory=dict)
     """documents that figures come from, by a short name that `source` of the tables begins with"""
 
@@ -250,6 +252,8 @@ class MachineModel(UserModel):
         yield from axes
         if self.dynamics is not None:
             yield from self.dynamics.problems(*_moving_parts(kinematics))
+        if self.stiffness is not None:
+            yield from self.stiffness.problems(kinematics.leg_parts is not None)
         parts = kinematics.clearance_parts
         held = () if parts is None else parts.leg_names
         if self.retract_axis is not None and (rotary.get(self.retract_axis, True) or self.retract_axis in held):
@@ -268,6 +272,8 @@ class MachineModel(UserModel):
         """The tables that hold figures with a source, or assumed ones."""
         axes = [FigureTable(("axes", name), a.assumed, by_key(a.source)) for name, a in self.axes.items()]
         masses = [] if self.dynamics is None else self.dynamics.figures()
+        if self.stiffness is not None:
+            masses = [*masses, FigureTable(("stiffness",), self.stiffness.assumed, by_key(self.stiffness.source))]
         timing = FigureTable(("timing",), self.timing.assumed, by_key(self.timing.source))
         return [*self.kinematics.figures(), *axes, *masses, timing]
 

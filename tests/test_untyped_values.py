@@ -37,7 +37,7 @@ BORDERS = {
     "machines/value_words.py": "what pydantic says of a fault",
     **{f"machines/{name}.py": FIGURES for name in (
         "analysis/certify", "analysis/chain", "analysis/limits_of_box", "analysis/maps", "layouts/design",
-        "stiffness/report", "tolerances/report")},
+        "dynamics/report", "dynamics/rods", "stiffness/report", "tolerances/report")},
     **{f"{name}.py": CERTIFICATES for name in (
         "machines/analysis/certificate_figure", "machines/certificate/certificate_file", "machines/certificate/lookup",
         "postproc/certificate_check/check", "postproc/certificate_check/legs", "postproc/certificate_check/machine_file",

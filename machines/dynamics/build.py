@@ -73,7 +73,8 @@ def _on_legs(machine: Machine, model: DynamicsModel, parts: LegParts, axes: tupl
     masses = LegMasses(np.array([t.mass for t in legs]), centres, np.array(inertia), np.array([t.rods for t in legs]),
                        np.array([t.joint for t in legs]), length, np.array([t.mass for t in carriers]),
                        np.array([t.under_part for t in carriers], dtype=np.bool_))
-    axis, table, head = parts.axis, (), None
+    axis, head = parts.axis, None
+    table: tuple[AxisBody, ...] = ()
     if axis is not None and axis.at_spindle:
         head = _of(model.head)
     elif axis is not None:

@@ -89,7 +89,7 @@ def _moved(joint: Joint, at: Floats, turn: Floats, shift: Floats) -> tuple[Float
     if not joint.rotary:
         return turn, shift + at[:, None] * (turn @ joint.direction)
     own = rotation(joint.direction, at)
-    return turn @ own, shift + np.einsum("nij,nj->ni", turn, joint.point - own @ joint.point)
+    return np.asarray(turn @ own), shift + np.einsum("nij,nj->ni", turn, joint.point - own @ joint.point)
 
 
 def _load(body: Body, turn: Floats, shift: Floats, moving: tuple[Floats, Floats, Floats, Floats]) -> tuple[Floats, Floats]:
@@ -105,4 +105,5 @@ def spun(inertia: Floats, turn: Floats, omega: Floats, alpha: Floats) -> Floats:
     if not np.any(inertia):
         return np.zeros_like(omega)
     whole = np.einsum("nij,j,nkj->nik", turn, inertia, turn)
-    return np.einsum("nij,nj->ni", whole, alpha) + cross(omega, np.einsum("nij,nj->ni", whole, omega))
+    spinning = np.einsum("nij,nj->ni", whole, omega)
+    return np.asarray(np.einsum("nij,nj->ni", whole, alpha) + cross(omega, spinning), dtype=np.float64)

@@ -44,6 +44,10 @@ class ForceRows(Protocol):
         """(a, b), each (N, J): |a x'/2 + b x| <= 1 of the squared speed x along a path q (N, J) with these derivatives."""
         ...
 
+    def standing(self, q: Floats) -> Floats:
+        """(N, J) of the limits, that standing still at joints (N, J) takes."""
+        ...
+
     def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
         """(N, J) of the limits, at joints (N, J) with their rates and accelerations in time."""
         ...

@@ -82,9 +82,9 @@ def with_forces(at: Derivatives, limits: JointLimits) -> tuple[Derivatives, Join
     first, second = limits.forces.rows(at.q, at.dq[:, :joints], at.d2q[:, :joints])
     columns = zip(at[1:], (first, second, np.zeros_like(first)), strict=True)
     free, one = np.full(joints, np.inf), np.ones(joints)
-    most = (np.append(old, new) for old, new in
-            ((limits.velocity, free), (limits.acceleration, one), (limits.jerk, free)))
-    return Derivatives(at.q, *map(np.column_stack, columns)), JointLimits(*most, forces=limits.forces)
+    most = JointLimits(np.append(limits.velocity, free), np.append(limits.acceleration, one), np.append(limits.jerk, free),
+                       forces=limits.forces)
+    return Derivatives(at.q, *map(np.column_stack, columns)), most
 
 
 def forces_bind(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Floats], Floats]) -> bool:

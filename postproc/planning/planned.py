@@ -279,7 +279,26 @@ def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnosti
     if found:
         one, made = max(found, key=lambda pair: _worst(pair[1]))
         beyond.append(_beyond(_worst(made), source.moves.line[one.move[[0, -1]]].tolist(), len(found), source.file))
+    beyond += _too_weak(motion)
     return (None, beyond) if beyond else (motion, [])
+
+
+def _too_weak(motion: PlannedMotion) -> list[Diagnostic]:
+    """An error where standing still, under gravity and the force at the tool, takes more than a motor has."""
+    source, worst = motion.source, (0.0, "", 0)
+    if not source.motors_limited:
+        return []
+    for one in motion.passes:
+        forces = source.bounds_of(one).forces
+        shares = np.zeros((0, 0)) if forces is None else forces.standing(source.path.q[one.block])
+        if shares.size and shares.max() > worst[0]:
+            k, j = np.unravel_index(int(shares.argmax()), shares.shape)
+            worst = float(shares[k, j]), source.machine.axis_names[int(j)], int(source.path.move[one.block[k]])
+    if worst[0] <= 1.0:
+        return []
+    return [error("plan.force", f"standing still takes {worst[0]:.2f} times the force that the motor of {worst[1]} can give",
+                  file=source.file, lines=[int(source.moves.line[worst[2]])],
+                  hint="check masses, force and balance of [dynamics] in the machine file, and cutting_force of the set-up")]
 
 
 def _limits_exceeded(passes: list[PassGeometry], needed: Floats, source: Source) -> list[Diagnostic]:

@@ -84,8 +84,8 @@ class _Grid:
         cap = np.minimum(self.cap, squared_speed(dq, limits.velocity))
         if forces is not None:
             free, one = np.full(q.shape[1], np.inf), np.ones(q.shape[1])
-            limits = JointLimits(*(np.append(old, new) for old, new in (
-                (limits.velocity, free), (limits.acceleration, one), (limits.jerk, free))))
+            limits = JointLimits(np.append(limits.velocity, free), np.append(limits.acceleration, one),
+                                 np.append(limits.jerk, free))
             dq, d2q, d3q = (np.column_stack(pair) for pair in zip((dq, d2q, d3q), forces, strict=True))
         if not self.jerky:
             return least_time(self.sigma, second_order(self.sigma, dq, d2q, limits.acceleration, cap, self.method.kernel))

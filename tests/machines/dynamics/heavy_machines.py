@@ -1,4 +1,4 @@
-"""Machines with masses by chance, and their bodies as point masses, placed by code that shares nothing with the product's."""
+"""Machines with masses by chance, and their bodies as point masses, placed by code of its own."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Points:
             for name in names:
                 move = _then(move, chain[name], sense * q[m.axis_names.index(name)])
                 table = m.dynamics.axes[name]
-                centre = np.array(joint.point if table.centre is None else table.centre)
+                centre = np.array(chain[name].point if table.centre is None else table.centre)
                 found += [(mass, move(x)) for mass, x in _rigid(table.mass, centre, table.inertia)]
         return found
 

@@ -17,7 +17,8 @@ from machines.machine import Machine
 from tests.machines.dynamics.heavy_machines import Points, heavy
 from toolpaths.arrays import Floats
 
-OF_LEGS = ["uranesx", "rotary-delta", "hexapod", "h4a-c-table", "h4a-spindle-axis", "h4-rotary", "planar-delta-z", "macro-micro"]
+OF_LEGS = ["uranesx", "rotary-delta", "hexapod", "h4a-c-table", "h4a-spindle-axis", "h4-rotary", "planar-delta-z",
+           "macro-micro"]
 OF_CHAINS = ["mill-3axis", "mikron-ucp710", "fork-head-ab", "head-table", "nutating-head"]
 
 
@@ -91,9 +92,9 @@ def delta(rods: float) -> Machine:
 
 
 def integrated(forces: Floats, seconds: float, exact: bool) -> tuple[Floats, Floats, Floats]:
-    """Carriages and platform (N, 6) in time, their rates, accelerations: multipliers of the rods' lengths, masses of the ends.
+    """Carriages and platform (N, 6) in time, their rates, accelerations: multipliers of the rods' lengths.
 
-    State (q1, q2, q3, x, y, z); rods of 20 kg a leg as m/3 and m/6 of their ends, or as halves.
+    State (q1, q2, q3, x, y, z); rods of 20 kg a leg as masses m/3 and m/6 of their ends, or as halves.
     """
     turn = np.deg2rad([0.0, 120.0, 240.0])
     base = 600.0 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
