@@ -88,14 +88,14 @@ def needed(machine: Machine) -> Dynamics:
 def _held(machine: Machine, q: Floats, asked: MotionAsked) -> tuple[Floats, Floats]:
     """Rates and accelerations (1, J) of the joints while the tip moves as asked and the tool axis stands.
 
-    The second derivative of the pose along the rates is a central difference of its first (II-26 takes one of the same).
+    How the rates of the tool change along the rates of the joints is a central difference (II-26 takes a one-sided one).
     """
     kinematics = machine.kinematics.with_tool(asked.tool)
-    back = np.linalg.pinv(kinematics.jacobian(q)[0], rcond=1e-9)
+    back = np.linalg.pinv(kinematics.twist_jacobian(q)[0], rcond=1e-9)
     rate = back @ np.concatenate([asked.speed, np.zeros(3)])
     size = max(float(np.abs(rate / np.where(machine.rotary, DEG, 1.0)).max()), 1e-12)
     h = 0.01 / size
-    ahead, behind = (kinematics.jacobian(q + sign * h * rate)[0] @ rate for sign in (1.0, -1.0))
+    ahead, behind = (kinematics.twist_jacobian(q + sign * h * rate)[0] @ rate for sign in (1.0, -1.0))
     bend = (ahead - behind) / (2.0 * h)
     return rate[None], (back @ (np.concatenate([asked.acceleration, np.zeros(3)]) - bend))[None]
 
@@ -132,7 +132,7 @@ def masses(dynamics: Dynamics, q: Floats) -> Floats:
 
 def tip_acceleration(machine: Machine, limits: ForceLimits, q: Floats, own: Floats) -> Floats:
     """(N, J) mm/s2 that each motor allows the tip in every direction from rest, tool axis held, after gravity."""
-    back = np.linalg.pinv(machine.kinematics.jacobian(q), rcond=1e-9)[:, :, :3]
+    back = np.linalg.pinv(machine.kinematics.twist_jacobian(q), rcond=1e-9)[:, :, :3]
     with np.errstate(divide="ignore"):
         return np.asarray(limits.left(q) / np.linalg.norm(own @ back, axis=2), dtype=np.float64)
 
