@@ -56,10 +56,15 @@ def cutting_forces(job: Job) -> dict[int, float]:
 
 
 def limits_not_kept(job: Job) -> list[Diagnostic]:
-    """A warning where tools of the CL file have limits in the set-up and the feeds are not planned."""
+    """Warnings where tools of the CL file have limits in the set-up, or motors in the machine file, and the feeds are not
+    planned."""
+    found = []
+    if job.machine.dynamics is not None and job.machine.dynamics.limited:
+        found.append(warning("plan.motors", f"what the motors of {job.machine.name} can give ([dynamics]) is not looked at: "
+                             "the feeds are those of the CL file", file=job.machine.file, hint="convert with --feed planned"))
     numbers = sorted({job.number_of(k) for k in limits_by_tool(job)})
     if not numbers:
-        return []
-    return [warning("setup.tool_limits", f"{', '.join(TOOL_LIMITS[:-1])} and {TOOL_LIMITS[-1]} of "
+        return found
+    return [*found, warning("setup.tool_limits", f"{', '.join(TOOL_LIMITS[:-1])} and {TOOL_LIMITS[-1]} of "
                     f"{', '.join(f'[tools.{n}]' for n in numbers)} are not kept: the feeds are those of the CL file",
                     file=job.options.setup or "", count=len(numbers), hint="convert with --feed planned")]
