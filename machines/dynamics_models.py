@@ -13,7 +13,7 @@ from machines.user_model import UserModel
 
 Amount = Annotated[float, Field(ge=0.0, le=1e9)]
 Limit = Annotated[float, Field(gt=0.0, le=1e12)]
-Place = tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=-1e6, le=1e6)],
+MassCentre = tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=-1e6, le=1e6)],
               Annotated[float, Field(ge=-1e6, le=1e6)]]
 Inertia = Amount | tuple[Amount, Amount, Amount]
 MassFigure = Literal["mass", "centre", "inertia", "rotor", "force", "balance", "rods", "joint", "length"]
@@ -26,7 +26,7 @@ class BodyModel(UserModel):
 
     mass: Amount
     """kg, the spindle of the platform included; of a platform that carries a rotary axis without what that axis turns"""
-    centre: Place = (0.0, 0.0, 0.0)
+    centre: MassCentre = (0.0, 0.0, 0.0)
     """mm, its centre of mass from the reference point of the level platform, axes at 0"""
     inertia: Inertia = 0.0
     """kg m2 about its centre of mass: one number, or three about the x, y and z of the level platform"""
@@ -42,14 +42,14 @@ class AxisMassModel(UserModel):
     mass: Amount = 0.0
     """kg of the body that this axis moves and no axis beyond it: slide, table, head, carriage, arm; of a leg of changing
     length the part that turns about the foot"""
-    centre: Place | None = None
+    centre: MassCentre | None = None
     """mm, its centre of mass in machine coordinates, all axes at 0; left out: on the line of a rotary axis or an arm's"""
     inertia: Inertia = 0.0
     """kg m2 of that body about its centre of mass: one number, or three about the machine's x, y and z, all axes at 0"""
     rotor: Amount = 0.0
     """kg or kg m2, inertia of motor and gear as the axis feels it"""
     force: Limit | None = None
-    """N, of a rotary axis N m: what the motor can give, both ways; left out: without limit"""
+    """N, of a rotary axis N m: what the motor can give, in both directions; left out: without limit"""
     balance: Annotated[float, Field(ge=-1e9, le=1e9)] = 0.0
     """N or N m that a counterbalance gives in the positive direction"""
     rods: Amount = 0.0
@@ -101,7 +101,7 @@ OF_LEGS, OF_LENGTHS, OF_CARRIERS = ("rods", "joint"), ("length",), ("under_part"
 class DynamicsModel(UserModel):
     """The `[dynamics]` table."""
 
-    down: Place = (0.0, 0.0, -1.0)
+    down: MassCentre = (0.0, 0.0, -1.0)
     """direction of gravity in machine coordinates, of length 1; [0, 0, 0]: without gravity"""
     platform: BodyModel | None = None
     """of a machine on legs"""

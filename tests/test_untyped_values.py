@@ -44,7 +44,7 @@ BORDERS = {
         "postproc/certificate_check/run")},
     "postproc/cli/machine_study.py": FIGURES,
     "machines/analysis/report.py": FIGURES, "machines/geometric_error/exchange/survey.py": FIGURES,
-    "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,
+    "postproc/report/loads.py": FIGURES, "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,
     **{f"postproc/page/{name}.py": FIGURES for name in (
         "columns", "document", "drawings", "run", "skeleton", "solids", "tools", "what_if")},
     "postproc/base/program_time.py": FIGURES, "postproc/cycle_time/toppra_check.py": FIGURES,

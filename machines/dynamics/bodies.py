@@ -19,7 +19,7 @@ GRAVITY = 9806.65
 
 @dataclass(frozen=True, eq=False)
 @arrays(centre="3", inertia="3")
-class Body:
+class RigidBody:
     """kg; centre of mass (3,) mm; moments of inertia (3,) kg mm2 about it, along the axes of the frame at rest."""
 
     mass: float
@@ -27,9 +27,9 @@ class Body:
     inertia: Floats
 
 
-def body(model: BodyModel) -> Body:
+def body(model: BodyModel) -> RigidBody:
     """Of a table of the machine file."""
-    return Body(model.mass, np.array(model.centre), moments(model.inertia))
+    return RigidBody(model.mass, np.array(model.centre), moments(model.inertia))
 
 
 def moments(inertia: Inertia) -> Floats:

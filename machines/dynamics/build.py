@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from machines.dynamics.bodies import NEWTON, NEWTON_METRE, Body, Dynamics, body, moments
+from machines.dynamics.bodies import NEWTON, NEWTON_METRE, Dynamics, RigidBody, body, moments
 from machines.dynamics.chain import AxisBody, ChainDynamics
 from machines.dynamics.legs import LegDynamics, LegMasses
 from machines.dynamics_models import AxisMassModel, BodyModel, DynamicsModel
@@ -84,9 +84,9 @@ def _on_legs(machine: Machine, model: DynamicsModel, parts: LegParts, axes: tupl
     return LegDynamics(machine.kinematics, parts, masses, _of(model.platform), *axes, head, table)
 
 
-def _of(model: BodyModel | None) -> Body:
-    return Body(0.0, np.zeros(3), np.zeros(3)) if model is None else body(model)
+def _of(model: BodyModel | None) -> RigidBody:
+    return RigidBody(0.0, np.zeros(3), np.zeros(3)) if model is None else body(model)
 
 
-def _body(table: AxisMassModel, point: Floats) -> Body:
-    return Body(table.mass, np.array(point if table.centre is None else table.centre), moments(table.inertia))
+def _body(table: AxisMassModel, point: Floats) -> RigidBody:
+    return RigidBody(table.mass, np.array(point if table.centre is None else table.centre), moments(table.inertia))

@@ -4,7 +4,7 @@ Screws and motions are (omega, v) with v at the machine's origin, in the frame o
 bed, S the screw of an axis: V' = sum of S q'' + (V x S) q'; a point r of a body has the acceleration v' + omega' x r +
 omega x (v + omega x r). The motor of an axis carries the component along its screw of all forces beyond it. The axes
 between part and bed move bodies against the senses in which they move the tool. Source: Featherstone, Rigid
-Body Dynamics Algorithms (2008), chapter 5; the same forces by a Jacobian: Company 2000, II-28.
+RigidBody Dynamics Algorithms (2008), chapter 5; the same forces by a Jacobian: Company 2000, II-28.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from machines.dynamics.bodies import GRAVITY, Body, Dynamics
+from machines.dynamics.bodies import GRAVITY, Dynamics, RigidBody
 from machines.kinematics.chain import Joint
 from toolpaths.arrays import Floats
 from toolpaths.rotations import cross, dot, rotation
@@ -28,7 +28,7 @@ class AxisBody:
     joint: Joint
     at: int
     sense: float
-    body: Body
+    body: RigidBody
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,8 @@ def _moved(joint: Joint, at: Floats, turn: Floats, shift: Floats) -> tuple[Float
     return np.asarray(turn @ own), shift + np.einsum("nij,nj->ni", turn, joint.point - own @ joint.point)
 
 
-def _load(body: Body, turn: Floats, shift: Floats, moving: tuple[Floats, Floats, Floats, Floats]) -> tuple[Floats, Floats]:
+def _load(body: RigidBody, turn: Floats, shift: Floats,
+          moving: tuple[Floats, Floats, Floats, Floats]) -> tuple[Floats, Floats]:
     """(moment about the origin, force), each (N, 3), that a body takes."""
     omega, v, alpha, a = moving
     centre = turn @ body.centre + shift

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from machines.dynamics.bodies import GRAVITY, Body, Dynamics
+from machines.dynamics.bodies import GRAVITY, Dynamics, RigidBody
 from machines.dynamics.chain import AxisBody, side_forces, spun
 from machines.kinematics.base import Kinematics
 from machines.kinematics.leg_motion import FifthAxis, LegMotion, LegParts
@@ -61,11 +61,11 @@ class LegDynamics(Dynamics):
     kinematics: Kinematics
     parts: LegParts
     masses: LegMasses
-    platform: Body
+    platform: RigidBody
     rotor: Floats
     balance: Floats
     down: Floats
-    head: Body | None = None
+    head: RigidBody | None = None
     table: tuple[AxisBody, ...] = field(default=())
 
     def forces(self, q: Floats, rate: Floats, acceleration: Floats, gravity: float = GRAVITY) -> Floats:
@@ -187,7 +187,7 @@ def _along(motion: LegMotion, mass: Floats, origin: Floats, offset: Floats, from
     return (-aside, f + aside) if from_end else (f - aside, aside)
 
 
-def _head(body: Body, axis: FifthAxis, motion: LegMotion, moving: tuple[Floats, Floats, Floats],
+def _head(body: RigidBody, axis: FifthAxis, motion: LegMotion, moving: tuple[Floats, Floats, Floats],
           base: Floats) -> tuple[Floats, Floats, Floats]:
     """(torque (N,), force (N, 3), moment about C (N, 3)) of what turns on an axis that the platform carries."""
     q, rate, acceleration = moving

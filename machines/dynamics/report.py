@@ -45,8 +45,9 @@ def forces_at(machine: Machine, asked: MotionAsked) -> dict[str, Any]:
     kinematics = machine.kinematics.with_tool(asked.tool)
     q = kinematics.inverse(asked.tip[None], asked.axis[None])[0]
     if not np.isfinite(q).all():
-        raise DiagnosticError([error("dynamics.reach", f"{machine.name} does not reach {asked.tip.tolist()} with the "
-                                     f"tool along {asked.axis.tolist()}", hint="name a place inside with --tip, or another --tool")])
+        where = f"{asked.tip.tolist()} with the tool along {asked.axis.tolist()}"
+        raise DiagnosticError([error("dynamics.reach", f"{machine.name} does not reach {where}",
+                                     hint="name a place inside with --tip, or another --tool")])
     rate, acceleration = _held(machine, q, asked)
     units, still = force_units(machine), np.zeros_like(q)
     rates_alone = dynamics.forces(q, rate, acceleration, 0.0) - dynamics.forces(q, still, acceleration, 0.0)

@@ -88,8 +88,6 @@ class Kinematics(ABC):
     (product of exponentials, see `Serial`); () of any other"""
     on_rods: RodPlatform | None = None
     """the platform and its rods, where rods carry the tool"""
-    leg_parts: LegParts | None = None
-    """what moves of a platform on legs; None where none carry the tool"""
     transmits: Transmission | None = None
     """how legs pass motion and force on to a platform; None where none carry the tool"""
     clearance_parts: ClearanceParts | None = None
@@ -98,6 +96,11 @@ class Kinematics(ABC):
     """where the machine is declared to work: of the platform's reference point, of the gauge point without a platform"""
     singular_names: tuple[str, ...] = ()
     """what `singular_distance` measures; () where it measures nothing"""
+
+    @property
+    def leg_parts(self) -> LegParts | None:
+        """What moves of a platform on legs; None where none carry the tool."""
+        return None
 
     @property
     def plane(self) -> Floats | None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from postproc.cycle_time.planned import motion_of
 from postproc.feedrate.feed import AllowedFeed
-from postproc.feedrate.limits import ForceRows, JointLimits
+from postproc.feedrate.limits import JointLimits, MotorLimits
 from postproc.feedrate.paths import ParametricPath
 from postproc.feedrate.plan import plan_second_order
 from postproc.feedrate.second_order import least_time
@@ -109,7 +109,7 @@ def least_seconds(path: MachinePath, limits: JointLimits, feed: AllowedFeed, s: 
     return float(least_time(s / unit, speed**2))
 
 
-def _force_rows(base: Any, forces: ForceRows, path: ParametricPath, unit: float,
+def _force_rows(base: Any, forces: MotorLimits, path: ParametricPath, unit: float,
                 both: Any) -> Any:
     """Limits of forces for toppra: its limits of acceleration, -1 to 1, of rows (a, b) in the place of (q', q'')."""
     def used(_: object, made: object, gridpoints: Floats, *more: Any) -> Any:

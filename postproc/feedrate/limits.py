@@ -32,7 +32,7 @@ TOOL_COLUMNS = len(fields(ToolLimits))
 """of a motion, one for each limit at the tool"""
 
 
-class ForceRows(Protocol):
+class MotorLimits(Protocol):
     """Limits of forces that depend on place and speed: of second order, and square in the speed."""
 
     @property
@@ -62,7 +62,7 @@ class JointLimits:
     acceleration: Floats
     jerk: Floats
     tool: ToolLimits | None = None
-    forces: ForceRows | None = None
+    forces: MotorLimits | None = None
 
     def __post_init__(self) -> None:
         for name in ("velocity", "acceleration", "jerk"):

@@ -17,7 +17,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from postproc.feedrate.limits import ForceRows, JointLimits, ToolLimits, squared_speed, steady_cap
+from postproc.feedrate.limits import JointLimits, MotorLimits, ToolLimits, squared_speed, steady_cap
 from postproc.feedrate.paths import Derivatives, Eased, ParametricToolPath
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import unit
@@ -106,7 +106,7 @@ def forces_bind(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable
     return False
 
 
-def steady_force_speed(eased: Eased, sigma: Floats, forces: ForceRows) -> Floats:
+def steady_force_speed(eased: Eased, sigma: Floats, forces: MotorLimits) -> Floats:
     """Largest constant sigma_dot (N,) under limits of forces."""
     at = eased.derivatives(sigma)
     with np.errstate(divide="ignore"):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.feedrate.limits import ForceRows, JointLimits, ToolLimits
+from postproc.feedrate.limits import JointLimits, MotorLimits, ToolLimits
 from postproc.planning.geometry import DEGREE, MachinePath
 from postproc.planning.pass_geometry import PassGeometry
 from toolpaths.arrays import Floats
@@ -46,7 +46,7 @@ def steady_speed(one: PassGeometry, limits: JointLimits) -> Floats:
     return np.asarray(slowest if limits.forces is None else np.minimum(slowest, _force_speed(one, limits.forces)))
 
 
-def _force_speed(one: PassGeometry, forces: ForceRows) -> Floats:
+def _force_speed(one: PassGeometry, forces: MotorLimits) -> Floats:
     """(k,) the same under limits of forces, by PLACES of each block and the largest change between them."""
     travel, path = one.ends - one.begin, np.searchsorted([p.end for p in one.paths], one.ends)
     used = np.zeros((len(PLACES), len(travel)))

@@ -156,7 +156,7 @@ class OnLegs(RedundantLegs):
         return MovingLoops(self.loops, place, turn, middle[:, self.legs_at], step[:, self.legs_at]).jets()
 
     @property
-    def leg_parts(self) -> LegParts:  # type: ignore[override]  # nothing assigns it
+    def leg_parts(self) -> LegParts:
         """See the base class."""
         of = self.legs
         return LegParts(self.legs_at, of.points, of.directions, of.lengths, of.arm, of.stretch > 0.0, self.carriers_at,

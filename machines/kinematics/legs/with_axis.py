@@ -251,7 +251,7 @@ class LegsWithAxis(Kinematics):
         return np.where(inside[:, None], axis, edge)
 
     @property
-    def leg_parts(self) -> LegParts:  # type: ignore[override]  # nothing assigns it
+    def leg_parts(self) -> LegParts:
         """See the base class."""
         return replace(self.on_legs.leg_parts, axis=FifthAxis(self.letter, *self.axis.line(), self.axis.at_spindle))
 

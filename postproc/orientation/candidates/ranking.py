@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix, diags, identity, vstack
 
 from postproc.feedrate.feed import AllowedFeed
 from postproc.feedrate.kernels.interior import pentadiagonal
-from postproc.feedrate.limits import ForceRows, JointLimits, squared_speed, steady_cap
+from postproc.feedrate.limits import JointLimits, MotorLimits, squared_speed, steady_cap
 from postproc.feedrate.paths import Eased
 from postproc.feedrate.plan import PlannerOptions
 from postproc.feedrate.problem import SpeedProblem
@@ -93,7 +93,7 @@ class _Grid:
         cap[free] = UNBOUND * steady_cap(d2q[free], d3q[free], limits)
         return self._third_order(dq, d2q, d3q, cap, limits)
 
-    def _forces(self, q: Floats, forces: ForceRows | None) -> tuple[Floats, Floats, Floats] | None:
+    def _forces(self, q: Floats, forces: MotorLimits | None) -> tuple[Floats, Floats, Floats] | None:
         """Rows (K, J) of the forces of joints (N, J) at the sites."""
         if forces is None:
             return None

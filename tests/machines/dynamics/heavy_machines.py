@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
 import machines
-from machines.dynamics_models import AxisMassModel, BodyModel, DynamicsModel, Place
+from machines.dynamics_models import AxisMassModel, BodyModel, DynamicsModel, MassCentre
 from machines.kinematics.chain import Joint
 from machines.machine import Machine
 from toolpaths.arrays import Floats
@@ -42,7 +42,7 @@ def heavy(name: str, seed: int = 0) -> Machine:
     return replace(m, dynamics=DynamicsModel(platform=platform, head=head, axes=axes))
 
 
-def _place(v: Floats) -> Place:
+def _place(v: Floats) -> MassCentre:
     x, y, z = v.tolist()
     return x, y, z
 
@@ -73,7 +73,7 @@ class Points:
         return found
 
     def platform(self, q: Floats) -> tuple[Floats, Rotation]:
-        """Place and turn of the platform by its loops alone."""
+        """MassCentre and turn of the platform by its loops alone."""
         k = self.machine.kinematics
         legs = getattr(k, "on_legs", k)
         own, free = q[legs.legs_at], [("x", "y", "z", "a", "b", "c").index(f) for f in legs.loops.freedoms]

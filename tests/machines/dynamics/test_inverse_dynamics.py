@@ -84,8 +84,8 @@ def delta(rods: float) -> Machine:
     k = m.kinematics
     turn = np.deg2rad([0.0, 120.0, 240.0])
     ring = np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
-    drives = replace(k.loops.drives, points=800.0 * ring, lengths=np.full(3, 781.0))  # type: ignore[attr-defined]  # on legs
-    kinematics = replace(k, loops=replace(k.loops, drives=drives, joints=200.0 * ring))  # type: ignore[attr-defined, type-var]  # on legs
+    drives = replace(k.loops.drives, points=800.0 * ring, lengths=np.full(3, 781.0))
+    kinematics = replace(k, loops=replace(k.loops, drives=drives, joints=200.0 * ring))
     axes = {name: AxisMassModel(mass=70.0, rods=rods) for name in m.axis_names}
     model = DynamicsModel(down=(0.0, 0.0, 0.0), platform=BodyModel(mass=70.0), axes=axes)
     return replace(m, kinematics=kinematics, dynamics=model)

@@ -114,12 +114,12 @@ def test_pose_dependent_forces_are_kept_and_least_by_toppra() -> None:
     limits = limits_at_feed(m, m.kinematics)
     made = plan(trip, limits, 2000.0, options=STRICT).trajectory()
     assert limits.forces is not None
-    used = np.abs(limits.forces.dynamics.forces(made.q, made.qd, made.qdd)).max() * 1e-3  # type: ignore[attr-defined]  # its own
+    used = np.abs(limits.forces.dynamics.forces(made.q, made.qd, made.qdd)).max() * 1e-3
     assert 3600.0 < used <= 4000.0 * (1.0 + 1e-9)
     own = plan_second_order(trip, limits, 2000.0)
     grid = np.concatenate([piece.eased.parameter(piece.profile.sigma)[0] for piece in own.pieces])
     grid = np.clip(np.unique(grid), trip.start, trip.end)
-    theirs = least_seconds(_Joints(trip), limits, own.feed, grid)  # type: ignore[arg-type]  # what it uses of a path
+    theirs = least_seconds(_Joints(trip), limits, own.feed, grid)
     assert own.seconds == pytest.approx(theirs, rel=2e-3)
     assert made.t[-1] >= own.seconds
 
