@@ -23,10 +23,10 @@ from machines.leg_layouts import BoundedVector, DriveModel, StarLayout, stray_ke
 from machines.legs_mobility import leg_faults, travel_faults
 from machines.machine import ControlKinematics
 from machines.models import KinematicsModel, Vector
-from machines.rotary_models import RotaryModel
 from machines.slider_models import (
     UNIT,
     ClearanceModel,
+    RotaryModel,
     WorkspaceModel,
     clearance_sizes,
     lineardeltakins,

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from machines.choices import BoughtOption, Park, Rapids, RolloverRule, Stop
+from machines.dynamics_models import DynamicsModel, StiffnessModel
 from machines.figures import Document
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
@@ -155,6 +156,8 @@ class Machine:
         documents: those that figures come from
         certificate: file that proves that the declared workspace is reached and free of singular positions, "" where that
             was sampled, or nobody asks it of the machine
+        dynamics: masses, and what the motors can give; None where the machine file does not say
+        stiffness: what its parts yield by; None likewise
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
         by_drives: the machine as its drives move it, where this one has the axes of the control's kinematics (`on_control`)
     """
@@ -189,6 +192,8 @@ class Machine:
     figures: Mapping[str, str] = field(default_factory=dict)
     documents: tuple[Document, ...] = ()
     certificate: str = ""
+    dynamics: DynamicsModel | None = None
+    stiffness: StiffnessModel | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))

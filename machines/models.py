@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, PrivateAttr
 
 from machines.certificate.lookup import comes_with_package
 from machines.choices import Park, Rapids, RolloverRule, Stop
+from machines.dynamics_models import DynamicsModel, StiffnessModel
 from machines.figures import Document, FigureSource, FigureTable, by_key, source_problems
 from machines.hooks import HooksModel
 from machines.key_problem import KeyProblem
@@ -231,6 +232,10 @@ class MachineModel(UserModel):
     """what the control of this machine does of its own, and which options it has"""
     hooks: HooksModel = HooksModel()
     """blocks of the shop round tool calls, indexing moves, operations and stops"""
+    dynamics: DynamicsModel | None = None
+    """masses of what the axes move, and what the motors can give"""
+    stiffness: StiffnessModel | None = None
+    """what rods, joints and drives yield by"""
     sources: dict[str, Document] = Field(default_factory=dict)
     """documents that figures come from, by a short name that `source` of the tables begins with"""
 
@@ -245,6 +250,10 @@ class MachineModel(UserModel):
         rotary = dict(zip(kinematics.axis_names, kinematics.rotary, strict=True))
         axes = list(self._axis_problems(rotary)) or list(self._travel_problems(kinematics))
         yield from axes
+        if self.dynamics is not None:
+            yield from self.dynamics.problems(*_moving_parts(kinematics))
+        if self.stiffness is not None:
+            yield from self.stiffness.problems(kinematics.leg_parts is not None)
         parts = kinematics.clearance_parts
         held = () if parts is None else parts.leg_names
         if self.retract_axis is not None and (rotary.get(self.retract_axis, True) or self.retract_axis in held):
@@ -262,7 +271,11 @@ class MachineModel(UserModel):
     def figures(self) -> list[FigureTable]:
         """The tables that hold figures with a source, or assumed ones."""
         axes = [FigureTable(("axes", name), a.assumed, by_key(a.source)) for name, a in self.axes.items()]
-        return [*self.kinematics.figures(), *axes, FigureTable(("timing",), self.timing.assumed, by_key(self.timing.source))]
+        masses = [] if self.dynamics is None else self.dynamics.figures()
+        if self.stiffness is not None:
+            masses = [*masses, FigureTable(("stiffness",), self.stiffness.assumed, by_key(self.stiffness.source))]
+        timing = FigureTable(("timing",), self.timing.assumed, by_key(self.timing.source))
+        return [*self.kinematics.figures(), *axes, *masses, timing]
 
     def control_kinematics(self) -> ControlKinematics | None:
         """What the control runs; None where joints are the program's axes.
@@ -301,6 +314,18 @@ class MachineModel(UserModel):
                 yield KeyProblem("machine.home", ("axes", name, "home"),
                                  f"home {axis.home:g} of {name} lies outside its travel {list(axis.range)}",
                                  f"write home = {min(max(axis.home, axis.range[0]), axis.range[1]):g}, or correct travel")
+
+
+def _moving_parts(kinematics: Kinematics) -> tuple[dict[str, Collection[str]], tuple[str, ...]]:
+    """What each axis is, by letter, and of "platform" and "head" those that there are: see `DynamicsModel.problems`."""
+    names = kinematics.axis_names
+    found: dict[str, Collection[str]] = dict.fromkeys(names, ())
+    if (parts := kinematics.leg_parts) is None:
+        return found, ()
+    for at, stretches in zip(parts.legs_at, parts.stretches, strict=True):
+        found[names[at]] = ("leg", "length") if stretches else ("leg",)
+    found |= {names[at]: ("carrier",) for at in parts.carriers_at}
+    return found, ("platform", "head") if parts.axis is not None and parts.axis.at_spindle else ("platform",)
 
 
 def blanks(numbers: Iterable[float]) -> str:

@@ -16,8 +16,7 @@ from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.machine import ControlKinematics
 from machines.mobility import delta_faults, h4_faults, reach_faults
 from machines.models import NotNegative, blanks
-from machines.rotary_models import RotaryModel
-from machines.slider_models import SliderModel, lineardeltakins
+from machines.slider_models import RotaryModel, SliderModel, lineardeltakins
 from toolpaths.arrays import Floats
 
 

@@ -14,9 +14,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
+from machines.analysis.transmission import condition_number
 from machines.tolerances.influence import influence, largest, single
 from machines.tolerances.sensitivity import sensitivity
 from tests.laws.test_acceptance import ROWS
+from tests.laws.test_acceptance_legs import cylinder, with_motors_at
 from tests.machines.tolerances.annex_f import OM, annex_f, annex_f_poses
 from tests.source import ROOT
 
@@ -58,6 +60,21 @@ def values() -> list[tuple[str, str, str, float]]:
     of = ("place",) * 3 + ("turn",) * 3
     for letter, text, what, value in zip("xyzxyz", printed, of, [*most.position, *(1000.0 * most.turn)], strict=True):
         found.append(("11", f"table F-2, P1 in {letter}: {what}", text, float(value)))
+    return [*found, *symmetric_h4()]
+
+
+def symmetric_h4() -> list[tuple[str, str, str, float]]:
+    """V-19 of H 100, r 260, L 480 mm: cos b - sin b = (r - H) / L, D where that is the angle with the arm down and level;
+    rows I and E of table V-33."""
+    h, r, length = 100.0, 260.0, 480.0
+    b = np.arccos((r - h) / length / np.sqrt(2.0)) - 0.25 * np.pi
+    across = np.sqrt(length**2 - (h + length * np.cos(b) - r) ** 2) + r - length * np.sin(b)
+    found = [("8", "H4s: beta0, degrees (V-19)", "31.4", float(np.degrees(b))),
+             ("8", "H4s: D, m", "0.42", float(across) * 1e-3)]
+    for row, phi, printed in (("I", (180, 270, 90, 180), ("1.90", "5.69")), ("E", (180, 315, 45, 180), ("1.74", "6.71"))):
+        numbers = condition_number(with_motors_at(phi).transmits, *cylinder())
+        found += [("9", f"table V-33, row {row}: {what} condition number", text, float(value))
+                  for what, text, value in zip(("best", "worst"), printed, (numbers.min(), numbers.max()), strict=True)]
     return found
 
 
@@ -65,13 +82,13 @@ def page() -> str:
     """The text of the page."""
     lines = ["| part | what | here |", "|---|---|---|", *(f"| {p.of} | {p.what} | {p.here} |" for p in PLACES), "",
              "## Values", "",
-             "Numbers as in `tests/laws/test_acceptance.py` and `tests/machines/tolerances`, which hold "
-             "them within their tolerance.", "", "| | what | printed | computed |", "|---|---|---|---|"]
+             "Numbers as in `tests/laws/test_acceptance.py`, `tests/laws/test_acceptance_legs.py` "
+             "and `tests/machines/tolerances`, which hold them within their tolerance.", "",
+             "| | what | printed | computed |", "|---|---|---|---|"]
     lines += [f"| {number} | {what} | {printed} | {np.format_float_positional(value, 5, fractional=False)} |"
               for number, what, printed, value in values()]
     lines += ["| 6 | UraneSX, forward of inverse | identity | within 1e-9 mm (`tests/laws/test_acceptance.py`) |",
-              "| 12 | annex E, 60 dimensions against the exact closure | - | within 1e-7 (`tests/machines/tolerances`) |",
-              "| 8, 9 | H4s: sizing, table V-33 | 31.4 degrees, 0.42 m; - | not yet |"]
+              "| 12 | annex E, 60 dimensions against the exact closure | - | within 1e-7 (`tests/machines/tolerances`) |"]
     return _HEADER + "\n".join(lines) + "\n"
 
 

@@ -37,7 +37,7 @@ BORDERS = {
     "machines/value_words.py": "what pydantic says of a fault",
     **{f"machines/{name}.py": FIGURES for name in (
         "analysis/certify", "analysis/chain", "analysis/limits_of_box", "analysis/maps", "layouts/design",
-        "stiffness/report", "tolerances/report")},
+        "dynamics/report", "dynamics/rods", "stiffness/report", "tolerances/report")},
     **{f"{name}.py": CERTIFICATES for name in (
         "machines/analysis/certificate_figure", "machines/certificate/certificate_file", "machines/certificate/lookup",
         "postproc/certificate_check/check", "postproc/certificate_check/legs", "postproc/certificate_check/machine_file",
@@ -46,7 +46,7 @@ BORDERS = {
     "machines/analysis/levers.py": FIGURES, "postproc/cli/machine_report.py": FIGURES,
     "postproc/cli/machine_study.py": FIGURES,
     "machines/analysis/report.py": FIGURES, "machines/geometric_error/exchange/survey.py": FIGURES,
-    "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,
+    "postproc/report/loads.py": FIGURES, "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,
     **{f"postproc/page/{name}.py": FIGURES for name in (
         "columns", "document", "drawings", "run", "skeleton", "solids", "tools", "what_if")},
     "postproc/base/program_time.py": FIGURES, "postproc/cycle_time/toppra_check.py": FIGURES,

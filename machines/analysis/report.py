@@ -26,6 +26,7 @@ from machines.analysis.transmission import (
     speed_transmission,
     worst,
 )
+from machines.dynamics.report import dynamics_figures
 from machines.kinematics.leg_geometry import LegGeometry
 from machines.kinematics.rod_platform import RodPlatform, Transmission
 from machines.machine import Machine
@@ -63,6 +64,7 @@ def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, 
         found["least_margins"] = least_margins(machine)
     if kinematics.transmits is None:
         found |= chain_figures(machine)
+    found |= dynamics_figures(machine)
     box = _box(machine)
     every, largest = tilts(machine)
     found["tilt_in_every_direction_deg"] = every if np.isfinite(every) else None

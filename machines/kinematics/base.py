@@ -22,6 +22,7 @@ from machines.kinematics import by_samples
 from machines.kinematics.chain import Joint
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceParts
 from machines.kinematics.leg_geometry import LegGeometry
+from machines.kinematics.leg_motion import LegMotion, LegParts
 from machines.kinematics.rod_platform import RodPlatform, Transmission
 from machines.kinematics.taylor import TaylorVector, straight
 from machines.kinematics.workspace import Workspace
@@ -95,6 +96,11 @@ class Kinematics(ABC):
     """where the machine is declared to work: of the platform's reference point, of the gauge point without a platform"""
     singular_names: tuple[str, ...] = ()
     """what `singular_distance` measures; () where it measures nothing"""
+
+    @property
+    def leg_parts(self) -> LegParts | None:
+        """What moves of a platform on legs; None where none carry the tool."""
+        return None
 
     @property
     def plane(self) -> Floats | None:
@@ -357,6 +363,14 @@ class Kinematics(ABC):
             ValueError: where the kind does not know it.
         """
         raise ValueError(f"the line of axis {letter} is not known")
+
+    def leg_motion(self, q: Floats, rate: Floats, acceleration: Floats) -> LegMotion:
+        """Legs and platform at joints (N, J) with their rates and accelerations, home mode; where there are `leg_parts`.
+
+        Raises:
+            ValueError: where none carry the tool.
+        """
+        raise ValueError(f"{type(self).__name__} machines have no legs")
 
     def carries_part(self, letter: str) -> bool:
         """True for a rotary axis that stands between the part and the bed, where no structure code says so."""

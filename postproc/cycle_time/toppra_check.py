@@ -15,7 +15,8 @@ import numpy as np
 
 from postproc.cycle_time.planned import motion_of
 from postproc.feedrate.feed import AllowedFeed
-from postproc.feedrate.limits import JointLimits
+from postproc.feedrate.limits import JointLimits, MotorLimits
+from postproc.feedrate.paths import ParametricPath
 from postproc.feedrate.plan import plan_second_order
 from postproc.feedrate.second_order import least_time
 from postproc.pipeline.result import PostResult
@@ -101,9 +102,26 @@ def least_seconds(path: MachinePath, limits: JointLimits, feed: AllowedFeed, s: 
     rows = [constraint.JointVelocityConstraintVarying(velocity),
             constraint.JointAccelerationConstraint(np.stack((-limits.acceleration, limits.acceleration), axis=1),
                                                    discretization_scheme=both)]
+    if limits.forces is not None:
+        rows.append(_force_rows(constraint.JointAccelerationConstraint, limits.forces, path, unit, both))
     speed = toppra.algorithm.TOPPRA(rows, made(), gridpoints=s / unit, solver_wrapper="seidel").compute_parameterization(
         0.0, 0.0, return_data=True)[1]
     return float(least_time(s / unit, speed**2))
+
+
+def _force_rows(base: Any, forces: MotorLimits, path: ParametricPath, unit: float,
+                both: Any) -> Any:
+    """Limits of forces for toppra: its limits of acceleration, -1 to 1, of rows (a, b) in the place of (q', q'')."""
+    def used(_: object, made: object, gridpoints: Floats, *more: Any) -> Any:
+        at = path.derivatives(np.clip(gridpoints * unit, path.start, path.end))
+        first, second = forces.rows(at.q, at.dq * unit, at.d2q * unit**2)
+        stand_in = type("Rows", (), {"dof": first.shape[1], "__call__": lambda _, x, order: first if order == 1 else second})
+        return base.compute_constraint_params(rows, stand_in(), gridpoints, *more)
+
+    joints = path.derivatives(np.array([path.start])).q.shape[1]
+    made = type("Forces", (base,), {"compute_constraint_params": used})
+    rows = made(np.tile([-1.0, 1.0], (joints, 1)), discretization_scheme=both)
+    return rows
 
 
 def _toppra() -> tuple[Any, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Protocol
 
 import numpy as np
 
@@ -31,15 +32,37 @@ TOOL_COLUMNS = len(fields(ToolLimits))
 """of a motion, one for each limit at the tool"""
 
 
+class MotorLimits(Protocol):
+    """Limits of forces that depend on place and speed: of second order, and square in the speed."""
+
+    @property
+    def acceleration(self) -> Floats:
+        """(J,) about the acceleration of each joint that its force allows; infinite without a limit."""
+        ...
+
+    def rows(self, q: Floats, dq: Floats, d2q: Floats) -> tuple[Floats, Floats]:
+        """(a, b), each (N, J): |a x'/2 + b x| <= 1 of the squared speed x along a path q (N, J) with these derivatives."""
+        ...
+
+    def standing(self, q: Floats) -> Floats:
+        """(N, J) of the limits, that standing still at joints (N, J) takes."""
+        ...
+
+    def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
+        """(N, J) of the limits, at joints (N, J) with their rates and accelerations in time."""
+        ...
+
+
 @dataclass(frozen=True)
 @arrays(velocity="J", acceleration="J", jerk="J")
 class JointLimits:
-    """Largest magnitudes per joint (J,), in joint units per s, s2, s3; inf means unlimited; `tool` where stated."""
+    """Largest magnitudes per joint (J,), in joint units per s, s2, s3; inf: unlimited; `tool`, `forces` where stated."""
 
     velocity: Floats
     acceleration: Floats
     jerk: Floats
     tool: ToolLimits | None = None
+    forces: MotorLimits | None = None
 
     def __post_init__(self) -> None:
         for name in ("velocity", "acceleration", "jerk"):

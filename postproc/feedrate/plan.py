@@ -16,7 +16,7 @@ from postproc.feedrate.motion import CHUNK, SAMPLE, MotionPiece, Plan
 from postproc.feedrate.paths import Eased, ParametricPath
 from postproc.feedrate.problem import MotionKnots
 from postproc.feedrate.profile import Profile, linear_profile, spline_profile
-from postproc.feedrate.rows import rows, steady_tool_speed
+from postproc.feedrate.rows import forces_bind, rows, steady_force_speed, steady_tool_speed
 from postproc.feedrate.second_order import second_order
 from postproc.feedrate.shares import shares
 from postproc.feedrate.solve_again import solved_again
@@ -82,7 +82,8 @@ def plan(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, st
     options = replace(options, method=options.method.settled())
     for eased in stretches:
         sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
-        profile, report, slower = _solve(MotionKnots(eased, sigma, limits, allowed), options)
+        felt = limits if forces_bind(eased, sigma, limits, allowed) else replace(limits, forces=None)
+        profile, report, slower = _solve(MotionKnots(eased, sigma, felt, allowed), options)
         pieces.append(MotionPiece(eased, profile, shares(report.weights, len(limits.velocity), float(profile.times[-1]))))
         reports.append(report)
         guess.append(slower)
@@ -105,10 +106,11 @@ def plan_second_order(path: ParametricPath, limits: JointLimits, feed: FeedLimit
         at = eased.derivatives(sigma)
         cap = np.minimum(squared_speed(at.dq, limits.velocity), allowed(eased.parameter(sigma)[0]) ** 2)
         most, dq, d2q = limits.acceleration, at.dq, at.d2q
-        if limits.tool is not None:
+        if limits.tool is not None or limits.forces is not None:
             found = rows(eased, sigma, limits, allowed)
             most, dq, d2q = found.limits.acceleration, found.dq, found.d2q
-            cap = np.minimum(found.cap, steady_tool_speed(eased, sigma, limits.tool) ** 2)
+            cap = found.cap if limits.tool is None else np.minimum(
+                found.cap, steady_tool_speed(eased, sigma, limits.tool) ** 2)
         x = second_order(sigma, dq, d2q, most, cap, options.method.kernel)
         pieces.append(MotionPiece(eased, linear_profile(sigma, x)))
     return Plan(tuple(pieces), limits, allowed, options.step)
@@ -126,10 +128,11 @@ def _mesh(eased: Eased, limits: JointLimits, feed: AllowedFeed, spacing: Spacing
 
 
 def _top(eased: Eased, limits: JointLimits, feed: AllowedFeed | None, sigma: Floats) -> Floats:
-    """Largest constant sigma_dot (N,) under the feed, unless it has marks of its own, and the limits at the tool."""
+    """Largest constant sigma_dot (N,) under the feed, unless it has marks of its own, and limits of tool and forces."""
     allowed = np.full(len(sigma), np.inf) if feed is None else eased.speed_limit(sigma, feed)
-    return allowed if limits.tool is None else np.minimum(allowed,
-                                                          steady_tool_speed(eased, sigma, limits.tool))
+    if limits.tool is not None:
+        allowed = np.minimum(allowed, steady_tool_speed(eased, sigma, limits.tool))
+    return allowed if limits.forces is None else np.minimum(allowed, steady_force_speed(eased, sigma, limits.forces))
 
 
 def _stretches(path: ParametricPath, stops: Sequence[float], ease: float) -> list[Eased]:

@@ -44,6 +44,8 @@ class SpeedProblem:
     weight: Floats
     tight: Floats
     shortest: Ints
+    forces: tuple[int, int] = (0, 0)
+    """first row of forces, and how many there are, one a joint"""
 
     @property
     def rows(self) -> int:
@@ -109,11 +111,13 @@ class MotionKnots:
         tight = np.ones((3, len(sigma))) if self.tight is None else self.tight[:, first:last].astype(np.float64)
         h = np.diff(sigma)
         weight = 0.5 * (np.append(h, 0.0) + np.insert(h, 0, 0.0))
+        count = 0 if self.limits.forces is None else len(self.limits.velocity)
+        forces = at.dq.shape[1] - count, count
         at, shortest = _smooth(at, self.sigma[first:last], self._widest(first, last))
         dq, d2q, d3q = (np.ascontiguousarray(order.T) for order in at[:3])
         basis = rest_basis(self.sigma, self.eased.ease, first, last)
         return SpeedProblem(basis, dq, d2q, d3q, at.limits, at.cap / tight[0] ** 2, at.capped,
-                            weight, tight[1:], shortest)
+                            weight, tight[1:], shortest, forces)
 
     def _widest(self, first: int, last: int) -> Floats:
         """The longer of the intervals before and behind each knot of [first, last)."""
@@ -133,14 +137,18 @@ def _smooth(at: LimitRows, sigma: Floats, widest: Floats) -> tuple[LimitRows, In
     """
     count = at.dq.shape[1]
     limits = at.limits
-    short = np.flatnonzero(np.isfinite(limits.acceleration) & (limits.acceleration < SHORT * limits.jerk))
+    reached = np.array(limits.acceleration)
+    if limits.forces is not None:
+        own = limits.forces.acceleration
+        reached[-len(own):] = np.where(own < SHORT * limits.jerk[:len(own)], own, np.inf)
+    short = np.flatnonzero(np.isfinite(reached) & (reached < SHORT * limits.jerk))
     if not len(short):
         return at, np.full(len(sigma), -1)
     steep = np.abs(at.dq[:, short]) / limits.acceleration[short]
     row = steep.max(axis=1) * widest / (CHANGE * np.sqrt(_reached(at, sigma)))
     zero = np.zeros((len(sigma), 1))
     wide = JointLimits(np.append(limits.velocity, np.inf), np.append(limits.acceleration, np.inf),
-                       np.append(limits.jerk, 1.0), limits.tool)
+                       np.append(limits.jerk, 1.0), limits.tool, limits.forces)
     capped = np.where(at.capped == count, count + 1, at.capped)
     return LimitRows(np.column_stack((at.dq, row)), np.column_stack((at.d2q, zero)), np.column_stack((at.d3q, zero)),
                      wide, at.cap, capped), short[steep.argmax(axis=1)]

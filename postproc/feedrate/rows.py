@@ -1,10 +1,13 @@
-"""What limits the motion at places of a path: joints, and where asked for the tool, as rows of one kind.
+"""What limits the motion at places of a path: joints, and where asked for the tool and the forces, as rows of one kind.
 
 The tip's acceleration lies in the plane of tangent t and normal n of its path, and so does its jerk but for
 |b p'''| x^1.5 along the binormal b, which only caps x. The disc of allowed vectors in that plane is replaced by the
 regular octagon inside it that touches it along +-t and +-n: on straight lines nothing is given away,
 elsewhere at most 1 - cos(pi/8) = 7.6 %. Where a twisted path has jerk in the plane and out of it at once,
 strict mode sees to their sum.
+
+Forces of motors depend on the place: |a x'/2 + b x| <= 1 is a row whose first and second derivatives are a and b, without
+a third.
 """
 
 from __future__ import annotations
@@ -14,13 +17,15 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from postproc.feedrate.limits import JointLimits, ToolLimits, steady_cap
+from postproc.feedrate.limits import JointLimits, MotorLimits, ToolLimits, squared_speed, steady_cap
 from postproc.feedrate.paths import Derivatives, Eased, ParametricToolPath
 from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import unit
 
 UNBOUND = 1e4
 """Where no velocity bounds x, this many times the steady cap does, so that numbers stay comparable."""
+FREE, AT_ONCE = 0.9, 65536
+"""of a limit of forces, up to which it is left out where nothing can bring more; places looked at together"""
 OCTAGON = np.pi / 8.0 * np.array([1.0, 3.0, 5.0, 7.0])
 """Directions of its sides from the tangent; the opposite ones come with each row."""
 
@@ -28,7 +33,8 @@ OCTAGON = np.pi / 8.0 * np.array([1.0, 3.0, 5.0, 7.0])
 class LimitRows(NamedTuple):
     """Derivatives by sigma (N, R), limits (R,) of acceleration and jerk, largest x = sigma_dot^2 (N,) and what caps it.
 
-    Rows are the joints, behind them those of the tool; `capped` (N,) is the joint, J for the tool, R for the feed.
+    Rows are the joints, behind them those of the tool, then those of forces, one a joint; `capped` (N,) is the joint, J for
+    the tool, R for the feed.
     """
 
     dq: Floats
@@ -55,7 +61,7 @@ def rows(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Float
     with np.errstate(divide="ignore"):
         speeds = limits.velocity / np.abs(at.dq)
     if limits.tool is None:
-        return _capped(at, limits, speeds, np.full(len(sigma), np.inf), allowed)
+        return _capped(*with_forces(at, limits), speeds, np.full(len(sigma), np.inf), allowed)
     found = tool(eased, sigma, s)
     with np.errstate(divide="ignore"):
         binormal = limits.tool.jerk / np.abs(np.einsum("ij,ij->i", found.frame[2], found.tip.d3q))
@@ -64,8 +70,47 @@ def rows(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Float
     both = Derivatives(at.q, *(np.concatenate(pair, axis=1) for pair in zip(at[1:], inner, strict=True)))
     velocity, acceleration, jerk = (np.append(old, np.full(4, new)) for old, new in (
         (limits.velocity, np.inf), (limits.acceleration, most[0]), (limits.jerk, most[1])))
-    wide = JointLimits(velocity, acceleration, jerk)
-    return _capped(both, wide, speeds, tilted, allowed)
+    wide = JointLimits(velocity, acceleration, jerk, forces=limits.forces)
+    return _capped(*with_forces(both, wide), speeds, tilted, allowed)
+
+
+def with_forces(at: Derivatives, limits: JointLimits) -> tuple[Derivatives, JointLimits]:
+    """The rows (N, R) and behind them those of the forces of the joints, where they are limited."""
+    if limits.forces is None:
+        return at, limits
+    joints = at.q.shape[1]
+    first, second = limits.forces.rows(at.q, at.dq[:, :joints], at.d2q[:, :joints])
+    columns = zip(at[1:], (first, second, np.zeros_like(first)), strict=True)
+    free, one = np.full(joints, np.inf), np.ones(joints)
+    most = JointLimits(np.append(limits.velocity, free), np.append(limits.acceleration, one), np.append(limits.jerk, free),
+                       forces=limits.forces)
+    return Derivatives(at.q, *map(np.column_stack, columns)), most
+
+
+def forces_bind(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Floats], Floats]) -> bool:
+    """Whether limits of forces may slow a motion down at sigma (N,), or the others hold everywhere before they do.
+
+    By the largest s'^2 that velocities and feed allow and the largest |s''| that accelerations allow next to it.
+    """
+    if limits.forces is None:
+        return False
+    for first in range(0, len(sigma), AT_ONCE):
+        s = eased.inside(eased.parameter(sigma[first:first + AT_ONCE])[0])
+        at = eased.path.derivatives(s)
+        a, b = (np.abs(row) for row in limits.forces.rows(at.q, at.dq, at.d2q))
+        most = np.minimum(squared_speed(at.dq, limits.velocity), feed(s) ** 2)[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            change = np.nanmin((limits.acceleration + np.abs(at.d2q) * most) / np.abs(at.dq), axis=1)
+            if not (a * change[:, None] + b * most <= FREE).all():
+                return True
+    return False
+
+
+def steady_force_speed(eased: Eased, sigma: Floats, forces: MotorLimits) -> Floats:
+    """Largest constant sigma_dot (N,) under limits of forces."""
+    at = eased.derivatives(sigma)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.sqrt(1.0 / np.abs(forces.rows(at.q, at.dq, at.d2q)[1]).max(axis=1)))
 
 
 def tool(eased: Eased, sigma: Floats, s: Floats) -> ToolMotion:

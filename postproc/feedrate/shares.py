@@ -53,7 +53,7 @@ class LimitShares:
 def weigh(problem: SpeedProblem, c: Floats, z: Multipliers, first: int, last: int) -> Floats:
     """Seconds (3, R + 1) of each row of knots [first, last); the last column is the feed's.
 
-    The row that holds an acceleration smooth counts as that acceleration.
+    The row that holds an acceleration smooth counts as that acceleration, the force of a joint as its acceleration.
     """
     x = problem.basis.values(c)[:, first:last]
     here = slice(first, last)
@@ -70,6 +70,10 @@ def weigh(problem: SpeedProblem, c: Floats, z: Multipliers, first: int, last: in
     if (smooth >= 0).any():
         found[1] += np.bincount(smooth, cost[-1], minlength=count)
         found[2, -2] = 0.0
+    start, joints = problem.forces
+    own = found[1, start:start + joints].copy()
+    found[1, start:start + joints] = 0.0
+    found[1, :joints] += own
     return found
 
 

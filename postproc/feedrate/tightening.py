@@ -70,6 +70,9 @@ def _ratios(grid: MotionKnots, profile: Profile, k: Ints, kernel: bool) -> Float
     limits, speed = grid.limits, np.sqrt(x[0])
     ratios = worst_ratios(at, x, limits, kernel)
     ratios[0] = np.maximum(ratios[0], s[1] * speed / grid.feed(s[0]))
+    if limits.forces is not None:
+        first, second = limits.forces.rows(at.q, at.dq, at.d2q)
+        ratios[1] = np.maximum(ratios[1], np.abs(second * x[0][:, None] + 0.5 * first * x[1][:, None]).max(axis=1))
     if limits.tool is not None:
         known = tool(grid.eased, sigma, s)
         _, bend, snap = (np.linalg.norm(rate, axis=1) for rate in _in_time(known.tip, x))

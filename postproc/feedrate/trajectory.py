@@ -126,9 +126,12 @@ class JointTrajectory:
         return Binding(axis, order, ratio)
 
     def _derived(self, limits: JointLimits) -> list[Floats]:
-        """(N, J) ratios of velocity, acceleration, jerk from the derivatives."""
-        return [np.abs(values) / getattr(limits, name)
-                for name, values in zip(ORDERS, (self.qd, self.qdd, self.qddd), strict=True)]
+        """(N, J) ratios of velocity, acceleration, jerk from the derivatives; a force counts as acceleration."""
+        found = [np.abs(values) / getattr(limits, name)
+                 for name, values in zip(ORDERS, (self.qd, self.qdd, self.qddd), strict=True)]
+        if limits.forces is not None:
+            found[1] = np.maximum(found[1], limits.forces.use(self.q, self.qd, self.qdd))
+        return found
 
     def _tool(self, limits: JointLimits) -> Floats:
         """(N, 3) ratios of the tool, by order."""

@@ -79,7 +79,7 @@ class Timer:
 
     A plan depends on how the joints go, not on where: on serial machines moving the part along its table does
     not change passes during which no rotary joint turns, and a table that turns back what the part is turned
-    changes nothing at all.
+    changes nothing at all. Where the machine file limits forces of motors, each place is planned.
 
     Args:
         work: the file with its part frame on the table frame
@@ -218,9 +218,10 @@ def extents(made: Sequence[Candidate]) -> tuple[Floats, Floats]:
 
 
 def _link(made: Candidate) -> bytes:
-    """A mark of how the joints go along the cuts of a pass, whatever they begin at."""
+    """A mark of how the joints go along the cuts of a pass, whatever they begin at; where forces of motors are limited the
+    place counts too, on which they depend."""
     mark = blake2b(digest_size=16)
-    rows = made.one.drilled.rows
-    for link in (*(q - q[0] for q in made.sites), made.q[rows] - made.q[rows - 1]):
+    rows, placed = made.one.drilled.rows, made.limits.forces is not None
+    for link in (*(q if placed else q - q[0] for q in made.sites), made.q[rows] - made.q[rows - 1]):
         mark.update((np.round(link, _DIGITS) + 0.0).tobytes())
     return mark.digest()

@@ -11,6 +11,7 @@ from typing import get_args
 import numpy as np
 
 from machines.choices import MotionOrder
+from machines.dynamics.limits import force_limits
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits, Machine
 from postproc.feedrate.limits import JointLimits, ToolLimits
@@ -46,6 +47,17 @@ SHORTEST = 0.005
 def joint_limits(limits: Limits) -> JointLimits:
     """What the planner needs of a machine's limits."""
     return JointLimits(limits.velocity, limits.acceleration, limits.jerk)
+
+
+def limits_at_feed(machine: Machine, kinematics: Kinematics, tool: ToolLimits | None = None,
+                   cutting_force: float = 0.0) -> JointLimits:
+    """What the planner needs of a machine that cuts: limits of axes, tool and motors.
+
+    Args:
+        kinematics: at the tip
+        cutting_force: N at the tip
+    """
+    return replace(joint_limits(machine.cutting_limits), tool=tool, forces=force_limits(machine, kinematics, cutting_force))
 
 
 def tool_limits(tool: ToolSetup | None) -> ToolLimits | None:
@@ -159,7 +171,7 @@ class PlannedMotion:
     def _steady(self) -> tuple[tuple[PassGeometry, ...], Floats]:
         """The passes stopping at corners, and (K,) s of each block at a constant feed that keeps `Source.steady`."""
         count = len(self.source.path)
-        if self.source.limited_jerk and not self.source.tools:
+        if self.source.limited_jerk and not self.source.tools and not self.source.motors_limited:
             return (), np.zeros(count)
         found, diagnostics = self.source.geometry(CORNER)
         require(diagnostics)
@@ -230,8 +242,8 @@ def _on_curve(step: Floats, travel: Floats) -> Bools:
 class Source:
     """What passes are made from: blocks, moves, machine, kinematics by tool, tolerance, rows before which it
     stops, how geometric errors are corrected, where they are, the feed override (1 for 100 %) at which the
-    motion is planned, limits by index of the tool, and whether the
-    control limits jerks."""
+    motion is planned, limits by index of the tool, whether the
+    control limits jerks, and N at the tip while it cuts, by index of the tool."""
 
     path: JointPath
     moves: Moves
@@ -244,6 +256,12 @@ class Source:
     override: float = 1.0
     tools: Mapping[int, ToolLimits] = field(default_factory=dict)
     limited_jerk: bool = True
+    cutting: Mapping[int, float] = field(default_factory=dict)
+
+    @property
+    def motors_limited(self) -> bool:
+        """Whether the machine file says what its motors can give."""
+        return self.machine.dynamics is not None and self.machine.dynamics.limited
 
     @property
     def bounds(self) -> JointLimits:
@@ -251,14 +269,15 @@ class Source:
         return joint_limits(self.machine.cutting_limits)
 
     def bounds_of(self, one: PassGeometry) -> JointLimits:
-        """Limits of the joints, and of the tool that cuts a pass."""
-        return replace(self.bounds, tool=self.tools.get(int(self.moves.tool[one.move[0]])))
+        """Limits of the joints, of the tool that cuts a pass, and of the motors."""
+        tool = int(self.moves.tool[one.move[0]])
+        return limits_at_feed(self.machine, self.kinematics(tool), self.tools.get(tool), self.cutting.get(tool, 0.0))
 
     def steady(self, one: PassGeometry) -> JointLimits:
-        """What no control keeps by itself, so that it is kept at the constant feed of a block: limits of the tool, and those
-        of the axes where it limits no jerk."""
+        """What no control keeps by itself, so that it is kept at the constant feed of a block: limits of tool and motors,
+        and those of the axes where it limits no jerk."""
         free, found = np.full(len(self.machine.axis_names), np.inf), self.bounds_of(one)
-        return JointLimits(free, free, free, found.tool) if self.limited_jerk else found
+        return JointLimits(free, free, free, found.tool, found.forces) if self.limited_jerk else found
 
     def geometry(self, sharpest: float = SHARPEST) -> tuple[list[PassGeometry], list[Diagnostic]]:
         """See `pass_geometry`."""
@@ -279,7 +298,26 @@ def planned_motion(source: Source) -> tuple[PlannedMotion | None, list[Diagnosti
     if found:
         one, made = max(found, key=lambda pair: _worst(pair[1]))
         beyond.append(_beyond(_worst(made), source.moves.line[one.move[[0, -1]]].tolist(), len(found), source.file))
+    beyond += _too_weak(motion)
     return (None, beyond) if beyond else (motion, [])
+
+
+def _too_weak(motion: PlannedMotion) -> list[Diagnostic]:
+    """An error where standing still, under gravity and the force at the tool, takes more than a motor has."""
+    source, worst = motion.source, (0.0, "", 0)
+    if not source.motors_limited:
+        return []
+    for one in motion.passes:
+        forces = source.bounds_of(one).forces
+        shares = np.zeros((0, 0)) if forces is None else forces.standing(source.path.q[one.block])
+        if shares.size and shares.max() > worst[0]:
+            k, j = np.unravel_index(int(shares.argmax()), shares.shape)
+            worst = float(shares[k, j]), source.machine.axis_names[int(j)], int(source.path.move[one.block[k]])
+    if worst[0] <= 1.0:
+        return []
+    return [error("plan.force", f"standing still takes {worst[0]:.2f} times the force that the motor of {worst[1]} can give",
+                  file=source.file, lines=[int(source.moves.line[worst[2]])],
+                  hint="check masses, force and balance of [dynamics] in the machine file, and cutting_force of the set-up")]
 
 
 def _limits_exceeded(passes: list[PassGeometry], needed: Floats, source: Source) -> list[Diagnostic]:

@@ -33,7 +33,7 @@ def source_of(job: Job, moves: Moves, path: JointPath, correction: PlannedCorrec
 
     return Source(path, moves, job.machine, job.kinematics, Tolerance(job.options.tolerance, job.axis_tolerance),
                   stops_of(job.toolpath, moves), job.toolpath.file, correction, override, limits_by_tool(job),
-                  limited_jerk)
+                  limited_jerk, cutting_forces(job))
 
 
 def shifted_moves(job: Job, moves: Moves) -> Bools:
@@ -63,11 +63,23 @@ def _limited(job: Job) -> list[int]:
     return [k for k, tool in tools.items() if tool is not None and tool.limited]
 
 
+def cutting_forces(job: Job) -> dict[int, float]:
+    """N at the tip by index of the tool, of those that the set-up gives one."""
+    tools = (job.setup.tools.get(str(job.number_of(k))) for k in range(len(job.toolpath.tools)))
+    return {k: tool.cutting_force for k, tool in enumerate(tools) if tool is not None and tool.cutting_force}
+
+
 def limits_not_kept(job: Job) -> list[Diagnostic]:
-    """A warning where tools of the CL file have limits in the set-up and the feeds are not planned."""
+    """Warnings where tools of the CL file have limits in the set-up, or motors in the machine file, and the feeds are not
+    planned."""
+    found = []
+    if job.machine.dynamics is not None and job.machine.dynamics.limited:
+        found.append(warning("plan.motors", f"what the motors of {job.machine.name} can give ([dynamics]) is not looked at: "
+                             "the feeds are those of the CL file", file=job.machine.file,
+                             hint="convert with --feed planned"))
     numbers = sorted({job.number_of(k) for k in _limited(job)})
     if not numbers:
-        return []
-    return [warning("setup.tool_limits", f"{', '.join(TOOL_LIMITS[:-1])} and {TOOL_LIMITS[-1]} of "
+        return found
+    return [*found, warning("setup.tool_limits", f"{', '.join(TOOL_LIMITS[:-1])} and {TOOL_LIMITS[-1]} of "
                     f"{', '.join(f'[tools.{n}]' for n in numbers)} are not kept: the feeds are those of the CL file",
                     file=job.options.setup or "", count=len(numbers), hint="convert with --feed planned")]

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.feedrate.limits import JointLimits, ToolLimits
+from postproc.feedrate.limits import JointLimits, MotorLimits, ToolLimits
 from postproc.planning.geometry import DEGREE, MachinePath
 from postproc.planning.pass_geometry import PassGeometry
 from toolpaths.arrays import Floats
 
 CORNER = 0.2
 """rad: the largest turn in one joint of the path that is meant to be passed at the feed of a block"""
+PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""of each block, where its forces are looked at"""
 ROUNDING = 1e-3
 """Part of the speed that rounding of feed words may take"""
 
@@ -40,7 +42,22 @@ def steady_speed(one: PassGeometry, limits: JointLimits) -> Floats:
     speed = np.concatenate([span_speed(path, limits) for path in one.paths])
     low = np.clip(np.searchsorted(breaks, one.begin, side="right") - 1, 0, len(speed) - 1)
     high = np.clip(np.searchsorted(breaks, one.ends, side="left"), low + 1, len(speed))
-    return np.asarray(np.minimum.reduceat(np.append(speed, np.inf), np.stack((low, high), axis=1).ravel())[::2])
+    slowest = np.minimum.reduceat(np.append(speed, np.inf), np.stack((low, high), axis=1).ravel())[::2]
+    return np.asarray(slowest if limits.forces is None else np.minimum(slowest, _force_speed(one, limits.forces)))
+
+
+def _force_speed(one: PassGeometry, forces: MotorLimits) -> Floats:
+    """(k,) the same under limits of forces, by PLACES of each block and the largest change between them."""
+    travel, path = one.ends - one.begin, np.searchsorted([p.end for p in one.paths], one.ends)
+    used = np.zeros((len(PLACES), len(travel)))
+    for k, made in enumerate(one.paths):
+        here = np.flatnonzero(path == k)
+        for row, place in enumerate(PLACES):
+            at = made.derivatives(np.clip(one.begin[here] + place * travel[here], made.start, made.end))
+            used[row, here] = np.abs(forces.rows(at.q, at.dq, at.d2q)[1]).max(axis=1, initial=0.0)
+    worst = used.max(axis=0) + 0.5 * np.abs(np.diff(used, axis=0)).max(axis=0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.sqrt(1.0 / worst))
 
 
 def span_speed(path: MachinePath, limits: JointLimits) -> Floats:

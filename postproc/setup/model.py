@@ -97,6 +97,9 @@ class ToolSetup(ToolBody):
     """largest acceleration of the tip along its path on the part, mm/s2; kept by --feed planned; default: no limit"""
     tip_jerk: float | None = Field(default=None, gt=0.0)
     """largest jerk of the tip along its path on the part, mm/s3; kept by --feed planned; default: no limit"""
+    cutting_force: float = Field(default=0.0, ge=0.0, le=1e6)
+    """N at the tip while it cuts, in the direction that is worst: taken off what the motors can give, where the machine file
+    says that ([dynamics]); the deflection that `convert` prints is under it"""
     axis_rate: float | None = Field(default=None, gt=0.0)
     """largest rate at which the tool axis turns on the part, degrees/s; kept by --feed planned; default: no limit"""
 

@@ -17,6 +17,12 @@ DESIGN = [
     HintCase("certificate.file", "machine certify --check c.json", {"c.json": "{}"},
              "write one with postproc (machine certify) NAME -o CERT.json",
              (Edit(COMMAND, "machine certify --check c.json", r"\1 uranesx -o c.json"),)),
+    HintCase("dynamics.missing", "machine forces m.toml", {"m.toml": 'base = "mill-3axis"\n'},
+             r"add (\[dynamics)\], with \[dynamics(\.axes\.)LETTER\] for each axis: (mass), (force)",
+             (Edit("m.toml", "", r"\1\2Z]\n\3 = 40\n\4 = 900\n"),)),
+    HintCase("dynamics.reach", "machine forces m.toml --tip 2000,0,0", {
+        "m.toml": 'base = "uranesx"\n[dynamics.axes.Z]\nmass = 40\n'}, "a place inside with (--tip)",
+             (Edit(COMMAND, "2000,0,0", "0,0,-100"),)),
     HintCase("analysis.map", "machine analyse mill-3axis --map speed", {}, "leave (--map) out",
              (Edit(COMMAND, " --map speed", ""),)),
     HintCase("design.none", "machine design --box 100x100x10 --max bulk=20 -o d.toml", {}, "loosen (--max)",

@@ -6,6 +6,7 @@ from tests.hints.case import Edit
 from tests.hints.convert_cases import CUT, FAST, LENGTH, OVER, START, TAP, TURNING, convert, nx, option, part, sheet
 from tests.hints.machine_cases import machine_text
 
+WEAK = 'base = "mill-3axis"\n[dynamics.axes.Z]\nmass = 40\nforce = 300\n'
 TWO = "UNITS/MM\n" + nx("EM12", 0, 12) + nx("EM6", 0, 6)
 NAMES = '[tool_numbers]\n"EM12" = 1\n"EM6" = 2\n[tools.1]\ngauge_length = 100.0\n[tools.2]\ngauge_length = 80.0\n'
 SIDE = START + "RAPID\nGOTO/0,0,5,0,0,1\nGOTO/0,0,0\nRAPID\nGOTO/0,0,50,1,0,0\nGOTO/0,9,50\n"
@@ -146,6 +147,21 @@ _TOOLS = [
         "convert with (--feed planned)",
         option(r" \1"),
         setup=LENGTH + "tip_acceleration = 900.0\n",
+    ),
+    convert(
+        "plan.motors",
+        START + CUT,
+        "convert with (--feed planned)",
+        option(r" \1"),
+        m=WEAK.replace("300", "3000"),
+    ),
+    convert(
+        "plan.force",
+        START + CUT,
+        "check masses, (force) and balance",
+        Edit("m.toml", "force = 300", r"\1 = 3000"),
+        m=WEAK,
+        more=" --feed planned",
     ),
     convert(
         "setup.program_number",

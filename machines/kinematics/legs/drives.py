@@ -87,6 +87,10 @@ class Drives:
             return fixed
         return np.asarray(fixed + np.cos(q)[:, :, None] * self._across - np.sin(q)[:, :, None] * self.arms)
 
+    def swung(self, q: Floats) -> Floats:
+        """(N, K, 3) mm from the axis of each arm to the rod's foot, which is -A_qq; 0 of all that are no arms."""
+        return np.asarray(np.broadcast_to(self._arm(q), (*q.shape, 3)), dtype=np.float64)
+
     def spans(self, q: Floats) -> Floats:
         """l (N, K) mm."""
         return np.asarray(self.lengths + self.stretch * q, dtype=np.float64)

@@ -16,8 +16,10 @@ import numpy as np
 from machines.kinematics.base import ErrorForm, ErrorForms, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry
 from machines.kinematics.leg_geometry import LegGeometry, pairs_of
+from machines.kinematics.leg_motion import LegMotion, LegParts
 from machines.kinematics.legs.attitudes import attitude, tilt_of
 from machines.kinematics.legs.bounds import MovingLoops, PlatformJets
+from machines.kinematics.legs.motion import leg_motion
 from machines.kinematics.legs.over_workspace import OverWorkspace
 from machines.kinematics.legs.poses import UP
 from machines.kinematics.legs.redundancy import RedundantLegs
@@ -152,6 +154,18 @@ class OnLegs(RedundantLegs):
     def moving(self, place: Floats, turn: Floats, middle: Floats, step: Floats) -> PlatformJets:
         """The platform along straight moves by `step` (N, J); `place`, `turn` and joints `middle` (N, J) in their middle."""
         return MovingLoops(self.loops, place, turn, middle[:, self.legs_at], step[:, self.legs_at]).jets()
+
+    @property
+    def leg_parts(self) -> LegParts:
+        """See the base class."""
+        of = self.legs
+        return LegParts(self.legs_at, of.points, of.directions, of.lengths, of.arm, of.stretch > 0.0, self.carriers_at,
+                        self.carriers)
+
+    def leg_motion(self, q: Floats, rate: Floats, acceleration: Floats) -> LegMotion:
+        """See the base class."""
+        own = self.legs_at
+        return leg_motion(self.loops, self._platform(q), (q[:, own], rate[:, own], acceleration[:, own]))
 
     # ---- singular positions, clearances --------------------------------------------------------------------
 

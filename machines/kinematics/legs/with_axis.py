@@ -17,6 +17,7 @@ from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceS
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about
 from machines.kinematics.leg_geometry import LegGeometry
+from machines.kinematics.leg_motion import FifthAxis, LegMotion, LegParts
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.one_turn import OneTurn
@@ -248,6 +249,15 @@ class LegsWithAxis(Kinematics):
         """Tool directions (N, 3) nearest to `axis`, those in reach as they are."""
         edge, inside = self.axis.nearest(unit(as_points(axis, 3, "axis")), self.workspace.tilt)
         return np.where(inside[:, None], axis, edge)
+
+    @property
+    def leg_parts(self) -> LegParts:
+        """See the base class."""
+        return replace(self.on_legs.leg_parts, axis=FifthAxis(self.letter, *self.axis.line(), self.axis.at_spindle))
+
+    def leg_motion(self, q: Floats, rate: Floats, acceleration: Floats) -> LegMotion:
+        """See the base class: of the legs."""
+        return self.on_legs.leg_motion(q[:, :-1], rate[:, :-1], acceleration[:, :-1])
 
     # ---- singular positions, bounds ------------------------------------------------------------------------
 

@@ -20,7 +20,7 @@ from postproc.orientation.passes.passes import CuttingStretch, Pass
 from postproc.orientation.passes.poses import held_poses, poses
 from postproc.orientation.passes.reasons import Refusal, Touching
 from postproc.planning.geometry import MachinePath
-from postproc.planning.planned import ORDERS, joint_limits
+from postproc.planning.planned import ORDERS, joint_limits, limits_at_feed
 from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
@@ -65,8 +65,8 @@ class Candidate:
 
     @cached_property
     def limits(self) -> JointLimits:
-        """of the machine's joints at feed"""
-        return joint_limits(self.machine.cutting_limits)
+        """of the machine's joints and motors at feed"""
+        return limits_at_feed(self.machine, self.one.kin, cutting_force=self.one.cutting_force)
 
     @cached_property
     def bound(self) -> float:

@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix, diags, identity, vstack
 
 from postproc.feedrate.feed import AllowedFeed
 from postproc.feedrate.kernels.interior import pentadiagonal
-from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
+from postproc.feedrate.limits import JointLimits, MotorLimits, squared_speed, steady_cap
 from postproc.feedrate.paths import Eased
 from postproc.feedrate.plan import PlannerOptions
 from postproc.feedrate.problem import SpeedProblem
@@ -77,15 +77,30 @@ class _Grid:
     def seconds(self, q: Floats, limits: JointLimits) -> float:
         """Least time for joints (N, J) at the sites."""
         moving = np.ptp(q, axis=0) > _MOVES
+        forces = self._forces(q, limits.forces)
         limits = JointLimits(limits.velocity[moving], limits.acceleration[moving], limits.jerk[moving])
         fitted = make_interp_spline(self.s, q[:, moving], k=DEGREE, check_finite=False).c
         dq, d2q, d3q = (self.slopes @ fitted).reshape(3, len(self.sigma), -1)
         cap = np.minimum(self.cap, squared_speed(dq, limits.velocity))
+        if forces is not None:
+            free, one = np.full(q.shape[1], np.inf), np.ones(q.shape[1])
+            limits = JointLimits(np.append(limits.velocity, free), np.append(limits.acceleration, one),
+                                 np.append(limits.jerk, free))
+            dq, d2q, d3q = (np.column_stack(pair) for pair in zip((dq, d2q, d3q), forces, strict=True))
         if not self.jerky:
             return least_time(self.sigma, second_order(self.sigma, dq, d2q, limits.acceleration, cap, self.method.kernel))
         free = np.isinf(cap)
         cap[free] = UNBOUND * steady_cap(d2q[free], d3q[free], limits)
         return self._third_order(dq, d2q, d3q, cap, limits)
+
+    def _forces(self, q: Floats, forces: MotorLimits | None) -> tuple[Floats, Floats, Floats] | None:
+        """Rows (K, J) of the forces of joints (N, J) at the sites."""
+        if forces is None:
+            return None
+        fitted = make_interp_spline(self.s, q, k=DEGREE, check_finite=False)
+        dq, d2q, _ = (self.slopes @ fitted.c).reshape(3, len(self.sigma), -1)
+        first, second = forces.rows(fitted(self.eased.inside(self.eased.parameter(self.sigma)[0])), dq, d2q)
+        return first, second, np.zeros_like(first)
 
     def _third_order(self, dq: Floats, d2q: Floats, d3q: Floats, cap: Floats, limits: JointLimits) -> float:
         """With jerk; derivatives (K, J) by sigma, `cap` (K,) of the squared speed."""

@@ -76,6 +76,7 @@ class Pass:
         by_home: the tool comes from home (first pass, tool change, GOHOME)
         tool: index into Toolpath.tools
         drilled: what is cut in holes
+        cutting_force: N at the tip, as the set-up has it of the tool
     """
 
     number: int
@@ -94,6 +95,7 @@ class Pass:
     stretches: tuple[CuttingStretch, ...]
     line: int
     drilled: Drilled
+    cutting_force: float = 0.0
 
     def shift(self, axis: Floats) -> Floats:
         """(3,) by which the tip moves so that the ball stays where it is: tip' = tip + R (axis - axis')."""
@@ -250,7 +252,7 @@ def _pass(number: int, rows: tuple[int, int], of: _Cutting) -> Pass:
     contact = of.contact(cuts, 0.0 if fixed else radius or 0.0)
     return Pass(number, rows, moves.tip[here], moves.axis[here], moves.kind[here] == Kind.RAPID, axis, contact,
                 radius or 0.0, fixed, not stays, not of.homes.isdisjoint(range(*rows)), tool, kin, tuple(inside),
-                int(moves.line[lead]), drilled_of(of.toolpath, moves, rows))
+                int(moves.line[lead]), drilled_of(of.toolpath, moves, rows), length.cutting_force if length else 0.0)
 
 
 def _kept(of: _Cutting, cuts: Ints) -> str:

@@ -1,0 +1,92 @@
+"""What the forces of the motors allow along a path: the pose-dependent limits of its second order.
+
+Along a path q(s) the motors give F = a s'' + b s'^2 + c with a = M q_s, b = M q_ss + h(q, q_s) and c = g(q), for F is linear
+in the accelerations and square in the rates. What gravity and a force at the tool take is taken off the limit on both
+sides, so that |a s'' + b s'^2| <= F_max - |c| - |J^T f|: slowing a motion down then never asks for more. (The side on which
+gravity would help is given away; counterbalances are in c.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from machines.dynamics.bodies import NEWTON, Dynamics
+from machines.dynamics.build import dynamics_of, force_limits_of
+from machines.kinematics.base import Kinematics
+from machines.machine import Machine
+from toolpaths.arrays import Floats
+from toolpaths.shapes import arrays
+
+LEAST = 0.02
+"""of a limit: where standing still takes more than the rest, this is what is left, so that a plan exists; it is reported"""
+
+
+@dataclass(frozen=True, eq=False)
+@arrays(limits="J", acceleration="J")
+class ForceLimits:
+    """Of one machine with one tool.
+
+    Attributes:
+        limits: (J,) kg mm/s2, kg mm2/s2; infinite where there is none
+        acceleration: (J,) about the acceleration that each allows by itself at home, infinite without a limit
+        cutting: kg mm/s2 at the tip in the worst direction
+    """
+
+    dynamics: Dynamics
+    kinematics: Kinematics
+    limits: Floats
+    acceleration: Floats
+    cutting: float = 0.0
+
+    def rows(self, q: Floats, dq: Floats, d2q: Floats) -> tuple[Floats, Floats]:
+        """(a, b), each (N, J), over what is left of the limits: |a x'/2 + b x| <= 1, x = s'^2; 0 of motors without a limit.
+
+        Args:
+            q, dq, d2q: (N, J) joints and their derivatives along the path
+        """
+        left = self.left(q)
+        own = self.dynamics.forces
+        zero = np.zeros_like(dq)
+        with np.errstate(invalid="ignore"):
+            first, second = (own(q, rate, acceleration, 0.0) / left for rate, acceleration in ((zero, dq), (dq, d2q)))
+        return np.nan_to_num(first), np.nan_to_num(second)
+
+    def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
+        """(N, J) what a motion takes of what is left of each limit; 1: all. 0 of motors without a limit."""
+        with np.errstate(invalid="ignore"):
+            return np.nan_to_num(np.abs(self.dynamics.forces(q, rate, acceleration, 0.0)) / self.left(q))
+
+    def standing(self, q: Floats) -> Floats:
+        """(N, J) of the limits: what gravity and the force at the tool take of each, standing still."""
+        zero = np.zeros_like(q)
+        still = np.abs(self.dynamics.forces(q, zero, zero))
+        if self.cutting:
+            rates = self.kinematics.jacobian(q)[:, :3]
+            still = still + self.cutting * np.linalg.norm(rates, axis=1)
+        return np.asarray(still / self.limits, dtype=np.float64)
+
+    def left(self, q: Floats) -> Floats:
+        """(N, J) what is left of the limits for motion."""
+        return np.asarray(self.limits * np.maximum(1.0 - self.standing(q), LEAST), dtype=np.float64)
+
+
+def force_limits(machine: Machine, kinematics: Kinematics, cutting: float = 0.0) -> ForceLimits | None:
+    """Of a machine; None where the machine file has no limit of a motor, or no masses.
+
+    Args:
+        kinematics: at the tip
+        cutting: N there, in the direction that is worst for each motor
+    """
+    limits = force_limits_of(machine)
+    dynamics = dynamics_of(machine)
+    if dynamics is None or not np.isfinite(limits).any():
+        return None
+    found = ForceLimits(dynamics, kinematics, limits, np.full(len(limits), np.inf), cutting * NEWTON)
+    home = machine.home[None]
+    unit = np.eye(len(limits))
+    own = np.abs(np.stack([dynamics.forces(home, np.zeros_like(home), u[None], 0.0)[0, j] for j, u in enumerate(unit)]))
+    with np.errstate(divide="ignore"):
+        alone = found.left(home)[0] / own
+    return replace(found, acceleration=alone)
