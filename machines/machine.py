@@ -15,10 +15,12 @@ from machines.dynamics_models import DynamicsModel, StiffnessModel
 from machines.figures import Document
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
-from machines.kinematics.legs.module_pins import ModulePins
-from machines.kinematics.legs.tip_axes import TipAxes, axis_limits
 from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
+
+if TYPE_CHECKING:
+    from machines.kinematics.legs.module_pins import ModulePins
+    from machines.kinematics.legs.tip_axes import TipAxes
 
 
 @dataclass(frozen=True)
@@ -207,6 +209,8 @@ class Machine:
         control = self.control_kinematics
         if control is None or control.axes is None or self.by_drives is not None:
             return self
+        from machines.kinematics.legs.tip_axes import axis_limits
+
         axes = replace(control.axes, travel=np.column_stack([self.limits.lower, self.limits.upper]))
         home, own = axes.axes_at(self.home[None])[0], self.limits
         velocity, acceleration, jerk, cutting = axis_limits(axes, home, np.stack([own.velocity, own.acceleration, own.jerk,

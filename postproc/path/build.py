@@ -218,6 +218,7 @@ def _with_axes(curves: Curves, axis0: Floats, axis1: Floats) -> Curves:
 
 
 @dataclass(frozen=True)
+@arrays(risen="_ J")
 class _Legs:
     """Frames and kinematics of a linking move: where it comes from, to home, on the path, where it goes to."""
 

@@ -66,16 +66,16 @@ def parallel(name: str, seed: int) -> ErrorModel:
         zero, guides = RodErrors.none(slides, rod_names(frame, slides)), np.ones(len(slides))
     else:
         zero, guides = own.zero, 1.0 - own.machine.legs.stretch  # a leg that changes its length has no guide
-    size = [5 * ARCSEC if angular(n) else 0.008 for n in zero.names]
+    size = [5 * ARCSEC if angular(n, zero) else 0.008 for n in zero.names]
     size = [s * (guides[zero.legs.index(n[0])] if ".guide." in n else 1.0) for s, n in zip(size, zero.names, strict=True)]
-    unit = [ARCSEC if angular(n) else 0.001 for n in zero.names]
+    unit = [ARCSEC if angular(n, zero) else 0.001 for n in zero.names]
     values = np.round(rng.normal(size=len(size)) * np.divide(size, unit), 1) * unit
     return with_uncertainty(ErrorModel(rods=zero.with_values(values), name=name, machine=name))
 
 
 def with_uncertainty(model: ErrorModel) -> ErrorModel:
     """The model with the standard deviations of UNCERTAINTY."""
-    return replace(model, covariance=np.diag([UNCERTAINTY[angular(name)] ** 2 for name in model.names]))
+    return replace(model, covariance=np.diag([UNCERTAINTY[angular(name, model.rods)] ** 2 for name in model.names]))
 
 
 def runs(rng: np.random.Generator) -> str:

@@ -57,7 +57,7 @@ def rod_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01,
     """All dimensions of a machine on rods."""
     rng, own = np.random.default_rng(seed), frame_of(kinematics)
     if own is not None:
-        return own.zero.with_values(rng.normal(size=len(own.zero.names)) * [angle if angular(n) else length
+        return own.zero.with_values(rng.normal(size=len(own.zero.names)) * [angle if angular(n, own.zero) else length
                                                                            for n in own.zero.names])
     frame = rod_frame(kinematics.on_rods)
     slides = kinematics.axis_names[: len(frame.rail)]

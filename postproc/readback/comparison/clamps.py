@@ -7,7 +7,6 @@ import numpy as np
 from machines.machine import ClampCodes
 from postproc.job.index_moves import indexed
 from postproc.job.job import Job
-from postproc.path.zero_entry import BELOW_HOME
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.comparison.tool_changes import correction
 from postproc.readback.execution.execute import Motion
@@ -125,5 +124,5 @@ def check_index(motion: Motion, job: Job, home: Floats, owner: Ints, faults: Fau
     off = abs(float(before[k, lift] - home[lift]))
     return [judge("verify.index", f"rotary axes turn while {name} is {off:.3f} mm from home", 0, int(motion.line[k]),
                   len(bad), f'retract {name} to home before it, or write index = "plane" under [clearance] of the set-up')]
-AWAY_BY_THE_TIP = BELOW_HOME + 4.0
-"""mm likewise in the mode by the tip: a chord of 10 degrees round an axis 1000 mm away lies 3.8 mm inside its arc"""
+AWAY_BY_THE_TIP = 14.0
+"""mm likewise in the mode by the tip, which stands up to 10 mm below home so that tools may be longer: a chord of 10 degrees round an axis 1000 mm away lies 3.8 mm inside its arc"""
