@@ -43,10 +43,11 @@ _HINTS: dict[MotionOrder, str] = {
 
 
 def implausible(machine: Machine) -> Iterator[KeyProblem]:
-    """Every figure that no machine has; paths as in the machine file."""
-    for j, name in enumerate(machine.axis_names):
-        yield from _limits(machine, j, name)
-    yield from _unlike(machine)
+    """Every figure that no machine has; paths as in the machine file. Next to one that is out of all range nothing is
+    compared with it."""
+    own = list(odd_limits(machine))
+    yield from own
+    yield from (one for one in _unlike(machine) if one.path[-1] not in {odd.path[-1] for odd in own})
     points = {joint.name: joint for joint in machine.kinematics.chain}
     slides = [joint for joint in points.values() if not joint.rotary]
     for joint in points.values():
@@ -55,6 +56,12 @@ def implausible(machine: Machine) -> Iterator[KeyProblem]:
             yield from _table_pivot(machine, joint, slides) if carries else _head_pivot(joint)
             if carries:
                 yield from _pivot_in_inches(machine, joint, slides)
+
+
+def odd_limits(machine: Machine) -> Iterator[KeyProblem]:
+    """Those that each axis has by itself."""
+    for j, name in enumerate(machine.axis_names):
+        yield from _limits(machine, j, name)
 
 
 def _limits(machine: Machine, j: int, name: str) -> Iterator[KeyProblem]:
@@ -68,7 +75,7 @@ def _limits(machine: Machine, j: int, name: str) -> Iterator[KeyProblem]:
             says = f"{key} of {name} is {value:g} {per}: machines have {least:g} to {most:g}"
             yield KeyProblem("machine.plausible", (*path, key), says, _HINTS[key])
     ramp = float(limits.velocity[j] / limits.acceleration[j])
-    if ramp > LONGEST_RAMP:
+    if ramp > LONGEST_RAMP and known["velocity"][0] <= limits.velocity[j] / scale <= known["velocity"][1]:
         says = f"{name} takes {ramp:.3g} s from rest to full speed, most machines less than {LONGEST_RAMP:g} s"
         yield KeyProblem("machine.plausible", (*path, "acceleration"), says, _HINTS["velocity"])
     length = float(limits.upper[j] - limits.lower[j])
