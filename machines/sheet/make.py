@@ -251,8 +251,9 @@ def _travel(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> tupl
         if ends[0] is None or ends[1] is None:
             return None
         if ends[0] >= ends[1]:
-            making.fault(path, f"{letter}.travel: {list(axis.travel)} is empty", f'write the lower end first, ["{axis.travel[1]}", '
-                         f'"{axis.travel[0]}"]' if ends[0] > ends[1] else "write both ends")
+            low, high = axis.travel[1], axis.travel[0]
+            making.fault(path, f"{letter}.travel: {list(axis.travel)} is empty",
+                         f'write the lower end first, ["{low}", "{high}"]' if ends[0] > ends[1] else "write both ends")
             return None
         return _round(ends[0]), _round(ends[1])
     if rotary:

@@ -101,7 +101,7 @@ def _made(file: Path, machine: str, controller: str, options: Options, given: Gi
     try:
         if not yes and _terminal() and not has_errors(found) and any(
                 d.code == "cl.no-units" and d.severity is Severity.WARNING for d in found):
-            options = replace(options, units=str(asked(units_question())))
+            options = replace(options, units="inch" if asked(units_question()) == "inch" else "mm")
             path, found = read_cl(file, options)
         sheet = new_setup(path, m, controller, options, given, None if yes else asked, yes, found, code, progress)
     except EOFError:

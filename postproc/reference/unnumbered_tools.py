@@ -97,7 +97,8 @@ def without_number(toolpath: Toolpath, setup: SetupFile) -> tuple[list[Diagnosti
     said = ", ".join("a tool without a name" if key == UNNAMED else key for key in keys[:6])
     more = "" if len(keys) <= 6 else f" and {len(keys) - 6} more"
     return [error("tool.number", f"the CL file gives no number to {said}{more}: T0 is an empty spindle, and without a tool "
-                  "call no length is in force", file=toolpath.file, lines=lines[:6], count=len(bad), hint="\n".join(hint))], proposed
+                  "call no length is in force", file=toolpath.file, lines=lines[:6], count=len(bad),
+                  hint="\n".join(hint))], proposed
 
 
 def _free(toolpath: Toolpath, setup: SetupFile) -> list[int]:

@@ -70,7 +70,7 @@ def test_many_faults_of_one_remedy_are_two_lines() -> None:
 
 
 def test_what_may_be_the_cause_stands_before_what_it_causes() -> None:
-    """A set-up for another machine was said below the travel that it exceeded; turning files brought the unit of their feeds."""
+    """A set-up for another machine was said below the travel that it exceeded; turning files brought their units."""
     travel, other = error("travel.exceeded", "X"), warning("tool.length", "y")
     for code in ("setup.machine", "setup.upside_down", "cl.no-units"):
         said = lines_of((travel, other, warning(code, "z")), Severity.INFO)
