@@ -251,9 +251,9 @@ def _travel(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> tupl
         if ends[0] is None or ends[1] is None:
             return None
         if ends[0] >= ends[1]:
-            low, high = axis.travel[1], axis.travel[0]
+            first, last = axis.travel[1], axis.travel[0]
             making.fault(path, f"{letter}.travel: {list(axis.travel)} is empty",
-                         f'write the lower end first, ["{low}", "{high}"]' if ends[0] > ends[1] else "write both ends")
+                         f'write the lower end first, ["{first}", "{last}"]' if ends[0] > ends[1] else "write both ends")
             return None
         return _round(ends[0]), _round(ends[1])
     if rotary:
