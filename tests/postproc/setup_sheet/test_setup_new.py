@@ -268,6 +268,10 @@ def test_a_refusal_by_travel_names_a_place_that_works(tmp_path: Path) -> None:
     got = run(*words, code=1)
     found = re.search(r"\[part\] (origin = \[.*?\]), (x_axis = \[.*?\]), (y_axis = \[.*?\]) in the set-up", got.stderr)
     assert found and "place.found" in got.stderr
+    for command in ("time", "report"):
+        page = ("-o", tmp_path / "r.html") if command == "report" else ()
+        other = CliRunner().invoke(app, [command, *map(str, (*words[1:-2], *page))])
+        assert found[0] in other.stderr, f"{command} says what place finds, too"
     setup.write_text("[part]\n" + "\n".join(found.groups()) + "\n")
     run(*words, "--setup", setup)
     assert out.exists()
