@@ -53,9 +53,7 @@ if TYPE_CHECKING:
 
 OF_SETUP = frozenset({"tool.number", "tool.same_number", "tool.length", "feed.missing", "spindle.not_started",
                       "spindle.no_speed"})
-"""codes of what a set-up answers"""
-_LOOKED_ON = OF_SETUP | {"tool.not_loaded"}
-"""where nothing else is wrong all that is missing is reported at once"""
+"""codes of what a set-up answers: where nothing else is wrong all that is missing is reported at once"""
 
 
 @dataclass(frozen=True)
@@ -264,7 +262,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     frame, found = work_frame(setup, toolpath, options.setup)
     diagnostics += found
     errors = {d.code for d in diagnostics if d.severity is Severity.ERROR}
-    if not places or frame is None or not errors <= _LOOKED_ON:
+    if not places or frame is None or not errors <= OF_SETUP | {"tool.not_loaded"}:
         return None, diagnostics
     toolpath, repeats = at_all(toolpath, places, setup.order)
     setup, placement = places[0].setup, places[0].placement

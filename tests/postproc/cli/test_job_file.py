@@ -123,7 +123,8 @@ def with_job_file(command: Any) -> list[Any]:
 def test_every_key_gives_way_to_every_spelling_of_its_option(part: Path, tmp_path: Path) -> None:
     """--tolerance X, --tolerance=X, -m X, -mX; what the command line leaves out is the job file's."""
     stated = {"machine": "mill-3axis", "controller": "haas-ngc", "setup": "s.toml", "hooks": "h.toml",
-              "error_model": "e.toml", "tolerance": 0.02, "axis_tolerance": 0.2, "units": "mm", "dialect": "nx", "allow_unknown": ["A"]}
+              "error_model": "e.toml", "tolerance": 0.02, "axis_tolerance": 0.2, "units": "mm", "dialect": "nx",
+              "allow_unknown": ["A"]}
     assert set(stated) == set(JobFile.model_fields)
     lines = (f"{key} = {json.dumps(value)}\n" for key, value in stated.items())
     (tmp_path / "job" / "postproc.toml").write_text("".join(lines))
