@@ -10,6 +10,8 @@ from machines.choices import MotionOrder
 from machines.key_problem import KeyProblem
 from machines.kinematics.chain import Joint
 from machines.machine import Machine
+from machines.toml_lines import KeyPath
+from toolpaths.arrays import Bools
 from toolpaths.units import DEG, MM_PER_INCH
 
 Ranges = dict[MotionOrder, tuple[float, float]]
@@ -43,10 +45,11 @@ _HINTS: dict[MotionOrder, str] = {
 
 
 def implausible(machine: Machine) -> Iterator[KeyProblem]:
-    """Every figure that no machine has; paths as in the machine file."""
-    for j, name in enumerate(machine.axis_names):
-        yield from _limits(machine, j, name)
-    yield from _unlike(machine)
+    """Every figure that no machine has; paths as in the machine file. Next to one that is out of all range nothing is
+    compared with it."""
+    own = list(odd_limits(machine))
+    yield from own
+    yield from _unlike(machine, {one.path for one in own})
     points = {joint.name: joint for joint in machine.kinematics.chain}
     slides = [joint for joint in points.values() if not joint.rotary]
     for joint in points.values():
@@ -55,6 +58,12 @@ def implausible(machine: Machine) -> Iterator[KeyProblem]:
             yield from _table_pivot(machine, joint, slides) if carries else _head_pivot(joint)
             if carries:
                 yield from _pivot_in_inches(machine, joint, slides)
+
+
+def odd_limits(machine: Machine) -> Iterator[KeyProblem]:
+    """Those that each axis has by itself."""
+    for j, name in enumerate(machine.axis_names):
+        yield from _limits(machine, j, name)
 
 
 def _limits(machine: Machine, j: int, name: str) -> Iterator[KeyProblem]:
@@ -68,7 +77,7 @@ def _limits(machine: Machine, j: int, name: str) -> Iterator[KeyProblem]:
             says = f"{key} of {name} is {value:g} {per}: machines have {least:g} to {most:g}"
             yield KeyProblem("machine.plausible", (*path, key), says, _HINTS[key])
     ramp = float(limits.velocity[j] / limits.acceleration[j])
-    if ramp > LONGEST_RAMP:
+    if ramp > LONGEST_RAMP and known["velocity"][0] <= limits.velocity[j] / scale <= known["velocity"][1]:
         says = f"{name} takes {ramp:.3g} s from rest to full speed, most machines less than {LONGEST_RAMP:g} s"
         yield KeyProblem("machine.plausible", (*path, "acceleration"), says, _HINTS["velocity"])
     length = float(limits.upper[j] - limits.lower[j])
@@ -77,23 +86,24 @@ def _limits(machine: Machine, j: int, name: str) -> Iterator[KeyProblem]:
         yield KeyProblem("machine.plausible", (*path, "travel"), says, "write it in mm: inches are times 25.4")
 
 
-def _unlike(machine: Machine) -> Iterator[KeyProblem]:
+def _unlike(machine: Machine, odd: set[KeyPath]) -> Iterator[KeyProblem]:
     """Slides of one machine are of one kind: a unit mistaken in one of them stands out; a tilting axis does not spin."""
     limits, chain = machine.limits, {joint.name for joint in machine.kinematics.chain}
     slides = [j for j, name in enumerate(machine.axis_names) if name in "XYZ" and name in chain and not machine.rotary[j]]
     for values, most, key, unit, hint in (
             (limits.velocity, SLOWEST, "velocity", "mm/s", "see to its unit: mm/min, m/min or mm/s"),
             (limits.upper - limits.lower, SHORTEST, "travel", "mm long", "see to their units: mm or inches")):
-        if not slides or np.ptp(values[slides]) == 0.0:
+        known = [j for j in slides if ("axes", machine.axis_names[j], key) not in odd]
+        if not known or np.ptp(values[known]) == 0.0:
             continue
-        least, largest = min(slides, key=lambda j: float(values[j])), max(slides, key=lambda j: float(values[j]))
+        least, largest = min(known, key=values.__getitem__), max(known, key=values.__getitem__)
         times = float(values[largest] / values[least])
         if times > most:
             short, long = machine.axis_names[least], machine.axis_names[largest]
             says = (f"{key} of {short} is {values[least]:g} {unit}, of {long} {values[largest]:g}: {times:.3g} times as "
                     f"much, of most machines less than {most:g} times")
             yield KeyProblem("machine.plausible", ("axes", short, key), says, hint)
-    yield from _turning(machine)
+    yield from _turning(machine, np.array([("axes", name, "velocity") not in odd for name in machine.axis_names], bool))
     for j, name in enumerate(machine.axis_names):
         speed = float(limits.velocity[j]) / DEG
         if machine.rotary[j] and not machine.endless[j] and TILT < speed <= ROTARY["velocity"][1]:
@@ -101,12 +111,13 @@ def _unlike(machine: Machine) -> Iterator[KeyProblem]:
             yield KeyProblem("machine.plausible", ("axes", name, "velocity"), says, "see to its unit: deg/s or turns/min")
 
 
-def _turning(machine: Machine) -> Iterator[KeyProblem]:
-    """Turns and slides of one machine are about as fast as one another."""
+def _turning(machine: Machine, known: Bools) -> Iterator[KeyProblem]:
+    """Turns and slides of one machine are about as fast as one another; (axes,) `known`: those that are looked at."""
     rotary, speed = np.array(machine.rotary, bool), machine.limits.velocity
-    if not rotary.any() or rotary.all():
+    turns, slides = rotary & known, ~rotary & known
+    if not turns.any() or not slides.any():
         return
-    turn, slide = int(np.where(rotary, speed, -1.0).argmax()), int(np.where(rotary, -1.0, speed).argmax())
+    turn, slide = int(np.where(turns, speed, -1.0).argmax()), int(np.where(slides, speed, -1.0).argmax())
     per = float(speed[turn]) / DEG / float(speed[slide])
     if TURNING[0] <= per <= TURNING[1]:
         return

@@ -119,6 +119,10 @@ def _axis(draft: Draft, name: str, axis: FreecadAxis, scale: float, text: str) -
                   _line(text, "axes", name, "max_velocity"), f"max_velocity {axis.max_velocity:g}")
     placed = axis.placed
     if placed is None or not any(placed.axis):
+        point = f"kinematics.axes.{name}.point"
+        if turns and point not in draft.stated:
+            draft.error("import.geometry", f"the file does not say where {name} lies", _line(text, "axes", name),
+                        f"state a point of its line in mm: --set \"{point}=[0, 0, 0]\"")
         return
     line = _line(text, "axes", name, "joint")
     length = sum(v * v for v in placed.axis) ** 0.5

@@ -104,8 +104,14 @@ class HalWord:
     line: int
 
 
+_SET = re.compile(r"(?:setp\s+)?([\w.-]+)\s*=(?!>)\s*(\S+)\s*$")
+"""`pin = value`: setp in its other form (halcmd(1))"""
+
+
 def _words(statement: str) -> tuple[str, ...]:
-    """Without the arrows, which mean nothing."""
+    """Without the arrows, which mean nothing; `pin = value` as setp."""
+    if set_by := _SET.match(statement.strip()):
+        return ("setp", *set_by.groups())
     return tuple(statement.replace("=>", " ").replace("<=", " ").split())
 
 
@@ -126,10 +132,18 @@ class HalFiles:
         for entry in self.ini.all("HAL", "HALFILE"):
             if self._readable(entry):
                 path = Path(entry.file).parent / entry.value.split()[0]
-                for line, raw in enumerate(_text_of(self.ini, path, entry.file, entry.line).splitlines(), 1):
-                    yield HalWord(_words(raw.partition("#")[0]), str(path), line)
+                yield from self._file(path, entry.file, entry.line, 0)
         for entry in self.ini.all("HAL", "HALCMD"):
             yield HalWord(_words(entry.value), entry.file, entry.line)
+
+    def _file(self, path: Path, file: str, line: int, depth: int) -> Iterator[HalWord]:
+        """The statements of a HAL file named in a line of `file`, and of those that it runs (`source`)."""
+        for number, raw in enumerate(_text_of(self.ini, path, file, line).splitlines(), 1):
+            words = _words(raw.partition("#")[0])
+            if words[:1] == ("source",) and len(words) > 1 and depth < DEPTH:
+                yield from self._file(self.ini.path.parent / words[1], str(path), number, depth + 1)
+            else:
+                yield HalWord(words, str(path), number)
 
     def pin(self, name: str) -> tuple[float | None, HalWord | None]:
         """What a pin holds before anything runs, and the statement that says so.

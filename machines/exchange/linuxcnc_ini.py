@@ -34,12 +34,12 @@ def read_linuxcnc(path: Path, text: str, stated: Sequence[str]) -> tuple[Draft, 
 class _IniMachine:
     def __init__(self, ini: IniFile, draft: Draft) -> None:
         self.ini, self.draft = ini, draft
-        draft.found += ini.found
         words = self._words("KINS", "KINEMATICS")
         self.module = words[0] if words else ""
         given = [word.partition("=")[2] for word in words if word.lower().startswith("coordinates=")]
         self.order = (given[0] if given else COORDINATES.get(self.module, "")).upper()
         self.hal = HalFiles(ini)
+        draft.found += ini.found
         self.scale = 1.0
 
     def _words(self, section: str, key: str) -> list[str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from machines.figures import ASSUMED, SOURCE
 from machines.loader import as_warnings, assemble, check
 from machines.machine import Machine
+from machines.plausible import implausible, odd_limits
 from machines.sheet.distances import against_distances, distances
 from machines.sheet.file_text import FileValue, machine_text, nested
 from machines.sheet.jog import sense
@@ -29,6 +30,8 @@ _ACCELERATION, _TURNING_ACCELERATION = 2000.0, 500.0
 """mm/s2, deg/s2, where the sheet states none"""
 _JERK = 10.0
 """1/s, jerk over acceleration: none is ever printed"""
+_OF_FIGURES = frozenset({"sheet.figure", "machine.plausible", "file.range", "file.value"})
+"""codes of figures, which keys that do not fit leave as they are"""
 _TIMES = {"tool_change": 6.0, "clamp": 0.5, "unclamp": 0.5}
 
 
@@ -39,11 +42,13 @@ class NewMachine:
     Attributes:
         machine: None where the sheet has errors
         text: of the machine file, "" likewise
+        unread: rotary axes whose pivots no readings prove
     """
 
     machine: Machine | None
     text: str
     diagnostics: list[Diagnostic]
+    unread: tuple[str, ...] = ()
 
     @property
     def assumed(self) -> list[str]:
@@ -102,7 +107,7 @@ def new_machine(source: str | Path, name: str = "") -> NewMachine:
     if file is None or sheet is None:
         rest = _without_wrong_keys(file) if file is not None and not found else None
         others = _made(file, rest, name).diagnostics if file is not None and rest is not None else []
-        return NewMachine(None, "", [*found, *more, *(d for d in others if d.code == "sheet.figure")])
+        return NewMachine(None, "", [*found, *more, *(d for d in others if d.code in _OF_FIGURES)])
     made = _made(file, sheet, name)
     return made if made.machine is None else _compared(made, file, sheet)
 
@@ -155,7 +160,7 @@ def _made(file: UserFile, sheet: DataSheet, name: str) -> NewMachine:
     _times(making, sheet)
     _table_top(making, sheet)
     if making.found:
-        return NewMachine(None, "", making.found)
+        return NewMachine(None, "", [*making.found, *_odd_besides(making, sheet)])
     whole = UserFile(name or file.name, file.file, nested(making.figures), making.origins)
     model, faults = check(whole)
     if model is None or has_errors(faults):
@@ -163,7 +168,33 @@ def _made(file: UserFile, sheet: DataSheet, name: str) -> NewMachine:
     machine = assemble(whole, model)
     odd = [file.problem(p.code, p.path, p.message, p.hint) for p in against_distances(machine, sheet)]
     found = [*faults, *as_warnings(whole, machine), *(replace(one, severity=Severity.WARNING) for one in odd)]
-    return NewMachine(machine, machine_text(making.figures, Path(file.file).name), found)
+    text = machine_text(making.figures, Path(file.file).name)
+    return NewMachine(machine, text, found, () if sheet.touched else sheet.rotary)
+
+
+def _odd_besides(making: _Making, sheet: DataSheet) -> list[Diagnostic]:
+    """Figures that no machine has, next to the faults of a sheet; where an axis could not be read, nothing is compared with
+    it: it stands there as a usual one."""
+    known = {path[1] for path in making.figures if path[0] == "axes" and path[2:] == ("velocity",)}
+    missing = [letter for letter in sheet.axes if letter not in known]
+    figures = dict(making.figures)
+    for letter in missing:
+        figures |= {("axes", letter, *key): value for key, value in _usual(letter in sheet.rotary).items()}
+    whole = UserFile(making.file.name, making.file.file, nested(figures), making.origins)
+    model, faults = check(whole)
+    if model is None or has_errors(faults):
+        return [d for d in faults if d.code in ("file.range", "file.value")]
+    machine = assemble(whole, model)
+    odd = list(odd_limits(machine) if missing else implausible(machine))
+    return [replace(whole.problem(p.code, p.path, p.message, p.hint), severity=Severity.WARNING) for p in odd]
+
+
+def _usual(rotary: bool) -> dict[KeyPath, FileValue]:
+    """Figures of an axis of which nothing is known, to look at those of the others."""
+    acceleration = _TURNING_ACCELERATION if rotary else _ACCELERATION
+    values: dict[str, FileValue] = {"travel": [-100.0, 100.0] if rotary else [-500.0, 0.0], "acceleration": acceleration,
+                                    "velocity": 100.0 if rotary else 500.0, "jerk": _JERK * acceleration, "home": 0.0}
+    return {(key,): value for key, value in values.items()}
 
 
 def _header(making: _Making, sheet: DataSheet) -> None:
@@ -218,6 +249,11 @@ def _travel(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> tupl
     if not isinstance(axis.travel, str):
         ends = [making.read(path, text, measure) for text in axis.travel]
         if ends[0] is None or ends[1] is None:
+            return None
+        if ends[0] >= ends[1]:
+            first, last = axis.travel[1], axis.travel[0]
+            making.fault(path, f"{letter}.travel: {list(axis.travel)} is empty",
+                         f'write the lower end first, ["{first}", "{last}"]' if ends[0] > ends[1] else "write both ends")
             return None
         return _round(ends[0]), _round(ends[1])
     if rotary:

@@ -93,6 +93,9 @@ def _text(made: NewMachine, output: Path, drawing: str) -> str:
              f"{made.machine.structure}, {len(made.assumed)} figures assumed", *_understood(made.machine)]
     if unproved:
         lines.append(f"senses of {', '.join(unproved)} are not proved: jog each by +10, write what was seen into the sheet")
+    if made.unread:
+        lines.append(f"where {', '.join(made.unread)} lie is not proved: a pivot off by some mm passes every rule; touch a "
+                     "ball in several poses and write [touched] into the sheet, or run the check program")
     lines.append(f"next: postproc convert part.cls -m {output} -c CONTROLLER --check-program check.nc proves the pivots")
     return "\n".join(lines)
 

@@ -155,6 +155,12 @@ def _run(path: Toolpath, machine: str, controller: str, options: Options, read: 
     known = hashed(machine, controller, options)
     result = convert(path, machine_of(machine), controller_of(controller), options=options, diagnostics=list(read),
                      progress=progress, clock=program_clock())
+    if not result.ok:
+        from dataclasses import replace
+
+        from postproc.setup_sheet.offers import offers
+
+        result = replace(result, diagnostics=(*result.diagnostics, *offers(result, path, machine, controller)))
     return Run(result, estimate_of(result), known or {}, f"{options.name}.nc")
 
 

@@ -77,7 +77,7 @@ def setup_new(file: ClFile, machine: MachineName,
                       allow_unknown=tuple(w.upper() for w in allow_unknown or ()))
     values: dict[str, Any] = {}
     with shown_errors(json), progress_bar() as progress:
-        sheet = _made(file, machine, controller, options, given, yes, work_offset_code, progress)
+        sheet, options = _made(file, machine, controller, options, given, yes, work_offset_code, progress)
     text = ""
     outputs: dict[Path, str | bytes] = {}
     if sheet.text and sheet.fit is not None:
@@ -88,15 +88,26 @@ def setup_new(file: ClFile, machine: MachineName,
 
 
 def _made(file: Path, machine: str, controller: str, options: Options, given: GivenAnswers, yes: bool, code: str,
-          progress: Any) -> SetupSheet:
+          progress: Any) -> tuple[SetupSheet, Options]:
+    """The sheet, and the options with the units that were answered."""
+    from dataclasses import replace
+
     from postproc.setup_sheet.make import new_setup
+    from postproc.setup_sheet.questions import units_question
+    from toolpaths.diagnostics import Severity, has_errors
 
     asked, m = _Asking(), machine_of(machine)
     path, found = read_cl(file, options)
     try:
-        return new_setup(path, m, controller, options, given, None if yes else asked, yes, found, code, progress)
+        if not yes and _terminal() and not has_errors(found) and any(
+                d.code == "cl.no-units" and d.severity is Severity.WARNING for d in found):
+            options = replace(options, units="inch" if asked(units_question()) == "inch" else "mm")
+            path, found = read_cl(file, options)
+        sheet = new_setup(path, m, controller, options, given, None if yes else asked, yes, found, code, progress)
     except EOFError:
-        return new_setup(path, m, controller, options, asked.added(given), None, False, found, code, progress)
+        sheet = new_setup(path, m, controller, options, asked.added(given), None, False, found, code, progress)
+    own = tuple(question for question, _ in asked.done if question.kind == "units")
+    return replace(sheet, questions=(*own, *sheet.questions)), options
 
 
 class _Asking:
@@ -133,6 +144,8 @@ class _Asking:
         for question, value in self.done:
             if question.name:
                 result = replace(result, tool_number={**result.tool_number, question.name: int(float(value))})
+            elif question.kind == "units":
+                continue  # an option of reading
             elif question.kind == "coolant":
                 result = replace(result, coolant=str(value))
             elif question.kind == "origin":

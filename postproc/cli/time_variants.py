@@ -154,7 +154,11 @@ def _timed(file: Path, machine: Machine, change: WhatIf, setup: str, asked: Aske
     result = convert(path, machine, asked.controller, options=options, diagnostics=found, progress=progress,
                      clock=program_clock(asked.model))
     if not result.ok:
-        return Timed(file, machine, setup, change, None, planner, None, result.diagnostics)
+        from postproc.setup_sheet.offers import offers
+
+        name = next(one for one in asked.machines if machine_of(one).name == machine.name)
+        more = offers(result, path, name, asked.controller) if change == AS_IS else []
+        return Timed(file, machine, setup, change, None, planner, None, (*result.diagnostics, *more))
     blocks, times, found = from_conversion(result, override), None, []
     if planner.kind == "ideal":
         from postproc.cycle_time.planned import planned_times

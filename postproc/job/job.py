@@ -263,7 +263,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     frame, found = work_frame(setup, toolpath, options.setup)
     diagnostics += found
     errors = {d.code for d in diagnostics if d.severity is Severity.ERROR}
-    if not places or frame is None or not errors <= OF_SETUP:
+    if not places or frame is None or not errors <= OF_SETUP | {"tool.not_loaded"}:
         return None, diagnostics
     toolpath, repeats = at_all(toolpath, places, setup.order)
     setup, placement = places[0].setup, places[0].placement

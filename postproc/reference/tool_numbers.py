@@ -34,13 +34,19 @@ def numbered(toolpath: Toolpath, setup: SetupFile, file: str = "") -> tuple[Tool
     found = [info("setup.tool_name_unused", f"[tool_numbers]: the CL file has no tool {', '.join(unknown)}", file=file,
                   hint="its tools: " + (", ".join(sorted(t.name for t in tools if t.name)) or "none has a name"))
              ] if unknown else []
+    given = toolpath
     if asked:
         toolpath = replace(toolpath, tools=tools, events=_events(toolpath, tools, asked))
     if not setup.output.tool_call:
         toolpath, more = measured(toolpath, setup)
         return toolpath, found + more
-    found += without_number(toolpath, setup)
+    missing, proposed = without_number(toolpath, setup)
+    found += missing
     toolpath, more = with_loads(toolpath)
+    if proposed:  # what is wrong with the loads shows where all tools have numbers
+        whole = setup.model_copy(update={"tool_numbers": {**setup.tool_numbers, **proposed}})
+        more = [*more, *(d for d in numbered(given, whole)[1] if d.code == "tool.not_loaded")]
+        return toolpath, found + more
     return toolpath, found + more + _not_loaded(toolpath)
 
 

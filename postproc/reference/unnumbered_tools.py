@@ -77,15 +77,16 @@ def _numbers(toolpath: Toolpath) -> Array:
     return np.array([t.number for t in toolpath.tools] + [-1])[toolpath.tool]
 
 
-def without_number(toolpath: Toolpath, setup: SetupFile) -> list[Diagnostic]:
-    """An error where tools that move have no number (T0 is an empty spindle), with the lines of a set-up that give one."""
+def without_number(toolpath: Toolpath, setup: SetupFile) -> tuple[list[Diagnostic], dict[str, int]]:
+    """An error where tools that move have no number (T0 is an empty spindle), with the lines of a set-up that give one;
+    these numbers by name."""
     if not setup.output.tool_call:
-        return []
+        return [], {}
     moving = toolpath.tool[toolpath.role != Role.START]
     used, at = np.unique(moving, return_index=True)
     bad = [int(k) for k in used[np.argsort(at)] if k >= 0 and toolpath.tools[int(k)].number <= 0]
     if not bad:
-        return []
+        return [], {}
     keys = list(dict.fromkeys(toolpath.tools[k].name or UNNAMED for k in bad))
     proposed = dict(zip(keys, _free(toolpath, setup), strict=False))
     lines = [int(toolpath.line[np.flatnonzero(toolpath.tool == k)[0]]) for k in bad]
@@ -96,7 +97,8 @@ def without_number(toolpath: Toolpath, setup: SetupFile) -> list[Diagnostic]:
     said = ", ".join("a tool without a name" if key == UNNAMED else key for key in keys[:6])
     more = "" if len(keys) <= 6 else f" and {len(keys) - 6} more"
     return [error("tool.number", f"the CL file gives no number to {said}{more}: T0 is an empty spindle, and without a tool "
-                  "call no length is in force", file=toolpath.file, lines=lines[:6], count=len(bad), hint="\n".join(hint))]
+                  "call no length is in force", file=toolpath.file, lines=lines[:6], count=len(bad),
+                  hint="\n".join(hint))], proposed
 
 
 def _free(toolpath: Toolpath, setup: SetupFile) -> list[int]:

@@ -123,6 +123,8 @@ def _made(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
           code: str, progress: Progress | None, spec: ControllerFile, reach: bool) -> SetupSheet:
     """See `new_setup`; `reach`: gauge lengths are asked for although no word depends on them."""
     found, known = read[0], list(read[1])
+    if refused := facts_of(toolpath, machine, spec, options).refused:  # nobody is asked for what no answer puts right
+        return SetupSheet("", (*known, *refused))
     named, asked, unnumbered = _numbers(toolpath, given, ask, assume)
     facts = replace(facts_of(toolpath, machine, spec, options, named), reach=reach)
     known += _of_two(named, toolpath) + _no_such_name(given, [one.name for one in asked], toolpath)

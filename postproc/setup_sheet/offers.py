@@ -21,7 +21,9 @@ def offers(result: PostResult, toolpath: Toolpath, machine: str, controller: str
     missing = sorted(codes & OF_SETUP)
     if missing:
         words = shlex.join([toolpath.file or "part.cls", "-m", machine, "-c", controller])
-        return [info("setup.offered", f"a set-up answers all of this: {', '.join(missing)}",
+        rest = ", ".join(sorted(codes - OF_SETUP))
+        return [info("setup.offered", f"a set-up answers all of this: {', '.join(missing)}"
+                     + (f"; put {rest} right first" if rest else ""),
                      hint=f"postproc setup new {words} -o part.setup.toml asks for all of "
                      "them at once, and finds a place that fits")]
     return found_place(result, toolpath)

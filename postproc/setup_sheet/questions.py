@@ -11,8 +11,9 @@ from typing import Literal, get_args
 
 from postproc.setup.spindle import CoolantKind
 from postproc.setup_sheet.facts import NumberedTool, SheetFacts, ToolFacts
+from toolpaths.choices import LengthUnit
 
-QuestionKind = Literal["tool_number", "gauge_length", "spindle", "feed", "coolant", "origin"]
+QuestionKind = Literal["tool_number", "gauge_length", "spindle", "feed", "coolant", "origin", "units"]
 AnswerSource = Literal["answered", "assumed"]
 ASSUMED_SPEED = 1000.0
 """rev/min, for a first run in the air: no cutting speed"""
@@ -25,9 +26,12 @@ _ABOVE_CUTTER = 50.0
 _LARGEST: dict[QuestionKind, float] = {"tool_number": 999999.0, "gauge_length": 2000.0, "spindle": 200000.0,
                                        "feed": 200000.0, "origin": 100000.0}
 _UNITS: dict[QuestionKind, str] = {"tool_number": "", "gauge_length": "mm", "spindle": "rev/min", "feed": "mm/min",
-                                   "coolant": "", "origin": "mm"}
+                                   "coolant": "", "origin": "mm", "units": ""}
 _OPTIONS: dict[QuestionKind, str] = {"tool_number": "--tool-number", "gauge_length": "--gauge-length",
-                                     "spindle": "--spindle", "feed": "--feed", "coolant": "--coolant", "origin": "--origin"}
+                                     "spindle": "--spindle", "feed": "--feed", "coolant": "--coolant", "origin": "--origin",
+                                     "units": "--units"}
+_WORDS: dict[QuestionKind, tuple[str, ...]] = {"coolant": get_args(CoolantKind), "units": get_args(LengthUnit)}
+"""answers that are words"""
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,11 @@ def origin_question(found: tuple[float, float, float]) -> Question:
                     ", ".join(f"{v:g}" for v in found), None)
 
 
+def units_question() -> Question:
+    """The unit of the lengths of a CL file that states none: it is read again by the answer."""
+    return Question("units", 0, f"unit of the CL file, which states none ({', '.join(_WORDS['units'])})", "mm", None)
+
+
 def questions_of(facts: SheetFacts) -> list[Question]:
     """All that the files leave open, in the order of the set-up file."""
     result = []
@@ -151,8 +160,7 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
     text = text.strip()
     if not text:
         return question.default, "" if question.default is not None else "a value is needed"
-    if question.kind == "coolant":
-        known = get_args(CoolantKind)
+    if known := _WORDS.get(question.kind):
         return (text.lower(), "") if text.lower() in known else (None, f"{text!r} is not one of {', '.join(known)}")
     if question.kind == "origin":
         return (text, "") if three_numbers(text) else (None, f"{text!r} is not x, y, z in mm")

@@ -9,8 +9,8 @@ _WHY = {
         "arc.no_start axis.spin calibrate.converged file.not_recovered geometric_errors.bound "
         "output.smoothing_mode plan.reach rollover.standing rollover.turn"),
     "the remedy is at the machine or in the CAM system: measured anew, exported anew": (
-        "calibrate.few calibrate.place calibrate.rank calibrate.silent calibrate.unchecked cl.index-axis cl.index-cut "
-        "log.fit tool-table.apart"),
+        "calibrate.few calibrate.place calibrate.rank calibrate.silent calibrate.unchecked cl.index-axis "
+        "log.fit"),
     "followed by a test of its own room, which has the files that it takes": (
         "extra.missing collision.point compensation.reach file.twice file.unfinished "
         "proof.comment proof.input_changed verify.clamp verify.no_bound"),

@@ -49,6 +49,21 @@ _OUTPUT = [
          part("FINI", "CUTTER/10,5\nFEDRAT/MMPM,600\nRAPID\n\\1/0,0,5\n\\1/0,0,0\n\\1/9,0,0\nFINI"),
          part_apt="UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFROM/0,0,50\nFINI\n"),
 ]
+INDEXED = (ROOT / "samples" / "indexing" / "creo_rotate.ncl").read_text("utf-8")
+NEXT = "18.7138783386\nRAPID\n"
+"""behind the second position of the table"""
+TWO_NUMBERS = "LOADTL/1,ADJUST,2", "LOADTL/2,ADJUST,2"
+TWO_REGISTERS = START.replace("LOADTL/1", "LOADTL/1,ADJUST,1") + CUT + "LOADTL/1,ADJUST,2\n" + CUT + "FINI\n"
+_CAM = [
+    _own("cl.index-cut", "inspect part.ncl", "put (RAPID) and an approach point after ROTATE",
+         Edit("part.ncl", NEXT.removesuffix("RAPID\n"), NEXT.replace("RAPID", r"\1")),
+         part_ncl=INDEXED.replace(NEXT, NEXT.removesuffix("RAPID\n"), 1)),
+    _own("tool-table.apart", f"verify p.nc part.apt {ON} --tool-table t.csv", "give each length a tool number of its own",
+         Edit("part.apt", *TWO_NUMBERS), Edit(COMMAND, "p.nc", "q.nc"), part_apt=TWO_REGISTERS,
+         again_apt=TWO_REGISTERS.replace(*TWO_NUMBERS), t_csv="register,length\n1,110\n2,110.01\n",
+         s_toml=LENGTH + "[tools.2]\ngauge_length = 110.01\n",
+         first=(f"convert part.apt {ON} -o p.nc", f"convert again.apt {ON} -o q.nc")),
+]
 CLAMPED = (ROOT / "machines" / "data" / "mikron-ucp710.toml").read_text("utf-8").replace(
     "[axes.C]\n", '[axes.C]\nclamp = "M10"\nunclamp = "M11"\n')
 _PROOFS = [
@@ -140,4 +155,4 @@ _MACHINES = [
     HintCase("cl.cycle-height", "inspect part.apt", {"part.apt": ISO_HOLE}, "give the dialect: (--dialect generic)",
              (Edit(COMMAND, "", r" \1"),)),
 ]
-OWN_ROOMS = [*_MACHINES, *_OUTPUT, *_PROOFS, *_CUTTERS, *_TABLES, *_AXES]
+OWN_ROOMS = [*_MACHINES, *_OUTPUT, *_CAM, *_PROOFS, *_CUTTERS, *_TABLES, *_AXES]

@@ -34,11 +34,14 @@ _SHORTER = "use a shorter tool (gauge_length)"
 WITHOUT_MOVE = {_MOVE: "", f"{_MOVE}, or {_LOWER}": _LOWER, f"{_MOVE}, turn it, or {_LOWER}": _LOWER,
                 f"{_MOVE}, {_LOWER}, or {_SHORTER}": f"{_LOWER}, or {_SHORTER}"}
 """remedies of travel and reach, and what is left of each where no place of the part fits"""
-FOLLOWS = {"cl.no-feed": ("feed.missing", "cl.feed"), "cl.no-units": ("cl.empty",), "cl.rapid-below": ("cl.cycle-depth",),
+FOLLOWS = {"cl.no-feed": ("feed.missing", "cl.feed", "convert.turning"), "cl.no-units": ("cl.empty", "convert.turning"),
+           "cl.rapid-below": ("cl.cycle-depth",),
            "setup.tool_unused": ("tool.number",), "place.found": ("path.odd_record",),
            "joints.chosen": ("travel.exceeded", "reach.axis", "path.odd_record"),
            **dict.fromkeys(PLACED, ("path.odd_record",))}
 """by code: its causes; where one of them is said, people read that alone"""
+CAUSES = {"setup.machine": PLACED, "setup.upside_down": PLACED, "cl.no-units": PLACED}
+"""by code of a warning: errors that it may be the cause of; where one of them is said, it stands before them"""
 LONGEST_NAME = 255
 """characters that the name of a file may have"""
 
@@ -222,8 +225,8 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
 
 def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
     """Diagnostics for people: of many with one code and one remedy the first, and where the others are; of one
-    wrong number one line. Where there are errors they come first, and what only follows from another is left out. JSON has
-    them all, in the order of the stages."""
+    wrong number one line. Where there are errors they come first, before them alone what may be their cause, and what only
+    follows from another is left out. JSON has them all, in the order of the stages."""
     from dataclasses import replace
 
     from toolpaths.diagnostics import Severity, has_errors
@@ -231,7 +234,8 @@ def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
     if has_errors(diagnostics):
         codes = {d.code for d in diagnostics}
         diagnostics = tuple(sorted((d for d in diagnostics if codes.isdisjoint(FOLLOWS.get(d.code, ()))),
-                                   key=lambda d: -d.severity))
+                                   key=lambda d: (codes.isdisjoint(CAUSES.get(d.code, ())) or d.severity < Severity.WARNING,
+                                                  -d.severity)))
         if least <= Severity.INFO and any(d.code == "place.found" and "[part]" in d.hint for d in diagnostics):
             diagnostics = tuple(replace(d, hint="") if d.code in PLACED and "system =" not in d.hint else d
                                 for d in diagnostics)

@@ -73,3 +73,13 @@ def test_what_is_wrong_is_said(tmp_path: Path) -> None:
     assert "ERROR import.geometry" in imported(tmp_path, mill(S=A))[1]
     (tmp_path / "kinematic.ini").write_text("CfgKinSimpleTrans")
     assert import_machine(tmp_path / "kinematic.ini", "auto", ())[2][0].code == "import.format"
+
+
+def test_all_that_the_file_does_not_say_comes_at_once(tmp_path: Path) -> None:
+    """Where an axis lies was asked for by a key of the machine file, one run after what carries what."""
+    bare = {**A, "joint": None}
+    machine, found = imported(tmp_path, mill(A=bare, C=bare))
+    assert machine is None and found == 3 * ["ERROR import.geometry"]
+    stated = ("kinematics.structure=w C' A' b X Y Z (C1) t", "kinematics.axes.A.point=[0, 0, 80]",
+              "kinematics.axes.C.point=[0, 0, 0]")
+    assert imported(tmp_path, mill(A=bare, C=bare), stated=stated)[0] is not None

@@ -43,6 +43,13 @@ net len motion.tooloffset.z => xyzac-trt-kins.tool-offset
 """
 
 
+OTHER_FORMS = """xyzac-trt-kins.x-rot-point = 5
+xyzac-trt-kins.y-rot-point=-3   # measured
+source pivots.hal
+"""
+"""the same pins as halcmd(1) has them otherwise"""
+
+
 def joint(k: int, kind: str = "LINEAR", low: float = -10, high: float = 12, velocity: float = 4, acceleration: float = 50,
           home: float = 0) -> str:
     return JOINT.format(k=k, kind=kind, low=low, high=high, velocity=velocity, acceleration=acceleration, home=home)
@@ -90,6 +97,11 @@ def test_pivots_come_from_hal(tmp_path: Path) -> None:
     assert 'point = "file: line 1, setp xyzac-trt-kins.x-rot-point 5, setp' in text
     assert ours.figures["X.velocity"] == "shop.ini: line 17, [JOINT_0] MAX_VELOCITY = 4"
     assert found == ["INFO import.assumed 0"]
+    (tmp_path / "pivots.hal").write_text("\n".join(TRT_HAL.splitlines()[2:]))
+    for hal in (OTHER_FORMS, OTHER_FORMS.replace("xyzac", "setp xyzac", 1)):
+        other = imported(tmp_path, trt(), hal)[1]
+        assert other is not None and other.control_kinematics == own.control_kinematics, "were LinuxCNC's defaults, unsaid"
+    assert "WARNING import.file 3" in imported(tmp_path, trt(), OTHER_FORMS.replace("pivots", "none"))[2]
     assert ours.limits.assumed == {f"{letter}.jerk" for letter in "XYZAC"}
 
 

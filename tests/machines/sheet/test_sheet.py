@@ -184,6 +184,20 @@ def test_all_faults_come_in_one_run(tmp_path: Path) -> None:
     assert [d.lines[0] for d in found] == [line_of(text, part) for part in ('"762"', '"fast"', "tip left", "2.8 h")]
 
 
+def test_odd_figures_come_with_what_cannot_be_read(tmp_path: Path) -> None:
+    """Inches per minute typed for mm/s came one run after the length without a unit, a reversed travel one more later."""
+    text = TRUNNION.replace('"762 mm"', '"762"').replace('"900 ipm"', '"900 in/s"').replace('"20 in"', '["0 in", "-20 in"]')
+    found = made(tmp_path, text).diagnostics
+    assert [(d.code, d.lines[0]) for d in found] == [
+        ("sheet.figure", line_of(text, '"762"')), ("sheet.figure", line_of(text, '["0 in"')),
+        ("machine.plausible", line_of(text, '"900 in/s"'))]
+    assert '["-20 in", "0 in"]' in found[1].hint
+    assert len(made(tmp_path, TRUNNION.replace('"900 ipm"', '"900 in/s"')).diagnostics) == 1, "of one figure"
+    text = TRUNNION.replace("-558.4", "558.4").replace("2.8 s", "2.8 h")
+    assert {d.code for d in made(tmp_path, text).diagnostics} == {"sheet.figure", "machine.plausible"}, "the sign of a pivot"
+    assert made(tmp_path, TRUNNION).unread == ("B", "C")
+
+
 def test_a_misspelt_key_hides_no_wrong_figure(tmp_path: Path) -> None:
     """Keys that do not fit are left out, and the figures of the rest are looked at in the same run."""
     text = TRUNNION.replace("rapid = ", "rapids = ", 1).replace("[Y]", "[Y]\nzeros = \"upper\"", 1)

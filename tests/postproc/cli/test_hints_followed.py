@@ -13,7 +13,7 @@ from postproc.cli.shared.console import ALIKE, lines_of
 from postproc.setup.system import with_system
 from tests.postproc.cli.test_cli import run
 from tests.postproc.kit import convert, toolpath
-from toolpaths.diagnostics import Diagnostic, Severity, error
+from toolpaths.diagnostics import Diagnostic, Severity, error, warning
 
 START = ["UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600"]
 
@@ -67,6 +67,18 @@ def test_many_faults_of_one_remedy_are_two_lines() -> None:
     assert len(lines_of((*many, *other), Severity.INFO)) == 3
     assert "and 539 more [cl.goto], lines 2, 3, 4" in lines_of((*many, *other), Severity.INFO)[1]
     assert len(lines_of(many[:ALIKE], Severity.INFO)) == ALIKE, "few are shown each"
+
+
+def test_what_may_be_the_cause_stands_before_what_it_causes() -> None:
+    """A set-up for another machine was said below the travel that it exceeded; turning files brought their units."""
+    travel, other = error("travel.exceeded", "X"), warning("tool.length", "y")
+    for code in ("setup.machine", "setup.upside_down", "cl.no-units"):
+        said = lines_of((travel, other, warning(code, "z")), Severity.INFO)
+        assert [line.split("[")[1].split("]")[0] for line in said] == [code, "travel.exceeded", "tool.length"]
+    said = lines_of((error("cl.goto", "X"), warning("setup.machine", "z")), Severity.INFO)
+    assert "cl.goto" in said[0], "of another fault it is no cause"
+    turning = (warning("cl.no-units", "u"), warning("cl.no-feed", "f"), error("convert.turning", "t"))
+    assert len(lines_of(turning, Severity.INFO)) == 1
 
 
 def test_g_code_in_the_place_of_a_cl_file_is_named(tmp_path: Path) -> None:

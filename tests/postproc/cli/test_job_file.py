@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
 
 from postproc.cli.app import app
+from postproc.cli.shared.job_defaults import given_defaults
 from postproc.pipeline.stages import STAGES
 from postproc.setup.job_file import JobFile
 from tests.postproc.cli.test_cli import run
@@ -109,6 +111,37 @@ def test_every_key_is_an_option_and_every_command_with_a_machine_and_a_cl_file_t
     for name in on_cl_files:
         got = run(*name.split(), *({"verify": ["x.nc"], "setup align": ["x.csv"]}.get(name, [])), part, "--no-such-option")
         assert re.search(r"postproc\.toml: .*machine mill-3axis", got.stderr), name
+
+
+def with_job_file(command: Any) -> list[Any]:
+    """Commands on CL files, of all groups."""
+    inner = list(getattr(command, "commands", {}).values())
+    own = [command] if {"machine", "dialect"} <= {p.name for p in command.params} else []
+    return own + [one for sub in inner for one in with_job_file(sub)]
+
+
+def test_every_key_gives_way_to_every_spelling_of_its_option(part: Path, tmp_path: Path) -> None:
+    """--tolerance X, --tolerance=X, -m X, -mX; what the command line leaves out is the job file's."""
+    stated = {"machine": "mill-3axis", "controller": "haas-ngc", "setup": "s.toml", "hooks": "h.toml",
+              "error_model": "e.toml", "tolerance": 0.02, "axis_tolerance": 0.2, "units": "mm", "dialect": "nx",
+              "allow_unknown": ["A"]}
+    assert set(stated) == set(JobFile.model_fields)
+    lines = (f"{key} = {json.dumps(value)}\n" for key, value in stated.items())
+    (tmp_path / "job" / "postproc.toml").write_text("".join(lines))
+
+    def taken(command: Any, *words: str) -> set[str]:
+        context = typer.Context(command)
+        given_defaults(command, [*(["x.nc"] if command.name == "verify" else ["x.csv"] if command.name == "align" else []),
+                                 str(part), *words], context)
+        return set((context.default_map or {}).get(command.name, {}))
+
+    for command in with_job_file(typer.main.get_command(app)):
+        keys = {one.name for one in command.params} & set(stated)
+        assert taken(command) == keys, command.name
+        for one in (p for p in command.params if p.name in keys):
+            for opt in one.opts:
+                for words in ([opt, "q"], [f"{opt}=q"] if opt.startswith("--") else [f"{opt}q"]):
+                    assert taken(command, *words) == keys - {one.name}, (command.name, words)
 
 
 def test_strict_makes_warnings_errors(part: Path, tmp_path: Path) -> None:

@@ -146,6 +146,14 @@ def test_a_tool_that_is_never_loaded_is_not_numbered() -> None:
     assert "EM6 (T2)" in found.message
 
 
+def test_a_tool_that_is_never_loaded_is_said_with_the_numbers_that_are_missing() -> None:
+    """It came in the second run, when the set-up had numbered the tools."""
+    second = TWO.rindex("LOAD/TOOL,0\n")
+    result = converted((TWO[:second] + TWO[second + 12:]).replace("FEDRAT", "$$ FEDRAT"))
+    assert {"tool.number", "tool.not_loaded", "feed.missing"} <= {d.code for d in result.diagnostics}
+    assert "tool.not_loaded" not in {d.code for d in converted(TWO).diagnostics}
+
+
 def test_names_that_the_file_does_not_have_are_reported() -> None:
     found = said(converted(TWO, of=setup(tool_numbers={**NAMES, "BALL8": 3})), "setup.tool_name_unused")
     assert "BALL8" in found.message and "EM12, EM6" in found.hint

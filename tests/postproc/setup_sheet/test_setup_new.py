@@ -268,6 +268,10 @@ def test_a_refusal_by_travel_names_a_place_that_works(tmp_path: Path) -> None:
     got = run(*words, code=1)
     found = re.search(r"\[part\] (origin = \[.*?\]), (x_axis = \[.*?\]), (y_axis = \[.*?\]) in the set-up", got.stderr)
     assert found and "place.found" in got.stderr
+    for command in ("time", "report"):
+        page = ("-o", tmp_path / "r.html") if command == "report" else ()
+        other = CliRunner().invoke(app, [command, *map(str, (*words[1:-2], *page))])
+        assert found[0] in other.stderr, f"{command} says what place finds, too"
     setup.write_text("[part]\n" + "\n".join(found.groups()) + "\n")
     run(*words, "--setup", setup)
     assert out.exists()
@@ -354,6 +358,28 @@ def test_a_question_on_a_terminal_stays_on_its_line(tmp_path: Path) -> None:
             said += part
     assert command.wait(60) == 0 and b"1 question" in said
     os.close(ours)
+
+
+def test_the_unit_of_a_file_that_states_none_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Millimetres were taken in silence on a terminal, where somebody could have been asked."""
+    (file := tmp_path / "part.apt").write_text("LOADTL/1\nSPINDL/RPM,900,CLW\nCOOLNT/OFF\nFEDRAT/20\nRAPID\nGOTO/0,0,2\n"
+                                               "GOTO/0,0,0\nGOTO/1,0,0\nRAPID\nGOTO/1,0,2\nFINI\n")
+    words = ("setup", "new", file, "-m", "mill-3axis", "-o", out := tmp_path / "s.toml", "--force")
+    assert "unit of the CL file" not in run(*words).output, "answers of a file hold values alone"
+    monkeypatch.setattr("postproc.cli.setup_new._terminal", lambda: True)
+    said = run(*words, stdin="cm\ninch\n")
+    assert "'cm' is not one of mm, inch" in said.stderr and "1 question\n" in said.stdout
+    assert "--units inch" in said.stdout and "answered (--units inch" in out.read_text()
+    assert "unit of the CL file" not in run(*words, "--units", "mm").output + run(*words, "--yes").output
+
+
+def test_nobody_is_asked_for_what_no_answer_puts_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numbers and speeds were asked for, then the file was refused for a tool that it never loads."""
+    text = "UNITS/MM\nTOOL PATH/A,TOOL,T1\nLOAD/TOOL,0\nRAPID\nGOTO/0,0,9\nGOTO/9,0,0\nEND-OF-PATH\n"
+    other = text.partition("\n")[2].replace("T1", "T2").replace("LOAD/TOOL,0\n", "")
+    (file := tmp_path / "part.cls").write_text(text + other)
+    said = run("setup", "new", file, "-m", "mill-3axis", "-o", tmp_path / "s.toml", stdin="1\n2\n", code=1)
+    assert "tool.not_loaded" in said.stderr and "number in the magazine" not in said.output
 
 
 def test_rapids_that_would_leave_their_line_are_feed_moves(tmp_path: Path) -> None:

@@ -51,6 +51,7 @@ def test_binary_files_are_neither_cl_text_nor_programs() -> None:
     """By chance some line of a binary file begins as a block of a program does; NULs alone and wide text are text."""
     records = struct.pack("<3i3d", 5000, 5, 7, 0.1, 2.3, -9.7) * 50 + b"\nG1 X5\n"
     assert "a binary file" in toolpaths.read_bytes(records)[1][0].message
+    assert not looks_like_gcode(b"%PDF-1.4\n") and not looks_like_gcode(b"PK\x03\x04\nG1 X5\n"), "by their first bytes"
     assert not looks_like_gcode(records) and looks_like_gcode(b"G1 X5\n") and looks_like_gcode(b"%\x00\x00\nG1 X5\n")
     wide, damaged = "UNITS/MM\nFEDRAT/9,MMPM\nGOTO/1,2,3\n".encode("utf-16"), b"UNITS/MM\n" + 40 * b"\0" + b"GOTO/1,2,3\n"
     for text in (wide, damaged):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from toolpaths.cl.text.other_formats import is_binary, other_format, shape_file
+from toolpaths.cl.text.other_formats import is_binary, is_document, other_format, shape_file
 
 _RECORD = re.compile(rb"(N?\d+\s*)?[A-Z][A-Z0-9]*\s*/")
 """An APT record with a major word, with or without a sequence number"""
@@ -14,7 +14,7 @@ _BLOCK = re.compile(rb"%|O\d|/?\s*N\d+\s*\S|/?\s*(\d+\s*)?BEGIN PGM|/?\s*[GMTXYZ
 
 def looks_like_gcode(data: bytes) -> bool:
     """True for a program of a control: a name, a numbered block or words, in what comes before any APT record."""
-    if shape_file(data) or is_binary(data):
+    if shape_file(data) or is_binary(data) or is_document(data):
         return False
     for raw in data[:20_000].splitlines():
         line = raw.strip().upper()

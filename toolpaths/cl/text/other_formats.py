@@ -38,13 +38,22 @@ _BLANK = b"\xef\xbb\xbf \t\r\n"
 APT = "export the toolpath as APT or CL text (GOTO records)"
 
 
+_DOCUMENT = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"%PDF-")
+"""how archives and documents begin"""
+
+
+def is_document(data: bytes) -> bool:
+    """True for an archive or a printed document by its first bytes."""
+    return data.startswith(_DOCUMENT)
+
+
 def other_format(data: bytes) -> tuple[str, str] | None:
     """(what a file is, what to do) where it is no CL text by its first bytes; None for all else."""
     head = data[:HEAD]
     package = head.startswith(b"PK\x03\x04") and head[30:38] == b"mimetype" and b"opentoolpath" in head[:120].lower()
     if package or (head.lstrip(_BLANK)[:1] == b"{" and _OTP.search(head)):
         return "an OpenToolpath file, which is not read", APT
-    if head.startswith((b"PK\x03\x04", b"\xd0\xcf\x11\xe0", b"%PDF-")):
+    if head.startswith(_DOCUMENT):
         return "a document or archive of a CAD or CAM system, not text", APT
     shapes = shape_file(data)
     if shapes:
