@@ -88,7 +88,7 @@ function sheetParts(k) {
   const run = report.runs[k], base = `runs.${k}`, position = (values) => (values ? make("span", {}, ...Object.entries(values).flatMap(([a, v]) => [make("span", {class: "whole"}, a + " " + number(v, 3)), " "])) : "-");
   const tools = run.tools.map((t, n) => ["T" + t.number, short(t.name || "-", 60), spindleText(t.spindle_rpm), t.gauge_length_mm === null ? "not stated" : figure(`${base}.tools.${n}.gauge_length_mm`, 4, "mm"),
     t.length_register === null ? "-" : "H" + t.length_register, make("span", {}, figure(`${base}.tools.${n}.time_s`, 1, "s"), " (" + number(t.time_s / 60, 1) + " min)"),
-    figure(`${base}.tools.${n}.cutting_mm`, 0, "mm"), position(t.first_axes)]);
+    figure(`${base}.tools.${n}.cutting_m`, 3, "m"), position(t.first_axes)]);
   const offset = run.work_offset, part = short(report.part, 120);
   if (!run.converted) return [make("p", {}, `${part} on ${lineOf(run)}: no program was written, so there is nothing to set up.`)];
   return [make("p", {}, `${part} on ${lineOf(run)}; program ${run.files.filter((f) => f.role === "program").map((f) => f.file).join(", ")}`),
@@ -118,7 +118,7 @@ function orientationParts(k) {
   return [make("p", {}, "Each pass is machined with a fixed tool axis (3+2). The table gives the chosen rotary positions, the time with them and with the axes of the CL file, and why other directions lost."),
     table(["Pass", "Rotary position, deg", "Time", "With the CL file's axes", "Held by", "Rejected candidates"], found.passes.map((p, n) => [String(p.pass), angles(p.orientation_deg),
       figure(`${base}.passes.${n}.time_s`, 3, "s"), figure(`${base}.passes.${n}.reference_time_s`, 3, "s"), p.limiting_axis || "-",
-      p.rejected && p.rejected.length ? make("div", {}, ...grouped(p.rejected)) : "-"]), [2, 3]),
+      p.rejected && p.rejected.length ? make("div", {}, ...grouped(p.rejected)) : "-"]), [2, 3]), ...polytopeParts(found),
     table(["Plan", "Time"], Object.keys(found.plans).filter((name) => found.plans[name]).map((name) => [name.replaceAll("_", " "), figure(`${base}.plans.${name}.time_s`, 3, "s")]), [1])];
 }
 
@@ -127,6 +127,7 @@ function errorParts(k, jump) {
   if (!found) return [make("p", {}, "No geometric errors were corrected: no --error-model was given, or the control corrects them.")];
   return [make("p", {}, found.title + ": worst before ", figure(base + ".worst_before_um", 2, "um"), ", after ", figure(base + ".worst_after_um", 3, "um"), ", bound ",
     figure(base + ".bound_um", 3, "um"), ", uncertainty (k = 2) ", found.uncertainty_k2_um === null ? "not known" : figure(base + ".uncertainty_k2_um", 2, "um")),
-  table(["CL line", "Part x, y, z, mm", "Error x, y, z before, um", "Before", "After"], found.worst.map((p, n) => [make("button", {type: "button", class: "jump", onclick: () => jump("cl", p.cl_line, 0)}, "line " + p.cl_line),
-    p.part_mm.map((v) => number(v, 3)).join(", "), p.vector_um.map((v) => number(v, 2)).join(", "), figure(`${base}.worst.${n}.before_um`, 2, "um"), figure(`${base}.worst.${n}.after_um`, 3, "um")]), [3, 4])];
+  table(["CL line", "Part x, y, z, mm", "Error x, y, z before, um", "after, um", "Size before", "after"], found.worst.map((p, n) => [make("button", {type: "button", class: "jump", onclick: () => jump("cl", p.cl_line, 0)}, "line " + p.cl_line),
+    p.part_mm.map((v) => number(v, 3)).join(", "), p.vector_um.map((v) => number(v, 2)).join(", "), p.vector_after_um.map((v) => number(v, 3)).join(", "), figure(`${base}.worst.${n}.before_um`, 2, "um"), figure(`${base}.worst.${n}.after_um`, 3, "um")]), [4, 5]),
+  make("p", {class: "note"}, `These are the ten worst; "error vectors" under Path draws them at ${found.places.length} places, before and after.`)];
 }
