@@ -71,7 +71,7 @@ function headParts(k) {
   const proof = witness ? make("div", {}, make("h3", {}, "What the proof covers"), make("p", {}, "Compared a second time, by other code: " + (witness.compared.join(", ") || "nothing") + "."),
     make("p", {}, witness.not_compared.length ? "Not compared: " + witness.not_compared.join("; ") + "." : "Nothing was left out."),
     make("p", {class: "note"}, "The proof is about the program, the CL file and the machine as its files describe it; not about deflection, heat, wear or following error.")) : null;
-  const files = make("div", {}, make("h3", {}, "What it rests on (SHA-256)"), table(["", "File", "SHA-256"], run.files.map((f) => [f.role.replace("_", " "), f.file, f.sha256]), []));
+  const files = make("div", {}, make("h3", {}, "What it rests on (SHA-256)"), table(["What", "File", "SHA-256"], run.files.map((f) => [f.role.replace("_", " "), f.file, f.sha256]), []));
   files.querySelectorAll("td:last-child").forEach((cell) => cell.classList.add("hash"));
   return [make("div", {}, make("h3", {}, "Figures"), table(["", ""], facts, [])), make("div", {}, make("h3", {}, "Travel used"), table(["Axis", "Used", "Travel", "Share", "Margin"], axes, [1, 2, 3, 4]), proof), files].filter(Boolean);
 }
@@ -111,6 +111,9 @@ function grouped(rejected) {
   return [...kinds.values()].sort((a, b) => b.length - a.length).map((all) => make("div", {}, (all.length > 1 ? `${all.length} candidates, the first ` : "") + `${angles(all[0])}: ${all[0].reason}`));
 }
 
+const PLAN_TEXT = {keep: "keep: the axes of the CL file", per_pass: "per pass: each pass under its own fastest axis", whole_part: "whole part: one axis for all passes",
+  auto: "auto: the least of all, turning between passes counted", paper_per_pass: "vertex-aligned: each pass with a corner of its polytope (below) turned into the cut, for comparison"};
+
 function orientationParts(k) {
   const found = report.runs[k].orientation, base = `runs.${k}.orientation`;
   if (!found) return [make("p", {}, "The tool axes are those of the CL file (--orient keep): none were chosen.")];
@@ -119,7 +122,7 @@ function orientationParts(k) {
     table(["Pass", "Rotary position, deg", "Time", "With the CL file's axes", "Held by", "Rejected candidates"], found.passes.map((p, n) => [String(p.pass), angles(p.orientation_deg),
       figure(`${base}.passes.${n}.time_s`, 3, "s"), figure(`${base}.passes.${n}.reference_time_s`, 3, "s"), p.limiting_axis || "-",
       p.rejected && p.rejected.length ? make("div", {}, ...grouped(p.rejected)) : "-"]), [2, 3]), ...polytopeParts(found),
-    table(["Plan", "Time"], Object.keys(found.plans).filter((name) => found.plans[name]).map((name) => [name.replaceAll("_", " "), figure(`${base}.plans.${name}.time_s`, 3, "s")]), [1])];
+    table(["Plan", "Time"], Object.keys(found.plans).filter((name) => found.plans[name]).map((name) => [PLAN_TEXT[name] || name.replaceAll("_", " "), figure(`${base}.plans.${name}.time_s`, 3, "s")]), [1])];
 }
 
 function errorParts(k, jump) {

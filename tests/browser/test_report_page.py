@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from tests.postproc.page.page_kit import HOSTILE, LINES, refused, small
+from tests.postproc.page.page_kit import HOSTILE, LINES, Made, refused, reported, small, turned
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
@@ -124,21 +125,26 @@ def test_many_operations_do_not_fill_the_page_with_their_legend(opened: Session)
     assert "op 15" in said and "op 16" not in said and "and 184 more" in said
 
 
-@pytest.mark.parametrize("run", [0, 1])
-def test_every_number_on_the_page_is_that_of_the_json(opened: Session, run: int) -> None:
-    opened.page.evaluate(f"pickRun({run})")
-    until(opened.page, f"shown.run.k === {run}")
-    shown = opened.page.eval_on_selector_all("[data-key]", NUMBERS)
+def read_back(page: Any, made: Made) -> set[str]:
+    """Keys of the numbers on the page, each compared with the JSON."""
+    shown = page.eval_on_selector_all("[data-key]", NUMBERS)
     assert len(shown) > 60
     for key, digits, text in shown:
-        value = reduce(lambda v, step: v[int(step)] if isinstance(v, list) else v[step], key.split("."), small().values)
+        value = reduce(lambda v, step: v[int(step)] if isinstance(v, list) else v[step], key.split("."), made.values)
         number = re.match(r"-?[\d.]+|-", text)
         assert number is not None, (key, text)
         if value is None:
             assert text.strip().startswith("-"), key
         else:
             assert float(number[0]) == pytest.approx(value, abs=0.5001 * 10.0 ** -int(digits)), key
-    keys = {key for key, _, _ in shown}
+    return {key for key, _, _ in shown}
+
+
+@pytest.mark.parametrize("run", [0, 1])
+def test_every_number_on_the_page_is_that_of_the_json(opened: Session, run: int) -> None:
+    opened.page.evaluate(f"pickRun({run})")
+    until(opened.page, f"shown.run.k === {run}")
+    keys = read_back(opened.page, small())
     base = f"runs.{run}.conversion."
     assert {base + "worst_tip_deviation_mm", base + "cycle_time_s", base + "band_s.0", f"runs.{run}.axes.0.used.0"} <= keys
 
@@ -187,7 +193,9 @@ def test_a_click_shows_the_point_and_both_its_lines(opened: Session) -> None:
     page.click("#jump-nc")
     until(page, "shown.texts.kind === 'nc0-0'")
     line = page.inner_text("#text .row.here")
-    assert re.search(r"X[-\d.]+", line), line
+    assert int(page.inner_text("#text .row.here b")) == page.evaluate("shown.run.columns['NC line'][shown.point]")
+    # LINES[13] is the sixth cut: it turns the axis from 0.08 to 0.1 rad off z, in one block or more; A alone turns it so
+    assert math.degrees(0.08) < abs(float(re.findall(r"A(-?[\d.]+)", line)[0])) < math.degrees(0.1001), line
 
 
 def test_a_line_of_a_text_leads_to_its_point_and_words_are_found(opened: Session) -> None:
@@ -277,3 +285,43 @@ def test_messages_of_what_was_not_converted_lead_to_the_cl_file(opened: Session)
     page.click("#first button.jump >> nth=0")
     page.wait_for_selector("#text .row.here")
     assert "9000" in page.inner_text("#text .row.here") and opened.said == []
+
+
+def test_errors_and_orientation_are_drawn_and_read_back(opened: Session) -> None:
+    """The colouring by correction, vectors at places, the polytope of a pass with its reach."""
+    page = opened.page
+    page.goto(turned().page.as_uri())
+    page.wait_for_selector("html[data-ready]", state="attached")
+    keys = read_back(page, turned())
+    assert {"runs.0.errors.worst_before_um", "runs.0.errors.uncertainty_k2_um", "runs.0.errors.worst.0.after_um",
+            "runs.0.orientation.passes.0.time_s", "runs.0.tools.0.cutting_m"} <= keys
+    page.select_option("#colour", "correction")
+    assert page.inner_text("#legend").count("um") == 1 and page.evaluate(DARK)
+    before = page.evaluate("drawNow(), shown.lines.length")
+    page.check("#vectors")
+    errors = turned().values["runs"][0]["errors"]
+    assert page.evaluate("drawNow(), shown.lines.length") == before + 2 * len(errors["places"])
+    worst, sure = errors["worst_before_um"], errors["uncertainty_k2_um"]
+    assert f"{worst:.2f} um, uncertainty (k = 2) {sure:.2f} um" in page.inner_text("#legend")
+    solid = turned().values["runs"][0]["orientation"]["polytopes"][0]
+    shown_rate = float(f"{solid['chosen']['rate']:.3g}")
+    drawn = page.get_attribute("#polytope svg", "aria-label")
+    assert solid["unit"] in drawn and f"chosen axis {shown_rate:g}" in drawn
+    edges = sum(len(solid[key]["edges"]) for key in ("cl_file", "chosen"))
+    assert page.locator("#polytope svg line").count() == edges + 2 * 2 + 3  # reach and its key, axes x, y, z
+    assert page.evaluate(POOR) == [] and opened.said == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("points", [100, 10_000])
+def test_pages_of_many_points_open_and_are_clicked(opened: Session, points: int) -> None:
+    """A million is of tests/benchmarks/bench_report.py."""
+    cuts = [f"GOTO/{0.01 * k:.4f},{5.0 * math.sin(0.003 * k):.4f},0" for k in range(points)]
+    lines = [*LINES[:7], "GOTO/0,0,50,0,0,1", "FEDRAT/MMPM,600", *cuts, "FINI"]
+    opened.page.goto(reported(lines=tuple(lines)).page.as_uri())
+    opened.page.wait_for_selector("html[data-ready]", state="attached")
+    assert opened.page.evaluate("shown.run.count") >= points
+    opened.page.evaluate(f"openText('cl', {9 + points // 2}, 0)")
+    until(opened.page, "byId('text').querySelector('.here') !== null")
+    opened.page.press("#text", "Enter")
+    assert f"line {9 + points // 2}" in opened.page.inner_text("#point") and opened.said == []
