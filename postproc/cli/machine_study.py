@@ -32,8 +32,8 @@ AlongOption = Annotated[list[str] | None, typer.Option("--along", metavar="x|y|z
 AtOption = Annotated[list[str] | None, typer.Option("--at", metavar="x|y|z|tilt=VALUE", help="with --map: the others, mm or "
                                                     "degrees; left out: the middle of the workspace")]
 MapCsv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="the map or curve as a table")]
-MapFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="the same drawn, .png or .svg; without --map "
-                                                      "the condition number")]
+MapFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="the same drawn, .png or .svg; "
+                                                      "without --map the condition number")]
 
 
 def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")], singular_above: SingularOption = None,
@@ -44,7 +44,7 @@ def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file"
 
     ending = figure_ending(figure)
     if measure is None and (along or at or csv):
-        raise typer.BadParameter(f"a map or a curve is of one measure: {', '.join(get_args(MapMeasure))}", param_hint="--map")
+        raise typer.BadParameter(f"of what? write one of {', '.join(get_args(MapMeasure))}", param_hint="--map")
     refuse_overwriting({"--csv": str(csv or ""), "--figure": str(figure or ""), "--json": json}, own_files(name))
     outputs: dict[Path, str | bytes] = {}
     if measure is None:

@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
+from postproc.cli.app import app
 from tests.postproc.page.page_kit import HOSTILE, LINES, Made, refused, reported, small, turned
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
@@ -64,6 +66,8 @@ LANE = """() => { const at = [], put = (x, y) => at.push([x, y]);
   const lanes = Object.assign(Object.create(Lanes.prototype), {left: 10, from: 0, to: 10, kind: "position", run});
   lanes.curve(g, (i) => [3, 7][i], 0, 1, 100, (v) => v, ""); return at; }"""
 """corners of a lane: it stands until 2 s, rests 4 s more, moves from 3 to 7 until 8 s"""
+A4 = 688
+"""pixels between the margins of the paper"""
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 
@@ -310,6 +314,26 @@ def test_errors_and_orientation_are_drawn_and_read_back(opened: Session) -> None
     edges = sum(len(solid[key]["edges"]) for key in ("cl_file", "chosen"))
     assert page.locator("#polytope svg line").count() == edges + 2 * 2 + 3  # reach and its key, axes x, y, z
     assert page.evaluate(POOR) == [] and opened.said == []
+
+
+def test_a_dossier_opens_prints_on_a4_and_fits_small_screens(opened: Session, tmp_path: Path) -> None:
+    page, made = opened.page, tmp_path / "m.html"
+    done = CliRunner().invoke(app, ["machine", "report", "planar-delta", "-c", "linuxcnc", "-o", str(made)])
+    assert done.exit_code == 0, done.output
+    page.goto(made.as_uri())
+    assert page.evaluate("[...document.images].every((one) => one.complete && one.naturalWidth > 0)")
+    for width in (360, 820):
+        page.set_viewport_size({"width": width, "height": 740})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate(POOR) == [] and page.locator("th:empty").count() == 0
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": A4, "height": 1017})
+    assert page.evaluate("document.documentElement.scrollWidth") <= A4
+    tops = page.eval_on_selector_all(".figures figure", "all => all.slice(0, 2).map(e => e.offsetTop)")
+    page.emulate_media(media="screen")
+    page.set_viewport_size({"width": 1300, "height": 900})
+    assert tops[0] == tops[1], "two maps stand side by side on paper"
+    assert opened.said == []
 
 
 @pytest.mark.slow
