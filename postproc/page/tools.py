@@ -31,7 +31,7 @@ def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
             continue
         first = row[blocks[:1]]
         q = c.poses.joints(motion, first, 1.0)[0] * unit
-        cut = float(timed[tool["number"]]["cut_mm"])
+        cut = float(str(timed[tool["number"]]["cut_mm"]))
         registers = np.unique(motion.register[row[blocks]])
         found.append(tool | {
             "length_register": next((int(r) for r in registers.tolist() if r >= 0), None),

@@ -309,6 +309,9 @@ def test_errors_and_orientation_are_drawn_and_read_back(opened: Session) -> None
     assert f"{worst:.2f} um, uncertainty (k = 2) {sure:.2f} um" in page.inner_text("#legend")
     solid = turned().values["runs"][0]["orientation"]["polytopes"][0]
     shown_rate = float(f"{solid['chosen']['rate']:.3g}")
+    reach = turned().values["runs"][0]["orientation"]["passes"][0]["reach"]["chosen"][solid["order"]]
+    assert solid["chosen"]["rate"] == pytest.approx(reach["rate"] * (1.0 if reach["unit"] == "mm/s" else 1e-3))
+    assert math.hypot(*solid["chosen"]["reach"]) == pytest.approx(solid["chosen"]["rate"])
     drawn = page.get_attribute("#polytope svg", "aria-label")
     assert solid["unit"] in drawn and f"chosen axis {shown_rate:g}" in drawn
     edges = sum(len(solid[key]["edges"]) for key in ("cl_file", "chosen"))
