@@ -54,6 +54,7 @@ BORDERS = {
     "postproc/placement/report.py": FIGURES, "postproc/cycle_time/report.py": FIGURES,
     "postproc/cycle_time/conversion.py": FIGURES, "postproc/cycle_time/shares.py": FIGURES,
     "postproc/time_fit/fit_text.py": FIGURES, "postproc/time_study/side_by_side.py": FIGURES,
+    "postproc/orientation/figures/polytope_edges.py": FIGURES,
     "postproc/orientation/report/figures_of_choice.py": FIGURES,
     "postproc/proof/file.py": "the proof file, JSON", "postproc/proof/hashes.py": TABLES,
     "postproc/proof/changes.py": FIGURES,

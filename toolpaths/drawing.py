@@ -10,10 +10,14 @@ import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, get_args
 
+import numpy as np
+
+from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
 from toolpaths.extras import need
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FORMATS: tuple[FigureEnding, ...] = get_args(FigureEnding)
@@ -22,6 +26,8 @@ DOTS = 130
 """per inch, of PNG"""
 ADJACENT: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "fontsize": "small", "frameon": False}
 """where legends stand"""
+LEVEL = 1e-6
+"""share of a value below which its changes are rounding"""
 TITLE = 90
 """characters of a title"""
 _RULES: Any = {"svg.hashsalt": "postproc", "font.family": "DejaVu Sans", "axes.grid": True, "grid.alpha": 0.3,
@@ -68,7 +74,22 @@ def _settle(sheet: Figure) -> None:
         place.set_position((round(left, 4), round(low, 4), round(width, 4), round(height, 4)))
 
 
+def level(axes: Axes, values: Floats) -> None:
+    """Room above and below a curve of values (N,) that are one number but for rounding, which else would fill the figure."""
+    known = values[np.isfinite(values)]
+    if known.size and float(np.ptp(known)) <= LEVEL * float(np.abs(known).max()):
+        middle = float(known.mean())
+        room = 0.1 * abs(middle) or 1.0
+        axes.set_ylim(middle - room, middle + room)
+    axes.ticklabel_format(axis="y", useOffset=False)
+
+
 def plain(text: str) -> str:
     """One line of printable characters; a label that began with _ would be left out of a legend."""
-    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)[:TITLE]
+    shown = printed(text)[:TITLE]
     return f" {shown}" if shown.startswith("_") else shown
+
+
+def printed(text: str) -> str:
+    """A mark for each character that does not print: controls, which XML does not hold, and signs that turn writing."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)

@@ -10,7 +10,7 @@ from machines.analysis.chain import indices, scaled_jacobian
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
-from toolpaths.drawing import image
+from toolpaths.drawing import image, level
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ def chain_map_figure(machine: Machine, ending: FigureEnding) -> bytes:
         if len(letters) == 1:
             axes.plot(sides[0], shown, color="#2456a6")
             axes.set_ylabel("condition number")
+            level(axes, shown)
             return
         axes.set_ylabel(f"{letters[1]}, degrees")
         if np.isfinite(shown).any():

@@ -24,7 +24,7 @@ from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
 from toolpaths.diagnostics import DiagnosticError, error
-from toolpaths.drawing import image
+from toolpaths.drawing import image, level
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -119,6 +119,7 @@ def map_figure(found: MeasuredPlaces, ending: FigureEnding) -> bytes:
         if len(axes_of) == 1:
             axes.plot(x, good, color="#2456a6")
             axes.set_ylabel(WORDS[found.measure])
+            level(axes, good)
         else:
             y = found.places[:, axes_of[1]]
             shape = (POINTS, POINTS)

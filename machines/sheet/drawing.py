@@ -11,6 +11,7 @@ import numpy as np
 from machines.kinematics.chain import Joint
 from machines.machine import Machine
 from toolpaths.arrays import Floats
+from toolpaths.drawing import printed
 
 SIZE, EDGE = 420.0, 60.0
 """of one view, and of the blank around it, in units of the picture"""
@@ -126,4 +127,4 @@ def _arrow(begin: tuple[float, float], end: tuple[float, float], colour: str) ->
 
 
 def _text(x: float, y: float, words: str, size: float = 13.0, colour: str = "#222") -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" fill="{colour}">{escape(words)}</text>'
+    return f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" fill="{colour}">{escape(printed(words))}</text>'

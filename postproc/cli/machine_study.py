@@ -18,6 +18,7 @@ from postproc.cli.shared.options import figure_ending, word_option
 if TYPE_CHECKING:
     from machines.machine import Machine
     from toolpaths.arrays import Floats
+    from toolpaths.choices import FigureEnding
     from toolpaths.diagnostics import Diagnostic
 
 ANALYSED = "Examples: postproc machine analyse uranesx --json -; " \
@@ -31,7 +32,8 @@ AlongOption = Annotated[list[str] | None, typer.Option("--along", metavar="x|y|z
 AtOption = Annotated[list[str] | None, typer.Option("--at", metavar="x|y|z|tilt=VALUE", help="with --map: the others, mm or "
                                                     "degrees; left out: the middle of the workspace")]
 MapCsv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="the map or curve as a table")]
-MapFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="the same drawn, .png or .svg")]
+MapFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="the same drawn, .png or .svg; "
+                                                      "without --map the condition number")]
 
 
 def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")], singular_above: SingularOption = None,
@@ -41,16 +43,19 @@ def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file"
     from postproc.cli.catalogue import analysis_text
 
     ending = figure_ending(figure)
-    if measure is None and (along or at or csv or figure):
-        raise typer.BadParameter("it is of a map or a curve: --map MEASURE is missing", param_hint="--map")
+    if measure is None and (along or at or csv):
+        raise typer.BadParameter(f"of what? write one of {', '.join(get_args(MapMeasure))}", param_hint="--map")
     refuse_overwriting({"--csv": str(csv or ""), "--figure": str(figure or ""), "--json": json}, own_files(name))
     outputs: dict[Path, str | bytes] = {}
     if measure is None:
         from machines.analysis.report import analyse
 
         with shown_errors(json):
-            found = analyse(machine_of(name), singular_above)
-        report((), json, found, analysis_text(found))
+            machine = machine_of(name)
+            found = analyse(machine, singular_above)
+            if figure is not None and ending is not None:
+                outputs[figure] = _condition_figure(machine, ending)
+        report((), json, found, analysis_text(found), outputs)
         return
     places, fixed = _along(along), _fixed(at)
     with shown_errors(json):
@@ -63,6 +68,20 @@ def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file"
         outputs[figure] = map_figure(values, ending)
     figures = values.figures
     report((), json, figures, analysis_text(figures), outputs)
+
+
+def _condition_figure(machine: Machine, ending: FigureEnding) -> bytes:
+    """What stands first in the analysis, drawn: the condition number over x and y, of a chain over its rotary axes."""
+    from machines.analysis.chain_map import chain_map_figure
+    from machines.analysis.maps import map_figure, measured
+    from toolpaths.diagnostics import DiagnosticError, error
+
+    if machine.kinematics.transmits is not None:
+        return map_figure(measured(machine, "condition", ("x", "y"), {}), ending)
+    if not any(machine.rotary):
+        raise DiagnosticError([error("analysis.map", f"{machine.name} has slides alone: its condition number is 1 "
+                                     "everywhere, there is nothing to draw", file=machine.file, hint="leave --figure out")])
+    return chain_map_figure(machine, ending)
 
 
 def _along(given: list[str] | None) -> tuple[MapNumber, ...]:

@@ -9,6 +9,7 @@ from importlib.resources import files
 from typing import Any
 
 from postproc.page.document import printable
+from toolpaths.units import DEG
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
 """the page may load nothing from anywhere"""
@@ -41,8 +42,9 @@ def page(dossier: Mapping[str, Any], pictures: Sequence[tuple[str, str, bytes]])
     return "\n".join(["<!doctype html>", '<html lang="en"><head><meta charset="utf-8">',
                       f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">',
                       '<meta name="viewport" content="width=device-width, initial-scale=1">',
-                      f"<title>{title}</title>", f"<style>{style}</style></head><body>", *_head(dossier),
-                      f"<nav>{links}</nav>", "<main>", *parts, "</main>", "</body></html>", ""])
+                      f"<title>{title}</title>", f"<style>{style}</style></head><body>", "<header>", *_head(dossier),
+                      f'<nav aria-label="Sections">{links}</nav></header>', "<main>", *parts, "</main>",
+                      "</body></html>", ""])
 
 
 def _head(dossier: Mapping[str, Any]) -> Iterator[str]:
@@ -130,7 +132,8 @@ def _condition(dossier: Mapping[str, Any]) -> Iterator[str]:
             if (one := found.get(key)) is not None]
     yield _table(("measure", "worst", "at", "proved nowhere more", "best seen"), rows, (1, 3, 4))
     indices = found.get("indices", {})
-    yield _table(("index", ""), [(key.replace("_", " "), _figures(value)) for key, value in indices.items()])
+    yield _table(("index", ""), [(key.replace("_", " "), "without end: singular" if value is None and
+                                key.startswith("condition") else _figures(value)) for key, value in indices.items()])
     if dossier["levers"]:
         yield "<p>Torque of a rotary axis per force at the tip: the largest distance of the tip from it within travel.</p>"
         levers = [(letter, f"{row['mm']:.4g}", " ".join(f"{k}{v:g}" for k, v in row["at"].items()))
@@ -144,14 +147,24 @@ def _certificate(dossier: Mapping[str, Any]) -> Iterator[str]:
         yield "<p>None: the workspace was sampled. postproc machine certify makes one.</p>" if legs else \
             "<p>Certificates are for machines on legs; a chain of axes reaches what its travel says.</p>"
         return
-    region = {key: _numbers(value) if isinstance(value, list) else value for key, value in found["region"].items()}
     proved = ", ".join(f"{name} {value:g}" for name, value in found["proved"].items())
-    yield _table(("", ""), [("file", found["file"]), ("boxes", str(found["boxes"])), ("region", _figures(region)),
+    yield _table(("", ""), [("file", found["file"]), ("boxes", str(found["boxes"])), ("region", _region(found["region"])),
                             ("distances from singular positions, at least", proved),
                             ("margin asked for", f"{found['margin']:g}"),
                             ("drives inside their travel", "proved" if found["travel_proved"] else "not proved"),
                             ("confirmed with this version", "yes" if found["checked_with_this_version"] else
                              "no: postproc machine certify --check")])
+
+
+def _region(region: Mapping[str, Any]) -> str:
+    """What was proved of which part and tool, ranges in mm and degrees."""
+    ranges = []
+    for key, ends in region.items():
+        name, _, unit = key.rpartition("_")
+        if isinstance(ends, list):
+            low, high = (value / DEG if unit == "rad" else value for value in ends)
+            ranges.append(f"{name} {low:.6g} to {high:.6g} {'degrees' if unit == 'rad' else unit}")
+    return f"of the {region['of']} with a tool of {region['tool_mm']:g} mm: {', '.join(ranges)}"
 
 
 def _errors(found: Mapping[str, Any] | None) -> Iterator[str]:
@@ -192,7 +205,8 @@ def _html_table(heads: Sequence[str], rows: Sequence[Sequence[str]], right: Iter
     if not rows:
         return ""
     n = [' class="n"' if k in set(right) else "" for k in range(len(heads))]
-    head = "".join(f"<th{c}>{escape(name)}</th>" for c, name in zip(n, heads, strict=True)) if any(heads) else ""
+    head = "".join(f'<th scope="col"{c}>{escape(name)}</th>' if name else "<td></td>"
+                   for c, name in zip(n, heads, strict=True)) if any(heads) else ""
     lines = "".join(f"<tr>{''.join(f'<td{c}>{cell}</td>' for c, cell in zip(n, row, strict=True))}</tr>" for row in rows)
     return f'<div class="scroll"><table>{f"<tr>{head}</tr>" if head else ""}{lines}</table></div>'
 

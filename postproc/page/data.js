@@ -41,7 +41,7 @@ function clockText(seconds) {
 function table(heads, rows, numeric) {
   const right = (k) => (numeric.includes(k) ? {class: "n"} : {});
   return make("div", {class: "scroll"}, make("table", {},
-    make("thead", {}, make("tr", {}, ...heads.map((h, k) => make("th", {scope: "col", ...right(k)}, h)))),
+    heads.some((h) => h) ? make("thead", {}, make("tr", {}, ...heads.map((h, k) => (h ? make("th", {scope: "col", ...right(k)}, h) : make("td", {}))))) : null,
     make("tbody", {}, ...rows.map((row) => make("tr", {}, ...row.map((cell, k) => make("td", right(k), cell)))))));
 }
 

@@ -38,6 +38,7 @@ function pathParts(run) {
   byId("slider").max = run.end;
   shown.view.setPath(run.columns["part x"], run.columns["part y"], run.columns["part z"]);
   recolour(); fit();
+  byId("vectors").parentElement.hidden = !run.info.errors;
   byId("machine").disabled = byId("bed").disabled = !run.info.skeleton && !run.legs;
   byId("bed").disabled = !run.info.skeleton;
   byId("view-note").textContent = "Drag to turn, with Shift to move, wheel to zoom, click a point. " + (run.info.skeleton || run.legs ? "Machine: axes as grey lines and circles, not its covers; x, y, z are those of the part." : "The machine is not drawn: its parts are not known as lines.");
@@ -49,6 +50,7 @@ function pathParts(run) {
 function recolour() {
   const {colours, legend} = coloured(shown.run, byId("colour").value, byId("rapids").checked);
   shown.view.setColours(colours); if (shown.run.solids.length) legend.push({colour: SOLID_COLOUR, text: "part, table, fixtures"});
+  if (byId("vectors").checked && shown.run.info.errors) legend.push(...errorLegend(shown.run.info.errors));
   showLegend(legend); draw();
 }
 
@@ -99,6 +101,7 @@ function drawNow() {
   }
   if (withMachine && run.legs) legLines(run, now.i + now.share, lines);
   for (const solid of run.solids) for (let k = 0; k < solid["edge 0"].length; k++) lines.push([0, 1, 2, 3, 4, 5].map((j) => solid["edge " + j][k]).concat(SOLID_COLOUR));
+  if (byId("vectors").checked && run.info.errors) errorLines(run.info.errors, 0.12 * size, lines);
   if (axis) toolLines(tip, axis, toolLength(run, now.next), 0.012 * size, lines);
   const p = ["part x", "part y", "part z"].map((n) => run.columns[n][shown.point]), r = 0.015 * size;
   for (let k = 0; k < 3; k++) lines.push([...p.map((v, i) => v - (i === k ? r : 0)), ...p.map((v, i) => v + (i === k ? r : 0)), 156, 28, 18]);
@@ -241,7 +244,7 @@ function handleCanvas(canvas) {
 
 function listen() {
   const on = (id, kind, what) => byId(id).addEventListener(kind, what);
-  on("colour", "change", recolour); on("rapids", "change", recolour); on("machine", "change", () => { recolour(); fit(); }); on("bed", "change", fit);
+  on("colour", "change", recolour); on("rapids", "change", recolour); on("vectors", "change", recolour); on("machine", "change", () => { recolour(); fit(); }); on("bed", "change", fit);
   on("fit", "click", fit); on("whole", "click", fitWhole); on("play", "click", play); on("slider", "input", () => { shown.fade = true; setTime(Number(byId("slider").value)); });
   on("run", "change", () => pickRun(Number(byId("run").value)));
   on("text-file", "change", async () => { await openText(byId("text-file").value, 0, 0); });

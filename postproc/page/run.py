@@ -28,6 +28,8 @@ from toolpaths.units import DEG
 
 VECTORS = 400
 """places at which error vectors are given"""
+DRAWN = 200
+"""passes whose polytope is given"""
 
 
 @dataclass(frozen=True)
@@ -180,16 +182,22 @@ def _errors(result: PostResult) -> dict[str, Any] | None:
 
     def place(k: int) -> dict[str, Any]:
         return {"cl_line": int(field.line[k]), "part_mm": field.tip[k].tolist(), "before_um": float(before[k]),
-                "after_um": float(after[k]), "vector_um": (field.before[k, :3] * 1e3).tolist()}
+                "after_um": float(after[k]), "vector_um": (field.before[k, :3] * 1e3).tolist(),
+                "vector_after_um": (field.after[k, :3] * 1e3).tolist()}
     return {"title": field.title, "worst_before_um": float(before.max()), "worst_after_um": float(after.max()),
             "bound_um": float(field.tip_bound * 1e3), "uncertainty_k2_um": None if sigma is None else 2e3 * sigma,
             "worst": [place(k) for k in worst.tolist()], "places": [place(k) for k in rows.tolist()]}
 
 
 def _orientation(result: PostResult) -> dict[str, Any] | None:
-    """The choice of tool axes with its candidates; None where those of the CL file are kept."""
-    if result.choice is None:
+    """The choice of tool axes with its candidates and polytopes; None where those of the CL file are kept."""
+    choice, plan = result.choice, result.options.orient
+    if choice is None:
         return None
+    from postproc.orientation.figures.polytope_edges import polytope_edges
+    from postproc.orientation.figures.sheet import most_gaining
     from postproc.orientation.report.figures_of_choice import as_dict
 
-    return as_dict(result.choice, result.options.orient)
+    found, made = as_dict(choice, plan), choice.plans[plan].picked
+    solids = [polytope_edges(tried, one, choice.work) for tried, one in zip(choice.tried[:DRAWN], made, strict=False)]
+    return found | {"polytopes": solids, "most_gaining": next(iter(most_gaining(choice)), None)}

@@ -71,7 +71,7 @@ function headParts(k) {
   const proof = witness ? make("div", {}, make("h3", {}, "What the proof covers"), make("p", {}, "Compared a second time, by other code: " + (witness.compared.join(", ") || "nothing") + "."),
     make("p", {}, witness.not_compared.length ? "Not compared: " + witness.not_compared.join("; ") + "." : "Nothing was left out."),
     make("p", {class: "note"}, "The proof is about the program, the CL file and the machine as its files describe it; not about deflection, heat, wear or following error.")) : null;
-  const files = make("div", {}, make("h3", {}, "What it rests on (SHA-256)"), table(["", "File", "SHA-256"], run.files.map((f) => [f.role.replace("_", " "), f.file, f.sha256]), []));
+  const files = make("div", {}, make("h3", {}, "What it rests on (SHA-256)"), table(["What", "File", "SHA-256"], run.files.map((f) => [f.role.replace("_", " "), f.file, f.sha256]), []));
   files.querySelectorAll("td:last-child").forEach((cell) => cell.classList.add("hash"));
   return [make("div", {}, make("h3", {}, "Figures"), table(["", ""], facts, [])), make("div", {}, make("h3", {}, "Travel used"), table(["Axis", "Used", "Travel", "Share", "Margin"], axes, [1, 2, 3, 4]), proof), files].filter(Boolean);
 }
@@ -88,7 +88,7 @@ function sheetParts(k) {
   const run = report.runs[k], base = `runs.${k}`, position = (values) => (values ? make("span", {}, ...Object.entries(values).flatMap(([a, v]) => [make("span", {class: "whole"}, a + " " + number(v, 3)), " "])) : "-");
   const tools = run.tools.map((t, n) => ["T" + t.number, short(t.name || "-", 60), spindleText(t.spindle_rpm), t.gauge_length_mm === null ? "not stated" : figure(`${base}.tools.${n}.gauge_length_mm`, 4, "mm"),
     t.length_register === null ? "-" : "H" + t.length_register, make("span", {}, figure(`${base}.tools.${n}.time_s`, 1, "s"), " (" + number(t.time_s / 60, 1) + " min)"),
-    figure(`${base}.tools.${n}.cutting_mm`, 0, "mm"), position(t.first_axes)]);
+    figure(`${base}.tools.${n}.cutting_m`, 3, "m"), position(t.first_axes)]);
   const offset = run.work_offset, part = short(report.part, 120);
   if (!run.converted) return [make("p", {}, `${part} on ${lineOf(run)}: no program was written, so there is nothing to set up.`)];
   return [make("p", {}, `${part} on ${lineOf(run)}; program ${run.files.filter((f) => f.role === "program").map((f) => f.file).join(", ")}`),
@@ -111,6 +111,9 @@ function grouped(rejected) {
   return [...kinds.values()].sort((a, b) => b.length - a.length).map((all) => make("div", {}, (all.length > 1 ? `${all.length} candidates, the first ` : "") + `${angles(all[0])}: ${all[0].reason}`));
 }
 
+const PLAN_TEXT = {keep: "keep: the axes of the CL file", per_pass: "per pass: each pass under its own fastest axis", whole_part: "whole part: one axis for all passes",
+  auto: "auto: the least of all, turning between passes counted", paper_per_pass: "vertex-aligned: each pass with a corner of its polytope (below) turned into the cut, for comparison"};
+
 function orientationParts(k) {
   const found = report.runs[k].orientation, base = `runs.${k}.orientation`;
   if (!found) return [make("p", {}, "The tool axes are those of the CL file (--orient keep): none were chosen.")];
@@ -118,8 +121,8 @@ function orientationParts(k) {
   return [make("p", {}, "Each pass is machined with a fixed tool axis (3+2). The table gives the chosen rotary positions, the time with them and with the axes of the CL file, and why other directions lost."),
     table(["Pass", "Rotary position, deg", "Time", "With the CL file's axes", "Held by", "Rejected candidates"], found.passes.map((p, n) => [String(p.pass), angles(p.orientation_deg),
       figure(`${base}.passes.${n}.time_s`, 3, "s"), figure(`${base}.passes.${n}.reference_time_s`, 3, "s"), p.limiting_axis || "-",
-      p.rejected && p.rejected.length ? make("div", {}, ...grouped(p.rejected)) : "-"]), [2, 3]),
-    table(["Plan", "Time"], Object.keys(found.plans).filter((name) => found.plans[name]).map((name) => [name.replaceAll("_", " "), figure(`${base}.plans.${name}.time_s`, 3, "s")]), [1])];
+      p.rejected && p.rejected.length ? make("div", {}, ...grouped(p.rejected)) : "-"]), [2, 3]), ...polytopeParts(found),
+    table(["Plan", "Time"], Object.keys(found.plans).filter((name) => found.plans[name]).map((name) => [PLAN_TEXT[name] || name.replaceAll("_", " "), figure(`${base}.plans.${name}.time_s`, 3, "s")]), [1])];
 }
 
 function errorParts(k, jump) {
@@ -127,6 +130,7 @@ function errorParts(k, jump) {
   if (!found) return [make("p", {}, "No geometric errors were corrected: no --error-model was given, or the control corrects them.")];
   return [make("p", {}, found.title + ": worst before ", figure(base + ".worst_before_um", 2, "um"), ", after ", figure(base + ".worst_after_um", 3, "um"), ", bound ",
     figure(base + ".bound_um", 3, "um"), ", uncertainty (k = 2) ", found.uncertainty_k2_um === null ? "not known" : figure(base + ".uncertainty_k2_um", 2, "um")),
-  table(["CL line", "Part x, y, z, mm", "Error x, y, z before, um", "Before", "After"], found.worst.map((p, n) => [make("button", {type: "button", class: "jump", onclick: () => jump("cl", p.cl_line, 0)}, "line " + p.cl_line),
-    p.part_mm.map((v) => number(v, 3)).join(", "), p.vector_um.map((v) => number(v, 2)).join(", "), figure(`${base}.worst.${n}.before_um`, 2, "um"), figure(`${base}.worst.${n}.after_um`, 3, "um")]), [3, 4])];
+  table(["CL line", "Part x, y, z, mm", "Error x, y, z before, um", "after, um", "Size before", "after"], found.worst.map((p, n) => [make("button", {type: "button", class: "jump", onclick: () => jump("cl", p.cl_line, 0)}, "line " + p.cl_line),
+    p.part_mm.map((v) => number(v, 3)).join(", "), p.vector_um.map((v) => number(v, 2)).join(", "), p.vector_after_um.map((v) => number(v, 3)).join(", "), figure(`${base}.worst.${n}.before_um`, 2, "um"), figure(`${base}.worst.${n}.after_um`, 3, "um")]), [4, 5]),
+  make("p", {class: "note"}, `These are the ten worst; "error vectors" under Path draws them at ${found.places.length} places, before and after.`)];
 }

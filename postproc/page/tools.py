@@ -14,8 +14,8 @@ from postproc.time_study.tables import by_tool
 
 
 def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
-    """`summary.tools_of` with length register, s as `time` counts them (its change among them), mm that its tip travels at
-    feed against the part, arcs by their length, and its first position (axes in mm and degrees, part in mm)."""
+    """`summary.tools_of` with length register, s as `time` counts them (its change among them), mm and m that its tip
+    travels at feed against the part, arcs by their length, and its first position (axes in mm and degrees, part in mm)."""
     c, job, b = result.comparison, result.job, e.blocks
     if c is None or job is None or b.row is None:
         return []
@@ -26,15 +26,16 @@ def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
     for tool in tools_of(result):
         blocks = np.flatnonzero(number == tool["number"])
         if not len(blocks):
-            found.append(tool | {"length_register": None, "time_s": 0.0, "cutting_mm": 0.0, "first_axes": None,
-                                 "first_part_mm": None})
+            found.append(tool | {"length_register": None, "time_s": 0.0, "cutting_mm": 0.0, "cutting_m": 0.0,
+                                 "first_axes": None, "first_part_mm": None})
             continue
         first = row[blocks[:1]]
         q = c.poses.joints(motion, first, 1.0)[0] * unit
+        cut = float(str(timed[tool["number"]]["cut_mm"]))
         registers = np.unique(motion.register[row[blocks]])
         found.append(tool | {
             "length_register": next((int(r) for r in registers.tolist() if r >= 0), None),
-            "time_s": timed[tool["number"]]["time_s"], "cutting_mm": timed[tool["number"]]["cut_mm"],
+            "time_s": timed[tool["number"]]["time_s"], "cutting_mm": cut, "cutting_m": cut / 1e3,
             "first_axes": dict(zip(result.machine.axis_names, q.tolist(), strict=True)),
             "first_part_mm": back.points(c.tip[first])[0].tolist()})
     return found

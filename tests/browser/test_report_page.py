@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 from collections.abc import Iterator
@@ -11,8 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
-from tests.postproc.page.page_kit import HOSTILE, LINES, refused, small
+from postproc.cli.app import app
+from tests.postproc.page.page_kit import HOSTILE, LINES, Made, refused, reported, small, turned
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
@@ -63,6 +66,8 @@ LANE = """() => { const at = [], put = (x, y) => at.push([x, y]);
   const lanes = Object.assign(Object.create(Lanes.prototype), {left: 10, from: 0, to: 10, kind: "position", run});
   lanes.curve(g, (i) => [3, 7][i], 0, 1, 100, (v) => v, ""); return at; }"""
 """corners of a lane: it stands until 2 s, rests 4 s more, moves from 3 to 7 until 8 s"""
+A4 = 688
+"""pixels between the margins of the paper"""
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 
@@ -124,21 +129,26 @@ def test_many_operations_do_not_fill_the_page_with_their_legend(opened: Session)
     assert "op 15" in said and "op 16" not in said and "and 184 more" in said
 
 
-@pytest.mark.parametrize("run", [0, 1])
-def test_every_number_on_the_page_is_that_of_the_json(opened: Session, run: int) -> None:
-    opened.page.evaluate(f"pickRun({run})")
-    until(opened.page, f"shown.run.k === {run}")
-    shown = opened.page.eval_on_selector_all("[data-key]", NUMBERS)
+def read_back(page: Any, made: Made) -> set[str]:
+    """Keys of the numbers on the page, each compared with the JSON."""
+    shown = page.eval_on_selector_all("[data-key]", NUMBERS)
     assert len(shown) > 60
     for key, digits, text in shown:
-        value = reduce(lambda v, step: v[int(step)] if isinstance(v, list) else v[step], key.split("."), small().values)
+        value = reduce(lambda v, step: v[int(step)] if isinstance(v, list) else v[step], key.split("."), made.values)
         number = re.match(r"-?[\d.]+|-", text)
         assert number is not None, (key, text)
         if value is None:
             assert text.strip().startswith("-"), key
         else:
             assert float(number[0]) == pytest.approx(value, abs=0.5001 * 10.0 ** -int(digits)), key
-    keys = {key for key, _, _ in shown}
+    return {key for key, _, _ in shown}
+
+
+@pytest.mark.parametrize("run", [0, 1])
+def test_every_number_on_the_page_is_that_of_the_json(opened: Session, run: int) -> None:
+    opened.page.evaluate(f"pickRun({run})")
+    until(opened.page, f"shown.run.k === {run}")
+    keys = read_back(opened.page, small())
     base = f"runs.{run}.conversion."
     assert {base + "worst_tip_deviation_mm", base + "cycle_time_s", base + "band_s.0", f"runs.{run}.axes.0.used.0"} <= keys
 
@@ -187,7 +197,9 @@ def test_a_click_shows_the_point_and_both_its_lines(opened: Session) -> None:
     page.click("#jump-nc")
     until(page, "shown.texts.kind === 'nc0-0'")
     line = page.inner_text("#text .row.here")
-    assert re.search(r"X[-\d.]+", line), line
+    assert int(page.inner_text("#text .row.here b")) == page.evaluate("shown.run.columns['NC line'][shown.point]")
+    # LINES[13] is the sixth cut: it turns the axis from 0.08 to 0.1 rad off z, in one block or more; A alone turns it so
+    assert math.degrees(0.08) < abs(float(re.findall(r"A(-?[\d.]+)", line)[0])) < math.degrees(0.1001), line
 
 
 def test_a_line_of_a_text_leads_to_its_point_and_words_are_found(opened: Session) -> None:
@@ -277,3 +289,66 @@ def test_messages_of_what_was_not_converted_lead_to_the_cl_file(opened: Session)
     page.click("#first button.jump >> nth=0")
     page.wait_for_selector("#text .row.here")
     assert "9000" in page.inner_text("#text .row.here") and opened.said == []
+
+
+def test_errors_and_orientation_are_drawn_and_read_back(opened: Session) -> None:
+    """The colouring by correction, vectors at places, the polytope of a pass with its reach."""
+    page = opened.page
+    page.goto(turned().page.as_uri())
+    page.wait_for_selector("html[data-ready]", state="attached")
+    keys = read_back(page, turned())
+    assert {"runs.0.errors.worst_before_um", "runs.0.errors.uncertainty_k2_um", "runs.0.errors.worst.0.after_um",
+            "runs.0.orientation.passes.0.time_s", "runs.0.tools.0.cutting_m"} <= keys
+    page.select_option("#colour", "correction")
+    assert page.inner_text("#legend").count("um") == 1 and page.evaluate(DARK)
+    before = page.evaluate("drawNow(), shown.lines.length")
+    page.check("#vectors")
+    errors = turned().values["runs"][0]["errors"]
+    assert page.evaluate("drawNow(), shown.lines.length") == before + 2 * len(errors["places"])
+    worst, sure = errors["worst_before_um"], errors["uncertainty_k2_um"]
+    assert f"{worst:.2f} um, uncertainty (k = 2) {sure:.2f} um" in page.inner_text("#legend")
+    solid = turned().values["runs"][0]["orientation"]["polytopes"][0]
+    shown_rate = float(f"{solid['chosen']['rate']:.3g}")
+    reach = turned().values["runs"][0]["orientation"]["passes"][0]["reach"]["chosen"][solid["order"]]
+    assert solid["chosen"]["rate"] == pytest.approx(reach["rate"] * (1.0 if reach["unit"] == "mm/s" else 1e-3))
+    assert math.hypot(*solid["chosen"]["reach"]) == pytest.approx(solid["chosen"]["rate"])
+    drawn = page.get_attribute("#polytope svg", "aria-label")
+    assert solid["unit"] in drawn and f"chosen axis {shown_rate:g}" in drawn
+    edges = sum(len(solid[key]["edges"]) for key in ("cl_file", "chosen"))
+    assert page.locator("#polytope svg line").count() == edges + 2 * 2 + 3  # reach and its key, axes x, y, z
+    assert page.evaluate(POOR) == [] and opened.said == []
+
+
+def test_a_dossier_opens_prints_on_a4_and_fits_small_screens(opened: Session, tmp_path: Path) -> None:
+    page, made = opened.page, tmp_path / "m.html"
+    done = CliRunner().invoke(app, ["machine", "report", "planar-delta", "-c", "linuxcnc", "-o", str(made)])
+    assert done.exit_code == 0, done.output
+    page.goto(made.as_uri())
+    assert page.evaluate("[...document.images].every((one) => one.complete && one.naturalWidth > 0)")
+    for width in (360, 820):
+        page.set_viewport_size({"width": width, "height": 740})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate(POOR) == [] and page.locator("th:empty").count() == 0
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": A4, "height": 1017})
+    assert page.evaluate("document.documentElement.scrollWidth") <= A4
+    tops = page.eval_on_selector_all(".figures figure", "all => all.slice(0, 2).map(e => e.offsetTop)")
+    page.emulate_media(media="screen")
+    page.set_viewport_size({"width": 1300, "height": 900})
+    assert tops[0] == tops[1], "two maps stand side by side on paper"
+    assert opened.said == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("points", [100, 10_000])
+def test_pages_of_many_points_open_and_are_clicked(opened: Session, points: int) -> None:
+    """A million is of tests/benchmarks/bench_report.py."""
+    cuts = [f"GOTO/{0.01 * k:.4f},{5.0 * math.sin(0.003 * k):.4f},0" for k in range(points)]
+    lines = [*LINES[:7], "GOTO/0,0,50,0,0,1", "FEDRAT/MMPM,600", *cuts, "FINI"]
+    opened.page.goto(reported(lines=tuple(lines)).page.as_uri())
+    opened.page.wait_for_selector("html[data-ready]", state="attached")
+    assert opened.page.evaluate("shown.run.count") >= points
+    opened.page.evaluate(f"openText('cl', {9 + points // 2}, 0)")
+    until(opened.page, "byId('text').querySelector('.here') !== null")
+    opened.page.press("#text", "Enter")
+    assert f"line {9 + points // 2}" in opened.page.inner_text("#point") and opened.said == []

@@ -52,7 +52,7 @@ def axes_map(sheet: Figure, place: PolarAxes, tried: PassSearch, made: Candidate
             edge = {"edgecolors": "#333333"} if kind == "bound" else {}
             place.scatter(azimuth[tilt <= most], tilt[tilt <= most], marker=mark, s=26, color=colour, linewidths=1.0,
                           label=label, **edge)
-    for it, mark, name, size in ((tried.aimed, "^", "paper", 110), (tried.best, "*", "best", 190),
+    for it, mark, name, size in ((tried.aimed, "^", "vertex-aligned", 110), (tried.best, "*", "best", 190),
                                  (made, "o", "plan", 150)):
         if it is not None:
             place.scatter(*_polar([it], frame, work), marker=mark, s=size, facecolors="none", edgecolors="#c2453a",

@@ -24,7 +24,8 @@ MANY = 60
 
 def plan_panel(place: Axes, choice: OrientationChoice) -> None:
     """Bars: cutting, turning and other seconds of each plan."""
-    plans: dict[str, OrientationPlan] = {**{name: choice.plans[name] for name in NAMES}, "paper\nper pass": choice.paper}
+    plans: dict[str, OrientationPlan] = {**{name: choice.plans[name] for name in NAMES},
+                                         "vertex-aligned\nper pass": choice.paper}
     parts = [shares_of(plan) for plan in plans.values()]
     left = np.zeros(len(parts))
     for name, colour in (("cutting", "#1f5f8b"), ("turning", "#d08a3c"), ("other", "#bbbbbb")):
@@ -39,7 +40,9 @@ def plan_panel(place: Axes, choice: OrientationChoice) -> None:
     place.invert_yaxis()
     place.set_xlim(0.0, 1.42 * max(float(left.max()), 1e-9))
     place.set_xlabel("seconds of the whole part")
-    place.set_title("plans", fontsize="medium")
+    place.set_title("plans: keep, the axes of the CL file; vertex-aligned, "
+                    "a vertex of the polytope in the cut",
+                    fontsize="medium")
     place.grid(False, axis="y")
     place.legend(**ADJACENT)
 
@@ -85,7 +88,7 @@ def gain_panel(place: Axes, choice: OrientationChoice, plan: Orientation) -> Non
     own = np.array([one.own.seconds for one in tried])
     number = np.arange(len(own))
     sets = {"best of the pass": np.array([one.best.seconds for one in tried]),
-            "paper": np.array([np.inf if one.aimed is None else one.aimed.seconds for one in tried]),
+            "vertex-aligned": np.array([np.inf if one.aimed is None else one.aimed.seconds for one in tried]),
             plan: np.array([made.seconds for made in picked])}
     for (name, made), mark, colour in zip(sets.items(), ("*", "^", "o"), ("#3f8f4f", "#7a4fa0", "#1f5f8b"),
                                           strict=True):

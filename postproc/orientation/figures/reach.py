@@ -21,7 +21,7 @@ HIGH = 0.2
 
 def reach_panel(place: Axes, tried: PassSearch, made: Candidate) -> None:
     """For the CL's axis, the paper's, the best and the plan's: least seconds of each order, and the planned ones."""
-    rows = {"CL axis": tried.own, "paper": tried.aimed, "best": tried.best, "plan": made}
+    rows = {"CL axis": tried.own, "vertex-aligned": tried.aimed, "best": tried.best, "plan": made}
     kept = {name: it for name, it in rows.items() if it is not None}
     for at, it in enumerate(kept.values()):
         feed = feed_of(it)

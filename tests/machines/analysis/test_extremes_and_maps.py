@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 import machines
@@ -26,6 +27,7 @@ from machines.analysis.transmission import (
     worst,
 )
 from postproc.cli.app import app
+from toolpaths.drawing import level
 
 SAME = {"condition_number": condition_number,
         "speed_transmission": speed_transmission, "force_transmission": force_transmission}
@@ -120,3 +122,29 @@ def test_maps_and_curves_as_table_and_figure(tmp_path: Path) -> None:
     assert curve.exit_code == 0 and len(table.read_text("utf-8").splitlines()) == 42
     for words in (["--along", "x"], ["--map", "speed", "--along", "q"], ["--map", "speed", "--at", "z"], ["--csv", "a.csv"]):
         assert run.invoke(app, ["machine", "analyse", "uranesx", *words]).exit_code == 2
+
+
+@pytest.mark.parametrize(("name", "said"), [("uranesx", "condition number, platform at z 0 mm"),
+                                            ("mill-4axis", "condition number over A")])
+def test_a_figure_without_a_map_is_of_the_condition_number(tmp_path: Path, name: str, said: str) -> None:
+    figure = tmp_path / "m.svg"
+    done = CliRunner().invoke(app, ["machine", "analyse", name, "--figure", str(figure)])
+    assert done.exit_code == 0 and said in figure.read_text("utf-8") and name in done.output
+
+
+def test_slides_alone_have_no_figure_of_their_condition(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["machine", "analyse", "mill-3axis", "--figure", str(tmp_path / "m.svg")])
+    assert done.exit_code == 1 and "leave --figure out" in done.output and not list(tmp_path.iterdir())
+
+
+def test_a_curve_that_is_one_number_is_drawn_as_one() -> None:
+    """Not its rounding over the whole height, with an axis of 1e-11 + 26.96."""
+    sheet = Figure()
+    axes = sheet.subplots()
+    values = 26.96291202 + 1e-11 * np.arange(5.0)
+    axes.plot(values)
+    level(axes, values)
+    low, high = axes.get_ylim()
+    assert low < 0.95 * 26.96 and high > 1.05 * 26.96
+    level(axes, np.array([1.0, 2.0, np.nan]))
+    assert axes.get_ylim() == (low, high)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from base64 import b64decode
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,9 @@ from typer.testing import CliRunner
 import machines
 from machines.analysis.chain_map import chain_map, chain_map_figure
 from machines.analysis.levers import levers
+from machines.sheet.drawing import drawing
 from postproc.cli.app import app
+from postproc.dossier.page import _region
 from tests.postproc.kit import machine
 
 ERRORS = "[components.EXX]\npolynomial = [0, 3]\nscale = 100\nrange = [-400, 400]\n"
@@ -61,6 +65,7 @@ def test_a_machine_on_legs_shows_maps_and_its_certificate(tmp_path: Path) -> Non
     assert values["certificate"]["boxes"] == len(found["boxes"]) and values["certificate"]["proved"] == found["proved"]
     rows = {row[0]: row[1:] for row in cells(page, "certificate") if row}
     assert rows["boxes"] == [str(len(found["boxes"]))] and rows["confirmed with this version"] == ["yes"]
+    assert " rad" not in page and rows["region"][0].startswith("of the platform with a tool of 0 mm: x ")
     worst = values["analysis"]["condition_number"]["worst"]
     assert ["condition number", f"{worst:.6g}"] == next(row[:2] for row in cells(page, "condition") if row)
     drawn = {path.name for path in (tmp_path / "f").iterdir()}
@@ -89,6 +94,15 @@ def test_texts_of_the_machine_file_stay_texts_and_nothing_is_loaded(tmp_path: Pa
     assert values["machine"]["description"] == HOSTILE and HOSTILE not in page and "<script" not in page
     assert "default-src 'none'" in page and not re.search(r"""(src|href)=["']?(?!#|data:)\w|@import|url\(""", page)
     assert values["levers"] == {} and values["pivots"] == {"linuxcnc": []}
+
+
+def test_ranges_of_a_certificate_are_in_degrees() -> None:
+    words = _region({"of": "tip", "tool_mm": 50.0, "x_mm": [-10.0, 20.5], "tilt_rad": [0.0, math.pi / 6]})
+    assert words == "of the tip with a tool of 50 mm: x -10 to 20.5 mm, tilt 0 to 30 degrees"
+
+
+def test_a_name_does_not_turn_the_writing_of_the_drawing() -> None:
+    assert "a\ufffdgpj\ufffd&lt;" in drawing(replace(machine("mikron-ucp710"), description="a\u202egpj\x00<"))
 
 
 @pytest.mark.parametrize("arguments", [["-o", "r.txt"], ["-o", "own.toml"], ["-c", "nobody", "-o", "r.html"],

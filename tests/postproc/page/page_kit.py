@@ -51,6 +51,20 @@ def refused() -> Made:
     return reported(lines=tuple(line.replace("GOTO/30,0,60", "GOTO/30,0,9000") for line in LINES))
 
 
+BALL = ["TOOL PATH/PASSES,TOOL,BALL16", "TLDATA/MILL,16.0000,8.0000,75.0000,0.0000,0.0000",
+        "MSYS/0.0000,0.0000,0.0000,1.0000000,0.0000000,0.0000000,0.0000000,1.0000000,0.0000000", "LOAD/TOOL,4,ADJUST,4",
+        "SPINDL/RPM,9000,CLW", "RAPID", "GOTO/0.0,0.0,30.0,0.0,0.0,1.0", "FEDRAT/MMPM,60000.0",
+        *(f"GOTO/0.0,{float(k)},{0.01 * k * k:.6f}" for k in range(6)), "RAPID", "GOTO/0.0,5.0,30.0", "END-OF-PATH"]
+"""one pass of a ball cutter with a fixed axis"""
+
+
+@cache
+def turned() -> Made:
+    """A pass whose axis is chosen, on a machine with errors that are corrected."""
+    return reported("--orient", "per-pass", "--units", "mm", "--error-model", str(SAMPLES / "errors/mikron-ucp710.toml"),
+                    lines=tuple(BALL))
+
+
 @cache
 def small() -> Made:
     """The small path under two controls."""
