@@ -24,7 +24,7 @@ PushOption = Annotated[str, typer.Option("--force", metavar="FX,FY,FZ", help="th
 def machine_forces(name: Annotated[str, typer.Argument(help="name or TOML file")], tip: TipOption = "",
                    axis: AxisOption = "", speed: SpeedOption = "0,0,0", acceleration: AccelerationOption = "0,0,0",
                    force: PushOption = "0,0,0", tool: TipTool = 0.0, json: Json = "") -> None:
-    """Forces of the motors, and in the rods, while the tip moves so, by parts: inertia, speed, gravity, force at the tip."""
+    """Forces of motors and in rods while the tip moves so, by parts: inertia, speed, gravity, force at the tip."""
     import numpy as np
 
     from postproc.cli.catalogue import analysis_text

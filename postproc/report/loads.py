@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from machines.stiffness.along import tip_compliance
 from postproc.path.model import FEED
 from postproc.pipeline.result import PostResult
 from postproc.planning.planned_source import cutting_forces
@@ -21,6 +20,8 @@ def deflection(result: PostResult) -> dict[str, Any] | None:
     job, path, moves = result.job, result.path, result.moves
     if job is None or path is None or moves is None or result.machine.stiffness is None:
         return None
+    from machines.stiffness.along import tip_compliance
+
     forces, worst = cutting_forces(job), dict[str, Any]()
     for tool, force in forces.items():
         rows = np.flatnonzero((path.code == FEED) & (moves.tool[path.move] == tool))

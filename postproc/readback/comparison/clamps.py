@@ -125,4 +125,5 @@ def check_index(motion: Motion, job: Job, home: Floats, owner: Ints, faults: Fau
     return [judge("verify.index", f"rotary axes turn while {name} is {off:.3f} mm from home", 0, int(motion.line[k]),
                   len(bad), f'retract {name} to home before it, or write index = "plane" under [clearance] of the set-up')]
 AWAY_BY_THE_TIP = 14.0
-"""mm likewise in the mode by the tip, which stands up to 10 mm below home so that tools may be longer: a chord of 10 degrees round an axis 1000 mm away lies 3.8 mm inside its arc"""
+"""mm likewise in the mode by the tip, which stands up to 10 mm below home so that tools may be longer: a chord of 10 degrees
+round an axis 1000 mm away lies 3.8 mm inside its arc"""

@@ -65,7 +65,7 @@ def test_the_sensitivity_is_the_derivative_of_the_exact_closure(name: str) -> No
     rates = found.on(kin).sensitivity(w)
     assert rates.shape[2] == len(found.names)
     for k, label in enumerate(found.names):
-        step = 2e-6 if angular(label, found) else 1e-3
+        step = 2e-6 if angular(label, found.rods) else 1e-3
         up, down = (found.with_values(sign * step * np.eye(len(found.names))[k]).on(kin).aim(w) for sign in (1.0, -1.0))
         size = np.abs(rates[:, :, k]).max()
         assert (up[0] - down[0]) / (2.0 * step) == pytest.approx(rates[:, :3, k], abs=1e-5 * size + 1e-9), label

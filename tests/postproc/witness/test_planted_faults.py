@@ -6,7 +6,7 @@ The read-back shares all of these with what it proves, so that it agrees with mo
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -35,6 +35,7 @@ from postproc.pipeline.result import PostResult
 from postproc.setup.model import Placement, SetupFile
 from postproc.verification.second_witness import second_witness
 from postproc.witness.machine import rods as rods_of_file
+from tests import machines_once
 from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.feeds import PER_MINUTE
 from toolpaths.toolpath import Kind, Toolpath
@@ -360,11 +361,19 @@ FAULTS: dict[str, tuple[str, str, str, str, Plant]] = {
 }
 
 
+@pytest.fixture
+def loaded_anew() -> Iterator[None]:
+    """No machine that was loaded with a fault is kept for other tests."""
+    yield
+    machines_once.forget()
+
+
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_planted_fault_is_found(name: str, monkeypatch: Patch) -> None:
+def test_a_planted_fault_is_found(name: str, loaded_anew: None, monkeypatch: Patch) -> None:
     *case, plant = FAULTS[name]
     unspoilt(*case)
     plant(monkeypatch)
+    machines_once.forget()
     assert codes(converted(*case)), f"{name}: the second witness agrees with the fault"
 
 
