@@ -12,6 +12,7 @@ from postproc.readback.text.canonical import (
     CALL,
     LAW,
     SMOOTH,
+    SMOOTH_AXIS,
     STATEMENT,
     DialectStatement,
     Drill,
@@ -121,6 +122,8 @@ class SiemensRun:
         elif s.name == "CYCLE832":
             off = "_OFF" in s.args or s.number(0, 0.0) <= 0.0
             self.new.append((b, SMOOTH, float("inf") if off else s.number(0) * self.unit(b)))
+            oriented = not any(isinstance(arg, str) and not arg.startswith("_ORI") for arg in s.args)
+            self.new.append((b, SMOOTH_AXIS, s.number(2, float("inf")) if oriented else float("inf")))
         elif s.name in CYCLES:
             drill, why = drill_of(s, float(number_of(self.words, "S")[b]), self.unit(b))
             if drill is None:
