@@ -214,5 +214,5 @@ class _Values:
         return str(int(max(number, 0.0))), self.tools.get(int(number), "")
 
     def _offset(self, number: float) -> str:
-        one = next(iter(self.offsets.values()))
-        return self.offsets.get(number, one if len(self.offsets) == 1 else "")
+        """Of a register; that of the first place before one is stated."""
+        return self.offsets.get(number, next(iter(self.offsets.values())))
