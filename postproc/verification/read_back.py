@@ -126,7 +126,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     job = job.with_moves(comparison.moves)
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
-               *check_stops(code, motion, job, faults), *check_clamps(code, motion, job, comparison.owner, faults),
+               *check_stops(code, motion, job, faults), *check_clamps(whole, motion, job, comparison.owner, faults),
                *check_options(code, motion, job, faults), *check_index(motion, job, home, comparison.owner, faults),
                *check_hooks(data, code, motion, job, comparison.owner, faults),
                *check_stock(data, job, faults), *_bodies(motion, executed, job, comparison, faults)]

@@ -12,6 +12,8 @@ from postproc.readback.comparison.faults import Faults
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinates
+from postproc.readback.text.canonical import SMOOTH_AXIS, Canonical
+from postproc.readback.text.modal import fill_values
 from postproc.reference.holes import PECKING, Phase
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
@@ -27,6 +29,9 @@ STILL = 1e-7
 
 _TURNS_BACK = 1e-6
 """mm that a tool must rise for a peck to have ended"""
+
+WRITTEN = 1e-6
+"""degrees of the last decimal that a tolerance of the tool axis is written with"""
 
 ROUNDING_SLACK = 1e-3
 """mm or degrees by which rounded words may pass a limit that the exact ones keep"""
@@ -176,6 +181,28 @@ def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults:
         else f"may take {motion.blend[k]:g} mm"
     return [faults.error("verify.smoothing", f"the control's smoothing {found}, its share of the tolerance is {share:g} mm",
                          int(moves.line[owner[k]]), int(motion.line[k]), len(bad),
+                         hint=reader_for(job.controller, job.machine.axis_names).smoothing_hint)]
+
+
+def check_axis_smoothing(code: Canonical, motion: Motion, job: Job, moves: Moves, owner: Ints,
+                         faults: Faults) -> list[Diagnostic]:
+    """What the control's own smoothing may take of the tool axis where cuts turn it and corners are rounded, as far as the
+    program says so."""
+    share = job.controller.kinematics.axis_smoothing_share * job.options.axis_tolerance
+    rotary = np.flatnonzero(np.array(job.machine.rotary))
+    if not share or not len(rotary):
+        return []
+    before = np.concatenate([motion.start[None], motion.end[:-1]])
+    turns = (np.abs(motion.end - before)[:, rotary] > STILL).any(axis=1)
+    rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0) & turns & (motion.blend > 0.0))
+    taken = fill_values(*code.words.pick(SMOOTH_AXIS), code.words.lines)[motion.block[rows]]
+    bad = rows[taken > share + WRITTEN]
+    if not len(bad):
+        return []
+    most = float(taken[taken > share + WRITTEN][0])
+    found = "has no limit" if np.isinf(most) else f"may take {most:g} degrees"
+    return [faults.error("verify.smoothing", f"the control's smoothing {found} of the tool axis, its share of the tolerance "
+                         f"is {share:g} degrees", int(moves.line[owner[bad[0]]]), int(motion.line[bad[0]]), len(bad),
                          hint=reader_for(job.controller, job.machine.axis_names).smoothing_hint)]
 
 

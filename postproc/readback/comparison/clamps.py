@@ -33,7 +33,8 @@ def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults:
         return found
     moves, cut = job.moves.without_pecks(), cutting_rows(motion, job, owner)
     columns = np.array([machine.axis_names.index(letter) for letter in machine.clamp_codes])
-    turning = dict(zip(machine.clamp_codes, (turned(motion, columns) > TURNS).T, strict=True))
+    turning = {letter: turns | (motion.block == _first(code, letter))
+               for letter, turns in zip(machine.clamp_codes, (turned(motion, columns) > TURNS).T, strict=True)}
     standing = {group: _standing(cut, np.any([turning[letter] for letter in group], axis=0))
                 for group in machine.clamp_groups}
     for letter, one in machine.clamp_codes.items():
@@ -51,7 +52,15 @@ def check_clamps(code: Canonical, motion: Motion, job: Job, owner: Ints, faults:
             found.append(faults.error("verify.clamp", f"axis {letter} stands through a cut and is not clamped",
                                       int(moves.line[owner[loose[0]]]), int(line[loose[0]]), len(loose),
                                       f"{one.clamp} before the cut"))
+        if state[-1] == 1.0:
+            found.append(faults.warning("verify.clamp", f"axis {letter} is free when the program ends", 0, int(line[-1]), 1,
+                                        f"{one.clamp} before the end"))
     return found
+
+
+def _first(code: Canonical, letter: str) -> int:
+    """The first block with a word of an axis, 0 without."""
+    return int(code.words.pick(letter)[0].min(initial=code.words.lines + 1)) % (code.words.lines + 1)
 
 
 def cutting_rows(motion: Motion, job: Job, owner: Ints) -> Bools:

@@ -15,6 +15,7 @@ from postproc.readback.comparison.bound_search import DeviationBound
 from postproc.readback.comparison.checks import (
     CHUNK,
     block_seconds,
+    check_axis_smoothing,
     check_holes,
     check_kinds,
     check_links,
@@ -134,6 +135,7 @@ def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gco
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_reach_bounds(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
+    diagnostics += check_axis_smoothing(code, motion, job, moves, owner, faults)
     slack = job.toolpath.spline_slack
     return Comparison(job.moves, worst_tip + slack, worst_axis, tip_line, axis_line, tip, axis, match, owner,
                       tuple(diagnostics), max(bound.tip, worst_tip) + slack, max(bound.axis, worst_axis), bound.unbounded,

@@ -65,7 +65,7 @@ class KlartextReader(Reader):
     m_codes = (*M_CODES, 13.0, 14.0, 91.0, 99.0, 126.0, 127.0, 128.0, 129.0)
     letters = "GMFSR?"
     sides: ClassVar[dict[int, str]] = {40: "off (R0)", 41: "left (RL)", 42: "right (RR)"}
-    smoothing_hint = "CYCL DEF 32.1 T as the post writes it"
+    smoothing_hint = "CYCL DEF 32.1 T and 32.2 TA as the post writes them"
     arc_slack = 0.016
     """mm, the TNC's own (circle end points)"""
 

@@ -21,6 +21,7 @@ from postproc.readback.text.canonical import (
     REGISTER,
     REST,
     SMOOTH,
+    SMOOTH_AXIS,
     STATEMENT,
     TURNS,
     Canonical,
@@ -282,6 +283,7 @@ class KlartextRun:
         elif number == 32.0:
             unit = MM_PER_INCH if self.inch else 1.0
             self.new += [(b, SMOOTH, s.keys.get("T", 0.0) * unit or math.inf)] if part == 1.0 else []
+            self.new += [(b, SMOOTH_AXIS, s.keys.get("TA", math.inf) if part == 2.0 else math.inf)] if part else []
         else:
             drill, why = drill_of(int(number), s.keys, float(self.speed[b]), self.inch)
             if drill is None:

@@ -12,6 +12,7 @@ from postproc.readback.text.canonical import (
     CALL,
     LAW,
     SMOOTH,
+    SMOOTH_AXIS,
     STATEMENT,
     DialectStatement,
     Drill,
@@ -31,6 +32,7 @@ LENGTH_AXIS = "$SC_TOOL_LENGTH_CONST"
 and plane change); otherwise it turns with G18 and G19"""
 ROUNDED, ROUNDED_RAPID = "[", "]"
 """words ADIS and ADISPOS: how far from the corner rounding may begin, at feed and at rapid"""
+TURNING = (3.0, 4.0, 5.0)
 _BY_DISTANCE = (641.0, 645.0)
 _SEQUENCE = {1: "X", 2: "Y", 3: "Z"}
 
@@ -47,6 +49,7 @@ class SiemensRun:
         self.states: list[tuple[int, float]] = []
         self.laws: list[WordMeaning] = []
         self.drills: list[Drill] = []
+        self.taps: list[tuple[int, float, bool]] = []
         self.state: InterpolationMode = "axes"
         self.called, self.oriented = -1, False
         self.polynomials = Polynomials(words)
@@ -101,6 +104,7 @@ class SiemensRun:
             for s in all_here:
                 self.one(b, s, modal, "MCALL" in names)
         self.modal_calls(modal)
+        self.turned_behind_taps([b for b, _ in modal])
         self.turned_lengths()
         return tuple(self.laws), tuple(self.drills)
 
@@ -121,16 +125,32 @@ class SiemensRun:
         elif s.name == "CYCLE832":
             off = "_OFF" in s.args or s.number(0, 0.0) <= 0.0
             self.new.append((b, SMOOTH, float("inf") if off else s.number(0) * self.unit(b)))
+            oriented = not any(isinstance(arg, str) and not arg.startswith("_ORI") for arg in s.args)
+            self.new.append((b, SMOOTH_AXIS, s.number(2, float("inf")) if oriented else float("inf")))
         elif s.name in CYCLES:
             drill, why = drill_of(s, float(number_of(self.words, "S")[b]), self.unit(b))
             if drill is None:
                 self.fault("gcode.cycle", b, f"{s.name} {why}", "as the post writes it")
                 return
             self.drills.append(drill)
+            if s.name == "CYCLE84" and s.number(6) in TURNING:
+                self.taps.append((b, s.number(6), is_modal))
             if is_modal:
                 modal[-1] = b, len(self.drills) - 1
             else:
                 self.new.append((b, CALL, float(len(self.drills) - 1)))
+
+    def turned_behind_taps(self, modal: list[int]) -> None:
+        """SDAC of CYCLE84: how the spindle turns when the cycle is over, as M3, M4 or M5 (Programming Manual Cycles).
+
+        modal: blocks that begin or end modal cycles.
+        """
+        stated, number = codes(self.words, "M", TURNING)
+        for b, turning, is_modal in self.taps:
+            over = next((k for k in modal if k > b), self.words.lines) if is_modal else b + 1
+            before = number[stated <= b]
+            if len(before) and before[-1] != turning and over <= self.words.lines and over not in stated:
+                self.new.append((over, "M", turning))
 
     def enter(self, b: int, state: InterpolationMode, law: WordMeaning) -> None:
         """A law in force from block b on."""

@@ -7,7 +7,9 @@ import re
 import numpy as np
 import pytest
 
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import convert, execute, good, goto, tilted, toolpath
+from toolpaths.diagnostics import Severity
 
 STATES_IT = {"siemens-840d", "heidenhain-tnc640"}
 CONTROLLERS = ["linuxcnc", "generic-iso", "fanuc-30i", "haas-ngc", *sorted(STATES_IT)]
@@ -47,6 +49,17 @@ def test_linuxcnc_moves_as_single_moves_would() -> None:
     at = ends.index(("feed", 20.0, 10.0, -8.0))
     assert ends[at - 2:at + 3] == [("rapid", 20.0, 10.0, 50.0), ("rapid", 20.0, 10.0, 7.0), ("feed", 20.0, 10.0, -8.0),
                                    ("feed", 20.0, 10.0, 7.0), ("rapid", 20.0, 10.0, 54.0)]
+
+
+@pytest.mark.parametrize("turning", [4, 5])
+def test_how_the_spindle_turns_behind_a_tap_is_read(turning: int) -> None:
+    """SDAC of CYCLE84: the next hole would be bored with the spindle the other way round, or standing."""
+    path = toolpath(*tapped()[:4], "CYCLE/OFF", "CYCLE/BORE,DEPTH,12,MMPM,100,CLEAR,3,RETURN,50", "GOTO/20,0,0", "CYCLE/OFF")
+    result = good(convert(path, "mill-3axis", "siemens-840d"))
+    text, count = re.subn(r"(CYCLE84\(.*?,,0,)3,", rf"\g<1>{turning},", result.text)
+    assert result.job is not None and count == 1
+    _, found = read_back(text, result.job, "part.apt")
+    assert {d.code for d in found if d.severity is Severity.ERROR} == {"verify.state"}
 
 
 @pytest.mark.parametrize(("controller", "machine"), [("fanuc-30i", "mikron-ucp710"), ("haas-ngc", "trunnion-bc"),

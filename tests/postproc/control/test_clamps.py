@@ -109,14 +109,15 @@ def test_axes_are_free_where_they_turn_and_clamped_where_they_cut(controller: st
 
 
 def matters(lines: list[str], n: int) -> bool:
-    """True where a cut follows, or the axis of the release in line n turns before its next clamp."""
+    """True where a cut follows, or the axis of the release in line n turns before its next clamp; from where it stands
+    when the program is started nobody knows."""
     code = lines[n].split()[-1]
     if code in ("M10", "M12"):
         return any(re.search(r"G0?1 |G81|M99| F\d", line) for line in lines[n + 1:])
     letter, clamp = ("A", "M10") if code == "M11" else ("C", "M12")
     stop = next((k for k in range(n, len(lines)) if re.search(rf"{clamp}\b", lines[k])), len(lines))
     word = rf"(?<![A-Z]){letter}([-+]?\d+\.?\d*)"
-    before = ["0", *re.findall(word, "\n".join(lines[:n]))][-1:]
+    before = re.findall(word, "\n".join(lines[:n]))[-1:] or ["nan"]
     stated = re.findall(word, "\n".join(lines[n:stop]))
     plane = any(re.search(r"G53\.1|CYCLE800\(0|PLANE SPATIAL", line) for line in lines[n:stop])
     return plane or len({float(v) for v in before + stated}) > 1
@@ -134,6 +135,15 @@ def test_each_code_that_is_left_out_is_caught(controller: str, output: str, thir
     missed = [(n, lines[n]) for n in places[third::3]
               if "verify.clamp" not in verdict(result, "\n".join(lines[:n] + lines[n + 1:]) + "\n")]
     assert len(places) >= 10 and not missed
+
+
+def test_axes_that_are_free_at_the_end_are_named() -> None:
+    result = converted("fanuc-30i", "axes")
+    assert result.job is not None and "verify.clamp" not in codes(result.diagnostics)
+    for code in ("M10", "M12"):
+        before, _, after = result.text.rpartition(f"\n{code}\n")
+        _, found = read_back(f"{before}\n{after}", result.job, "test.apt", gcode="edited.nc")
+        assert [d.severity for d in found if d.code == "verify.clamp"] == [Severity.WARNING]
 
 
 def test_a_program_without_clamps_is_refused_by_the_reader() -> None:

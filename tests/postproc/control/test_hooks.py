@@ -107,6 +107,30 @@ def test_each_block_that_is_left_out_is_caught(controller: str, third: int) -> N
         assert "verify.hook" in verdict(result, "\n".join(lines[:n] + lines[n + 1:]) + "\n"), number
 
 
+VALUES = {"tool_number": "G65 P{} A{{tool_number:02d}}", "tool_name": "G65 P{} ({{tool_name}})",
+          "operation": "G65 P{} ({{operation}})", "work_offset": "G65 P{} W{{work_offset:02d}}"}
+OTHER = {"tool_number": ("A01", "A02"), "tool_name": ("(T1)", "(T2)"), "operation": ("(OP1)", "(OP2)"),
+         "work_offset": ("W54", "W55")}
+
+
+@pytest.mark.parametrize("value", VALUES)
+def test_each_value_that_is_another_is_caught(value: str) -> None:
+    """A call that measures a tool, or sets an offset, with the number of another one."""
+    blocks = {f"{when}_{place}": (VALUES[value].format(9010 + 10 * k + j),)
+              for k, place in enumerate(PLACES) for j, when in enumerate(("before", "after"))}
+    result = postproc.convert(work(), replace(clamping(), hooks=HooksModel(**blocks, passive=("G65",))), "fanuc-30i", SETUP,
+                              Options(output="axes"))
+    assert result.ok and not verdict(result, result.text)
+    lines, (one, other) = result.text.splitlines(), OTHER[value]
+    # between two operations a block may name either
+    places = [n for n, line in enumerate(lines) if line.startswith("G65") and one in line
+              and (value != "operation" or n < lines.index("M1") or "P903" in line)]
+    assert len(places) >= 5
+    for n in places[::3]:
+        changed = [*lines[:n], lines[n].replace(one, other), *lines[n + 1:]]
+        assert "verify.hook" in verdict(result, "\n".join(changed) + "\n"), lines[n]
+
+
 @pytest.mark.parametrize("controller", CONTROLS)
 def test_modal_codes_are_stated_again_behind_them(controller: str) -> None:
     """A macro may leave another code of motion: the next block that moves states its own."""

@@ -20,7 +20,7 @@ from postproc.setup.model import OutputSettings
 from postproc.verification.read_back import read_back
 from tests.postproc.control.test_clamps import SETUP, clamping
 from tests.postproc.control.test_hooks import converted, own_blocks, verdict, work
-from tests.postproc.kit import toolpath
+from tests.postproc.kit import setup_of, toolpath
 from toolpaths.diagnostics import Severity
 
 
@@ -41,6 +41,20 @@ def test_the_same_block_at_several_places_is_asked_for_at_each() -> None:
     assert len(own) >= 16
     for n in own:
         assert "verify.hook" in verdict(result, "\n".join(lines[:n] + lines[n + 1:]) + "\n"), n
+
+
+def test_a_work_offset_by_number_is_that_of_each_place() -> None:
+    """Before the first register is stated it is that of the first place."""
+    setup = setup_of('[tools.1]\ngauge_length = 90\n[tools.2]\ngauge_length = 65\n[[places]]\nname = "front"\n'
+                     'work_offset_code = "G54"\n[[places]]\nname = "back"\nwork_offset_code = "G55"\norigin = [40, 0, 0]\n'
+                     '[clearance]\nmargin = 5\n')
+    hooks = HooksModel(after_tool=("G65 P9010 W{work_offset:02d}",), before_operation=("G65 P9020 W{work_offset:02d}",),
+                       passive=("G65",))
+    result = postproc.convert(work(), replace(clamping(), hooks=hooks), "fanuc-30i", setup, Options(output="axes"))
+    assert result.ok, [str(d) for d in result.diagnostics]
+    assert {"W54", "W55"} <= set(re.findall(r"P90[12]0 (W\d+)", result.text))
+    for wrong in ("W55", "W56"):
+        assert "verify.hook" in verdict(result, result.text.replace("P9010 W54", f"P9010 {wrong}", 1))
 
 
 @pytest.mark.covering
@@ -65,7 +79,7 @@ def test_lines_go_to_gaps_so_that_as_few_as_can_be_are_left() -> None:
     for _ in range(300):
         lines = np.unique(rng.integers(1, 12, rng.integers(0, 6)))
         gaps = [(int(a), int(a + w)) for a, w in zip(rng.integers(0, 10, 5), rng.integers(1, 6, 5), strict=True)]
-        assert len(unmatched(lines, gaps)) == len(gaps) - _most(lines.tolist(), gaps)
+        assert len(unmatched(lines.tolist(), gaps)) == len(gaps) - _most(lines.tolist(), gaps)
 
 
 def _most(lines: list[int], gaps: list[tuple[int, int]]) -> int:

@@ -11,7 +11,9 @@ import machines
 import postproc
 from postproc.pipeline.convert import verify
 from postproc.setup.model import SetupFile
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import codes, convert, good, machine, shop_file, toolpath
+from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Toolpath
 
 MACHINE = "mill-3axis"
@@ -66,6 +68,23 @@ def test_a_level_that_takes_more_is_found_in_the_operation_that_must_not(control
     assert found(text) == set()
     at = text.rindex(fine)
     assert found(text[:at] + rough + text[at + len(fine):]) == {"verify.smoothing"}
+
+
+@pytest.mark.parametrize(("controller", "word", "others"), [
+    ("siemens-840d", "_ORI_FINISH,0.015)", ("_ORI_FINISH,5)", "_ORI_FINISH)", "_FINISH,0.015)")),
+    ("heidenhain-tnc640", " TA0.015", (" TA5", ""))])
+def test_more_than_the_tool_axis_may_lose_is_found_where_cuts_turn_it(controller: str, word: str,
+                                                                      others: tuple[str, ...]) -> None:
+    """The tolerance of rotary axes has a share of its own; where they stand it takes nothing."""
+    head = ["UNITS/MM", "LOADTL/1", "SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600", "RAPID", "GOTO/0,0,20,0,0,1"]
+    turning = toolpath(*(f"GOTO/{x},0,5,{0.02 * x},0,{(1.0 - (0.02 * x)**2)**0.5:.9f}" for x in range(0, 20, 4)), head=head)
+    standing = toolpath("GOTO/0,0,5", "GOTO/10,0,5", "GOTO/10,10,5", head=head)
+    for path, code in ((turning, "verify.smoothing"), (standing, None)):
+        made = good(convert(path, "mikron-ucp710", controller, setup(), output="axes"))
+        assert made.job is not None and word in made.text
+        for other in others:
+            _, found = read_back(made.text.replace(word, other), made.job, "part.cls")
+            assert {d.code for d in found if d.severity is Severity.ERROR} == ({code} if code else set()), other
 
 
 def test_the_bound_counts_the_most_that_an_operation_leaves_to_the_control() -> None:

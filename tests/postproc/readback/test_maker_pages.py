@@ -14,6 +14,7 @@ from postproc.control.modes import table_axes
 from postproc.controllers.model import builtin_files
 from postproc.readback.text.words import plain
 from postproc.setup.model import SetupFile
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import convert, toolpath
 from tests.postproc.kit import good as converted
 from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, control, faults, good, look, words
@@ -202,6 +203,36 @@ def test_smoothing_is_what_the_program_says(dialect: str, on: str, blend: float)
     parameter of CYCLE832. Under G05.1 Q1 it is a parameter of the control, which the controller file states."""
     motion = good(dialect, program(dialect, f"{on}G0 X1. Y0. Z9.\n"))
     assert motion.blend[-1] == pytest.approx(blend)
+
+
+def test_smoothing_of_the_tool_axis_is_what_the_program_says() -> None:
+    """S4 3.25: third parameter of CYCLE832, types of orientation; T3 12: TA of cycle 32. Degrees: three tenths of 0.05."""
+    assert {name: spec(name).kinematics.axis_smoothing_share for name in (SIEMENS, TNC)} == {SIEMENS: 0.3, TNC: 0.3}
+    turning = toolpath("RAPID", "GOTO/0,0,20,0,0,1", "FEDRAT/MMPM,500", "GOTO/0,0,5", "GOTO/5,0,5,0.1,0,0.994987437")
+    for dialect, words_ in ((SIEMENS, "CYCLE832(0.003,_ORI_FINISH,0.015)"), (TNC, "HSC-MODE:0 TA0.015")):
+        made = converted(convert(turning, "mikron-ucp710", dialect, output="axes"))
+        assert words_ in made.text and made.job is not None
+        for degrees, bad in ((0.015, False), (0.014, False), (0.016, True)):
+            _, found = read_back(made.text.replace("0.015", str(degrees)), made.job, "part.apt")
+            assert ("verify.smoothing" in {d.code for d in found}) == bad
+
+
+def test_names_in_blocks_of_the_shop() -> None:
+    """Letters, digits, blanks, - . _ alone, any other character is _; 120 characters a block, twelve for its number."""
+    name = "ROUGH/TOP;1"
+    path = toolpath("UNITS/MM", f"TOOL PATH/{name},TOOL,{'E' * 150}", "MSYS/0,0,0,1,0,0,0,1,0", "LOAD/TOOL,1",
+                    "SPINDL/RPM,1000,CLW", "RAPID", "GOTO/0,0,20", "FEDRAT/MMPM,500", "GOTO/0,0,5", "END-OF-PATH", head=[])
+    hooks = {"before_operation": ["(OP {operation})"], "after_tool": ["(T {tool_name})"]}
+    setup = SetupFile.model_validate({"tools": {"1": {"gauge_length": 100.0}}, "hooks": hooks})
+    text = converted(convert(path, "mill-3axis", FANUC, setup)).text
+    assert "(OP ROUGH_TOP_1)" in text and f"\n(T {'E' * (120 - 12 - 4)})\n" in text
+
+
+def test_room_below_home_for_longer_tools() -> None:
+    """Z is at home at 250 mm."""
+    path = toolpath("RAPID", "GOTO/0,0,20,0,0,1", "FEDRAT/MMPM,500", "GOTO/0,0,5", "GOTO/5,0,5,0.1,0,0.994987437")
+    text = converted(convert(path, "mikron-ucp710", FANUC, output="tcp")).text
+    assert "G53 G0 Z240.\nG43.4 H1\n" in text
 
 
 def test_only_generic_iso_has_states_of_its_own() -> None:

@@ -91,6 +91,14 @@ def test_taps_feed_by_pitch_and_speed() -> None:
     assert heights("CYCLE84(20,0,1,-8,,0,3,,1.25,0,400,800)") == [(1, 0, 100), (-8, 1, 500), (1, 1, 1000), (20, 0, 100)]
 
 
+@pytest.mark.parametrize("body", ["CYCLE84({})\nX9\n", "MCALL CYCLE84({})\nX1\nMCALL\nX9\n"])
+def test_the_spindle_behind_a_tap_turns_as_sdac_says(body: str) -> None:
+    for sdac, after in ((3, 1), (4, -1), (5, 0)):
+        cycle = body.format(f"20,0,1,-8,,0,{sdac},,1.25,0,400,400")
+        spindle = good(SIEMENS, program(f"S400 M3\nF100\nG0 X0 Y0 Z20\n{cycle}")).spindle.tolist()
+        assert spindle[-1] == after and set(spindle[:-1]) == {1}
+
+
 def test_reaming_has_feeds_of_its_own() -> None:
     assert heights("CYCLE85(20,0,1,-8,,0,60,120)") == [(1, 0, 100), (-8, 1, 60), (1, 1, 120), (20, 0, 100)]
 
