@@ -184,7 +184,7 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         look_ahead=control.look_ahead, block_time=control.block_time,
         length_register=register_beyond(control.length_register),
         radius_register=None if control.radius_register is None else register_beyond(control.radius_register),
-        certificate=model.kinematics.certificate,
+        certificate=model.kinematics.certificate, kind_code=kinds.stamp(str(model.kinematics.kind)),
         figures=origins_of_figures(model.sources, model.figures()), documents=tuple(model.sources.values()),
         clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
         turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))

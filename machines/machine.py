@@ -150,6 +150,7 @@ class Machine:
         documents: those that figures come from
         certificate: file that proves that the declared workspace is reached and free of singular positions, "" where that
             was sampled, or nobody asks it of the machine
+        kind_code: whose code its kinematics is, with the first digits of its hash; "" for a kind of this project
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
     """
 
@@ -182,6 +183,7 @@ class Machine:
     figures: Mapping[str, str] = field(default_factory=dict)
     documents: tuple[Document, ...] = ()
     certificate: str = ""
+    kind_code: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from toolpaths.choices import DialectName
 from toolpaths.cl.systems.freecad import EXPORTED, FreeCadReader
 from toolpaths.cl.systems.nci import NciReader
+from toolpaths.cl.systems.shop_forms import ShopText
 from toolpaths.cl.systems.step_nc import StepNcReader
 from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.scan import Points
@@ -64,3 +65,10 @@ def read_form(plain: bytes, given: DialectName | None, log: DiagnosticLog) -> Fo
     else:
         said = StepNcReader(text, log).read()
     return Form(*found, said.program, said.points(), plain.count(b"\n") + (not plain.endswith(b"\n")))
+
+
+def shop_form(shop: ShopText, data: bytes) -> Form:
+    """A file of whose records an installed package has made statements; `data`: its bytes, for the count of its lines."""
+    said = shop.statements()
+    ends = max(data.count(b"\n"), data.count(b"\r"))
+    return Form(shop.like, shop.evidence, said.program, said.points(), ends + (not data.endswith((b"\n", b"\r"))))
