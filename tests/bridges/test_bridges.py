@@ -177,6 +177,7 @@ def test_both_batch_files_of_nx_call_the_same_command() -> None:
     """The one of Windows is not run elsewhere; its line ends are those that cmd needs."""
     shell, batch = ((FOLDER / f"nx/postprocess.{ending}").read_bytes() for ending in ("sh", "bat"))
     assert b"\r" not in shell and batch.count(b"\r\n") == batch.count(b"\n")
-    options = [re.findall(rb"(?<= )--?[a-z]+", text.partition(b"convert ")[2]) for text in (shell.replace(b"[ -n", b"["), batch)]
+    called = [text.partition(b"convert ")[2] for text in (shell.replace(b"[ -n", b"["), batch)]
+    options = [re.findall(rb"(?<= )--?[a-z]+", text) for text in called]
     assert set(options[0]) == {b"-m", b"-c", b"-o", b"--proof", b"--json", b"--setup"}
     assert {*options[1], b"--setup"} == {*options[0]} and b'set MORE=--setup "%SETUP%"' in batch

@@ -10,7 +10,8 @@ from pathlib import Path
 
 TOOLTIP = "APT text (CL data) for postproc"
 SILENT = {"G17", "G21", "G40", "G43", "G49", "G54", "G80", "G90", "G91.1", "G94"}
-RAPID, FEED, ARCS, HOLES = {"G0", "G00"}, {"G1", "G01"}, {"G2": -1, "G02": -1, "G3": 1, "G03": 1}, {"G73", "G81", "G82", "G83"}
+RAPID, FEED, HOLES = {"G0", "G00"}, {"G1", "G01"}, {"G73", "G81", "G82", "G83"}
+ARCS = {"G2": -1, "G02": -1, "G3": 1, "G03": 1}
 PLAIN = {"M0": "STOP", "M00": "STOP", "M1": "OPSTOP", "M01": "OPSTOP", "M5": "SPINDL/OFF", "M05": "SPINDL/OFF",
          "M7": "COOLNT/MIST", "M07": "COOLNT/MIST", "M8": "COOLNT/FLOOD", "M08": "COOLNT/FLOOD", "M9": "COOLNT/OFF",
          "M09": "COOLNT/OFF"}
