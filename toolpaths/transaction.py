@@ -182,7 +182,8 @@ def _put(todo: Sequence[_Output], run: str) -> None:
 
 
 def _into_place(one: _Output) -> None:
-    """The new file in the place of the old one; where another program holds that open, as viewers do on Windows, a moment later.
+    """The new file in the place of the old one; where another program holds that open, as viewers do on Windows, a little
+    later.
 
     Raises:
         OSError: where it stays held, or for any other reason.
@@ -293,9 +294,10 @@ def _for(path: Path) -> Iterator[None]:
 
 
 def _cannot(path: Path, fault: OSError) -> Diagnostic:
-    hint = {HELD: "close it there, or choose another place",
-            READ_ONLY: "make it writable (chmod u+w), or choose another place",
-            os.strerror(errno.ENOSPC): "make room on the disk, or choose another place"}.get(str(fault.strerror), "choose another place")
+    hints = {HELD: "close it there, or choose another place",
+             READ_ONLY: "make it writable (chmod u+w), or choose another place",
+             os.strerror(errno.ENOSPC): "make room on the disk, or choose another place"}
+    hint = hints.get(str(fault.strerror), "choose another place")
     return error("file.write", f"cannot be written: {fault.strerror or fault}", file=str(path), hint=hint)
 
 

@@ -161,7 +161,8 @@ def test_a_viewer_that_holds_the_file_for_a_moment_is_waited_for(shop: tuple[Pat
 
 
 @pytest.mark.parametrize(("number", "tries", "words", "hint"), [
-    (32, 4, transaction.HELD, "close it there"), (5, 4, transaction.HELD, "close it there"), (1, 0, "Permission denied", "")])
+    (32, 4, transaction.HELD, "close it there"), (5, 4, transaction.HELD, "close it there"),
+    (1, 0, "Permission denied", "")])
 def test_a_viewer_that_keeps_the_file_is_named_and_all_stays(shop: tuple[Path, dict[Path, str]], number: int, tries: int,
                                                              words: str, hint: str, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, outputs = shop
