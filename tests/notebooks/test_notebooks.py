@@ -1,4 +1,4 @@
-"""The notebooks of the samples: their cells run in their order, they hold no outputs, and nothing of the machine they were made on."""
+"""The notebooks of the samples: their cells run in their order; they hold no outputs and no paths of a computer."""
 
 from __future__ import annotations
 
