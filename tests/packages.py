@@ -23,8 +23,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("toolpaths", "machines", "postproc")
-TESTS = ("tests/toolpaths", "tests/plugins", "tests/bridges", "tests/machines/test_kinds.py", "tests/postproc/batch",
-         "tests/postproc/cli", "tests/postproc/page", "tests/postproc/proof", "tests/postproc/python")
+TESTS = ("tests/toolpaths/cl", "tests/toolpaths/test_transaction.py", "tests/toolpaths/test_input_files.py", "tests/plugins",
+         "tests/bridges", "tests/machines/test_kinds.py", "tests/postproc/proof")
 """rooms whose tests need nothing but the installed packages, samples and each other"""
 IN_TREE = ("tests/postproc/proof/test_traceability.py",)
 """of these, what looks at the source tree"""
