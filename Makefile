@@ -9,7 +9,7 @@ PYTEST_ARGS ?= -n auto --maxprocesses 4 --dist loadfile -rfEs
 SOURCES := toolpaths machines postproc
 NUMERIC = $(shell grep -rl --include='test_*.py' 'mark\.numeric' tests)
 
-.PHONY: docs demo test quick numeric hard damage changes slow mutants programs faults fuzz same lint lock clean
+.PHONY: docs packages demo test quick numeric hard damage changes slow mutants programs faults fuzz same lint lock clean
 
 demo: $(STAMP)
 	@mkdir -p out
@@ -79,6 +79,10 @@ numeric: $(STAMP)
 docs: $(STAMP)
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
 	$(BIN)/python -m sphinx -q -b man docs out
+
+# Wheel and sdist, installed and tested outside the tree: PYTHONS="python3.11 python3.12 python3.13", EXTRAS="[all]".
+packages: $(STAMP)
+	$(BIN)/python tests/packages.py $(foreach one,$(PYTHONS),--python $(one)) $(if $(EXTRAS),--extras "$(EXTRAS)")
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

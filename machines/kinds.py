@@ -15,18 +15,23 @@ import os
 import sys
 from collections.abc import Iterator
 from functools import cache
+from hashlib import sha256
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 from zlib import crc32
 
 from machines.models import KinematicsModel
 from toolpaths.input_files import place
+from toolpaths.plug_ins import PlugInFault, PlugInGroup, imported, named, registered
 
-GROUP, FILES = "postproc.kinematics", "POSTPROC_KINDS"
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+GROUP: PlugInGroup = "postproc.kinematics"
+FILES = "POSTPROC_KINDS"
 BUILT_IN = {
     "serial": "machines.serial_models:SerialModel",
     "linear-delta": "machines.parallel_models:LinearDeltaModel",
@@ -34,15 +39,13 @@ BUILT_IN = {
     "legs": "machines.legs_models:LegsModel",
 }
 """`[kinematics] kind` -> module:model of that table; imported when a file asks for it"""
+_SHOWN = 12
+"""digits of a hash that a header has"""
 HOW = f'a package registers a kind in the entry point group "{GROUP}"; a file of yours is named in {FILES}=FILE.py'
 
 
-class KindFault(ValueError):
+class KindFault(PlugInFault):
     """A registered kind that cannot be used; the message says why, `hint` what to do."""
-
-    def __init__(self, message: str, hint: str) -> None:
-        super().__init__(message)
-        self.hint = hint
 
 
 def known() -> list[str]:
@@ -67,8 +70,9 @@ def model_of(kind: str) -> type[KinematicsModel] | None:
     if kind in (made := _in_files()):
         return made[kind]
     points = _registered().get(kind, [])
-    if len({point.value for point in points}) > 1:
-        raise KindFault(f"kind {kind!r} is registered several times: {', '.join(point.value for point in points)}",
+    if len(points) > 1:
+        packages = ", ".join(f"{point.value} of {named(point)}" for point in points)
+        raise KindFault(f"kind {kind!r} is registered several times: {packages}",
                         "uninstall all but one of these packages")
     return _loaded(points[0]) if points else None
 
@@ -83,23 +87,29 @@ def code_file(kind: str) -> Path | None:
     return Path(file) if file else None
 
 
+def stamp(kind: str) -> str:
+    """Whose code a kind is, for the header of a program; "" for a built-in one."""
+    code = code_file(kind)
+    if code is None:
+        return ""
+    points = [] if kind in _in_files() else _registered().get(kind, [])
+    origin = f"{named(points[0])} {points[0].dist.version}" if points and points[0].dist is not None else code.name
+    return f"kind {kind} of {origin} (code {sha256(code.read_bytes()).hexdigest()[:_SHOWN]})"
+
+
 def _registered() -> dict[str, list[EntryPoint]]:
     """Entry points of installed packages by kind."""
-    result: dict[str, list[EntryPoint]] = {}
-    for point in entry_points(group=GROUP):
-        if point.name not in BUILT_IN:
-            result.setdefault(point.name, []).append(point)
-    return result
+    return {kind: points for kind, points in registered(GROUP).items() if kind not in BUILT_IN}
 
 
 def _loaded(point: EntryPoint) -> type[KinematicsModel]:
+    what = f"kind {point.name!r} ({point.value} of {named(point)})"
     try:
-        model = point.load()
-    except (Exception, SystemExit) as fault:  # code of others: whatever it raises
-        raise KindFault(f"kind {point.name!r} ({point.value}) is not imported: {type(fault).__name__}: {fault}",
-                        "correct or reinstall the package that registers it") from fault
+        model = imported(point, what)
+    except PlugInFault as fault:
+        raise KindFault(str(fault), fault.hint) from fault
     if not (isinstance(model, type) and issubclass(model, KinematicsModel)):
-        raise KindFault(f"kind {point.name!r} ({point.value}) is not a KinematicsModel (machines/models.py)",
+        raise KindFault(f"{what} is not a KinematicsModel (machines/models.py)",
                         "register the model of the [kinematics] table")
     return model
 

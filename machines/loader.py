@@ -186,6 +186,7 @@ def assemble(file: UserFile, model: MachineModel) -> Machine:
         radius_register=None if control.radius_register is None else register_beyond(control.radius_register),
         certificate=model.kinematics.certificate, dynamics=model.dynamics,
         stiffness=model.stiffness,
+        kind_code=kinds.stamp(str(model.kinematics.kind)),
         figures=origins_of_figures(model.sources, model.figures()), documents=tuple(model.sources.values()),
         clamps=tuple(ClampCodes(a.clamp, a.unclamp) for a in map(model.axes.get, names) if a),
         turns=tuple(Turns(a.modulo, a.modulo_range[0], a.rollover or "", a.park) for a in map(model.axes.get, names) if a))

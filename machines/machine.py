@@ -160,6 +160,7 @@ class Machine:
             was sampled, or nobody asks it of the machine
         dynamics: masses, and what the motors can give; None where the machine file does not say
         stiffness: what its parts yield by; None likewise
+        kind_code: whose code its kinematics is, with the first digits of its hash; "" for a kind of this project
         stated: the limits as the machine file has them; `limits` is another object where they were changed in memory
         by_drives: the machine as its drives move it, where this one has the axes of the control's kinematics (`on_control`)
     """
@@ -196,6 +197,7 @@ class Machine:
     certificate: str = ""
     dynamics: DynamicsModel | None = None
     stiffness: StiffnessModel | None = None
+    kind_code: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))

@@ -27,8 +27,9 @@ from toolpaths.diagnostics import REPORT
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "postproc" / "explain"
 CODE = re.compile(r"^[a-z_-]+\.[a-z][a-z0-9_-]*$")
-NONE = frozenset({"postproc.controllers", "postproc.cycle_time", "postproc.kinematics", "postproc.toml", "bodies.part",
-                  "bodies.table", "output.coolant", "output.feed"})
+NONE = frozenset({"postproc.controllers", "postproc.cycle_time", "postproc.toml", "bodies.part",
+                  "postproc.kinematics", "postproc.cl_dialects", "postproc.cl_readers", "postproc.orientation_criteria",
+                  "postproc.report_tabs", "bodies.table", "output.coolant", "output.feed"})
 """texts of that form that are no codes: modules, files, keys of the set-up"""
 MADE = {"verify.tip", "verify.axis", "setup.work_offset", "coolant.off", "coolant.flood", "coolant.mist", "coolant.through",
         "coolant.air", "proof.program", "proof.cl_file", "proof.setup", "proof.machine", "proof.controller",

@@ -20,7 +20,7 @@ ROAD = ("toolpaths", "machines", "postproc")
 """Each package may import itself and those before it."""
 HEAVY = {"numpy", "numba", "scipy", "rich"}
 TOP = {"README.md", "ARCHITECTURE.md", "LICENSE", "CHANGELOG.md", "CONTRIBUTING.md", "docs", "pyproject.toml",
-       "requirements.lock", "Makefile", "postproc", "machines", "toolpaths", "tests", "samples"}
+       "requirements.lock", "MANIFEST.in", "Makefile", "postproc", "machines", "toolpaths", "tests", "samples"}
 
 
 MOST_LINES, MOST_IN_FUNCTION = 400, 60

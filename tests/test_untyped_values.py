@@ -48,7 +48,7 @@ BORDERS = {
     "machines/analysis/report.py": FIGURES, "machines/geometric_error/exchange/survey.py": FIGURES,
     "postproc/report/loads.py": FIGURES, "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,
     **{f"postproc/page/{name}.py": FIGURES for name in (
-        "columns", "document", "drawings", "run", "skeleton", "solids", "tools", "what_if")},
+        "columns", "document", "drawings", "run", "skeleton", "solids", "tabs", "tools", "what_if")},
     "postproc/base/program_time.py": FIGURES, "postproc/cycle_time/toppra_check.py": FIGURES,
     "postproc/report/summary.py": FIGURES, "postproc/report/trace.py": FIGURES, "postproc/report/unwinding.py": FIGURES,
     "postproc/placement/report.py": FIGURES, "postproc/cycle_time/report.py": FIGURES,

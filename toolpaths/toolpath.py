@@ -13,6 +13,7 @@ from toolpaths.arrays import Array, Floats, Ints, shared
 from toolpaths.choices import CycleKind, GivenDialect, GivenUnit, LengthUnit
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.given_arrays import CLOSE, GivenArrays, given_rows, off_circle, passes, unit_rows
+from toolpaths.plug_ins import PlugIn
 from toolpaths.shapes import arrays
 
 
@@ -175,11 +176,18 @@ _SHARED = ("tip", "axis", "feed", "feed_mode", "kind", "role", "arc", "cycle", "
 
 @dataclass(frozen=True)
 class ClSource:
-    """The bytes of the CL file that a path was read from, and with which units and dialect ("": as the file says)."""
+    """The bytes of the CL file that a path was read from, and with which units and dialect ("": as the file says).
+
+    Where a plug-in reads the file: which, the records that it makes of it, as APT text, and the line of the file by record
+    (None where the text stands line for line).
+    """
 
     data: bytes
     units: GivenUnit = ""
     dialect: GivenDialect = ""
+    plug_in: PlugIn | None = None
+    records: bytes = b""
+    lines: tuple[int, ...] | None = None
 
 
 @dataclass(frozen=True)

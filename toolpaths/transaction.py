@@ -16,6 +16,7 @@ import shutil
 import signal
 import stat
 import threading
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,11 @@ import toolpaths.interrupted_runs as leftovers
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 
 READ_ONLY = "it is read-only"
+HELD = "another program holds it open"
+_HELD_BY_OTHERS = (5, 32, 33)
+"""numbers of Windows: access denied, sharing violation, lock violation"""
+_PATIENCE = (0.05, 0.1, 0.2, 0.4)
+"""s between tries"""
 
 
 @dataclass(frozen=True)
@@ -143,7 +149,7 @@ def _put(todo: Sequence[_Output], run: str) -> None:
     """Rename all into their places; where one fails what stood there is put back."""
     if len(todo) == 1:
         with _for(todo[0].path):
-            todo[0].staged.replace(todo[0].target)
+            _into_place(todo[0])
         _sync_folder(todo[0].target.parent)
         return
     folder, folders = todo[-1].target.parent, {one.target.parent for one in todo}
@@ -161,7 +167,7 @@ def _put(todo: Sequence[_Output], run: str) -> None:
             _write_note(journal, leftovers.journal_text(entries))
         for one in todo:
             with _for(one.path):
-                one.staged.replace(one.target)
+                _into_place(one)
         for each in folders:
             _sync_folder(each)
         with _for(journal):
@@ -173,6 +179,27 @@ def _put(todo: Sequence[_Output], run: str) -> None:
         _tidy(folder, entries, notes)
         raise
     _tidy(folder, entries, notes)
+
+
+def _into_place(one: _Output) -> None:
+    """The new file in the place of the old one; where another program holds that open, as viewers do on Windows, a little
+    later.
+
+    Raises:
+        OSError: where it stays held, or for any other reason.
+    """
+    for wait in _PATIENCE:
+        try:
+            one.staged.replace(one.target)
+            return
+        except PermissionError as fault:
+            if getattr(fault, "winerror", None) not in _HELD_BY_OTHERS:
+                raise
+            time.sleep(wait)
+    try:
+        one.staged.replace(one.target)
+    except PermissionError as fault:
+        raise OSError(fault.errno, HELD) from fault
 
 
 def _entry(one: _Output, folder: Path, run: str) -> leftovers.Entry:
@@ -207,8 +234,9 @@ def _write_note(path: Path, text: str) -> None:
     _sync_folder(path.parent)
 
 
-def _sync(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
+def _sync(path: Path, how: int = os.O_RDWR) -> None:
+    """To the disk. Windows does that for files which are open to be written alone, other systems for folders read alone."""
+    handle = os.open(path, how)
     try:
         os.fsync(handle)
     finally:
@@ -218,7 +246,7 @@ def _sync(path: Path) -> None:
 def _sync_folder(folder: Path) -> None:
     """Names of a folder to the disk, where its file system can."""
     with contextlib.suppress(OSError):
-        _sync(folder)
+        _sync(folder, os.O_RDONLY)
 
 
 def _remove(path: Path) -> None:
@@ -266,8 +294,10 @@ def _for(path: Path) -> Iterator[None]:
 
 
 def _cannot(path: Path, fault: OSError) -> Diagnostic:
-    hint = {READ_ONLY: "make it writable (chmod u+w), or choose another place", os.strerror(errno.ENOSPC):
-            "make room on the disk, or choose another place"}.get(str(fault.strerror), "choose another place")
+    hints = {HELD: "close it there, or choose another place",
+             READ_ONLY: "make it writable (chmod u+w), or choose another place",
+             os.strerror(errno.ENOSPC): "make room on the disk, or choose another place"}
+    hint = hints.get(str(fault.strerror), "choose another place")
     return error("file.write", f"cannot be written: {fault.strerror or fault}", file=str(path), hint=hint)
 
 

@@ -181,7 +181,8 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         values = summary.as_dict(result, str(output), time)
         text = summary.as_text(result, str(output), time, values)
         more = [] if result.ok else _offers(result, path, machine, controller)
-        outputs |= pages(page, path, result, known, output.name, time)
+        shown, of_tabs = pages(page, path, result, known, output.name, time)
+        outputs |= shown
         if result.ok:
             texts, more = program_files(output, result.text, result.files or {})
             refuse_inputs(list(texts)[:-1], inputs)
@@ -189,7 +190,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
             more += unlike
             check = _checked(result, spec, check_program)
             outputs = {**outputs, **dict(zip(fields, noted, strict=True)), **kept, **check, **texts}
-    found = [*result.diagnostics, *more]
+    found = [*result.diagnostics, *more, *of_tabs]
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 

@@ -83,6 +83,7 @@ def report_command(file: ClFile, machine: Machines, controller: Controllers,
     refuse_overwriting({"-o": str(output), "--json": json, **_figure_files(figures, len(machine) * len(controller))}, inputs)
     from postproc.base.options import Options
     from postproc.page.document import document, report_dict, texts_of
+    from postproc.page.tabs import with_tabs
 
     options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect,
                       tuple(w.upper() for w in allow_unknown or ()), feed=feed, error_model=error_model, hooks=hooks,
@@ -95,27 +96,30 @@ def report_command(file: ClFile, machine: Machines, controller: Controllers,
     with shown_errors(json), progress_bar() as progress:
         path, read = read_cl(file, options, progress, options.tolerance)
         runs = [_run(path, m, c, options, read, progress) for m in machine for c in controller]
-        values = report_dict(path, runs)
+        values, tab_faults = with_tabs(report_dict(path, runs))
         outputs[output] = document(values, [] if no_texts else texts_of(runs))
         if figures is not None:
             from postproc.page.drawings import drawings
 
             outputs = {**{figures / name: data for name, data in drawings(values).items()}, **outputs}
-        found = list(dict.fromkeys(d for run in runs for d in run.result.diagnostics))
+        found = list(dict.fromkeys(d for run in runs for d in run.result.diagnostics)) + tab_faults
         text = "\n".join([*(_line(one) for one in values["runs"]), f"{output}: {len(outputs[output]) / 1e6:.2f} MB"])
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
 def pages(page: Path | None, path: Toolpath, result: PostResult, known: dict[ProofInput, Hashes] | None, name: str,
-          time: Estimate | None) -> dict[Path, str | bytes]:
-    """The page of `convert --report` by its place, of a conversion that writes the program `name`; none without one."""
+          time: Estimate | None) -> tuple[dict[Path, str | bytes], list[Diagnostic]]:
+    """The page of `convert --report` by its place, of a conversion that writes the program `name`, and what is wrong with
+    packages that add to it; none without one."""
     if page is None:
-        return {}
+        return {}, []
     from postproc.page.document import document, report_dict, texts_of
     from postproc.page.run import Run
+    from postproc.page.tabs import with_tabs
 
     runs = [Run(result, time, known or {}, name)]
-    return {page: document(report_dict(path, runs), texts_of(runs))}
+    values, found = with_tabs(report_dict(path, runs))
+    return {page: document(values, texts_of(runs))}, found
 
 
 def check_page(page: Path, option: str) -> None:

@@ -15,6 +15,8 @@ function words(k, info) {
   byId("sheet-body").replaceChildren(...sheetParts(k));
   byId("orientation-body").replaceChildren(...orientationParts(k));
   byId("errors-body").replaceChildren(...errorParts(k, openText));
+  byId("tabs").replaceChildren(...tabParts(k));
+  byId("tab-links").replaceChildren(...(info.tabs || []).flatMap((tab, n) => [make("a", {href: "#tab-" + n}, short(tab.title, 60)), " "]));
   byId("messages-body").replaceChildren(sorted.length ? messageItems(sorted, jumpTo) : "None.");
 }
 

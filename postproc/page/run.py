@@ -17,7 +17,7 @@ from postproc.page.solids import solids
 from postproc.page.tools import tool_rows
 from postproc.page.what_if import what_if
 from postproc.pipeline.result import PostResult
-from postproc.proof.hashes import Hashes, ProofInput, sha256
+from postproc.proof.hashes import Hashes, ProofInput, cl_hashes, sha256
 from postproc.report import summary
 from postproc.report.residuals import residuals
 from postproc.verification.proof_text import statement
@@ -96,8 +96,8 @@ def _legs(result: PostResult, known: Mapping[str, Floats]) -> dict[str, Any] | N
 def _files(run: Run) -> list[dict[str, str]]:
     """What the proof rests on: each file with its role and SHA-256."""
     source, result = run.result.source, run.result
-    found = [] if source is None else [("cl_file", result.toolpath.file.replace("\\", "/").rsplit("/", 1)[-1],
-                                        sha256(source.data))]
+    name = result.toolpath.file.replace("\\", "/")
+    found = [] if source is None else [("cl_file", one.file, one.sha256) for one in cl_hashes(name, source)]
     if result.ok:
         found.append(("program", run.name, sha256(result.text.encode())))
         found += [("program", name, sha256(text.encode())) for name, text in (result.files or {}).items()]

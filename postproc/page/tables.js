@@ -134,3 +134,11 @@ function errorParts(k, jump) {
     p.part_mm.map((v) => number(v, 3)).join(", "), p.vector_um.map((v) => number(v, 2)).join(", "), p.vector_after_um.map((v) => number(v, 3)).join(", "), figure(`${base}.worst.${n}.before_um`, 2, "um"), figure(`${base}.worst.${n}.after_um`, 3, "um")]), [4, 5]),
   make("p", {class: "note"}, `These are the ten worst; "error vectors" under Path draws them at ${found.places.length} places, before and after.`)];
 }
+
+// Sections of installed packages: texts and tables, as plain values.
+function tabParts(k) {
+  return (report.runs[k].tabs || []).map((tab, n) => make("section", {id: "tab-" + n}, make("h2", {}, short(tab.title, 120)),
+    ...tab.blocks.map((block, b) => (typeof block === "string" ? make("p", {}, block) : table(block.heads, block.rows.map((row, i) => row.map((cell, j) => (typeof cell === "number" ? figure(`runs.${k}.tabs.${n}.blocks.${b}.rows.${i}.${j}`, 4, "") : cell === null ? "-" : cell))),
+      block.heads.map((_, j) => j).filter((j) => block.rows.every((row) => typeof row[j] !== "string"))))),
+    make("p", {class: "note"}, `Of the package ${tab.package} ${tab.version} (${tab.name}; code ${tab.sha256.slice(0, 12)}), not of postproc.`)));
+}

@@ -48,7 +48,8 @@ def with_cubics(path: Toolpath, options: Options) -> Toolpath:
     source = path.source
     if source is None or not path.spline_slack:
         return path
-    read = read_bytes(source.data, file=path.file, units=source.units or None, dialect=source.dialect or None,
+    asked = source.dialect or None if source.plug_in is None else None
+    read = read_bytes(source.data, file=path.file, units=source.units or None, dialect=asked,
                       allow_unknown=options.allow_unknown, tolerance=path.spline_slack / SPLINE_SHARE, cubics=True)
     return read.toolpath if len(read.toolpath.faults) == len(path.faults) else path
 

@@ -17,6 +17,7 @@ from postproc.pipeline.cutcom_header import cutcom_lines
 from postproc.pipeline.pivot_header import pivot_lines
 from postproc.pipeline.stage_values import CompiledStage
 from postproc.readback.comparison.length_margins import pending_lines
+from postproc.setup.criteria import criteria_of
 from postproc.setup.model import stated_value
 
 
@@ -27,6 +28,10 @@ def header_lines(made: CompiledStage) -> list[str]:
     header = [f"postproc {VERSION}", f"source {FilePath(made.toolpath.file).name}", f"machine {machine.name}",
               f"controller {made.controller_name}", PENDING, *made.options.header(),
               f"words: {_meanings(made.program)}", *_work_offsets(job)]
+    if made.source is not None and made.source.plug_in is not None:
+        header.append(f"CL file as read by {made.source.plug_in.stamped()}")
+    header += [f"machine by {machine.kind_code}"] * bool(machine.kind_code)
+    header += [f"orientation criterion {one.plug_in.stamped()}" for one in criteria_of(made.setup.orientation.criteria)]
     header += _measured(job)
     if made.setup.tool_numbers:
         numbers = dict.fromkeys(f"{t.name} = T{t.number}" for t in made.toolpath.tools if t.name)

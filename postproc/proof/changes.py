@@ -9,7 +9,7 @@ from typing import Any, Literal
 from postproc.base.version import VERSION
 from postproc.pipeline.result import VerifyResult
 from postproc.proof.file import AGAIN, HashedFile, ProofFile, options_of, read_proof
-from postproc.proof.hashes import FileHash, Hashes, ProofInput, proof_place, sha256
+from postproc.proof.hashes import FileHash, Hashes, ProofInput, cl_hashes, proof_place, sha256
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
 from toolpaths.input_files import STANDARD_INPUT, is_regular, read_input
 
@@ -68,7 +68,7 @@ def compared(result: VerifyResult, inputs: dict[ProofInput, Hashes],
 
 
 def _cl(result: VerifyResult) -> Hashes:
-    return () if result.source is None else (FileHash(Path(result.cl_file).name, sha256(result.source.data)),)
+    return () if result.source is None else cl_hashes(result.cl_file, result.source)
 
 
 def _program(result: VerifyResult, kept: ProofFile, folder: Path) -> str:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from postproc.base.version import VERSION
 from postproc.pipeline.result import PostResult
-from postproc.proof.hashes import FileHash, Hashes, ProofInput, sha256
+from postproc.proof.hashes import Hashes, ProofInput, cl_hashes, sha256
 from postproc.readback.comparison.compare import Comparison
 from postproc.verification.proof_text import statement
 from toolpaths.diagnostics import Diagnostic, error
@@ -120,12 +120,12 @@ def proof_text(result: PostResult, inputs: dict[ProofInput, Hashes], output: str
     found, source = result.comparison, result.source
     if found is None or source is None:
         raise ValueError("a path that was not read from a file, or not compared, has no proof")
-    cl = FileHash(Path(result.toolpath.file).name, sha256(source.data))
+    cl = cl_hashes(result.toolpath.file, source)
     texts = {Path(output).name: result.text, **(result.files or {})}
     values: dict[str, Any] = {
         "schema_version": 1, "kind": "proof of a program", "postproc": VERSION,
         "proved": not found.unbounded, "statement": statement(found, result.witness),
-        "inputs": {name: [vars(one) for one in found] for name, found in {"cl_file": (cl,), **inputs}.items()},
+        "inputs": {name: [vars(one) for one in found] for name, found in {"cl_file": cl, **inputs}.items()},
         "program": [{"file": name, "sha256": sha256(text.encode())} for name, text in texts.items()],
         "options": options_of(result), "records": asdict(result.toolpath.records),
         "read_back": _read_back(found), "second_reading": _second(result)}

@@ -13,8 +13,10 @@ from machines.loader import builtin
 from machines.user_file import UserFile, base_chain, read_toml
 from postproc.base.options import Options
 from postproc.controllers.model import builtin_files
+from postproc.setup.criteria import criteria_of
 from postproc.setup.files import file_keys, seen_from_here, value_at
 from toolpaths.input_files import read_input
+from toolpaths.toolpath import ClSource
 
 ENDING = ".proof.json"
 """behind the name of the program"""
@@ -40,6 +42,12 @@ def sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
+def cl_hashes(name: str, source: ClSource) -> Hashes:
+    """Of a CL file, and of the code of the package that reads it, where one does."""
+    code = source.plug_in
+    return (FileHash(Path(name).name, sha256(source.data)), *([] if code is None else [FileHash(str(code), code.sha256)]))
+
+
 def input_hashes(machine: str, controller: str, options: Options) -> dict[ProofInput, Hashes]:
     """By input (set-up, machine, controller, error model): its file, the files of its `base` chain, files that it names.
 
@@ -49,8 +57,9 @@ def input_hashes(machine: str, controller: str, options: Options) -> dict[ProofI
     Raises:
         OSError: where a file cannot be read any more.
     """
+    stated = _criteria(options.setup) if options.setup else ()
     setup = (*(_with_files(options.setup, {}, _meshes) if options.setup else ()),
-             *(_with_files(options.hooks, {}, _none) if options.hooks else ()))
+             *(_with_files(options.hooks, {}, _none) if options.hooks else ()), *stated)
     return {"setup": setup,
             "machine": machine_hashes(machine),
             "controller": _with_files(controller, builtin_files(), _none),
@@ -90,6 +99,13 @@ def _meshes(file: UserFile) -> list[Path]:
     """Mesh files of a set-up, as it sees them."""
     seen = seen_from_here(file)
     return [Path(seen.file).parent / str(value_at(seen.values, key)) for key in file_keys(seen.values)]
+
+
+def _criteria(setup: str) -> Hashes:
+    """The code of the packages whose limits of tool axes a set-up states."""
+    file, _ = read_toml(setup)
+    tables = {} if file is None else file.values.get("orientation", {}).get("criteria", {})
+    return tuple(FileHash(str(one.plug_in), one.plug_in.sha256) for one in criteria_of(tables))
 
 
 def _kind(file: UserFile) -> list[Path]:

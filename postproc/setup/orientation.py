@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from machines.user_model import UserModel
+from postproc.setup.criteria import CriterionValue, criteria_of
 from postproc.setup.ranges import pair
 
 LimitAngle = Annotated[float, Field(ge=-90.0, le=90.0)]
@@ -16,6 +17,14 @@ def _ordered(values: tuple[float, float]) -> tuple[float, float]:
     if values[0] > values[1]:
         raise ValueError(f"the least, {values[0]:g}, is above the greatest, {values[1]:g}: write [least, greatest]")
     return values
+
+
+CriterionTables = dict[str, dict[str, CriterionValue]]
+
+
+def _checked(tables: CriterionTables) -> CriterionTables:
+    criteria_of(tables)
+    return tables
 
 
 AngleRange = Annotated[tuple[LimitAngle, LimitAngle], BeforeValidator(pair), AfterValidator(_ordered)]
@@ -40,6 +49,8 @@ class OrientationLimits(UserModel):
     """the same as least distance of the contact from the tool axis, mm"""
     fixed_operations: tuple[str, ...] = ()
     """names of operations that keep the axes of the CL file"""
+    criteria: Annotated[CriterionTables, AfterValidator(_checked)] = Field(default_factory=dict)
+    """limits of installed packages, a table for each by its name, with the keys that the package says"""
 
     @model_validator(mode="after")
     def _one_centre(self) -> OrientationLimits:

@@ -181,6 +181,7 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
     heard = together(said)
     if len(comparison.executed[0].curves) and not unread and all(one.what != "curves" for one in heard.compared):
         unread = [NotCompared("text", "polynomials: the program is not one text in the order in which it runs")]
+    unread = [*unread, *_records_of_others(source)]
     found += [error("verify.not_compared", f"the second witness has not compared {one.why}", file=job.toolpath.file,
                     hint="leave --require-proof out, where the read-back alone is enough")
               for one in unread if options.require_proof]
@@ -196,6 +197,11 @@ def _unread_text(job: Job, program: bytes | str, curves: bool) -> list[NotCompar
     if not what or not program or not reader.in_macros(as_bytes(program)):
         return []
     return [NotCompared("text", f"{' and '.join(what)}: a program with variables, read back alone")]
+
+
+def _records_of_others(source: ClSource) -> list[NotCompared]:
+    """What this witness takes from a package: which records a file holds that only that package reads."""
+    return [] if source.plug_in is None else [NotCompared("text", f"records of the CL file as read by {source.plug_in}")]
 
 
 def _order(setup: SetupFile, comparison: Comparison, job: Job) -> list[Diagnostic]:
@@ -231,7 +237,8 @@ def _case(source: ClSource, setup: SetupFile, options: Options, job: Job, compar
     control, words, curves = job.control_at(place), job.controller.codes, len(comparison.executed[0].curves) > 0
     errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})
     machine = _by_drives(job.machine)
-    return Case(source.data, machine_tables(machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
+    text = source.data if source.plug_in is None else source.records
+    return Case(text, machine_tables(machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
                 *errors, "{register}" in words.length_offset, "{register}" in words.compensation_left,
                 sum(bit for bit, code in ((1, words.flood), (2, words.mist), (4, words.through), (8, words.air)) if code),
@@ -239,4 +246,4 @@ def _case(source: ClSource, setup: SetupFile, options: Options, job: Job, compar
                 clamps={a: (c.clamp, c.unclamp) for a, c in job.machine.clamp_codes.items()} if program else {},
                 modulo={job.machine.axis_names[j]: roll.rule for j, roll in control.rolls.items()},
                 origin=control.origin, limits=limits_as_used(machine), work_offset=offset_joints(control),
-                chosen=job.toolpath.axis if options.orient != "keep" else None)
+                chosen=job.toolpath.axis if options.orient != "keep" else None, cl_lines=source.lines)

@@ -15,7 +15,7 @@ from postproc.witness.dialect import ALL, dialect_of, scale_of
 from postproc.witness.execution import Execution, Z
 from postproc.witness.other_forms import other_text
 from postproc.witness.rows import assembled
-from postproc.witness.text import Array, Record, read
+from postproc.witness.text import Array, Record, read, renumbered
 
 _NAN3 = (math.nan,) * 3
 FEEDS = {"MMPM": (1.0, False), "IPM": (25.4, False), "FPM": (304.8, False), "MPM": (1000.0, False), "MMPS": (60.0, False),
@@ -36,13 +36,14 @@ _UNREAD_MOTION = frozenset((
     "INDIRP", "ROTHED"))
 
 
-def commanded(data: bytes, units: str | None = None, dialect: str | None = None) -> Commanded:
-    """What a CL file commands; `units` and `dialect` stand before what the file says.
+def commanded(data: bytes, units: str | None = None, dialect: str | None = None,
+              lines: tuple[int, ...] | None = None) -> Commanded:
+    """What a CL file commands; `units` and `dialect` stand before what the file says, `lines` are those of its records.
 
     What is not understood is in `unread`, and the positions that it touches are not known.
     """
     other = other_text(data, dialect)
-    name, text = other or (dialect or "", read(data))
+    name, text = other or (dialect or "", read(data) if lines is None else renumbered(read(data), lines))
     spoken = ALL.get(name) or dialect_of(text.records, data)
     scale = {"mm": 1.0, "inch": 25.4}.get(units or "", 0.0) or scale_of(text.records)
     e = Execution(text, spoken, scale)

@@ -19,6 +19,7 @@ class Case:
         machine: the parsed file, then its base and that one's
         errors: the program corrects geometric errors; error_model: the parsed file of them over its bases, empty where there
             is none, its tables by the names that stand in `error_tables`
+        cl_lines: of the CL file, by line of `cl`, where that is made of another text; None where it is the file
         registers: False where the control has no length registers to be named; radius_named: its cutter compensation
             names one; coolants: bits of the kinds that it has codes for: it gives the nearest of them for others
         program: its text, where it is one file; clamps: codes that clamp and release, by letter of the axes
@@ -51,6 +52,7 @@ class Case:
     limits: Array | None = None
     work_offset: Array | None = None
     chosen: Array | None = None
+    cl_lines: tuple[int, ...] | None = None
 
 
 @dataclass(frozen=True)

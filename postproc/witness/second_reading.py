@@ -33,7 +33,7 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
     """What this witness says of an executed program; it never raises for what it does not understand."""
     began = process_time()
     try:
-        c = with_spindle(commanded(case.cl, case.units, case.dialect), case.setup)
+        c = with_spindle(commanded(case.cl, case.units, case.dialect, case.cl_lines), case.setup)
         place = placement(case.setup, c)
         c = c if case.chosen is None else _reoriented(c, case.chosen)
     except Unplaced as fault:

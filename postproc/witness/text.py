@@ -118,6 +118,12 @@ def read(data: bytes) -> ClText:
                   [int(before[k]) for k in used], [int(lines[k]) for k in used])
 
 
+def renumbered(text: ClText, lines: tuple[int, ...]) -> ClText:
+    """A text with other numbers of its lines: `lines` by number from 1."""
+    found = np.array(lines, np.int64)
+    return ClText(text.points, found[text.line - 1], text.records, text.before, [int(found[k - 1]) for k in text.lines])
+
+
 def _lines_of_points(text: bytes, spans: list[tuple[int, int]], ends: Array, line_of: Array) -> Array:
     """Lines of the plain points: all line ends but those of other records, and those that only continue."""
     real = ends[np.frombuffer(text, np.uint8)[ends] == 10]

@@ -47,6 +47,7 @@ class HintCase:
         harm: what is done to the files that they write
         code_left: the code may still be said, of another thing; the message is gone
         stops: errors of other codes that are left: what else is wrong in the same files
+        packages: the folder is one in which packages are installed
     """
 
     code: str
@@ -58,6 +59,7 @@ class HintCase:
     harm: tuple[Edit, ...] = ()
     code_left: bool = False
     stops: tuple[str, ...] = field(default=())
+    packages: bool = False
 
     def begin(self, folder: Path) -> None:
         """The files, and what the first commands write."""

@@ -16,9 +16,10 @@ from tests.hints.import_cases import IMPORTS
 from tests.hints.machine_cases import MACHINE
 from tests.hints.macro_cases import MACROS
 from tests.hints.own_room_cases import OWN_ROOMS
+from tests.hints.package_cases import PACKAGES
 from tests.hints.place_cases import PLACE
 from tests.hints.tool_cases import TOOLS
 from tests.hints.verify_cases import VERIFY
 
 CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE, *ALIGN, *PLACE, *VERIFY, *EXCHANGE,
-         *OWN_ROOMS, *MACROS, *BATCH, *DESIGN]
+         *OWN_ROOMS, *MACROS, *BATCH, *DESIGN, *PACKAGES]

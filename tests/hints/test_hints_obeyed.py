@@ -43,6 +43,8 @@ def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("case", CASES, ids=[f"{c.code}-{k}" for k, c in enumerate(CASES)])
 def test_a_hint_obeyed_is_the_end_of_its_fault(case: HintCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    if case.packages:
+        monkeypatch.syspath_prepend(str(tmp_path))
     case.begin(tmp_path)
     _, before = called(case.command, tmp_path)
     said = [d for d in before if d["code"] == case.code and re.search(case.says, d["hint"])]

@@ -97,7 +97,7 @@ def test_a_package_registers_a_kind_by_its_metadata(tmp_path, monkeypatch) -> No
     assert machines.load("mill-3axis").kinematics.straight_slides  # a built-in kind stays what it is
     (info / "entry_points.txt").write_text(f"[{kinds.GROUP}]\nscissors = gone_module:Model\n")
     fault = only(tmp_path)
-    assert "is not imported: ModuleNotFoundError" in fault.message and "reinstall the package" in fault.hint
+    assert "shop-machine) is not imported: ModuleNotFoundError" in fault.message and "reinstall or" in fault.hint
 
 
 def test_files_that_are_no_kinds_are_refused_with_what_is_wrong(tmp_path, monkeypatch) -> None:

@@ -133,6 +133,62 @@ def test_what_cannot_be_put_back_is_put_back_by_the_next_run(shop: tuple[Path, d
     assert {k: v for k, v in state(folder).items() if not k.startswith("made")} == before
 
 
+def held(times: int, number: int) -> Callable[[Path, Path], Path]:
+    """`Path.replace` as on Windows while a viewer holds the old file: refused so often with the number of the fault."""
+    real, calls = Path.replace, [0]
+
+    def replace(self: Path, target: Path) -> Path:
+        if target.name == "main.nc" and self.suffix == ".new" and calls[0] < times:
+            calls[0] += 1
+            fault = PermissionError(errno.EACCES, "Permission denied")
+            fault.winerror = number
+            raise fault
+        return real(self, target)
+
+    return replace
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_viewer_that_holds_the_file_for_a_moment_is_waited_for(shop: tuple[Path, dict[Path, str]], alone: bool,
+                                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, outputs = shop
+    outputs = {folder / "main.nc": "new main.nc"} if alone else outputs
+    waits = list[float]()
+    monkeypatch.setattr(transaction.time, "sleep", waits.append)
+    monkeypatch.setattr(Path, "replace", held(2, 32))
+    assert write_together(outputs) == [] and len(waits) == 2
+    assert {p: p.read_text() for p in outputs} == outputs
+
+
+@pytest.mark.parametrize(("number", "tries", "words", "hint"), [
+    (32, 4, transaction.HELD, "close it there"), (5, 4, transaction.HELD, "close it there"),
+    (1, 0, "Permission denied", "")])
+def test_a_viewer_that_keeps_the_file_is_named_and_all_stays(shop: tuple[Path, dict[Path, str]], number: int, tries: int,
+                                                             words: str, hint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, outputs = shop
+    before, waits = state(folder), list[float]()
+    monkeypatch.setattr(transaction.time, "sleep", waits.append)
+    monkeypatch.setattr(Path, "replace", held(99, number))
+    with pytest.raises(DiagnosticError) as fault:
+        write_together(outputs)
+    (found,) = fault.value.diagnostics
+    assert words in found.message and hint in found.hint and len(waits) == tries and state(folder) == before
+
+
+def test_files_are_synced_open_to_be_written_as_windows_needs_it(shop: tuple[Path, dict[Path, str]],
+                                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+    import fcntl
+
+    def fsync(handle: int) -> None:
+        read_only = fcntl.fcntl(handle, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
+        if read_only or stat.S_ISDIR(os.fstat(handle).st_mode):
+            raise OSError(errno.EBADF, "Bad file descriptor")
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(Path, "hardlink_to", lambda self, target: (_ for _ in ()).throw(OSError(errno.ENOTSUP, "no links")))
+    assert write_together(shop[1]) == []
+
+
 def test_read_only_files_are_refused(shop: tuple[Path, dict[Path, str]]) -> None:
     folder, outputs = shop
     (folder / "subs" / "O1").chmod(0o444)

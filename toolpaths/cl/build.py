@@ -92,10 +92,12 @@ class ToolpathBuilder:
     """Reads one program. Handlers get it with the statement and use what they need."""
 
     def __init__(self, program: StatementList, points: Points, dialect: Dialect, units: LengthUnit, log: DiagnosticLog,
-                 allow_unknown: Iterable[str] = (), spline_slack: float = 0.0, cubics: bool = False):
+                 allow_unknown: Iterable[str] = (), spline_slack: float = 0.0, cubics: bool = False,
+                 passive: frozenset[str] = frozenset()):
         self.program, self.points, self.dialect, self.log = program, points, dialect, log
         self.units, self.scale, self.spline_slack, self.cubics = units, SCALE[units], spline_slack, cubics
-        self.allow_unknown = frozenset(w.upper() for w in allow_unknown)
+        self.passive = passive  # words that a package says to be without effect
+        self.allow_unknown = frozenset(w.upper() for w in allow_unknown) | passive
         self.row = self.fast = self.line = self.index = self.stop = 0
         self._piece = 0
         self.pieces: list[tuple[int, int]] = []

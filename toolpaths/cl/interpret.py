@@ -241,7 +241,8 @@ def _report_word(b: ToolpathBuilder, word: str, found: list[tuple[int, int, int]
     hint = f"{f'write {meant}, or ' if meant else ''}--allow-unknown {word} leaves it out"
     for line, row, numbers in found:
         if word in b.allow_unknown:
-            b.log.warning("cl.unknown-word", f"unknown word {word}, left out", line, key=word)
+            add = b.log.info if word in b.passive else b.log.warning
+            add("cl.unknown-word", f"unknown word {word}, left out", line, key=word)
         elif (numbers >= _MANY and 0 < row < b.row) or word.split(" ")[-1] in motion.HANDLERS or (
                 numbers > 0 and word.startswith(_MOVING)):
             b.log.error("cl.unknown-motion", f"unknown word {word} with {numbers} numbers, which may move the tool", line,

@@ -17,7 +17,8 @@ from toolpaths.cl.interpret import HANDLERS, known, report_others, run
 from toolpaths.cl.rapid_heights import low_rapids
 from toolpaths.cl.records import counted
 from toolpaths.cl.structure import open_paths
-from toolpaths.cl.systems.recognise import read_form, recognised
+from toolpaths.cl.systems.recognise import Form, read_form, recognised, shop_form
+from toolpaths.cl.systems.shop_forms import ShopText, shop_text
 from toolpaths.cl.text.dialects import DIALECTS, Dialect, detect, units_said
 from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.other_formats import APT, other_format
@@ -32,6 +33,8 @@ _OWN_HEAD = b"$$-> TOOLPATH /"
 _TAIL = 400
 """bytes that hold the last two lines"""
 _ENDS = (b"FINI", b"END")
+_SEEN = 20_000
+"""bytes of a file that some package may read, in which APT text has a point"""
 _SENTENCE = 3
 """words of a line behind the end that is the text of a listing"""
 
@@ -89,30 +92,24 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     log = DiagnosticLog(file)
     raw = data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data)
     other = None if recognised(raw) else other_format(raw)
-    if other:
+    shop = _read_by_package(raw, dialect, other is not None, log)
+    if other and shop is None:
         return _refused(file, f"this is {other[0]}", other[1])
-    plain = normalise(raw, log)
-    largest = LARGEST_OWN if plain.startswith(_OWN_HEAD) else LARGEST
-    if form := read_form(plain, dialect, log):
-        program, points, lines, found, evidence = form.program, form.points, form.lines, DIALECTS[form.name], form.evidence
-    else:
-        parts = scan(plain, progress, largest)
-        program, points, lines = Lexer(plain, parts, log, known, largest).program(), parts.points, parts.lines
-        found, evidence = (DIALECTS[dialect], "given") if dialect else detect(program)
-    del plain
-    b = ToolpathBuilder(program, points, found, _units(program, units, log), log, allow_unknown,
-                        SPLINE_SHARE * tolerance or SPLINE_CHORD, cubics)
+    said, apt = _said(raw, dialect, shop, log, progress)
+    program, found = said.program, DIALECTS[said.name]
+    b = ToolpathBuilder(program, said.points, found, _units(program, units, log), log, allow_unknown,
+                        SPLINE_SHARE * tolerance or SPLINE_CHORD, cubics, frozenset() if shop is None else shop.passive)
     run(b, 0, len(program.statements))
     b.finish_rows()
     open_paths(b)
-    if file and not form:
-        _cut_off(raw, lines, log)
+    if file and apt:
+        _cut_off(raw, said.lines, log)
     counts = report_others(b)
     if b.row == 0 and not has_errors(log.diagnostics()):
         log.error("cl.empty", "the file has no points", hint="a CL file has GOTO records")
     toolpath = assemble(b)
     _check_rapids(b, toolpath)
-    if not form:
+    if apt or shop is not None:
         check_forms(program, log, b.allow_unknown, found)
     records = counted(b, frozenset(HANDLERS))
     if _no_apt_text(b, records):
@@ -123,9 +120,35 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         log.info("cl.turning", f"{whole}: milling alone is converted")
     diagnostics = log.diagnostics()
     read = replace(_with_faults(toolpath, diagnostics), records=records)
-    object.__setattr__(read, "source", ClSource(raw, units or "", dialect or ""))
-    return ReadResult(read, diagnostics, counts, found.name, evidence,
-                      b.arc_records, b.cycle_records, lines)
+    source = ClSource(raw, units or "", dialect or "") if shop is None else shop.source(raw, units)
+    object.__setattr__(read, "source", source)
+    return ReadResult(read, diagnostics, counts, found.name, said.evidence,
+                      b.arc_records, b.cycle_records, said.lines)
+
+
+def _said(raw: bytes, dialect: DialectName | None, shop: ShopText | None, log: DiagnosticLog,
+          progress: ReadProgress | None) -> tuple[Form, bool]:
+    """What a file says, and True where it is APT text, line for line."""
+    if shop is not None and shop.lines is not None:
+        return shop_form(shop, raw), False
+    plain = normalise(raw, log) if shop is None else shop.text
+    form = read_form(plain, dialect if shop is None else shop.like, log)
+    if form is not None:
+        return form, False
+    largest = LARGEST_OWN if plain.startswith(_OWN_HEAD) else LARGEST
+    parts = scan(plain, progress, largest)
+    program = Lexer(plain, parts, log, known, largest).program()
+    if shop is not None:
+        return Form(shop.like, shop.evidence, program, parts.points, parts.lines), True
+    found, evidence = (DIALECTS[dialect], "given") if dialect else detect(program)
+    return Form(found.name, evidence, program, parts.points, parts.lines), True
+
+
+def _read_by_package(data: bytes, dialect: DialectName | None, other: bool, log: DiagnosticLog) -> ShopText | None:
+    """A file that an installed package reads; None where a dialect is asked for, or the file is the project's own form or
+    one that is known without it. `other`: it is no APT text."""
+    known_form = dialect is not None or data.startswith(_OWN_HEAD) or recognised(data) is not None
+    return None if known_form else shop_text(data, other or b"GOTO" not in data[:_SEEN].upper(), log)
 
 
 def _refused(file: str, message: str, hint: str) -> ReadResult:

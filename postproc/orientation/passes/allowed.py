@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from postproc.orientation.passes.passes import Pass
 from postproc.orientation.passes.reasons import HALF_TURN, BrokenLimit, LimitedAngle, Touching
+from postproc.setup.criteria import Criterion, criteria_of
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Bools, Floats
 from toolpaths.rotations import angle_between
@@ -39,6 +42,7 @@ class _Bound:
     """(M, K)"""
     low: float
     high: float
+    title: str = ""
 
     def over(self) -> Floats:
         """(M, K) by how much, rad; 0 or less inside and where the angle is not known."""
@@ -84,7 +88,20 @@ class AllowedAxes:
                 for first in range(0, len(rows), step):
                     some = rows[first:first + step]
                     result[some] = np.fmax.reduce(axes[some] @ normals.T, axis=1, initial=-np.inf) <= offset + _SLACK
+        for bound in self._criteria(one, axes[result]):
+            result[result] = (bound.over() <= _SLACK).all(axis=1)
         return result
+
+    @cached_property
+    def criteria(self) -> tuple[Criterion, ...]:
+        """Those of packages that the set-up states."""
+        return criteria_of(self.limits.criteria)
+
+    def _criteria(self, one: Pass, axes: Floats) -> Iterator[_Bound]:
+        """What criteria of packages make of unit axes (M, 3); one after the other."""
+        for criterion in self.criteria if len(axes) else ():
+            angles = criterion.angles(axes, one.contact.normal, one.contact.travel)
+            yield _Bound("criterion", angles, *criterion.bounds(), criterion.title())
 
     def among(self, one: Pass, apart: float) -> Floats:
         """All axes (M, 3) of an even lattice, some `apart` rad from each other, that a pass may take."""
@@ -114,14 +131,14 @@ class AllowedAxes:
         at, limits = one.contact, self.limits
         if not len(at):
             lean = angle_between(axes, one.axis)[:, None]
-            return [_Bound("tilt from the CL axis", lean, 0.0, self.tilt)]
+            return [_Bound("tilt from the CL axis", lean, 0.0, self.tilt), *self._criteria(one, axes)]
         least = off_centre(limits, one.radius)
         result = [_Bound("tilt from the normal", at.inclination(axes), least, self.tilt)]
         if limits.lead is not None:
             result.append(_Bound("lead", at.lead(axes), limits.lead[0] * DEG, limits.lead[1] * DEG))
         if limits.tilt is not None:
             result.append(_Bound("tilt sideways", at.tilt(axes), limits.tilt[0] * DEG, limits.tilt[1] * DEG))
-        return result
+        return [*result, *self._criteria(one, axes)]
 
 
 def off_centre(limits: OrientationLimits, radius: float) -> float:
@@ -144,11 +161,11 @@ def lattice(apart: float) -> Floats:
 
 def _noted(one: Pass, bound: _Bound, k: int) -> BrokenLimit:
     """A limit that is broken at place k."""
-    line = int(one.contact.line[k]) if len(one.contact) else None
+    line = int(one.contact.line[k]) if len(one.contact) == bound.values.shape[1] else None
     high = HALF_TURN if bound.high >= np.pi else bound.high / DEG
-    return BrokenLimit(bound.limited, float(bound.values[0, k]) / DEG, bound.low / DEG, high, line)
+    return BrokenLimit(bound.limited, float(bound.values[0, k]) / DEG, bound.low / DEG, high, line, bound.title)
 
 
 def own_outside(one: Pass, limits: OrientationLimits) -> BrokenLimit | None:
     """Which limit of the set-up the CL's own axis of a pass breaks; --max-tilt does not count."""
-    return None if not len(one.contact) else AllowedAxes(np.pi, None, limits).outside(one, one.axis)
+    return AllowedAxes(np.pi, None, limits).outside(one, one.axis) if len(one.contact) or limits.criteria else None

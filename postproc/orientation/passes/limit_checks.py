@@ -6,10 +6,11 @@ from __future__ import annotations
 import numpy as np
 
 from machines.user_file import nearest, read_toml
-from postproc.orientation.passes.allowed import off_centre, own_outside
+from postproc.orientation.passes.allowed import AllowedAxes, off_centre, own_outside
 from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.diagnostics import Diagnostic, error, info, warning
+from toolpaths.plug_ins import PlugInFault
 from toolpaths.units import DEG
 
 _NORMALS = ("have the CAM system write surface normals (GOTO with nine numbers), or name the part mesh ([bodies] part), or "
@@ -21,10 +22,23 @@ def limit_faults(work: PassContext, file: str = "", tilt: float = np.pi) -> list
     `tilt` the largest from the surface normals, rad."""
     limits = work.setup.orientation
     free = [one for one in work.passes if not one.fixed]
+    if broken := _broken_criteria(work, limits, free, file):
+        return broken
     impossible = _too_wide(work, limits, free, file) or _too_steep(work, limits, free, file, tilt)
     own = [] if impossible else [*_own(work, limits, free), *_own_tilt(work, free, tilt)]
     return [*_unknown_operations(work, limits, file), *_no_normals(work, limits, free), *impossible,
             *_no_contact(work, free), *own]
+
+
+def _broken_criteria(work: PassContext, limits: OrientationLimits, free: list[Pass], file: str) -> list[Diagnostic]:
+    """An error where the code of a package gives no angles of the axes that the passes have now."""
+    try:
+        for one in free if limits.criteria else ():
+            AllowedAxes(np.pi, None, limits).outside(one, one.axis)
+    except PlugInFault as fault:
+        return [error("orient.criterion", str(fault), file=file or work.toolpath.file, lines=_line(file, "criteria"),
+                      hint=fault.hint)]
+    return []
 
 
 def _unknown_operations(work: PassContext, limits: OrientationLimits, file: str) -> list[Diagnostic]:

@@ -63,11 +63,12 @@ class Refusal:
         return "out of reach" + (nearest if self.missing > 0.0 else "")
 
 
-LimitedAngle = Literal["tilt from the CL axis", "tilt from the normal", "lead", "tilt sideways"]
+LimitedAngle = Literal["tilt from the CL axis", "tilt from the normal", "lead", "tilt sideways", "criterion"]
 """angles of a tool axis that are limited"""
 _ANGLE: dict[LimitedAngle, tuple[str, str]] = {
     "tilt from the CL axis": ("tilt", " from the axis of the CL file"), "lead": ("lead", ""),
-    "tilt from the normal": ("tilt", " from the surface normal"), "tilt sideways": ("tilt sideways", "")}
+    "tilt from the normal": ("tilt", " from the surface normal"), "tilt sideways": ("tilt sideways", ""),
+    "criterion": ("", "")}
 """what each is called, and what it is measured from where the name does not say it"""
 
 
@@ -78,6 +79,7 @@ class BrokenLimit:
     Attributes:
         angle, low, high: degrees at the worst place, and what is allowed
         line: of the CL file, None where only the axis of the pass is known
+        title: of the angle, where a criterion of a package limits it
     """
 
     limited: LimitedAngle
@@ -85,10 +87,12 @@ class BrokenLimit:
     low: float
     high: float
     line: int | None = None
+    title: str = ""
 
     def __str__(self) -> str:
         where = "" if self.line is None else f" at line {self.line}"
         name, origin = _ANGLE[self.limited]
+        name = self.title or name
         low, high = f"{self.low:.3f}", f"{self.high:.3f}"
         between = f"{low} to {high}" if self.low != 0.0 or not origin else high
         allowed = f"at least {low}" if self.high >= HALF_TURN else between

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from toolpaths.choices import DialectName
 from toolpaths.cl.systems.as_statements import EXPORTED, AsStatements
+from toolpaths.cl.systems.shop_forms import ShopText
 from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.scan import Points
 from toolpaths.cl.text.source import text_of
@@ -68,3 +69,10 @@ def _said(form: DialectName, text: str, log: DiagnosticLog) -> AsStatements:
     if form == "nci":
         return NciReader(log).read(text)
     return (FreeCadReader if form == "freecad" else StepNcReader)(text, log).read()
+
+
+def shop_form(shop: ShopText, data: bytes) -> Form:
+    """A file of whose records an installed package has made statements; `data`: its bytes, for the count of its lines."""
+    said = shop.statements()
+    ends = max(data.count(b"\n"), data.count(b"\r"))
+    return Form(shop.like, shop.evidence, said.program, said.points(), ends + (not data.endswith((b"\n", b"\r"))))
