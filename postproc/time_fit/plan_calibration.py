@@ -28,7 +28,7 @@ from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from postproc.time_fit.calibrate import Runs, begin_of, expected, free_parameters, prior_of, slopes
 from postproc.time_fit.candidate_moves import SPEED, CandidateMoves, candidates, cl_text
-from postproc.time_fit.left_out import KEPT, LEAST_SHARE
+from postproc.time_fit.left_out import KEPT, LEAST_SHARE, MOSTLY
 from postproc.time_fit.log import RunLog
 from postproc.time_fit.runs import MeasuredRun, run_of_log
 from toolpaths.arrays import Floats
@@ -45,6 +45,8 @@ SCATTER = 0.01
 """share of a section's time that a run scatters, of sections of the mean length"""
 SHORTER = 0.95
 """by which a test is made shorter at least that takes too long with its linking moves"""
+MARGIN = 2.5
+"""times the share of a run that a kind of motion needs which it is given: on the control it takes another time"""
 GAIN = 0.01
 """share of the variance that is left which a further move must take away"""
 
@@ -77,7 +79,7 @@ class Knowledge:
     """What M candidates say of F parameters, and what the program at hand asks.
 
     Attributes:
-        information (M, F, F): in prior deviations; seconds (M,): of each; kinds (M, K): s in motion by kind
+        information (M, F, F): in prior deviations; seconds (M,): of each; kinds (M, K): s of sections that are of a kind
         wanted (F,): s of the program's time for a prior deviation of each parameter; share (K,): s of it by kind
     """
 
@@ -91,7 +93,7 @@ class Knowledge:
         """s2 of the program's time after a run of some candidates."""
         inner = np.eye(len(self.wanted)) + self.information[chosen].sum(axis=0)
         seen = self.kinds[chosen].sum(axis=0)
-        held = (seen > 0.0) & (seen >= LEAST_SHARE * seen.sum())
+        held = (seen > 0.0) & (seen >= MARGIN * LEAST_SHARE * self.seconds[chosen].sum())
         of_kind = np.array([NOT_SEEN[name] for name in KINDS]) * np.where(held, KEPT, 1.0)
         return float(self.wanted @ np.linalg.solve(inner, self.wanted) + (self.share @ of_kind) ** 2)
 
@@ -175,6 +177,7 @@ def knowledge(blocks: MotionBlocks, box: PostResult, machine: Machine, model: Cy
     times, here = timed(test, model), timed(blocks, model)
     information = np.stack([0.5 * weighted[owner == k].T @ weighted[owner == k] for k in range(count)])
     by_kind = run.by_kind(times)
+    by_kind = np.where(by_kind > MOSTLY * by_kind.sum(axis=1, keepdims=True), by_kind, 0.0)
     kinds = np.stack([by_kind[owner == k].sum(axis=0) for k in range(count)])
     seconds = np.array([run.modelled(model)[owner == k].sum() for k in range(count)])
     return Knowledge(information, seconds, kinds, wanted, time_by_kind(blocks, here))
