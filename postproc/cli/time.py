@@ -45,10 +45,10 @@ HeldAgainst = Annotated[Literal["toppra"] | None, typer.Option(
     "--check", metavar="{toppra}", help="hold the planned passes of a CL file against toppra's least time under "
     "velocity and acceleration")]
 Tables = Annotated[str, typer.Option("--csv", metavar="TABLES.csv", help="the tables by tool, operation and cause")]
-Planned = Annotated[Path | None, typer.Option(
+TestProgram = Annotated[Path | None, typer.Option(
     "--plan-calibration", metavar="TEST.nc", help="write the test program, in air, whose measured run would narrow the band "
     "of FILE most, and its set-up TEST.setup.toml; run and log it, then --calibrate")]
-PlannedTime = Annotated[float, typer.Option("--plan-seconds", metavar="S", min=5.0, max=3600.0,
+TestSeconds = Annotated[float, typer.Option("--plan-seconds", metavar="S", min=5.0, max=3600.0,
                                             help="s that the test program may take")]
 
 
@@ -78,8 +78,8 @@ def time(files: TimedFiles,
          beyond: Beyond = False,
          max_blocks: MaxBlocks = None,
          check: HeldAgainst = None,
-         plan_calibration: Planned = None,
-         plan_seconds: PlannedTime = 60.0,
+         plan_calibration: TestProgram = None,
+         plan_seconds: TestSeconds = 60.0,
          json: Json = "") -> None:
     """Estimate how long programs take, with a band, and where the time goes; several side by side."""
     logs, ending = calibrate or [], figure_ending(figure)

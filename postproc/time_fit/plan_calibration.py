@@ -1,9 +1,9 @@
 """The test program that narrows the band of a program's time most: moves in air, chosen by what they show of the control.
 
-Each candidate (`candidate_moves.py`) is timed by the model at its parameters and beside them; with J the derivatives of its
+Each candidate (`candidate_moves.py`) is timed by the model at its parameters and next to them; with J the derivatives of its
 sections' times in prior deviations over the uncertainty of a section, J'J is what the moves say of the parameters
 (information, V. V. Fedorov, Theory of Optimal Experiments, 1972). The time of the program at hand has the variance
-c'(I + sum J'J)^-1 c, c its own derivatives (c-optimality), and beside it what the model is off on kinds of motion that no
+c'(I + sum J'J)^-1 c, c its own derivatives (c-optimality), and with it what the model is off on kinds of motion that no
 run has shown. Moves are taken one after the other, those that lower this variance most for a second of the run, until the
 time is spent or nothing is gained.
 """
@@ -124,7 +124,7 @@ def plan_calibration(blocks: MotionBlocks, machine: Machine, controller: str, mo
         name: of the test program's file
 
     Raises:
-        DiagnosticError: why the smallest box of air is not within reach, or that no move tells anything within the time.
+        DiagnosticError: why the smallest box of air is not within reach, or that no move shows anything within the time.
     """
     model = model.quick().of_machine(machine)
     all_moves, box = _box(machine, controller, setup, model)
