@@ -47,7 +47,7 @@ TIP = (
 _WHAT_IF = [
     HintCase(
         "time.plan",
-        "time p.nc -m mill-3axis -c linuxcnc --plan-calibration t.nc --plan-seconds 5",
+        "time p.nc -m mill-3axis -c generic-iso --plan-calibration t.nc --plan-seconds 5",
         {"p.nc": PROGRAM},
         "more time with --plan-seconds",
         (Edit(COMMAND, "--plan-seconds 5", "--plan-seconds 60"),),
