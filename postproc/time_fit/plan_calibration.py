@@ -140,11 +140,11 @@ def plan_calibration(blocks: MotionBlocks, machine: Machine, controller: str, mo
             plan = _expected(blocks, machine, model, made, test, taken, low, high)
             if plan.after.band[1] - plan.after.band[0] < plan.now.band[1] - plan.now.band[0]:
                 return plan
-            raise DiagnosticError([error("time.plan", "the band of this program is as narrow as a test would leave it",
+            raise DiagnosticError([error("time.test", "the band of this program is as narrow as a test would leave it",
                                          hint="log a run of the program itself, and give it with --calibrate")])
         alone = float(known.seconds[rows].sum())
         left = min(budget - (taken - alone), SHORTER * alone)
-    raise DiagnosticError([error("time.plan", f"no test within {budget:g} s narrows the band of this program",
+    raise DiagnosticError([error("time.test", f"no test within {budget:g} s narrows the band of this program",
                                  hint="give it more time with --plan-seconds")])
 
 

@@ -46,7 +46,7 @@ TIP = (
 )
 _WHAT_IF = [
     HintCase(
-        "time.plan",
+        "time.test",
         "time p.nc -m mill-3axis -c generic-iso --plan-calibration t.nc --plan-seconds 5",
         {"p.nc": PROGRAM},
         "more time with --plan-seconds",
