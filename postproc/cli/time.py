@@ -45,6 +45,11 @@ HeldAgainst = Annotated[Literal["toppra"] | None, typer.Option(
     "--check", metavar="{toppra}", help="hold the planned passes of a CL file against toppra's least time under "
     "velocity and acceleration")]
 Tables = Annotated[str, typer.Option("--csv", metavar="TABLES.csv", help="the tables by tool, operation and cause")]
+TestProgram = Annotated[Path | None, typer.Option(
+    "--plan-calibration", metavar="TEST.nc", help="write the test program, in air, whose measured run would narrow the band "
+    "of FILE most, and its set-up TEST.setup.toml; run and log it, then --calibrate")]
+TestSeconds = Annotated[float, typer.Option("--plan-seconds", metavar="S", min=5.0, max=3600.0,
+                                            help="s that the test program may take")]
 
 
 def time(files: TimedFiles,
@@ -73,13 +78,19 @@ def time(files: TimedFiles,
          beyond: Beyond = False,
          max_blocks: MaxBlocks = None,
          check: HeldAgainst = None,
+         plan_calibration: TestProgram = None,
+         plan_seconds: TestSeconds = 60.0,
          json: Json = "") -> None:
     """Estimate how long programs take, with a band, and where the time goes; several side by side."""
     logs, ending = calibrate or [], figure_ending(figure)
     _check(output, logs, len(files))
+    test = plan_calibration
+    _check_plan(test, len(files) * (1 + len(with_machine or []) + len(with_setup or []) + len(what_if or [])), bool(logs))
     only_with_errors(beyond, error_model)
     given = {f"the file {k}" if k else "the file": str(file) for k, file in enumerate(files)}
-    refuse_overwriting({"-o": output, "--json": json, "--csv": csv, "--figure": str(figure or "")},
+    refuse_overwriting({"-o": output, "--json": json, "--csv": csv, "--figure": str(figure or ""),
+                        "--plan-calibration": str(test or ""),
+                        "the test's set-up": str(test.with_suffix(".setup.toml")) if test else ""},
                        {**given, "the set-up": setup, "the hooks": hooks,
                         **{f"the log {log}": log for log in logs}, **{f"the set-up {one}": one for one in with_setup or []},
                         "the error model": error_model, **own_files(machine, controller),
@@ -90,7 +101,8 @@ def time(files: TimedFiles,
     options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model, hooks=hooks,
                       error_beyond=beyond)
     asked = Asked(tuple(files), (machine, *(with_machine or [])), controller, model, (setup, *(with_setup or [])),
-                  tuple(what_if or ()), tuple(logs), output, override, options, csv, figure, check is not None, ending)
+                  tuple(what_if or ()), tuple(logs), output, override, options, csv, figure, check is not None, ending,
+                  test, plan_seconds)
     with shown_errors(json), progress_bar() as progress:
         values, text, outputs, found = answer(asked, progress)
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
@@ -103,3 +115,9 @@ def _check(output: str, logs: list[str], files: int) -> None:
     if logs and len(logs) != files:
         raise typer.BadParameter(f"{len(logs)} given for {files} files: one for each FILE, in their order",
                                  param_hint="--calibrate")
+
+
+def _check_plan(test: Path | None, variants: int, logs: bool) -> None:
+    if test is not None and (variants > 1 or logs):
+        raise typer.BadParameter("a test is planned for one file on one machine, before it is measured",
+                                 param_hint="--plan-calibration")

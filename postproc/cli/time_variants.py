@@ -57,6 +57,8 @@ class Asked:
     figure: Path | None
     check: bool
     ending: FigureEnding | None
+    plan: Path | None = None
+    plan_seconds: float = 60.0
 
 
 @dataclass(frozen=True)
@@ -116,6 +118,8 @@ def answer(asked: Asked, progress: Progress) -> TimeAnswer:
     else:
         table, words = _several(variants, made)
     found += side_by_side.without_effect(variants)
+    if asked.plan is not None and (blocks := all_timed[0].blocks) is not None:
+        values, text, outputs = _planned_test(asked, all_timed[0], blocks, asked.plan)
     outputs |= _files(asked, [one.name for one in variants], estimates, made)
     return table | values, words + (f"\n{text}" if text else ""), outputs, list(dict.fromkeys(found))
 
@@ -242,6 +246,20 @@ def _variants(all_timed: list[Timed], estimates: list[Estimate]) -> list[side_by
         side_by_side.Variant(name, str(one.file), one.machine.name, one.setup, one.what_if.text, e)
         for name, one, e in zip(names, all_timed, estimates, strict=True)
     ]
+
+
+def _planned_test(asked: Asked, one: Timed, blocks: MotionBlocks,
+                  test: Path) -> tuple[dict[str, Any], str, dict[Path, str | bytes]]:
+    """The test program that narrows the band of one program: figures, text, its files."""
+    from postproc.setup.model import load_setup
+    from postproc.time_fit.plan_calibration import plan_calibration
+    from postproc.time_fit.plan_text import as_dict, as_text
+
+    shop = read_value(load_setup(one.setup or None, asked.options.hooks))
+    plan = plan_calibration(blocks, one.machine, asked.controller, one.model, shop, asked.plan_seconds,
+                            test.name)
+    files: dict[Path, str | bytes] = {test: plan.text, test.with_suffix(".setup.toml"): plan.setup}
+    return {"plan_calibration": as_dict(plan)}, as_text(plan, test.name), files
 
 
 def _files(asked: Asked, names: list[str], estimates: list[Estimate], made: list[TimeTables]) -> dict[Path, str | bytes]:

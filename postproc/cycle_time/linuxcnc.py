@@ -16,7 +16,7 @@ import numpy as np
 from postproc.base.memory import give_back
 from postproc.cycle_time.blocks import Cause, CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_corners import KINK, BlendArcs, Corners, blends, corners
-from postproc.cycle_time.linuxcnc_kernels import speeds, timeline
+from postproc.cycle_time.linuxcnc_kernels import next_begins, speeds, timeline
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE, PlannerSegments, clamped, segments
 from postproc.cycle_time.phases import BlockTimes, Ramps, ramps, summed
 from postproc.cycle_time.shape import NOTHING, shape
@@ -37,6 +37,8 @@ GAP_CYCLES = 4.0
 """servo cycles below which what blends leave of a line goes to the blend ([TRAJ] ARC_BLEND_GAP_CYCLES)"""
 
 
+COMPILED_FROM = 4_000
+"""segments that are executed cycle by cycle, from which compiling pays"""
 _TOGETHER = 100_000
 """corners that are looked at together"""
 ON_CYCLE = 1e-6
@@ -257,7 +259,7 @@ def _timed(blocks: MotionBlocks, s: PlannerSegments, row: Row, settings: Setting
     gentle = through & ~row.traverse & (2.0 * row.length < RAMP_TIME * (first + np.minimum(last, target))) & (last > 0.0)
     r = ramps(row.length, first, last, target, row.rate, gentle)
     stops = ~through
-    overlap = _overlapping(row, r, settings)
+    overlap = _overlapping(row, r, settings, target, first)
     settling = np.where(stops & (overlap == 0.0), settings.stop_cycles * settings.cycle, 0.0)
     pause, resting = _pauses(blocks, s, row)
     clock = chosen(timeline, len(row.length), KERNEL_FROM)
@@ -266,18 +268,24 @@ def _timed(blocks: MotionBlocks, s: PlannerSegments, row: Row, settings: Setting
     return _by_block(blocks, s, row, r.up + r.down, r.steady, begin, end, pause, stops, first, last, r.peak)
 
 
-def _overlapping(row: Row, r: Ramps, settings: Settings) -> Floats:
+def _overlapping(row: Row, r: Ramps, settings: Settings, target: Floats, first: Floats) -> Floats:
     """(M,) s before the end of a segment at which the next begins.
 
-    Segments begin with a servo cycle, the next one with the cycle in which the speed falls below that of the blend: as much
-    before it as that moment is behind the begin of its cycle, half a cycle on average and nothing where it falls on one; of
-    segments that only gain and lose speed the part that does not overlap (measured: the rounded peak takes the rest).
+    Segments begin with a servo cycle, the next one with the cycle in which the speed falls below that of the blend
+    (`next_begins`). Of segments that are entered at speed, as much before that moment as it is behind the begin of its
+    cycle, half a cycle on average and nothing where it falls on one; of those that only gain and lose speed the part that
+    does not overlap (measured: the rounded peak takes the rest).
     """
     overlap = np.where(row.ends == OVERLAP, np.minimum(row.overlap_speed / row.rate, r.down), 0.0)
     part = np.maximum(np.minimum(r.steady / settings.cycle, 1.0), 1.0 - overlap / np.maximum(r.down, 1e-300))
     within = np.mod((r.seconds - overlap) / settings.cycle + ON_CYCLE, 1.0) - ON_CYCLE
     early = 2.0 * settings.blend_cycles * settings.cycle * within * part
-    return np.asarray(overlap + np.where(overlap > 0.0, np.maximum(early, 0.0), 0.0))
+    overlap += np.where(overlap > 0.0, np.maximum(early, 0.0), 0.0)
+    rows = np.flatnonzero((overlap > 0.0) & (first == 0.0))
+    loop = chosen(next_begins, len(rows), COMPILED_FROM)
+    begins = loop(row.length[rows], target[rows], row.rate[rows], row.overlap_speed[rows], settings.cycle)
+    overlap[rows] = np.maximum(r.seconds[rows] - begins, 0.0)
+    return np.asarray(overlap)
 
 
 def _ahead(row: Row, depth: int) -> Floats:

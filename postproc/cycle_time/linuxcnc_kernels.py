@@ -94,3 +94,36 @@ def timeline(seconds: Any, overlap: Any, rest: Any, fresh: Any) -> Any:
         end = max(begin + seconds[k], end)
         result[0, k], result[1, k] = begin, end
     return result
+
+
+@loop(takes=(("float64", 1),) * 4 + (("float64", 0),))
+def next_begins(length: Any, target: Any, rate: Any, blend: Any, cycle: Any) -> Any:
+    """(N,) s from the begin of each segment to that of the next one, which overlaps its end; executed cycle by cycle.
+
+    Each segment begins at rest with a servo cycle and gains at most `rate` (N,) a cycle, towards `target` (N,) and no more
+    than lets it stop at its `length` (N,); the next begins with the cycle in which it loses speed, as asked for, and is
+    slower than `blend` (N,) (LinuxCNC `tpCalculateTrapezoidalAccel`, `tcUpdateDistFromAccel`, `tcIsBlending`).
+    """
+    result = np.zeros(len(length))
+    for k in range(len(length)):
+        step = rate[k] * cycle
+        speed, left, count = 0.0, length[k], 0
+        while True:
+            count += 1
+            square = rate[k] * (2.0 * left - speed * cycle) + 0.25 * step * step
+            wanted = np.sqrt(square) - 0.5 * step if square > 0.25 * step * step else -0.5 * step
+            wanted = min(wanted, target[k])
+            gain = max(min(wanted - speed, step), -step)
+            after = max(speed + gain, 0.0)
+            follows = abs(wanted - speed - gain) < 1e-8 and gain < 0.0
+            left -= 0.5 * (after + speed) * cycle
+            speed = after
+            if (follows and speed < blend[k]) or speed <= 0.0 or 2.0 * left < speed * cycle:
+                break
+            if gain == 0.0 and speed == target[k]:
+                steady = np.floor((left - 0.5 * speed * speed / rate[k]) / (speed * cycle)) - 2.0
+                if steady > 0.0:
+                    count += int(steady)
+                    left -= steady * speed * cycle
+        result[k] = (count - 1) * cycle
+    return result

@@ -127,12 +127,35 @@ def calibrate(runs: Sequence[MeasuredRun], model: CycleTimeModel, file: str = ""
     return (None if has_errors(found) else fit), found
 
 
+def begin_of(model: CycleTimeModel) -> CycleTimeModel:
+    """The model where a fit begins: parameters that are 0 hold something."""
+    return model.model_copy(update={k: max(getattr(model, k), v) for k, v in STARTS.items()})
+
+
+def expected(run: MeasuredRun, model: CycleTimeModel, scatter: float, machine: Machine | None = None) -> CalibratedModel:
+    """What a fit to a run would leave uncertain that goes as the model has it: the same parameters, their covariance.
+
+    Args:
+        run: with the model's own times; scatter: share of a section's time that a run scatters, of sections of the mean
+            length
+    """
+    begin, data, prior = begin_of(model), Runs.of([run]), prior_of(machine)
+    free, start = free_parameters(data, model), begin.values()
+
+    def modelled(x: Floats) -> Floats:
+        values = start.copy()
+        values[free] += x * prior[free]
+        return data.modelled(begin.with_values(values))
+    weighted = slopes(modelled, np.zeros(len(free))) / data.uncertainty(scatter)[:, None]
+    return _record(data, model, begin, weighted, free, prior, data.modelled(model), scatter, "expected", machine)
+
+
 def _fitted(data: Runs, before: Floats, model: CycleTimeModel, file: str, machine: Machine | None) -> CalibratedModel:
     """The fit of the parameters that the kind of model has."""
     from scipy.optimize import least_squares
 
-    begin = model.model_copy(update={k: max(getattr(model, k), v) for k, v in STARTS.items()})
-    free, prior = _free(data, model), _prior(machine)
+    begin = begin_of(model)
+    free, prior = free_parameters(data, model), prior_of(machine)
     start, measured = begin.values(), data.measured
 
     def modelled(x: Floats) -> Floats:
@@ -152,11 +175,11 @@ def _fitted(data: Runs, before: Floats, model: CycleTimeModel, file: str, machin
         scale = _scatter(modelled(x), measured, len(free))
     values = start.copy()
     values[free] += x * prior[free]
-    weighted = _slopes(modelled, x) / data.uncertainty(scale)[:, None]
+    weighted = slopes(modelled, x) / data.uncertainty(scale)[:, None]
     return _record(data, model, begin.with_values(values), weighted, free, prior, before, scale, file, machine)
 
 
-def _free(data: Runs, model: CycleTimeModel) -> list[int]:
+def free_parameters(data: Runs, model: CycleTimeModel) -> list[int]:
     """Rows of PARAMETERS that are fitted: those of the kind of model; jerk where it counts, the spindle where a run starts
     it."""
     starts = any((run.blocks.pauses.cause == Cause.SPINDLE).any() for run in data.runs)
@@ -164,7 +187,7 @@ def _free(data: Runs, model: CycleTimeModel) -> list[int]:
     return [k for k, name in enumerate(PARAMETERS) if name in FREE[model.kind] and name not in without]
 
 
-def _prior(machine: Machine | None) -> Floats:
+def prior_of(machine: Machine | None) -> Floats:
     """(8,) standard deviations of the logarithms; accelerations and jerks that the machine file states vary little."""
     result = dict(PRIOR)
     for limit in ("acceleration", "jerk"):
@@ -192,7 +215,7 @@ def _start(modelled: Modelled, measured: Floats, free: list[int]) -> Floats:
     return min(options, key=lambda x: float(np.abs(modelled(x) - measured).sum()))
 
 
-def _slopes(modelled: Modelled, x: Floats) -> Floats:
+def slopes(modelled: Modelled, x: Floats) -> Floats:
     """(K, F) derivatives by central differences; where a parameter holds nothing here, what moving it far would show."""
     here, columns = modelled(x), []
     for k in range(len(x)):

@@ -46,6 +46,13 @@ TIP = (
 )
 _WHAT_IF = [
     HintCase(
+        "time.test",
+        "time p.nc -m mill-3axis -c generic-iso --plan-calibration t.nc --plan-seconds 5",
+        {"p.nc": PROGRAM},
+        "more time with --plan-seconds",
+        (Edit(COMMAND, "--plan-seconds 5", "--plan-seconds 60"),),
+    ),
+    HintCase(
         "time.what_if",
         "time p.nc -m mill-3axis -c linuxcnc --what-if X.speed=1.3",
         {"p.nc": PROGRAM},

@@ -67,6 +67,14 @@ STEADY = "".join(f"G1 X{0.5 * i:g} Y{5.0 * math.sin(i / 8):.4f} C{0.8 * i:.4f} F
                  for i in range(1, 100))
 WHOLE = "".join(f"G1 X{2 * i} A{i} F600\n" for i in range(1, 101))
 """each 100 ms, a multiple of the servo cycle"""
+
+
+def in_whole_cycles(count: int, milliseconds: int, form: str) -> str:
+    """Blocks of so many ms under G93; the letters of the form count mm and degrees a block."""
+    return "".join(f"G1 {form.format(x=0.5 * i, y=5.0 * math.sin(i / 8), a=0.2 * i, c=2 * i)} F{60000 / milliseconds:g}\n"
+                   for i in range(1, count + 1))
+
+
 STEPS = "".join(f"G1 X{0.5 * i:.3f} Y{3 * math.sin(i / 12):.4f} F{3000 + 2500 * math.sin(i / 15):.0f}\n"
                 for i in range(1, 250))
 REPEATED = "G0 Z300\nF900\nG91 G81 X10 Y2 Z-8 R-2 L4\nG80 G90\nG0 Z310\n"
@@ -93,6 +101,13 @@ PROGRAMS: dict[str, tuple[str, str]] = {
     "5 axes at their feed, G93": ("mikron-ucp710", f"{HEAD} G64 P0.02\nG0 Z240\nG93\n{STEADY}G94\n"),
     "5 axes at their feed, tip": ("linuxcnc-xyzac-trt", f"{HEAD} G64 P0.02\nG0 Z300\nG93\n{STEADY}G94\n"),
     "5 axes, G93, whole cycles": ("mikron-ucp710", f"{HEAD} G64 P0.02\nG0 Z240 X0 A0\nG93\n{WHOLE}G94\n"),
+    "5 axes, G93, whole cycles of 20 ms": (
+        "mikron-ucp710", f"{HEAD} G64 P0.02\nG0 Z240 X0 A0\nG93\n" + in_whole_cycles(200, 20, "X{x:g} A{a:g}") + "G94\n"),
+    "5 axes, G93, whole cycles of 50 ms": (
+        "mikron-ucp710", f"{HEAD} G64 P0.02\nG0 Z240 X0 A0\nG93\n" + in_whole_cycles(80, 50, "C{c:g}") + "G94\n"),
+    "tip, G93, whole cycles of 20 ms": (
+        "linuxcnc-xyzac-trt", f"{HEAD} G64 P0.02\nG0 Z300\nG93\n" + in_whole_cycles(200, 20, "X{x:g} Y{y:.4f} C{c:g}")
+        + "G94\n"),
     "tool changes": ("mill-3axis", f"{HEAD} G64 P0.01\n{CHANGES}"),
     "4 axes, G94, G64 P0.01": ("mill-4axis", f"{HEAD} G64 P0.01\nG0 Z450\nF2000\n{INDEXED}"),
     "5 axes, G94, G64 P0.01": ("mikron-ucp710", f"{HEAD} G64 P0.01\nF3000\n{circle(200, 30.0, turned)}"),
@@ -117,5 +132,7 @@ MEASURED = {
     "rotary axes alone": 8.149, "short lines at speed": 1.202, "straight chain, G64 Q0.01": 0.961,
     "small arcs in all planes": 5.696, "rotary and linear in turn": 6.762, "5 axes, control's kinematics": 4.751,
     "cycles repeated, no G98": 3.602, "5 axes at their feed, G93": 11.992, "5 axes at their feed, tip": 12.377,
-    "units that change": 4.985, "5 axes, G93, whole cycles": 10.209, "a feed in every line": 4.542}
+    "units that change": 4.985, "5 axes, G93, whole cycles": 10.209,
+    "5 axes, G93, whole cycles of 20 ms": 7.579, "5 axes, G93, whole cycles of 50 ms": 9.544,
+    "tip, G93, whole cycles of 20 ms": 8.007, "a feed in every line": 4.542}
 """s that LinuxCNC 2.9's simulator took, for where it is not installed"""
