@@ -77,15 +77,13 @@ class Kinematics(ABC):
     tool_axis: Floats = UP
     """(3,) from the tip to the spindle when all joints are 0"""
     straight_slides: bool = False
-    """True where, at fixed rotary joints, the tip is an affine function of the linear joints, which turn no
-    tool: slides move it along straight lines, evenly, whatever the others do"""
+    """True where, at fixed rotary joints, the tip is an affine function of the linear joints, which turn no tool"""
     slides_square: bool = False
     """True where the slides besides are square to each other and no turning axis lies between them"""
     jets_proved: bool = False
     """True where `jets` bounds the third derivative, False where it only looks at places: then no block has a bound"""
     chain: tuple[Joint, ...] = ()
-    """the axes from the workpiece to the tool of a machine whose poses are their motions one after the other
-    (product of exponentials, see `Serial`); () of any other"""
+    """the axes from the workpiece to the tool, their motions one after the other (`Serial`); () of any other machine"""
     on_rods: RodPlatform | None = None
     """the platform and its rods, where rods carry the tool"""
     transmits: Transmission | None = None

@@ -75,7 +75,10 @@ def _ask(question: SheetQuestion) -> str:
 
     while True:
         typer.echo(question.prompt(), nl=False, err=True)
-        line = sys.stdin.readline() if sys.stdin is not None else ""
+        try:
+            line = sys.stdin.readline() if sys.stdin is not None else ""
+        except OSError:  # nothing there to be read
+            line = ""
         if not line:
             raise EOFError
         try:
