@@ -4,7 +4,7 @@ A run of the whole suite ends with its total and the files that take most; `--cp
 run fails where one file or one test takes more than its share of the total (`OF_A_FILE`, `OF_A_TEST`): shares are the same
 on slow and on busy machines, seconds are not. The total is turned into that of a machine that needs `USUAL` s for
 `yardstick`, which workers time as they begin, after every `EVERY` tests and as they end; a run that takes `SLACK` times
-`BUDGET` there fails too. Processors differ by that much in what a yard and the suite take, and load does.
+`BUDGET` there is told so, and does not fail for it: a yard and the suite are not slowed alike by other processors and by load.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
 def pytest_sessionfinish(session: pytest.Session) -> None:
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput |= {"cpu": dict(spent), "yards": [*yards, yardstick()]}
-    elif len(spent) > WHOLE and (too_dear(spent) or too_long(spent, yards)) and not session.exitstatus:
+    elif len(spent) > WHOLE and too_dear(spent) and not session.exitstatus:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
