@@ -24,7 +24,7 @@ def test_words_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     text = ("\n".join(rows) + "\n\n  \nM30\n").encode()
     fast, slow = (read(text, at_once, monkeypatch) for at_once in (True, False))
     assert fast.lines == slow.lines and fast.value.tobytes() == slow.value.tobytes()
-    assert (fast.letter == slow.letter).all() and (fast.line == slow.line).all() and (fast.point == slow.point).all()
+    assert all(getattr(fast, name).tolist() == getattr(slow, name).tolist() for name in ("letter", "line", "point"))
     assert len(fast.letter) == 80 * 8 + 1
 
 
