@@ -19,13 +19,13 @@ def words_at_once(text: bytes) -> tuple[Array, Floats, Ints, Bools] | None:
     but letters, each with its number behind it, or the text is short."""
     if not wanted(len(text), COMPILE_FROM):
         return None
-    letter, value, line, point = compiled(plain_words)(np.frombuffer(text, dtype=np.uint8), 10.0 ** np.arange(23))
-    return (letter, value, line, point) if len(letter) == len(value) else None
+    letter, value, line, point, odd = compiled(plain_words)(np.frombuffer(text, dtype=np.uint8), 10.0 ** np.arange(23))
+    return None if odd else (letter, value, line, point)
 
 
 @loop(takes=(("uint8", 1), ("float64", 1)))
-def plain_words(text: Array, powers: Floats) -> tuple[Array, Floats, Ints, Bools]:
-    """As `words_at_once`; letters alone, without values, where a word is none. `powers` (23,) of ten."""
+def plain_words(text: Array, powers: Floats) -> tuple[Array, Floats, Ints, Bools, int]:
+    """As `words_at_once`, with 1 behind where a word is none; `powers` (23,) of ten."""
     count = 0
     for c in text:
         if 65 <= (c & 0xDF) <= 90:
@@ -42,7 +42,7 @@ def plain_words(text: Array, powers: Floats) -> tuple[Array, Floats, Ints, Bools
         if c == 32 or c == 9:
             continue
         if not 65 <= (c & 0xDF) <= 90:
-            return letter, value[:0], line, point
+            return letter, value, line, point, 1
         letter[n], line[n] = c, row
         minus = at < size and text[at] == 45
         if at < size and (text[at] == 45 or text[at] == 43):
@@ -57,11 +57,11 @@ def plain_words(text: Array, powers: Floats) -> tuple[Array, Floats, Ints, Bools
                 places += 1 if places >= 0 else 0
             at += 1
         if digits == 0 or digits > _MOST_DIGITS:
-            return letter, value[:0], line, point
+            return letter, value, line, point, 1
         point[n] = places >= 0
         number = float(whole)
         if places > 0:
             number = number / powers[places]
         value[n] = -number if minus else number
         n += 1
-    return letter, value, line, point
+    return letter, value, line, point, 0

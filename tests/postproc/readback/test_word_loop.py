@@ -24,7 +24,7 @@ def test_words_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     text = ("\n".join(rows) + "\n\n  \nM30\n").encode()
     fast, slow = (read(text, at_once, monkeypatch) for at_once in (True, False))
     assert fast.lines == slow.lines and fast.value.tobytes() == slow.value.tobytes()
-    assert (fast.letter == slow.letter).all() and (fast.line == slow.line).all() and (fast.point == slow.point).all()
+    assert all(getattr(fast, name).tolist() == getattr(slow, name).tolist() for name in ("letter", "line", "point"))
     assert len(fast.letter) == 80 * 8 + 1
 
 
@@ -33,7 +33,14 @@ def test_words_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_is_odd_is_left_to_the_array_form(text: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(word_loop, "wanted", lambda *_: True)
     monkeypatch.setattr(word_loop, "compiled", lambda function: function)
-    assert word_loop.words_at_once(b"G0 Z5\n" + text) is None
+    assert word_loop.words_at_once(b"G0 Z5\n" + text) is None and word_loop.words_at_once(text) is None
+
+
+@pytest.mark.parametrize("text", [b"271\n", b"G1 X5\n(51.)\n$\n", b"-+.5\n", b"(G1)\n9\n"])
+def test_lines_without_letters_are_no_blocks(text: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(word_loop, "wanted", lambda *_: True)
+    monkeypatch.setattr(word_loop, "compiled", lambda function: function)
+    assert [d.code for d in tokenise(text)[1]] == ["gcode.syntax"]
 
 
 @pytest.mark.parametrize(("text", "lines"), [
