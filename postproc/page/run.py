@@ -63,7 +63,8 @@ def run_dict(run: Run) -> dict[str, Any]:
         "tools": tool_rows(result, run.estimate) if run.estimate is not None else [],
         "work_offset": _offset(result), "header": _header(result),
         "what_if": what_if(run.estimate) if run.estimate is not None else None,
-        "message_lines": _message_lines(run), "errors": _errors(result), "orientation": _orientation(result), "causes": list(CAUSES),
+        "message_lines": _message_lines(run), "errors": _errors(result), "orientation": _orientation(result),
+        "causes": list(CAUSES),
         "operations": [op.name or f"operation {k + 1}" for k, op in enumerate(result.toolpath.operations)],
         "skeleton": chain(result.machine, result.job) if result.job is not None else None,
         "solids": solids(result), "points": of_points}
@@ -174,10 +175,11 @@ def _header(result: PostResult) -> list[str]:
 
 
 def _message_lines(run: Run) -> list[list[dict[str, int]]]:
-    """For each message of the conversion where its CL lines stand in the program: the first block that moves for each, number
-    and line of the program's file; lines without such a block are left out."""
+    """For each message of the conversion where its CL lines stand in the program: the first block that moves for each, by
+    number and line of the program's file; lines without such a block are left out."""
     result, c, e = run.result, run.result.comparison, run.estimate
-    asked = [list(dict.fromkeys(d.lines))[:MESSAGE_LINES] if d.file == result.toolpath.file else [] for d in result.diagnostics]
+    asked = [list(dict.fromkeys(d.lines))[:MESSAGE_LINES] if d.file == result.toolpath.file else []
+             for d in result.diagnostics]
     if not result.ok or c is None or e is None or e.blocks.cl_line is None:
         return [[] for _ in asked]
     cl, first = np.unique(np.asarray(e.blocks.cl_line), return_index=True)

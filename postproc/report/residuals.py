@@ -75,8 +75,8 @@ def tip_uncertainty(result: PostResult, rows: Ints) -> Floats | None:
         rows: (K,) of `residuals`
 
     Returns:
-        (K,) mm, one standard deviation of the tip in the direction in which it is greatest; None where the error model has no
-        covariance, or there is no field.
+        (K,) mm, one standard deviation of the tip in the direction in which it is greatest; None where the error model has
+        no covariance, or there is no field.
     """
     found, job, nominal = result.after_formatting, result.job, result.nominal
     if (found is None or job is None or job.errors is None or job.errors.covariance is None or nominal is None
