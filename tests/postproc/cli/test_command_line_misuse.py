@@ -43,7 +43,7 @@ def test_texts_of_files_command_no_terminal(tmp_path: Path) -> None:
     hostile = "\x1b[2J\x07\x9b31m\u202eX"
     path = cl(tmp_path, f"TPRINT/{hostile}", "RAPID", "GOTO/0,0,5", "GOTO/1,0,5")
     wrong = tmp_path / "wrong.cls"
-    wrong.write_text(path.read_text() + f"GOTO/{hostile},1,2\n")
+    wrong.write_text(path.read_text() + f"\nGOTO/{hostile},1,2\n")
     for arguments, code, said in ((["inspect", path], 0, "points"), (["inspect", wrong], 1, "GOTO/"),
                                   (["convert", wrong, *MILL, "-o", tmp_path / "p.ngc"], 1, "GOTO/")):
         got = run(*arguments)
