@@ -26,6 +26,7 @@ from postproc.cli.shared.options import (
     ToleranceOption,
     UnitsOption,
 )
+from postproc.cli.shared.says import readable
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
@@ -126,7 +127,7 @@ class _Asking:
             return ""  # answers that come from a file end with the values; --origin states the place
         one = question if question.default is not None else replace(question, default=self.last.get(question.kind))
         while True:
-            typer.echo(one.prompt(), nl=False, err=True)
+            typer.echo(readable(one.prompt()), nl=False, err=True)
             value, wrong = parsed(one, _line())
             if value is not None and not wrong:
                 self.last[question.kind] = value

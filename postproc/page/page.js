@@ -4,7 +4,7 @@ const shown = {run: null, time: 0, point: 0, playing: 0, fade: false, texts: nul
 // All that is said in words and numbers.
 function words(k, info) {
   verdict(k, byId("verdict"));
-  const sorted = [...info.conversion.diagnostics].sort((a, b) => WEIGHT[a.severity] - WEIGHT[b.severity]);
+  const sorted = info.conversion.diagnostics.map((d, n) => ({...d, blocks: info.message_lines[n]})).sort((a, b) => WEIGHT[a.severity] - WEIGHT[b.severity]);
   const found = sorted.filter((d) => d.severity !== "info");
   byId("first").replaceChildren(...(found.length ? [messageItems(found, jumpTo)] : [make("p", {class: "note"}, "No warnings.")]));
   byId("compare").replaceChildren(...[compareTable(pickRun)].filter(Boolean));
@@ -173,10 +173,10 @@ async function openText(kind, line, file) {
   if (line > 0) shown.texts.show(Math.min(line, shown.texts.lines.length));
 }
 
-function jumpTo(d, line) {
-  const cl = d.file.replace(/\\/g, "/").split("/").pop() === report.cl_file;
-  openText(cl ? "cl" : "nc", line, 0);
-  if (cl) pointOfLine("cl", line);
+// From a message to a line of the CL file, or to the block that moves for it.
+function jumpTo(line, block) {
+  if (block) openText(`nc${shown.run.k}-${block.nc_file}`, block.nc_line, block.nc_file); else openText("cl", line, 0);
+  pointOfLine("cl", line);
   byId("texts").scrollIntoView({block: "nearest"});
 }
 

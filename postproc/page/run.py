@@ -18,8 +18,9 @@ from postproc.page.tools import tool_rows
 from postproc.page.what_if import what_if
 from postproc.pipeline.result import PostResult
 from postproc.proof.hashes import Hashes, ProofInput, cl_hashes, sha256
+from postproc.readback.text.canonical import in_files
 from postproc.report import summary
-from postproc.report.residuals import residuals
+from postproc.report.residuals import residuals, tip_uncertainty
 from postproc.verification.proof_text import statement
 from toolpaths.arrays import Floats, finite
 from toolpaths.diagnostics import Severity
@@ -28,6 +29,8 @@ from toolpaths.units import DEG
 
 VECTORS = 400
 """places at which error vectors are given"""
+MESSAGE_LINES = 8
+"""lines of a message that are given in the program too"""
 DRAWN = 200
 """passes whose polytope is given"""
 
@@ -60,7 +63,8 @@ def run_dict(run: Run) -> dict[str, Any]:
         "tools": tool_rows(result, run.estimate) if run.estimate is not None else [],
         "work_offset": _offset(result), "header": _header(result),
         "what_if": what_if(run.estimate) if run.estimate is not None else None,
-        "errors": _errors(result), "orientation": _orientation(result), "causes": list(CAUSES),
+        "message_lines": _message_lines(run), "errors": _errors(result), "orientation": _orientation(result),
+        "causes": list(CAUSES),
         "operations": [op.name or f"operation {k + 1}" for k, op in enumerate(result.toolpath.operations)],
         "skeleton": chain(result.machine, result.job) if result.job is not None else None,
         "solids": solids(result), "points": of_points}
@@ -170,22 +174,41 @@ def _header(result: PostResult) -> list[str]:
     return found
 
 
+def _message_lines(run: Run) -> list[list[dict[str, int]]]:
+    """For each message of the conversion where its CL lines stand in the program: the first block that moves for each, by
+    number and line of the program's file; lines without such a block are left out."""
+    result, c, e = run.result, run.result.comparison, run.estimate
+    asked = [list(dict.fromkeys(d.lines))[:MESSAGE_LINES] if d.file == result.toolpath.file else []
+             for d in result.diagnostics]
+    if not result.ok or c is None or e is None or e.blocks.cl_line is None:
+        return [[] for _ in asked]
+    cl, first = np.unique(np.asarray(e.blocks.cl_line), return_index=True)
+    line, files = np.asarray(e.blocks.line)[first], c.executed[0].files
+    file = np.maximum(np.searchsorted([n for _, n in files], line) - 1, 0) if files else np.zeros(len(line), dtype=np.int64)
+    known = {own: {"cl_line": own, "nc_file": of, "nc_line": at} for own, of, at in zip(
+        cl.tolist(), file.tolist(), in_files(line, files).tolist(), strict=True)}
+    return [[known[one] for one in lines if one in known] for lines in asked]
+
+
 def _errors(result: PostResult) -> dict[str, Any] | None:
-    """Geometric errors before and after correction with their uncertainty, and vectors at places of the part; um, arcsec."""
+    """Geometric errors before and after correction, and vectors at places of the part with the uncertainty of each; um."""
     field = residuals(result) if result.compensation is not None and result.ok else None
     if field is None or not len(field.line):
         return None
     rows = np.unique(np.linspace(0, len(field.line) - 1, min(len(field.line), VECTORS)).astype(np.int64))
     before, after = (np.linalg.norm(x[:, :3], axis=1) * 1e3 for x in (field.before, field.after))
     worst = np.argsort(-before, kind="stable")[:10]
-    sigma = result.compensation.uncertainty_tip if result.compensation is not None else None
+    shown, found = np.union1d(rows, worst), result.compensation.uncertainty_tip if result.compensation is not None else None
+    sigma = tip_uncertainty(result, shown)
+    known = {} if sigma is None else dict(zip(shown.tolist(), (2e3 * sigma).tolist(), strict=True))
+    largest = None if found is None else max(2e3 * found, *known.values())
 
     def place(k: int) -> dict[str, Any]:
         return {"cl_line": int(field.line[k]), "part_mm": field.tip[k].tolist(), "before_um": float(before[k]),
                 "after_um": float(after[k]), "vector_um": (field.before[k, :3] * 1e3).tolist(),
-                "vector_after_um": (field.after[k, :3] * 1e3).tolist()}
+                "vector_after_um": (field.after[k, :3] * 1e3).tolist(), "uncertainty_k2_um": known.get(k)}
     return {"title": field.title, "worst_before_um": float(before.max()), "worst_after_um": float(after.max()),
-            "bound_um": float(field.tip_bound * 1e3), "uncertainty_k2_um": None if sigma is None else 2e3 * sigma,
+            "bound_um": float(field.tip_bound * 1e3), "uncertainty_k2_um": largest,
             "worst": [place(k) for k in worst.tolist()], "places": [place(k) for k in rows.tolist()]}
 
 

@@ -1,4 +1,5 @@
 // Everything of the report that is words and numbers.
+const nameOf = (d) => d.file.replace(/\\/g, "/").split("/").pop(), inCl = (d) => nameOf(d) === report.cl_file;
 const lineOf = (run) => `${run.machine}, ${run.controller}`;
 
 function verdict(k, box) {
@@ -12,10 +13,16 @@ function verdict(k, box) {
   }
 }
 
+// A message with its lines: those of the CL file lead there and to the block that moves for them, those of other files are said.
 function messageItems(list, jump) {
-  return make("ul", {class: "messages"}, ...list.map((d) => make("li", {}, make("span", {class: d.severity}, d.severity), ` [${d.code}] ${d.message}`,
-    d.count > 1 ? ` (${d.count} times)` : "", d.hint ? make("div", {class: "note"}, "What to do: " + d.hint) : null,
-    ...[...new Set(d.lines || [])].slice(0, 8).map((line) => make("button", {type: "button", class: "jump", onclick: () => jump(d, line)}, "line " + line)))));
+  const to = (text, line, block) => make("button", {type: "button", class: "jump", onclick: () => jump(line, block)}, text);
+  return make("ul", {class: "messages"}, ...list.map((d) => {
+    const lines = [...new Set(d.lines || [])].slice(0, 8), blockOf = (line) => (d.blocks || []).find((one) => one.cl_line === line);
+    const elsewhere = d.file && lines.length && !inCl(d) ? ` ${nameOf(d)}, line ${lines.join(", ")}` : null;
+    return make("li", {}, make("span", {class: d.severity}, d.severity), ` [${d.code}] ${d.message}`,
+      d.count > 1 ? ` (${d.count} times)` : "", d.hint ? make("div", {class: "note"}, "What to do: " + d.hint) : null, elsewhere,
+      ...(inCl(d) ? lines.flatMap((line) => { const block = blockOf(line); return [to("line " + line, line, null), block ? to("program line " + block.nc_line, line, block) : null]; }) : []));
+  }));
 }
 
 function timeCell(k) {
@@ -130,9 +137,10 @@ function errorParts(k, jump) {
   if (!found) return [make("p", {}, "No geometric errors were corrected: no --error-model was given, or the control corrects them.")];
   return [make("p", {}, found.title + ": worst before ", figure(base + ".worst_before_um", 2, "um"), ", after ", figure(base + ".worst_after_um", 3, "um"), ", bound ",
     figure(base + ".bound_um", 3, "um"), ", uncertainty (k = 2) ", found.uncertainty_k2_um === null ? "not known" : figure(base + ".uncertainty_k2_um", 2, "um")),
-  table(["CL line", "Part x, y, z, mm", "Error x, y, z before, um", "after, um", "Size before", "after"], found.worst.map((p, n) => [make("button", {type: "button", class: "jump", onclick: () => jump("cl", p.cl_line, 0)}, "line " + p.cl_line),
-    p.part_mm.map((v) => number(v, 3)).join(", "), p.vector_um.map((v) => number(v, 2)).join(", "), p.vector_after_um.map((v) => number(v, 3)).join(", "), figure(`${base}.worst.${n}.before_um`, 2, "um"), figure(`${base}.worst.${n}.after_um`, 3, "um")]), [4, 5]),
-  make("p", {class: "note"}, `These are the ten worst; "error vectors" under Path draws them at ${found.places.length} places, before and after.`)];
+  table(["CL line", "Part x, y, z, mm", "Error x, y, z before, um", "after, um", "Size before", "after", "Uncertainty of both (k = 2)"], found.worst.map((p, n) => [make("button", {type: "button", class: "jump", onclick: () => jump("cl", p.cl_line, 0)}, "line " + p.cl_line),
+    p.part_mm.map((v) => number(v, 3)).join(", "), p.vector_um.map((v) => number(v, 2)).join(", "), p.vector_after_um.map((v) => number(v, 3)).join(", "), figure(`${base}.worst.${n}.before_um`, 2, "um"), figure(`${base}.worst.${n}.after_um`, 3, "um"),
+    p.uncertainty_k2_um === null ? "not known" : figure(`${base}.worst.${n}.uncertainty_k2_um`, 2, "um")]), [4, 5, 6]),
+  make("p", {class: "note"}, `These are the ten worst; "error vectors" under Path draws them at ${found.places.length} places, before and after` + (found.uncertainty_k2_um === null ? "." : ", with a cross at each end: twice the standard deviation to either side."))];
 }
 
 // Sections of installed packages: texts and tables, as plain values.

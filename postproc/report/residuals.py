@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from machines.geometric_error.actual.actual import approach
+from machines.geometric_error.actual.model import uncertainty
 from postproc.base.group_rows import groups
 from postproc.pipeline.result import PostResult
 from postproc.reference.holes import Phase
@@ -65,6 +66,31 @@ def residuals(result: PostResult) -> Residuals | None:
     before, after = (np.concatenate([part.directions(x[:, :3]), part.directions(x[:, 3:])], axis=1) for x in (before, after))
     return Residuals(moves.line[here], part.points(moves.tip[here]), part.directions(moves.axis[here]), q, before, after,
                      found.tip_bound, found.axis_bound, f"{name} on {result.machine.name}, errors of {job.errors.name}")
+
+
+def tip_uncertainty(result: PostResult, rows: Ints) -> Floats | None:
+    """What is not known of the error at places of the field of a conversion, before as after correction.
+
+    Args:
+        rows: (K,) of `residuals`
+
+    Returns:
+        (K,) mm, one standard deviation of the tip in the direction in which it is greatest; None where the error model has
+        no covariance, or there is no field.
+    """
+    found, job, nominal = result.after_formatting, result.job, result.nominal
+    if (found is None or job is None or job.errors is None or job.errors.covariance is None or nominal is None
+            or result.moves is None):
+        return None
+    moves, move = planned_moves(job, result.moves, nominal), np.flatnonzero(result.moves.phase != Phase.PECK)[found.points]
+    block, tool = last_blocks(nominal, len(result.moves))[move[rows]], moves.tool[found.points[rows]]
+    q, travel, worst = nominal.q[block], approach(_steady(nominal.q))[block], np.empty(len(rows))
+    for k in groups(tool):
+        kinematics = job.kinematics(int(tool[k[0]]))
+        actual = job.errors.on(kinematics)
+        wanted = np.concatenate(kinematics.forward(q[k]), axis=1)
+        worst[k] = uncertainty(job.errors, actual, actual.coordinates(q[k], wanted), travel[k]).tip_worst
+    return worst
 
 
 def _steady(q: Floats) -> Floats:

@@ -298,15 +298,18 @@ def test_errors_and_orientation_are_drawn_and_read_back(opened: Session) -> None
     page.wait_for_selector("html[data-ready]", state="attached")
     keys = read_back(page, turned())
     assert {"runs.0.errors.worst_before_um", "runs.0.errors.uncertainty_k2_um", "runs.0.errors.worst.0.after_um",
+            "runs.0.errors.worst.0.uncertainty_k2_um",
             "runs.0.orientation.passes.0.time_s", "runs.0.tools.0.cutting_m"} <= keys
     page.select_option("#colour", "correction")
     assert page.inner_text("#legend").count("um") == 1 and page.evaluate(DARK)
     before = page.evaluate("drawNow(), shown.lines.length")
     page.check("#vectors")
     errors = turned().values["runs"][0]["errors"]
-    assert page.evaluate("drawNow(), shown.lines.length") == before + 2 * len(errors["places"])
+    crosses = 2 * 3  # at the ends of both vectors
+    assert page.evaluate("drawNow(), shown.lines.length") == before + (2 + crosses) * len(errors["places"])
     worst, sure = errors["worst_before_um"], errors["uncertainty_k2_um"]
-    assert f"{worst:.2f} um, uncertainty (k = 2) {sure:.2f} um" in page.inner_text("#legend")
+    assert f"longest {worst:.2f} um" in page.inner_text("#legend")
+    assert f"uncertainty of each (k = 2), largest {sure:.2f} um" in page.inner_text("#legend")
     solid = turned().values["runs"][0]["orientation"]["polytopes"][0]
     shown_rate = float(f"{solid['chosen']['rate']:.3g}")
     reach = turned().values["runs"][0]["orientation"]["passes"][0]["reach"]["chosen"][solid["order"]]
@@ -317,6 +320,24 @@ def test_errors_and_orientation_are_drawn_and_read_back(opened: Session) -> None
     edges = sum(len(solid[key]["edges"]) for key in ("cl_file", "chosen"))
     assert page.locator("#polytope svg line").count() == edges + 2 * 2 + 3  # reach and its key, axes x, y, z
     assert page.evaluate(POOR) == [] and opened.said == []
+
+
+def test_a_message_leads_to_its_line_in_both_texts(opened: Session) -> None:
+    page, values = opened.page, turned().values["runs"][0]
+    page.goto(turned().page.as_uri())
+    page.wait_for_selector("html[data-ready]", state="attached")
+    wanted = next(links for links in values["message_lines"] if links)[0]
+    page.click(f"#messages-body button.jump:has-text('program line {wanted['nc_line']}') >> nth=0")
+    until(page, "shown.texts.kind === 'nc0-0'")
+    assert page.evaluate("shown.texts.here") == wanted["nc_line"]
+    assert page.evaluate("shown.run.columns['NC line'][shown.point]") == wanted["nc_line"]
+    page.click(f"#messages-body button.jump:has-text('line {wanted['cl_line']}') >> nth=0")
+    until(page, "shown.texts.kind === 'cl'")
+    assert page.evaluate("shown.texts.here") == wanted["cl_line"]
+    other = page.evaluate("messageItems([{severity: 'warning', code: 'a.b', message: 'm', file: 'd/s.toml', lines: [5]}])"
+                          ".textContent")
+    assert other.endswith("s.toml, line 5")  # no line of CL file or program
+    assert opened.said == []
 
 
 def test_a_dossier_opens_prints_on_a4_and_fits_small_screens(opened: Session, tmp_path: Path) -> None:

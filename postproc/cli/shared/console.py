@@ -11,7 +11,7 @@ import typer
 
 from postproc.base.job_place import NAME
 from postproc.base.json_values import plain, rounded
-from postproc.cli.shared.says import SAYS
+from postproc.cli.shared.says import SAYS, readable
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -180,7 +180,7 @@ def _say(stage: str, said: list[str]) -> None:
     """Each stage once, as it begins."""
     if stage and said[-1:] != [stage]:
         said.append(stage)
-        typer.echo(stage, err=True)
+        typer.echo(readable(stage), err=True)
 
 
 def print_json(values: object) -> None:
@@ -212,13 +212,13 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
     more, failed = _written(target, _headed(values, ok), dict(outputs or {}))
     lines = lines_of((*diagnostics, *more), Severity.WARNING if SAYS.quiet else Severity.INFO)
     for line in ([SAYS.job_line] if SAYS.job_line and lines else []) + lines:
-        typer.echo(line, err=True)
+        typer.echo(readable(line), err=True)
     if failed and outputs:
         values, text = {"diagnostics": [d.as_dict() for d in (*diagnostics, *more)]}, ""
     if target == "-":
         print_json(rounded(_headed(values, ok and not failed)))
     elif text and not SAYS.quiet:
-        typer.echo(text)
+        typer.echo(readable(text))
     if failed or not ok:
         raise typer.Exit(1)
 

@@ -40,6 +40,8 @@ def width() -> int:
 ORDER = ("convert", "verify", "compare", "inspect", "trace", "time", "report", "orient", "place", "calibrate", "errors",
          "machine", "controller", "setup", "batch")
 """commands as the help lists them, the first ones first; others follow"""
+RUN_OTHERS = ("batch",)
+"""commands that look at the options of others, and run them"""
 
 
 class Argument(TyperArgument):
@@ -97,8 +99,10 @@ class Group(TyperGroup):
 
 def only_called(app: typer.Typer, arguments: Sequence[str]) -> typer.Typer:
     """The application with the one command that is called, so that the options of no other are built; with all of them where
-    the first argument names none."""
+    the first argument names none, or one that runs others."""
     name = arguments[0] if arguments else ""
+    if name in RUN_OTHERS:
+        return app
     one = copy(app)
     one.registered_commands = [c for c in app.registered_commands if name == (c.name or getattr(c.callback, "__name__", ""))]
     one.registered_groups = [g for g in app.registered_groups if name == g.name]

@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from postproc.cli.shared.says import SAYS
+from postproc.cli.shared.says import SAYS, readable
 
 ONLY_OF_CL = "dialect"
 """an option that only commands on CL files have: the others take machine and controller"""
@@ -40,7 +40,7 @@ def given_defaults(command: Any, arguments: list[str], context: typer.Context) -
         if "quiet" in given:
             SAYS.job_line = line  # it stands before warnings and errors
         else:
-            typer.echo(line, err=True)
+            typer.echo(readable(line), err=True)
 
 
 def _shown(value: object) -> str:

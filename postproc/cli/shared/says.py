@@ -1,8 +1,9 @@
-"""How much a command says, by its options -q, -v and --strict."""
+"""How much a command says, by its options -q, -v and --strict; texts as a terminal may be given them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from unicodedata import category
 
 
 @dataclass
@@ -28,3 +29,11 @@ class Says:
 
 SAYS = Says()
 """of the command that runs: every command sets all three before it begins"""
+
+
+def readable(text: str) -> str:
+    """A text of files as a terminal may be given it: a mark for each control but the ends of lines, and for each sign that
+    turns writing (Unicode categories Cc and Cf)."""
+    if text.replace("\n", "").isprintable():
+        return text
+    return "".join("\N{REPLACEMENT CHARACTER}" if c != "\n" and category(c) in ("Cc", "Cf") else c for c in text)

@@ -17,6 +17,7 @@ from postproc.batch.receipts import Receipt, kept
 from postproc.batch.run import Ran, Where, runs
 from postproc.cli.app import app
 from postproc.cli.batch import _swept
+from postproc.cli.shared.group import only_called
 from tests.postproc.batch.batch_kit import (
     JOBS,
     batch_folder,
@@ -30,7 +31,8 @@ from toolpaths.diagnostics import DiagnosticError
 
 
 def _batch(jobs: Path, *words: str) -> tuple[int, str, dict[str, object]]:
-    ran = CliRunner().invoke(app, ["batch", str(jobs), *words])
+    arguments = ["batch", str(jobs), *words]
+    ran = CliRunner().invoke(only_called(app, arguments), arguments)  # as the command line does
     index = jobs.parent / "out" / "index.json"
     return ran.exit_code, ran.output, json.loads(index.read_text("utf-8")) if index.exists() else {}
 

@@ -244,9 +244,9 @@ def test_a_small_conversion_imports_what_it_needs(tmp_path: Path) -> None:
 
 def test_the_command_that_is_called_is_built_alone() -> None:
     root = typer.main.get_command(app)
-    for name in root.commands:
+    for name in set(root.commands) - {"batch"}:
         assert list(typer.main.get_command(only_called(app, [name, "--help"])).commands) == [name]
-    for arguments in ([], ["--help"], ["--version"], ["convrt"]):
+    for arguments in ([], ["--help"], ["--version"], ["convrt"], ["batch", "--help"]):
         assert only_called(app, arguments) is app
 
 

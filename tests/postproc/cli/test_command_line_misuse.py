@@ -38,6 +38,19 @@ def test_outputs_that_would_replace_something_are_wrong_use(tmp_path: Path) -> N
     assert path.read_bytes() == before and not out.exists() and setup.read_bytes() == TOOLS.read_bytes()
 
 
+def test_texts_of_files_command_no_terminal(tmp_path: Path) -> None:
+    """Escape sequences and signs that turn writing, in a name that is shown and in a record that is refused."""
+    hostile = "\x1b[2J\x07\x9b31m\u202eX"
+    path = cl(tmp_path, f"TPRINT/{hostile}", "RAPID", "GOTO/0,0,5", "GOTO/1,0,5")
+    wrong = tmp_path / "wrong.cls"
+    wrong.write_text(path.read_text() + f"\nGOTO/{hostile},1,2\n")
+    for arguments, code, said in ((["inspect", path], 0, "points"), (["inspect", wrong], 1, "GOTO/"),
+                                  (["convert", wrong, *MILL, "-o", tmp_path / "p.ngc"], 1, "GOTO/")):
+        got = run(*arguments)
+        assert got.exit_code == code and said in got.output, got.output
+        assert not [c for c in got.output if c != "\n" and not c.isprintable()], repr(got.output)
+
+
 def test_a_link_is_kept(tmp_path: Path) -> None:
     target, link = tmp_path / "real.ngc", tmp_path / "link.ngc"
     target.write_text("old")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 import zlib
 from base64 import b64decode
@@ -69,6 +70,41 @@ def test_what_cannot_be_converted_is_on_the_page_with_its_reasons() -> None:
     assert made.code == 1 and not made.values["ok"] and not run["converted"] and run["points"] is None
     assert any(d["severity"] == "error" for d in run["conversion"]["diagnostics"])
     assert made.page.exists() and "not converted" in made.said
+
+
+@pytest.mark.parametrize("sigma", ["[sigma]\nEA0C = 5.0\n", ""])
+def test_each_place_has_the_uncertainty_of_its_error(sigma: str, tmp_path: Path) -> None:
+    """A table that is tilted by 50 arcsec, known to 5 arcsec (one standard deviation): a fifth of the error at each place
+    (k = 2)."""
+    model = tmp_path / "e.toml"
+    model.write_text('machine = "mikron-ucp710"\ncorrected_by = "post"\nlength_unit = "um"\nangle_unit = "arcsec"\n'
+                     "[location]\nEA0C = 50.0\n" + sigma)
+    made = reported("--error-model", str(model), "--no-texts")
+    errors = made.values["runs"][0]["errors"]
+    every = [*errors["places"], *errors["worst"]]
+    assert made.code == 0 and len(every) == 12 + 10 and errors["worst_before_um"] > 1.0
+    assert min(one["before_um"] for one in every) < 0.9 * errors["worst_before_um"]
+    found = [one["uncertainty_k2_um"] for one in every]
+    assert found == [pytest.approx(0.2 * one["before_um"], rel=1e-3) if sigma else None for one in every]
+    assert errors["uncertainty_k2_um"] >= max(found) if sigma else errors["uncertainty_k2_um"] is None
+
+
+def test_a_message_names_the_block_that_moves_for_its_line() -> None:
+    """Feeds lowered for an axis: the block of each CL line is the first with its point as the axes have it."""
+    made = reported(lines=tuple(line.replace("600", "60000") for line in LINES))
+    run = made.values["runs"][0]
+    page = made.page.read_text()
+    text = zlib.decompress(b64decode(dict(re.findall(r'id="text-([\w-]+)" data-name="[^"]*">([^<]*)<', page))["nc0-0"]))
+    program, links = text.decode().splitlines(), dict(zip((d["code"] for d in run["conversion"]["diagnostics"]),
+                                                          run["message_lines"], strict=True))
+    slowed = next(d for d in run["conversion"]["diagnostics"] if d["code"] == "feed.reduced")
+    assert [one["cl_line"] for one in links["feed.reduced"]] == slowed["lines"][:8] and links["setup.tool_unused"] == []
+    for one in links["feed.reduced"]:
+        tilt = 180.0 / math.pi * math.asin(float(LINES[one["cl_line"] - 1].split(",")[3]))
+        before = 180.0 / math.pi * math.asin(float(LINES[one["cl_line"] - 2].split(",")[3]))
+        turned = re.findall(r" A(-?[\d.]+)", "\n".join(program[:one["nc_line"]]))[-1]
+        assert one["nc_file"] == 0 and before - 1e-3 < abs(float(turned)) < tilt + 1e-3, one
+        assert re.search(r"G1|[XYZAC]-?\d", program[one["nc_line"] - 1]), one
 
 
 def test_figures_are_drawn_without_a_browser_with_units_on_their_axes(monkeypatch: pytest.MonkeyPatch) -> None:
