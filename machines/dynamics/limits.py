@@ -9,6 +9,7 @@ gravity would help is given away; counterbalances are in c.)
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
+
+if TYPE_CHECKING:
+    from machines.kinematics.legs.tip_axes import TipAxes
 
 LEAST = 0.02
 """of a limit: where standing still takes more than the rest, this is what is left, so that a plan exists; it is reported"""
@@ -72,13 +76,57 @@ class ForceLimits:
         return np.asarray(self.limits * np.maximum(1.0 - self.standing(q), LEAST), dtype=np.float64)
 
 
-def force_limits(machine: Machine, kinematics: Kinematics, cutting: float = 0.0) -> ForceLimits | None:
+@dataclass(frozen=True, eq=False)
+@arrays(acceleration="J")
+class DriveLimits:
+    """Of the drives of a platform whose joints here are the axes of its control's kinematics, as many as drives.
+
+    Attributes:
+        own: of the drives
+        axes: what moves them
+        acceleration: (J,) of an axis alone, as of `ForceLimits`
+    """
+
+    own: ForceLimits
+    axes: TipAxes
+    acceleration: Floats
+
+    def rows(self, q: Floats, dq: Floats, d2q: Floats) -> tuple[Floats, Floats]:
+        """See `ForceLimits`: joints are axes, rows are drives."""
+        return self.own.rows(*self.axes.drive_motion(q, dq, d2q))
+
+    def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
+        """See `ForceLimits`."""
+        return self.own.use(*self.axes.drive_motion(q, rate, acceleration))
+
+    def standing(self, q: Floats) -> Floats:
+        """See `ForceLimits`."""
+        return self.own.standing(self.axes.drives(q))
+
+
+def _of_drives(machine: Machine, drives: Machine, kinematics: Kinematics, cutting: float) -> DriveLimits | None:
+    """Of the machine by its control's axes; `kinematics` of these, at the tip."""
+    from machines.kinematics.legs.tip_axes import TipAxes
+
+    own = force_limits(drives, drives.kinematics.with_tool(kinematics.tool_length), cutting)
+    if not isinstance(own, ForceLimits) or not isinstance(kinematics, TipAxes):
+        return None
+    home, count = machine.home[None], len(machine.home)
+    at, rates, none = drives.home[None], kinematics.drive_rates(home)[0], np.zeros((1, count))
+    used = [own.use(at, none, rates[:, j][None]).max() for j in range(count)]
+    with np.errstate(divide="ignore"):
+        return DriveLimits(own, kinematics, 1.0 / np.array(used))
+
+
+def force_limits(machine: Machine, kinematics: Kinematics, cutting: float = 0.0) -> ForceLimits | DriveLimits | None:
     """Of a machine; None where the machine file has no limit of a motor, or no masses.
 
     Args:
         kinematics: at the tip
         cutting: N there, in the direction that is worst for each motor
     """
+    if machine.by_drives is not None:
+        return _of_drives(machine, machine.by_drives, kinematics, cutting)
     limits = force_limits_of(machine)
     dynamics = dynamics_of(machine)
     if dynamics is None or not np.isfinite(limits).any():
