@@ -316,8 +316,8 @@ def _too_weak(motion: PlannedMotion) -> list[Diagnostic]:
             worst = float(shares[k, j]), names[int(j)], int(source.path.move[one.block[k]])
     if worst[0] <= 1.0 - LEAST:
         return []
-    return [error("plan.force", f"standing still takes {worst[0]:.2f} times the force that the motor of {worst[1]} can give, "
-                  f"at most {1.0 - LEAST:g} leaves one for motion",
+    return [error("plan.force", f"standing still takes {worst[0]:.2f} times the force that the motor of {worst[1]} can "
+                  f"give: at most {1.0 - LEAST:g} leave some for motion",
                   file=source.file, lines=[int(source.moves.line[worst[2]])],
                   hint="check masses, force and balance of [dynamics] in the machine file, and cutting_force of the set-up")]
 
