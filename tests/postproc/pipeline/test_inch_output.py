@@ -207,6 +207,7 @@ def test_words_of_u_v_w_are_inches_too() -> None:
     """Controls scale them (LinuxCNC: G20), and so does the read-back: home is 206.654 mm of all legs."""
     setup = setup_of('[part]\norigin = [0, 0, -250]\n[tools.1]\ngauge_length = 80\n[clearance]\nmargin = 20\n'
                      '[output]\nunits = "inch"\n')
-    inch = good(convert(toolpath("RAPID", "GOTO/0,0,5", "FEDRAT/MMPM,3000", "GOTO/0,0,0", "GOTO/1,0,0"), "hexapod", setup=setup))
+    path = toolpath("RAPID", "GOTO/0,0,5", "FEDRAT/MMPM,3000", "GOTO/0,0,0", "GOTO/1,0,0")
+    inch = good(convert(path, "hexapod", setup=setup))
     assert "U8.13598 V8.13598" in inch.text and inch.comparison is not None and inch.comparison.worst_tip < 0.01
     assert inch.witness is not None and not inch.witness.findings
