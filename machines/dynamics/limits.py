@@ -9,7 +9,6 @@ gravity would help is given away; counterbalances are in c.)
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,11 +19,10 @@ from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.shapes import arrays
 
-if TYPE_CHECKING:
-    from machines.kinematics.legs.tip_axes import TipAxes
-
 LEAST = 0.02
 """of a limit: where standing still takes more than the rest, this is what is left, so that a plan exists; it is reported"""
+STEP = 0.02
+"""mm or rad of the differences by which drives follow axes, over the root of the acceleration where that is the larger"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,34 +86,41 @@ class DriveLimits:
     """
 
     own: ForceLimits
-    axes: TipAxes
+    axes: Kinematics
     acceleration: Floats
 
     def rows(self, q: Floats, dq: Floats, d2q: Floats) -> tuple[Floats, Floats]:
         """See `ForceLimits`: joints are axes, rows are drives."""
-        return self.own.rows(*self.axes.drive_motion(q, dq, d2q))
+        return self.own.rows(*drive_motion(self.axes, q, dq, d2q))
 
     def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
         """See `ForceLimits`."""
-        return self.own.use(*self.axes.drive_motion(q, rate, acceleration))
+        return self.own.use(*drive_motion(self.axes, q, rate, acceleration))
 
     def standing(self, q: Floats) -> Floats:
         """See `ForceLimits`."""
         return self.own.standing(self.axes.drives(q))
 
 
+def drive_motion(axes: Kinematics, q: Floats, rate: Floats, acceleration: Floats) -> tuple[Floats, Floats, Floats]:
+    """Joints of the drives with their rates and accelerations, each (N, K), of axes (N, J) with theirs: differences along
+    the parabola that the axes run."""
+    largest = np.stack([np.abs(rate).max(axis=1), np.sqrt(np.abs(acceleration).max(axis=1))]).max(axis=0)[:, None]
+    h = STEP / np.where(largest > 0.0, largest, 1.0)
+    ahead, back = (axes.drives(q + side * h * rate + 0.5 * h**2 * acceleration) for side in (1.0, -1.0))
+    at = axes.drives(q)
+    return at, (ahead - back) / (2.0 * h), (ahead - 2.0 * at + back) / h**2
+
+
 def _of_drives(machine: Machine, drives: Machine, kinematics: Kinematics, cutting: float) -> DriveLimits | None:
     """Of the machine by its control's axes; `kinematics` of these, at the tip."""
-    from machines.kinematics.legs.tip_axes import TipAxes
-
     own = force_limits(drives, drives.kinematics.with_tool(kinematics.tool_length), cutting)
-    if not isinstance(own, ForceLimits) or not isinstance(kinematics, TipAxes):
+    if not isinstance(own, ForceLimits):
         return None
-    home, count = machine.home[None], len(machine.home)
-    at, rates, none = drives.home[None], kinematics.drive_rates(home)[0], np.zeros((1, count))
-    used = [own.use(at, none, rates[:, j][None]).max() for j in range(count)]
+    unit = np.eye(len(machine.home))
+    used = own.use(*drive_motion(kinematics, np.tile(machine.home, (len(unit), 1)), 0.0 * unit, unit)).max(axis=1)
     with np.errstate(divide="ignore"):
-        return DriveLimits(own, kinematics, 1.0 / np.array(used))
+        return DriveLimits(own, kinematics, 1.0 / used)
 
 
 def force_limits(machine: Machine, kinematics: Kinematics, cutting: float = 0.0) -> ForceLimits | DriveLimits | None:

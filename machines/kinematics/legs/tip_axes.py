@@ -27,8 +27,6 @@ STILL = 1e-9
 """mm or rad per mm or rad: of a drive that an axis does not move"""
 STEP = 1e-4
 """mm or rad of the differences by which rates of drives are taken"""
-WIDE = 0.02
-"""the same of second ones, over the root of the acceleration where that is the larger"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,15 +78,6 @@ class TipAxes(Serial):
         ahead, back = (self.drives((q[:, None] + side * STEP * np.eye(self.joints)).reshape(-1, self.joints))
                        for side in (1.0, -1.0))
         return np.asarray(np.swapaxes((ahead - back).reshape(len(q), self.joints, -1), 1, 2) / (2.0 * STEP))
-
-    def drive_motion(self, q: Floats, rate: Floats, acceleration: Floats) -> tuple[Floats, Floats, Floats]:
-        """Joints of the legs with their rates and accelerations, each (N, K), of axes (N, J) with theirs: differences along
-        the parabola that the axes run."""
-        largest = np.stack([np.abs(rate).max(axis=1), np.sqrt(np.abs(acceleration).max(axis=1))]).max(axis=0)[:, None]
-        h = WIDE / np.where(largest > 0.0, largest, 1.0)
-        ahead, back = (self.drives(q + side * h * rate + 0.5 * h**2 * acceleration) for side in (1.0, -1.0))
-        at = self.drives(q)
-        return at, (ahead - back) / (2.0 * h), (ahead - 2.0 * at + back) / h**2
 
     @property
     def drive_margins(self) -> tuple[tuple[str, bool], ...]:
