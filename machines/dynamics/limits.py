@@ -21,6 +21,8 @@ from toolpaths.shapes import arrays
 
 LEAST = 0.02
 """of a limit: where standing still takes more than the rest, this is what is left, so that a plan exists; it is reported"""
+STEP = 0.02
+"""mm or rad of the differences by which drives follow axes, over the root of the acceleration where that is the larger"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,13 +74,64 @@ class ForceLimits:
         return np.asarray(self.limits * np.maximum(1.0 - self.standing(q), LEAST), dtype=np.float64)
 
 
-def force_limits(machine: Machine, kinematics: Kinematics, cutting: float = 0.0) -> ForceLimits | None:
+@dataclass(frozen=True, eq=False)
+@arrays(acceleration="J")
+class DriveLimits:
+    """Of the drives of a platform whose joints here are the axes of its control's kinematics, as many as drives.
+
+    Attributes:
+        own: of the drives
+        axes: what moves them
+        acceleration: (J,) of an axis alone, as of `ForceLimits`
+    """
+
+    own: ForceLimits
+    axes: Kinematics
+    acceleration: Floats
+
+    def rows(self, q: Floats, dq: Floats, d2q: Floats) -> tuple[Floats, Floats]:
+        """See `ForceLimits`: joints are axes, rows are drives."""
+        return self.own.rows(*drive_motion(self.axes, q, dq, d2q))
+
+    def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
+        """See `ForceLimits`."""
+        return self.own.use(*drive_motion(self.axes, q, rate, acceleration))
+
+    def standing(self, q: Floats) -> Floats:
+        """See `ForceLimits`."""
+        return self.own.standing(self.axes.drives(q))
+
+
+def drive_motion(axes: Kinematics, q: Floats, rate: Floats, acceleration: Floats) -> tuple[Floats, Floats, Floats]:
+    """Joints of the drives with their rates and accelerations, each (N, K), of axes (N, J) with theirs: differences along
+    the parabola that the axes run."""
+    largest = np.stack([np.abs(rate).max(axis=1), np.sqrt(np.abs(acceleration).max(axis=1))]).max(axis=0)[:, None]
+    h = STEP / np.where(largest > 0.0, largest, 1.0)
+    ahead, back = (axes.drives(q + side * h * rate + 0.5 * h**2 * acceleration) for side in (1.0, -1.0))
+    at = axes.drives(q)
+    return at, (ahead - back) / (2.0 * h), (ahead - 2.0 * at + back) / h**2
+
+
+def _of_drives(machine: Machine, drives: Machine, kinematics: Kinematics, cutting: float) -> DriveLimits | None:
+    """Of the machine by its control's axes; `kinematics` of these, at the tip."""
+    own = force_limits(drives, drives.kinematics.with_tool(kinematics.tool_length), cutting)
+    if not isinstance(own, ForceLimits):
+        return None
+    unit = np.eye(len(machine.home))
+    used = own.use(*drive_motion(kinematics, np.tile(machine.home, (len(unit), 1)), 0.0 * unit, unit)).max(axis=1)
+    with np.errstate(divide="ignore"):
+        return DriveLimits(own, kinematics, 1.0 / used)
+
+
+def force_limits(machine: Machine, kinematics: Kinematics, cutting: float = 0.0) -> ForceLimits | DriveLimits | None:
     """Of a machine; None where the machine file has no limit of a motor, or no masses.
 
     Args:
         kinematics: at the tip
         cutting: N there, in the direction that is worst for each motor
     """
+    if machine.by_drives is not None:
+        return _of_drives(machine, machine.by_drives, kinematics, cutting)
     limits = force_limits_of(machine)
     dynamics = dynamics_of(machine)
     if dynamics is None or not np.isfinite(limits).any():

@@ -118,7 +118,8 @@ def dynamics_figures(machine: Machine) -> dict[str, Any]:
     felt = own[:, np.arange(len(names)), np.arange(len(names))] / inertia_units(machine)
     found["felt_kg_or_kg_m2"] = {name: {"at_home": float(felt[0, j]), "least": float(felt[:, j].min()),
                                         "largest": float(felt[:, j].max())} for j, name in enumerate(names)}
-    if (limits := force_limits(machine, machine.kinematics)) is not None:
+    limits = force_limits(machine, machine.kinematics)
+    if isinstance(limits, ForceLimits):
         found |= _guaranteed(machine, limits, q, own)
     if isinstance(dynamics, LegDynamics):
         found |= _lumped(dynamics, q, own) | rod_figures(machine, dynamics)

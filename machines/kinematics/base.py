@@ -299,8 +299,7 @@ class Kinematics(ABC):
         return np.zeros((max(len(q) - 1, 0), 0))
 
     def places_apart(self) -> Floats | None:
-        """(2, J) joints in reach, rotary ones apart, by which the axis is found that turns the tool about one
-        direction everywhere (`postproc/joints/poles.py`); None of a kind that knows of none."""
+        """(2, J) joints in reach, rotary ones apart, for `postproc/joints/poles.py`; None of a kind that knows of none."""
         return None
 
     def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
@@ -312,8 +311,7 @@ class Kinematics(ABC):
 
     @property
     def drive_margins(self) -> tuple[tuple[str, bool], ...]:
-        """(name, True for rad) of each drive whose travel is none of a joint: of machines whose joints are the axes of the
-        control's own kinematics."""
+        """(name, True for rad) of drives whose travel is none of a joint: where joints are the control's own axes."""
         return ()
 
     def drive_margins_at(self, q: Floats) -> Floats:
@@ -354,8 +352,7 @@ class Kinematics(ABC):
         raise ValueError(f"errors of {type(self).__name__} machines cannot be modelled")
 
     def axis_line(self, letter: str) -> tuple[Floats, Floats]:
-        """(direction (3,), point (3,) in mm) of the line of an axis when all joints are 0, in the frame that
-        carries it; the point of a slide is 0.
+        """(direction (3,), point (3,) mm, 0 of slides) of an axis, joints at 0, in the frame that carries it.
 
         Raises:
             ValueError: where the kind does not know it.

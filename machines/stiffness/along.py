@@ -26,6 +26,8 @@ def tip_compliance(machine: Machine, kinematics: Kinematics, q: Floats) -> Float
     given = machine.stiffness
     if given is None:
         return None
+    if (drives := machine.by_drives) is not None:
+        return tip_compliance(drives, drives.kinematics.with_tool(kinematics.tool_length), kinematics.drives(q))
     if (parts := kinematics.leg_parts) is None:
         return _of_chain(given, kinematics, q)
     legs, placed = kinematics.leg_geometry, kinematics.clearance_parts

@@ -17,6 +17,7 @@ import numpy as np
 
 from machines.choices import Rapids
 from machines.kinematics.base import Kinematics
+from machines.kinematics.chain import ROTARY
 from machines.kinematics.frames import reference_x
 from machines.machine import Machine
 from postproc.control.planes import Plane
@@ -148,6 +149,11 @@ class Control:
     def slides(self) -> Ints:
         """Joint numbers of the linear axes."""
         return np.flatnonzero(~np.array(self.machine.rotary))
+
+    @cached_property
+    def length_letters(self) -> Ints:
+        """Columns of the words that controls take for lengths, by their letters: all but A, B, C."""
+        return np.flatnonzero([name not in ROTARY for name in self.machine.axis_names])
 
     @cached_property
     def xyz(self) -> Ints:

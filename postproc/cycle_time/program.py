@@ -75,10 +75,11 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     blocks = MotionBlocks(Axes.of(machine), start, end, motion.line, motion.code == 0, arc, center, normal, sweep,
                           np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names,
                           pauses,
-                           origin.cl_line, origin.move, _tip_lengths(motion, control), pieces, np.arange(len(motion)),
+                           origin.cl_line, origin.move, _feed_lengths(motion, control), pieces, np.arange(len(motion)),
                            tool=np.asarray(motion.tool[:len(motion)]))
     turned = np.where(np.isnan(motion.pitch), override, 1.0)
-    blocks = replace(blocks, speed=_clamped(_speeds(motion, blocks, by_radius) * turned, blocks, machine))
+    linear = _linear(motion, control)
+    blocks = replace(blocks, speed=_clamped(_speeds(motion, blocks, linear, by_radius) * turned, blocks, linear, machine))
     moving = (np.abs(end - start) > NOTHING).any(axis=1) | arc
     blocks = _unrolled(blocks, motion, control, unit) if (motion.frame > 0).any() else blocks.take(moving)
     return replace(blocks, pauses=_with_indexing(blocks, machine))
@@ -109,16 +110,19 @@ def _arcs(motion: Motion, control: Control, arc: Bools, start: Floats) -> tuple[
     return normal, np.nan_to_num(arc_sweeps(motion, control)), center
 
 
-def _tip_lengths(motion: Motion, control: Control) -> Floats:
-    """(E,) path of the tip where X, Y, Z are the tip and the joints follow; NaN elsewhere."""
-    rows = np.flatnonzero(motion.frame > 0)
-    if not len(rows):
-        return repeated(np.nan, len(motion))
-    result = np.full(len(motion), np.nan)
-    before, end = coordinates(motion, rows)
-    result[rows] = control.under("tcp").feed_length(end - before)
-    turning = np.linalg.norm((end - before)[:, control.xyz], axis=1) <= NOTHING
-    result[rows[turning]] *= DEG
+def _feed_lengths(motion: Motion, control: Control) -> Floats:
+    """(E,) what the feed refers to where X, Y, Z are the tip and the joints follow, and where a control's rule is not that
+    of `shape.feed_length`: mm, rad where no slide moves; NaN elsewhere and on arcs of machine coordinates."""
+    result, rows = np.full(len(motion), np.nan), np.flatnonzero(motion.frame > 0)
+    if len(rows):
+        before, end = coordinates(motion, rows)
+        step = end - before
+        result[rows] = control.under("tcp").feed_length(np.where(np.abs(step) > NOTHING, step, 0.0))
+        result[rows[_turning(before, end, control)]] *= DEG
+    if control.feed_rule != "xyz-first" and len(rows := np.flatnonzero((motion.frame == 0) & (motion.code != 2))):
+        step, unit = np.diff(motion.end, axis=0, prepend=motion.start[None])[rows], motion.unit[rows]
+        slides = (np.abs(step[:, control.slides]) > NOTHING).any(axis=1)
+        result[rows] = control.under("axes").feed_units(step, unit) * np.where(slides, unit, DEG)
     return result
 
 
@@ -198,10 +202,23 @@ def _carried(at: Ints, values: Floats, count: int) -> Floats:
     return fill_values(at, values, count)
 
 
-def _speeds(motion: Motion, blocks: MotionBlocks, by_radius: bool) -> Floats:
+def _linear(motion: Motion, control: Control) -> Bools:
+    """(E,) where a feed per minute counts mm: a slide moves, or where X, Y, Z are the tip that does."""
+    step = np.abs(np.diff(motion.end, axis=0, prepend=motion.start[None]))
+    result = (step[:, control.slides] > NOTHING).any(axis=1) | (motion.code == 2)
+    if len(rows := np.flatnonzero(motion.frame > 0)):
+        result[rows] = (motion.code[rows] == 2) | ~_turning(*coordinates(motion, rows), control)
+    return np.asarray(result)
+
+
+def _turning(before: Floats, end: Floats, control: Control) -> Bools:
+    """(N,) where the tip stands, at words (N, J)."""
+    return np.asarray(np.linalg.norm((end - before)[:, control.xyz], axis=1) <= NOTHING)
+
+
+def _speeds(motion: Motion, blocks: MotionBlocks, linear: Bools, by_radius: bool) -> Floats:
     """(E,) mm/s or rad/s that the feed word asks for."""
     form, unit = shape(blocks), motion.unit
-    linear = (form.first != 0.0).any(axis=1) | blocks.arc
     per_minute = motion.feed * np.where(linear, unit, DEG)
     least = LEAST_RATE * np.where(linear, unit, DEG)
     around = np.where(blocks.arc & by_radius, blocks.sweep, 1.0)
@@ -210,12 +227,11 @@ def _speeds(motion: Motion, blocks: MotionBlocks, by_radius: bool) -> Floats:
     return np.where(blocks.rapid, np.inf, asked)
 
 
-def _clamped(speed: Floats, blocks: MotionBlocks, machine: Machine) -> Floats:
+def _clamped(speed: Floats, blocks: MotionBlocks, linear: Bools, machine: Machine) -> Floats:
     """Speeds (E,) as the control runs them: at feed none above the largest cutting feed, of the machine and of each axis."""
     if not math.isfinite(machine.largest_feed) and not machine.cutting_velocity:
         return speed
     form = shape(blocks)
-    linear = (form.first != 0.0).any(axis=1) | blocks.arc
     with np.errstate(divide="ignore"):
         own = (machine.cutting_limits.velocity / form.share).min(axis=1)
     most = np.minimum(own, machine.largest_feed * np.where(linear, 1.0, DEG))

@@ -11,7 +11,7 @@ from typing import get_args
 import numpy as np
 
 from machines.choices import MotionOrder
-from machines.dynamics.limits import force_limits
+from machines.dynamics.limits import LEAST, force_limits
 from machines.kinematics.base import Kinematics
 from machines.machine import Limits, Machine
 from postproc.feedrate.limits import JointLimits, ToolLimits
@@ -312,10 +312,12 @@ def _too_weak(motion: PlannedMotion) -> list[Diagnostic]:
         shares = np.zeros((0, 0)) if forces is None else forces.standing(source.path.q[one.block])
         if shares.size and shares.max() > worst[0]:
             k, j = np.unravel_index(int(shares.argmax()), shares.shape)
-            worst = float(shares[k, j]), source.machine.axis_names[int(j)], int(source.path.move[one.block[k]])
-    if worst[0] <= 1.0:
+            names = (source.machine.by_drives or source.machine).axis_names
+            worst = float(shares[k, j]), names[int(j)], int(source.path.move[one.block[k]])
+    if worst[0] <= 1.0 - LEAST:
         return []
-    return [error("plan.force", f"standing still takes {worst[0]:.2f} times the force that the motor of {worst[1]} can give",
+    return [error("plan.force", f"standing still takes {worst[0]:.2f} times the force that the motor of {worst[1]} can "
+                  f"give: at most {1.0 - LEAST:g} leave some for motion",
                   file=source.file, lines=[int(source.moves.line[worst[2]])],
                   hint="check masses, force and balance of [dynamics] in the machine file, and cutting_force of the set-up")]
 

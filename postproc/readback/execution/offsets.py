@@ -40,6 +40,11 @@ class Offsets:
     corners: OutsideCorners = ""
     """how the control goes round outside corners of such a contour"""
 
+    @property
+    def lengths_at(self) -> Ints:
+        """Columns of words that a control takes for lengths, by their letters: in programs in inches it scales them."""
+        return self.xyz[self.xyz >= 0] if self.control is None else self.control.length_letters
+
     def shifts(self, tools: Ints, sides: Ints) -> Floats:
         """(N,) mm by which words are shifted to the left of the move, negative to the right, with tools and sides (N,)."""
         result = np.zeros(len(tools))

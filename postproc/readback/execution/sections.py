@@ -101,14 +101,14 @@ def _held(section: BlockSection, rows: MotionRows, moving: Bools, code: Canonica
 
 def _state(section: BlockSection, start: Floats, frame: ExecutionFrame, offsets: Offsets) -> SectionState:
     """Words in the coordinates of the law."""
-    xyz = offsets.xyz[offsets.xyz >= 0]
+    lengths = offsets.lengths_at
     drilling = among(section.motion, CYCLES)
     steps = np.array(section.steps) if section.has_steps or drilling.any() else section.steps
     if section.inch.any():
         columns = section.columns.copy()
-        columns[:, xyz] *= section.scale[:, None]
+        columns[:, lengths] *= section.scale[:, None]
         steps = np.array(steps)
-        steps[:, xyz] *= section.scale[:, None]
+        steps[:, lengths] *= section.scale[:, None]
     else:
         columns = section.columns
     shift = _shift(section, frame, offsets)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,9 +11,13 @@ import numpy as np
 import pytest
 
 import machines
+from machines.dynamics.limits import force_limits
+from machines.dynamics_models import AxisMassModel, BodyModel, DynamicsModel, StiffnessModel
 from machines.kinematics.legs.tip_axes import TipAxes
 from machines.machine import Machine
+from machines.stiffness.along import tip_compliance
 from tests.machines.random_slides import poses_over_workspace
+from toolpaths.arrays import Floats
 
 MODULES = {"hexapod": "genhexkins", "rotary-delta": "rotarydeltakins"}
 
@@ -74,3 +79,31 @@ def test_drives_take_the_time_of_their_fastest_part() -> None:
     fastest = float((np.abs(np.diff(at, axis=0)) * 2000.0 / real.limits.velocity).max())
     apart = float((np.abs(at[-1] - at[0]) / real.limits.velocity).max())
     assert apart < seconds <= fastest < 1.1 * seconds
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_forces_and_stiffness_of_the_tips_axes_are_those_of_the_drives(name: str) -> None:
+    """One motion by axes and by drives takes the same of every motor; what legs, not slides X, Y, Z, yield by."""
+    drives = on_control(name).by_drives
+    assert drives is not None
+    loads = {letter: AxisMassModel(mass=10.0, rods=10.0, force=900.0) for letter in drives.axis_names}
+    heavy = replace(drives, dynamics=DynamicsModel(platform=BodyModel(mass=70.0), axes=loads),
+                    stiffness=StiffnessModel(rod=100.0, drive=50.0))
+    tips = heavy.on_control()
+    axes, legs = tips.kinematics.with_tool(70.0), heavy.kinematics.with_tool(70.0)
+    by_axes, by_drives = force_limits(tips, axes, 50.0), force_limits(heavy, legs, 50.0)
+    assert by_axes is not None and by_drives is not None
+    t = np.linspace(0.0, 0.5, 41)[:, None]
+    size, phase, h = np.where(tips.rotary, 0.05, 20.0), np.arange(axes.joints), 2e-4
+
+    def at(s: Floats) -> Floats:
+        return np.asarray(tips.home + size * np.cos(5.0 * s + phase))
+    q, rate, acceleration = at(t), -5.0 * size * np.sin(5.0 * t + phase), -25.0 * size * np.cos(5.0 * t + phase)
+    before, here, after = (axes.drives(at(s)) for s in (t - h, t, t + h))
+    moved = here, (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
+    np.testing.assert_allclose(by_axes.use(q, rate, acceleration), by_drives.use(*moved), atol=1e-4)
+    np.testing.assert_allclose(by_axes.rows(q, rate, acceleration)[1], by_drives.rows(*moved)[1], atol=1e-4)
+    np.testing.assert_allclose(by_axes.standing(q), by_drives.standing(here), rtol=1e-9)
+    assert np.isfinite(by_axes.acceleration).all() and by_axes.standing(q).max() > 0.1
+    soft = tip_compliance(tips, axes, q), tip_compliance(heavy, legs, here)
+    assert (soft[0] is None and soft[1] is None) or np.allclose(*soft)

@@ -16,7 +16,7 @@ from postproc.pipeline.convert import verify
 from postproc.pipeline.result import PostResult
 from postproc.readback.comparison.checks import block_lengths, block_seconds
 from postproc.setup.model import SetupFile
-from tests.postproc.kit import SAMPLES, codes, convert, good, machine, shop_file, tool_setup, toolpath
+from tests.postproc.kit import SAMPLES, codes, convert, good, machine, setup_of, shop_file, tool_setup, toolpath
 
 CONTROLS = {"fanuc-30i": "mikron-ucp710", "haas-ngc": "trunnion-bc", "siemens-840d": "mikron-ucp710",
             "heidenhain-tnc640": "mikron-ucp710", "linuxcnc": "head-table", "generic-iso": "fork-head-ab"}
@@ -201,3 +201,13 @@ def test_a_set_up_says_inches_in_its_file(tmp_path: Path) -> None:
     path = toolpath("RAPID", "GOTO/0,0,50", "GOTO/0,0,5", "GOTO/25.4,0,5")
     made = good(postproc.convert(path, machine("mill-3axis"), "fanuc-30i", setup=str(file)))
     assert "F23.622\nX1.\n" in made.text
+
+
+def test_words_of_u_v_w_are_inches_too() -> None:
+    """Controls scale them (LinuxCNC: G20), and so does the read-back: home is 206.654 mm of all legs."""
+    setup = setup_of('[part]\norigin = [0, 0, -250]\n[tools.1]\ngauge_length = 80\n[clearance]\nmargin = 20\n'
+                     '[output]\nunits = "inch"\n')
+    path = toolpath("RAPID", "GOTO/0,0,5", "FEDRAT/MMPM,3000", "GOTO/0,0,0", "GOTO/1,0,0")
+    inch = good(convert(path, "hexapod", setup=setup))
+    assert "U8.13598 V8.13598" in inch.text and inch.comparison is not None and inch.comparison.worst_tip < 0.01
+    assert inch.witness is not None and not inch.witness.findings
