@@ -4,7 +4,7 @@ A run of the whole suite ends with its total and the files that take most; `--cp
 run fails where one file or one test takes more than its share of the total (`OF_A_FILE`, `OF_A_TEST`): shares are the same
 on slow and on busy machines, seconds are not. The total is turned into that of a machine that needs `USUAL` s for
 `yardstick`, which workers time as they begin, after every `EVERY` tests and as they end; a run that takes `SLACK` times
-`BUDGET` there is told so, and does not fail for it: a yard and the suite are not slowed alike by other processors and by load.
+`BUDGET` there is told so, and does not fail for it: other processors and load do not slow a yard and the suite alike.
 """
 
 from __future__ import annotations
