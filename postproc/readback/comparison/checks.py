@@ -203,8 +203,9 @@ def check_smoothing_levels(code: Canonical, motion: Motion, job: Job, moves: Mov
                             (other & ~asks & ~np.isnan(level), faults.warning, "the controller file has")):
         if bad.any():
             k = int(rows[bad.argmax()])
-            result.append(report("verify.smoothing", f"the level of the control's smoothing is another than {by}", int(moves.line[owner[k]]),
-                                 int(motion.line[k]), int(bad.sum()), hint=reader.smoothing_hint))
+            result.append(report("verify.smoothing", f"the level of the control's smoothing is another than {by}",
+                                 int(moves.line[owner[k]]), int(motion.line[k]), int(bad.sum()),
+                                 hint=reader.smoothing_hint))
     return result
 
 
