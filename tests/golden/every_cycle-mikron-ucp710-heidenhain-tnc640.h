@@ -6,7 +6,7 @@
 5 ; proved by read-back, second reading: all 18 cuts within 0.0001 mm, 0.0001 degrees
 6 ; tolerance 0.01 mm, axis tolerance 0.05 degrees
 7 ; feed mode auto
-8 ; setup without a file, fingerprint of the set-up 527fd724
+8 ; setup without a file, fingerprint of the set-up 2477345d
 9 ; words: machine coordinates without RTCP, tilted work planes
 10 ; work offset datum number 1 in machine coordinates: X0.0000 Y-40.0000 Z-10.0000 A0.0000 C0.0000
 11 ; pivots that the control must hold, in machine coordinates, all axes at 0, anywhere along each axis:

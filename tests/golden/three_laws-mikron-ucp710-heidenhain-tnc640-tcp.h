@@ -7,7 +7,7 @@
 6 ; tolerance 0.01 mm, axis tolerance 0.05 degrees
 7 ; feed mode auto
 8 ; output mode tcp
-9 ; setup without a file, fingerprint of the set-up 527fd724
+9 ; setup without a file, fingerprint of the set-up 2477345d
 10 ; words: machine coordinates without RTCP, tool-centre-point control
 11 ; work offset datum number 1 in machine coordinates: X0.0000 Y0.0000 Z0.0000 A0.0000 C0.0000
 12 ; pivots that the control must hold, in machine coordinates, all axes at 0, anywhere along each axis:
