@@ -9,6 +9,9 @@ import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from postproc.base.length_text import SAID, LengthText
+from toolpaths.units import MM_PER_INCH
+
 NO_FILE = "without a file"
 """in the place of a file's name where a set-up came without one"""
 SETUP_MARK = "fingerprint of the set-up"
@@ -81,9 +84,9 @@ def feed_line(source: str, merged: float) -> str:
     return f"feed {source}, merged within {100.0 * merged:g} %"
 
 
-def smoothing_line(mm: float) -> str:
+def smoothing_line(mm: float, said: LengthText) -> str:
     """What the control's own smoothing may take, where that is not as the controller file has it."""
-    return f"control's smoothing {mm:.6g} mm"
+    return f"control's smoothing {said.exactly(mm)}"
 
 
 def feeds_line() -> str:
@@ -162,8 +165,8 @@ _SETUP_FOLDED = re.compile(_BEGINS + b"setup" + _GAP + _NAME + b"," + _GAP + _sp
 _HOOKS = re.compile(_BEGINS + _spaced(HOOKS) + _GAP + rb"([^\n]*)")
 _SETUP = re.compile(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
 _OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
-_TOLERANCE = re.compile(rb"(?im)^[ \t(;\dN]*tolerance (\d[\d.e-]*) mm,")
-_SMOOTHING = re.compile(rb"(?im)^[ \t(;\dN]*control.{0,3}s smoothing (\d[\d.e-]*) mm")
+_TOLERANCE = re.compile(rb"(?im)^[ \t(;\dN]*tolerance (\d[\d.e-]*) (mm|inch)\b")
+_SMOOTHING = re.compile(rb"(?im)^[ \t(;\dN]*control.{0,3}s smoothing (\d[\d.e-]*) (mm|inch)\b")
 _PLANNED = re.compile(rb"(?im)^[ \t(;\d]*feed planned")
 _FEEDS = re.compile(rb"(?im)^[^\n]*" + FEEDS.encode("ascii") + rb" ([0-9a-f]{8})\b")
 _PLACE = re.compile(f"(?i){FEEDS} {UNKNOWN}")
@@ -182,10 +185,17 @@ def read_header(data: bytes) -> ProgramHeader:
         ours=_OURS.search(header) is not None, by_control=by_control is not None,
         corrected=_unfolded(named[1]) if named else None, model=marks[0],
         axes=AxesNamed(*(text.decode("ascii", "replace").lower() for text in axes.groups())) if axes else None,
-        setup=_named(setup) if setup else None, tolerance=float(tolerance[1]) if tolerance else 0.0,
+        setup=_named(setup) if setup else None, tolerance=_mm(tolerance),
         planned=_PLANNED.search(header) is not None, feeds=marks[1],
         hooks=hooks[1].decode("utf-8", "replace").strip().removesuffix(")") if hooks else "",
-        smoothing=float(smoothing[1]) if smoothing else 0.0)
+        smoothing=_mm(smoothing))
+
+
+def _mm(said: re.Match[bytes] | None) -> float:
+    """mm of a length as `LengthText.exactly` says it, 0 where none is said."""
+    if said is None:
+        return 0.0
+    return float(f"{float(said[1]) * (1.0 if said[2].lower() == b'mm' else MM_PER_INCH):.{SAID}g}")
 
 
 def _unfolded(name: bytes) -> str:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from toolpaths.units import MM_PER_INCH
 
+SAID = 6
+"""digits of a length in mm that is read again"""
 _MARGIN = 1e-6
 """of the last decimal: what stands on it goes to the next, on every processor"""
 
@@ -26,6 +28,10 @@ class LengthText:
     def text(self, mm: float, places: int = 4) -> str:
         """The number with its unit."""
         return f"{self.plain(mm, places)} {self.name}"
+
+    def exactly(self, mm: float) -> str:
+        """The number with its unit and as many digits as it has, SAID in mm: in inches one more, so that they come back."""
+        return f"{mm / self.unit:.{SAID + (self.unit != 1.0)}g} {self.name}"
 
     def up(self, mm: float, places: int = 4) -> str:
         """The number rounded up; "unknown" where it is none."""

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 from postproc.base.given import faults_of
 from postproc.base.header_words import chosen_axes, feed_line, hooks_line, setup_line, smoothing_line
+from postproc.base.length_text import LengthText
 from toolpaths.choices import GivenDialect, GivenUnit
 from toolpaths.diagnostics import DiagnosticError
 
@@ -69,9 +70,9 @@ class Options:
         if found:
             raise DiagnosticError(found)
 
-    def header(self) -> list[str]:
+    def header(self, said: LengthText) -> list[str]:
         """The options as comment lines of an output file; files by their names, wherever they stand."""
-        lines = [f"tolerance {self.tolerance:g} mm, axis tolerance {self.axis_tolerance:g} degrees",
+        lines = [f"tolerance {said.exactly(self.tolerance)}, axis tolerance {self.axis_tolerance:g} degrees",
                  f"feed mode {self.feed_mode}"]
         if self.output != "auto":
             lines.append(f"output mode {self.output}")
@@ -84,7 +85,7 @@ class Options:
         if self.optimise:
             lines.append("optimised for the time on the control")
         if self.smoothing:
-            lines.append(smoothing_line(self.smoothing))
+            lines.append(smoothing_line(self.smoothing, said))
         if self.error_model:
             beyond = ", beyond its range too" if self.error_beyond else ""
             lines.append(f"error model {Path(self.error_model).name}{beyond}")

@@ -26,7 +26,7 @@ def header_lines(made: CompiledStage) -> list[str]:
     job, machine = made.job, made.machine
     said = made.controller.lengths
     header = [f"postproc {VERSION}", f"source {FilePath(made.toolpath.file).name}", f"machine {machine.name}",
-              f"controller {made.controller_name}", PENDING, *made.options.header(),
+              f"controller {made.controller_name}", PENDING, *made.options.header(said),
               f"words: {_meanings(made.program)}", *_work_offsets(job)]
     if made.source is not None and made.source.plug_in is not None:
         header.append(f"CL file as read by {made.source.plug_in.stamped()}")

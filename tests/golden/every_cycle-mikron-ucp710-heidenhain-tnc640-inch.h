@@ -4,7 +4,7 @@
 3 ; machine mikron-ucp710
 4 ; controller heidenhain-tnc640
 5 ; proved by read-back, second reading: all 18 cuts within 0.00001 inch, 0.0001 degrees
-6 ; tolerance 0.01 mm, axis tolerance 0.05 degrees
+6 ; tolerance 0.0003937008 inch, axis tolerance 0.05 degrees
 7 ; feed mode auto
 8 ; setup without a file, fingerprint of the set-up d1265c0c
 9 ; words: machine coordinates without RTCP, tilted work planes

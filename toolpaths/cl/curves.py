@@ -190,6 +190,10 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
     if b.cubics and _add_cubics(b, curve, inner, chord):
         return
     chords = spline_points(curve, inner, chord)
+    if not len(chords):
+        b.log.error("cl.nurbs", f"the spline takes more chords within {b.spline_slack:.3g} mm of it than are made of one",
+                    b.line, "have the CAM system write the curve as points (GOTO), or allow a wider --tolerance")
+        return
     arcs = spline_arcs(curve, inner, chord, b.splines - 1)
     pieces = arcs if 0 < len(arcs) < len(chords) else [(x, y, z, ()) for x, y, z in chords.tolist()]
     for n, (x, y, z, arc) in enumerate(pieces, 1):
@@ -205,6 +209,8 @@ def _add_cubics(b: ToolpathBuilder, curve: Floats, inner: Floats, chord: float) 
     """The spline piece by piece, each by chords at equal steps of its parameter, as many as a power of two; False, and
     nothing is added, where it turns back between two knots: there steps of its parameter stand nearly still."""
     points, last = cubic_points(curve, inner, chord)
+    if not len(points):
+        return False
     along = np.diff(points, axis=0, prepend=curve[:1])
     turn = np.arctan2(np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1), (along[:-1] * along[1:]).sum(axis=1))
     if (turn[~last[:-1]] > _TURNS).any():
@@ -254,6 +260,8 @@ def spline_arcs(control: Floats, inner: Floats, chord: float,
     u, v, normal = plane
     flat = (control - control[0]) @ np.stack([u, v], axis=1)
     at = places_of(control, knots, chord / DENSER**2, _LEAST_PLACES)
+    if not len(at):
+        return []
     points = np.concatenate([flat[:1], de_boor(flat, knots, at, DEGREE)])
     slope = DEGREE * np.diff(flat, axis=0) / width_of(knots, len(flat), DEGREE)[:, None]
     tangent = de_boor(slope, knots[1:-1], np.append(0.0, at), DEGREE - 1)

@@ -30,7 +30,8 @@ def spline_points(control: Floats, inner: Floats, chord: float) -> Floats:
 
     control (n, 3); inner (n - 3,): the inner knots and 1. A short chord, h in the parameter, is off by h^2 |C'' x C'|
     / (8 |C'|): equal steps of the integral of its root are the fewest chords (de Boor, Good approximation by splines with
-    variable knots, 1973). Where `_follows` does not prove them there are more.
+    variable knots, 1973). Where `_follows` does not prove them there are more; (0, 3) where those that may be made are not
+    proved either.
     """
     knots = knots_of(inner)
     edges, sums = _chords_before(control, knots, _SHARE * chord)
@@ -39,11 +40,13 @@ def spline_points(control: Floats, inner: Floats, chord: float) -> Floats:
     for number in range(_TRIES + _HALVINGS):
         at = np.interp(steps, sums, edges)
         bad = ~_follows(control, knots, at, chord)
-        if not bad.any() or len(at) > _MOST_CHORDS * len(control):
+        if not bad.any():
+            return de_boor(control, knots, at[1:], DEGREE)
+        if len(at) > _MOST_CHORDS * len(control):
             break
         steps = _more_steps(steps, bad) if number < _TRIES else np.sort(
             np.append(steps, 0.5 * (steps[:-1] + steps[1:])[bad]))
-    return de_boor(control, knots, at[1:], DEGREE)
+    return np.zeros((0, 3))
 
 
 def _more_steps(steps: Floats, bad: Bools) -> Floats:
@@ -107,9 +110,12 @@ def _follows(control: Floats, knots: Floats, at: Floats, chord: float) -> Bools:
 
 def cubic_points(control: Floats, inner: Floats, chord: float) -> tuple[Floats, Bools]:
     """Points (M, 3) as of `spline_points`, of chords of equal steps between knots, their numbers powers of two; which (M,)
-    are at a knot. Pieces that bend have four chords at least, so that their points show that they are cubics."""
+    are at a knot; none where `places_of` has none. Pieces that bend have four chords at least, so that their points show
+    that they are cubics."""
     knots = knots_of(inner)
     at = places_of(control, knots, chord)
+    if not len(at):
+        return np.zeros((0, 3)), np.zeros(0, dtype=np.bool_)
     breaks = np.unique(knots)
     counts = np.diff(np.searchsorted(at, breaks, side="right"))
     counts = np.where(counts > 1, np.maximum(2 ** np.ceil(np.log2(np.maximum(counts, 1))).astype(int), _LEAST_CHORDS), 1)
@@ -123,11 +129,14 @@ def knots_of(inner: Floats) -> Floats:
 
 
 def places_of(control: Floats, knots: Floats, chord: float, least: int = 1) -> Floats:
-    """(M,) parameters after the first between which chords keep within `chord`, at least so many to a span."""
+    """(M,) parameters after the first between which chords keep within `chord`, at least so many to a span; none where
+    a span takes more than may be made."""
     breaks = np.unique(knots)
     bend = _second_derivatives(control, knots, breaks)
     steps = np.ceil(np.diff(breaks) * np.sqrt(bend / (8.0 * chord)))
-    counts = np.clip(steps, least, _MOST_CHORDS).astype(int)
+    if steps.max() > _MOST_CHORDS:
+        return np.zeros(0)
+    counts = np.maximum(steps, least).astype(int)
     return np.concatenate([np.linspace(a, c, n + 1)[1:] for a, c, n in zip(breaks, breaks[1:], counts, strict=False)])
 
 

@@ -12,7 +12,7 @@ from postproc.readback.comparison.faults import Faults
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinates
-from postproc.readback.text.canonical import SMOOTH_AXIS, Canonical
+from postproc.readback.text.canonical import SMOOTH_AXIS, SMOOTH_LEVEL, Canonical
 from postproc.readback.text.modal import fill_values
 from postproc.reference.holes import PECKING, Phase
 from postproc.reference.moves import Moves
@@ -182,6 +182,31 @@ def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults:
     return [faults.error("verify.smoothing", f"the control's smoothing {found}, its share of the tolerance is {share:g} mm",
                          int(moves.line[owner[k]]), int(motion.line[k]), len(bad),
                          hint=reader_for(job.controller, job.machine.axis_names).smoothing_hint)]
+
+
+def check_smoothing_levels(code: Canonical, motion: Motion, job: Job, moves: Moves, owner: Ints,
+                           faults: Faults) -> list[Diagnostic]:
+    """The level of the control's own smoothing while cutting is that of the blocks asked for, as the same reader reads them:
+    an error in an operation of [output.smoothing], a warning in others, whose level no one stated."""
+    plan, reader = job.smoothing, reader_for(job.controller, job.machine.axis_names)
+    wanted = np.array([reader.smoothing_level(one.blocks) for one in plan.used] or [np.nan])
+    if np.isnan(wanted).all():
+        return []
+    named = np.array([op.name in plan.named for op in job.toolpath.operations] or [False])
+    rows = np.flatnonzero((owner < len(moves)) & (motion.code > 0))
+    operation = np.minimum(job.toolpath.operation[moves.row[owner[rows]]], len(wanted) - 1)
+    asked, asks = wanted[operation], named[operation]
+    level = fill_values(*code.words.pick(SMOOTH_LEVEL), code.words.lines)[motion.block[rows]]
+    other = ~np.isnan(asked) & (level != asked)
+    result = []
+    for bad, report, by in ((other & asks, faults.error, "[output.smoothing] asks for"),
+                            (other & ~asks & ~np.isnan(level), faults.warning, "the controller file has")):
+        if bad.any():
+            k = int(rows[bad.argmax()])
+            result.append(report("verify.smoothing", f"the level of the control's smoothing is another than {by}",
+                                 int(moves.line[owner[k]]), int(motion.line[k]), int(bad.sum()),
+                                 hint=reader.smoothing_hint))
+    return result
 
 
 def check_axis_smoothing(code: Canonical, motion: Motion, job: Job, moves: Moves, owner: Ints,

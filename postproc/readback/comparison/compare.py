@@ -21,6 +21,7 @@ from postproc.readback.comparison.checks import (
     check_links,
     check_low_rapids,
     check_smoothing,
+    check_smoothing_levels,
     check_speeds,
     check_travel,
 )
@@ -135,6 +136,7 @@ def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gco
     diagnostics += check_travel(motion, executed, moves, owner, faults)
     diagnostics += check_reach_bounds(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
+    diagnostics += check_smoothing_levels(code, motion, job, moves, owner, faults)
     diagnostics += check_axis_smoothing(code, motion, job, moves, owner, faults)
     slack = job.toolpath.spline_slack
     return Comparison(job.moves, worst_tip + slack, worst_axis, tip_line, axis_line, tip, axis, match, owner,

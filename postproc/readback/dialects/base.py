@@ -21,6 +21,7 @@ from postproc.readback.text.canonical import (
     COOLANT,
     EXTENDED_OFFSETS,
     LOADED,
+    SMOOTH_LEVEL,
     STANDS,
     Canonical,
     ProgramText,
@@ -77,6 +78,8 @@ class Reader(ABC):
     turn_codes = False
     arc_slack = float("inf")
     sides: ClassVar[dict[int, str]] = {40: "off (G40)", 41: "left (G41)", 42: "right (G42)"}
+    alone = "{}"
+    """a program of given blocks"""
     smoothing_hint = "G64 P Q as the post writes it, or G61"
     neutral: ClassVar[frozenset[str]] = frozenset()
     statements: ClassVar[frozenset[str]] = frozenset()
@@ -173,6 +176,13 @@ class Reader(ABC):
             return None, [*found, *more]
         code, last = self.judged(text, line, file)
         return replace(code, files=files), [*found, *more, *placed(last, files)]
+
+    def smoothing_level(self, blocks: tuple[str, ...]) -> float:
+        """The level that blocks of the controller file set the control's own smoothing to, NaN for none."""
+        text = "\n".join(blocks).format(tolerance="1", chain="1", axis="1") + "\n"
+        code, _ = self.read(self.alone.format(text))
+        stated = np.zeros(0) if code is None else code.words.pick(SMOOTH_LEVEL)[1]
+        return float(stated[-1]) if len(stated) else float("nan")
 
     def executed(self, data: bytes, file: str, others: Mapping[str, bytes]) -> tuple[Canonical | None, list[Diagnostic]]:
         """A program in macro language, as the plain blocks that it comes to."""

@@ -24,6 +24,7 @@ from postproc.readback.text.canonical import (
     OFFSET,
     REGISTER,
     SMOOTH,
+    SMOOTH_LEVEL,
     Canonical,
     ProgramText,
     WordMeaning,
@@ -170,6 +171,7 @@ class FanucReader(IsoReader):
         for b, c in zip(*codes(words, "G", (5.1, 61)), strict=True):
             on = c == 5.1 and block(words, int(b)).get("Q", 0.0) == 1.0
             new.append((int(b), SMOOTH, (float("inf") if fixed is None else fixed) if on else 0.0))
+            new.append((int(b), SMOOTH_LEVEL, block(words, int(b)).get("R", 0.0) if on else float("nan")))
 
     def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
                found: list[Diagnostic]) -> None:

@@ -16,12 +16,15 @@ from postproc.readback.dialects.base import M_CODES
 from postproc.readback.dialects.fanuc import MILLISECONDS, FanucReader, block, take
 from postproc.readback.dialects.iso import New
 from postproc.readback.macros.execution import MacroLanguage
-from postproc.readback.text.canonical import SMOOTH, ProgramText
+from postproc.readback.text.canonical import SMOOTH, SMOOTH_LEVEL, ProgramText
 from postproc.readback.text.flow import Call, Structure
 from postproc.readback.text.modal import GROUPS, Groups, codes
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Bools, Ints
-from toolpaths.diagnostics import Diagnostic
+from toolpaths.diagnostics import Diagnostic, error
+
+_LEVELS = (1.0, 2.0, 3.0)
+"""P of G187: rough, medium, finish (Mill Operator's Manual NGC, G187)"""
 
 
 class HaasReader(FanucReader):
@@ -84,14 +87,18 @@ class HaasReader(FanucReader):
         for b in codes(words, "G", (187,))[0].tolist():
             stated = block(words, b)
             new.append((b, SMOOTH, stated.get("E", 0.0) * self.units_at(words, b) or float("inf")))
+            new.append((b, SMOOTH_LEVEL, stated.get("P", float("nan"))))
         for b in codes(words, "G", (61,))[0].tolist():
-            new.append((b, SMOOTH, 0.0))
+            new += [(b, SMOOTH, 0.0), (b, SMOOTH_LEVEL, float("nan"))]
 
     def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
                found: list[Diagnostic]) -> None:
         """Besides what Fanuc has: the words of G187."""
         for b in codes(words, "G", (187,))[0].tolist():
-            take(words, drop, b, "PE")
+            level = take(words, drop, b, "PE").get("P", 1.0)
+            if level not in _LEVELS:
+                found.append(error("gcode.smoothing", f"G187 P{level:g}: there is no such level", file=file,
+                                   lines=[int(line[b])], hint="G187 P1, P2 or P3"))
         super().others(words, new, drop, line, file, found)
 
 

@@ -15,6 +15,7 @@ from postproc.readback.text.canonical import (
     REGISTER,
     REST,
     SMOOTH,
+    SMOOTH_LEVEL,
     TURNS,
     Canonical,
     ProgramText,
@@ -29,6 +30,8 @@ from toolpaths.units import MM_PER_INCH
 
 New = list[tuple[int, str, float]]
 """words to add: block, letter, value"""
+_OWN_LEVELS = 1000
+"""from here on levels that the controller file knows by their words, beyond the R and P of controls"""
 
 
 class IsoReader(Reader):
@@ -72,14 +75,14 @@ class IsoReader(Reader):
         """Words without those of the control's smoothing that the controller file knows by what they may take, and that."""
         known = self.controller.known_smoothing if self.controller is not None else {}
         new, drop = list[tuple[int, str, float]](), np.zeros(len(words.letter), dtype=bool)
-        for text, mm in known.items():
+        for number, (text, mm) in enumerate(known.items(), _OWN_LEVELS):
             stated = [(ord(part[0]), float(part[1:])) for part in text.split(" ")]
             for k in np.flatnonzero((words.letter == stated[0][0]) & (words.value == stated[0][1])).tolist():
                 rows = slice(k, k + len(stated))
                 here = list(zip(words.letter[rows].tolist(), words.value[rows].tolist(), strict=True))
                 if here == stated and words.line[k] == words.line[k + len(stated) - 1]:
                     drop[rows] = True
-                    new.append((int(words.line[k]), SMOOTH, mm))
+                    new += [(int(words.line[k]), SMOOTH, mm), (int(words.line[k]), SMOOTH_LEVEL, float(number))]
         return words.take(~drop) if new else words, new
 
     def check(self, words: Words, file: str) -> list[Diagnostic]:

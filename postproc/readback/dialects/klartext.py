@@ -63,8 +63,9 @@ class KlartextReader(Reader):
                             "LBL", "CALL LBL", "CALL PGM", "PLANE SPATIAL", "PLANE RESET", "FUNCTION TCPM",
                             "FUNCTION RESET TCPM", "STOP", "SPL"})
     m_codes = (*M_CODES, 13.0, 14.0, 91.0, 99.0, 126.0, 127.0, 128.0, 129.0)
-    letters = "GMFSR?"
+    letters = "GMFS?"
     sides: ClassVar[dict[int, str]] = {40: "off (R0)", 41: "left (RL)", 42: "right (RR)"}
+    alone = "BEGIN PGM A MM\n{}END PGM A MM\n"
     smoothing_hint = "CYCL DEF 32.1 T and 32.2 TA as the post writes them"
     arc_slack = 0.016
     """mm, the TNC's own (circle end points)"""
@@ -264,7 +265,7 @@ def _contour(body: str, line: int, new: New) -> DialectStatement | None:
         elif name == "L" and match["letter"] != "R":
             letter = match["letter"]
             made.append((line, letter[1].lower() if len(letter) == 2 else letter, float(match["number"])))
-        elif name:
+        elif name and (match["letter"] != "R" or name == "CR"):
             keys[match["letter"]] = float(match["number"])
         else:
             return None

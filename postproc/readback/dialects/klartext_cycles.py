@@ -28,6 +28,8 @@ NEEDED = {number: tuple(f"Q{n}" for n in names) for number, names in {
     240: (200, 343, 201, 344, 206, 211, 203, 204)}.items()}
 """parameters that a cycle must state (Cycle Programming 34059x); those that later software added (Q395, Q208
 of cycle 205) have their old meaning where they are not stated"""
+MAY = {203: ("Q395",), 205: ("Q208", "Q395"), 200: ("Q395",)}
+"""those that a cycle may state besides; others are none of its own there"""
 Q = dict[str, float]
 Made = tuple[Drill | None, str]
 
@@ -55,6 +57,9 @@ def _drill_of(number: int, q: Q, speed: float) -> Made:
     missing = [k for k in NEEDED[number] if k not in q]
     if missing:
         return None, f"lacks {missing[0]}: the control asks for it"
+    strange = [k for k in q if k not in NEEDED[number] and k not in MAY.get(number, ())]
+    if strange:
+        return None, f"with {strange[0]}, which is no parameter of it in software 34059x"
     if q.get("Q395", 0.0) != 0.0 or q["Q201"] >= 0.0:
         return None, "with Q395, or with a depth that is not negative, is not executed by this reader"
     return _tap(q, speed, number == 207) if number in (206, 207) else kinds[number](q, speed)

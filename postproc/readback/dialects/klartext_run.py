@@ -22,6 +22,7 @@ from postproc.readback.text.canonical import (
     REST,
     SMOOTH,
     SMOOTH_AXIS,
+    SMOOTH_LEVEL,
     STATEMENT,
     TURNS,
     Canonical,
@@ -281,9 +282,12 @@ class KlartextRun:
                 self.fault("gcode.dwell", b, "CYCL DEF 9.1 lacks its time",
                            "CYCL DEF 9.1 DWELL 0.5 (seconds)")
         elif number == 32.0:
-            unit = MM_PER_INCH if self.inch else 1.0
+            unit, mode = MM_PER_INCH if self.inch else 1.0, s.keys.get("HSC-MODE", 0.0)
+            if part == 2.0 and mode not in (0.0, 1.0):
+                self.fault("gcode.smoothing", b, f"CYCL DEF 32.2 with HSC-MODE:{mode:g}", "HSC-MODE:0 finishing, 1 roughing")
             self.new += [(b, SMOOTH, s.keys.get("T", 0.0) * unit or math.inf)] if part == 1.0 else []
             self.new += [(b, SMOOTH_AXIS, s.keys.get("TA", math.inf) if part == 2.0 else math.inf)] if part else []
+            self.new += [(b, SMOOTH_LEVEL, s.keys.get("HSC-MODE", math.nan) if part == 2.0 else math.nan)] if part else []
         else:
             drill, why = drill_of(int(number), s.keys, float(self.speed[b]), self.inch)
             if drill is None:

@@ -200,8 +200,9 @@ class SiemensReader(Reader):
             if d not in (0.0, 1.0):
                 run.fault("gcode.tool", b, f"D{d:g}: the length of another cutting edge than the first is not known",
                           "D1 or D0")
-            run.length.append((b, -1.0 if kind and d == 0.0 else loaded))
-            new.append((b, REGISTER, run.length[-1][1] if kind else UNSTATED))
+            register = -1.0 if kind and d == 0.0 else loaded
+            run.length.append((b, np.inf if kind and d > 0.0 and loaded < 0.0 else register))
+            new.append((b, REGISTER, register if kind else UNSTATED))
 
 
 def _apart(text: bytes) -> tuple[bytes, list[tuple[int, str]]]:

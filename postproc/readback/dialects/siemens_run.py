@@ -13,6 +13,7 @@ from postproc.readback.text.canonical import (
     LAW,
     SMOOTH,
     SMOOTH_AXIS,
+    SMOOTH_LEVEL,
     STATEMENT,
     DialectStatement,
     Drill,
@@ -34,6 +35,8 @@ ROUNDED, ROUNDED_RAPID = "[", "]"
 """words ADIS and ADISPOS: how far from the corner rounding may begin, at feed and at rapid"""
 TURNING = (3.0, 4.0, 5.0)
 _BY_DISTANCE = (641.0, 645.0)
+_LEVELS = {"_ROUGH": 1.0, "_SEMIFIN": 2.0, "_FINISH": 3.0}
+"""of CYCLE832, with _ORI before them too (Cycles 3.25)"""
 _SEQUENCE = {1: "X", 2: "Y", 3: "Z"}
 
 
@@ -45,6 +48,7 @@ class SiemensRun:
         self.words, self.text, self.line, self.file, self.found, self.new = words, text, line, file, found, new
         self.axes, self.units = axes, codes(words, "G", (70, 71, 700, 710))
         self.length: list[tuple[int, float]] = []
+        """blocks, and the register in force from there on: -1 none, inf that of a tool that no block has loaded"""
         self.kept: list[tuple[int, float]] = []
         self.states: list[tuple[int, float]] = []
         self.laws: list[WordMeaning] = []
@@ -127,6 +131,8 @@ class SiemensRun:
             self.new.append((b, SMOOTH, float("inf") if off else s.number(0) * self.unit(b)))
             oriented = not any(isinstance(arg, str) and not arg.startswith("_ORI") for arg in s.args)
             self.new.append((b, SMOOTH_AXIS, s.number(2, float("inf")) if oriented else float("inf")))
+            kind = next((arg.removeprefix("_ORI") for arg in s.args if isinstance(arg, str)), "")
+            self.new.append((b, SMOOTH_LEVEL, float("nan") if off else _LEVELS.get(kind, float("nan"))))
         elif s.name in CYCLES:
             drill, why = drill_of(s, float(number_of(self.words, "S")[b]), self.unit(b))
             if drill is None:
@@ -221,6 +227,10 @@ class SiemensRun:
         shift = shift + rotation @ np.array([s.number(k, 0.0) for k in (10, 11, 12)])
         shift = shift * self.unit(b)
         direction = s.number(13, 0.0)
+        if direction not in (-1.0, 0.0, 1.0):
+            self.fault("gcode.mode", b, f"CYCLE800 with _DIR {direction:g}: no direction of the first rotary axis",
+                       "_DIR 1 or -1")
+            return
         choice: RotaryDirection = "+" if direction > 0.0 else "-" if direction < 0.0 else "nearest"
         self.enter(b, "tilted", WordMeaning("tilted", s.name, rotation, shift, choice))
 

@@ -71,6 +71,38 @@ def test_a_level_that_takes_more_is_found_in_the_operation_that_must_not(control
 
 
 @pytest.mark.parametrize(("controller", "word", "others"), [
+    ("haas-ngc", "G187 P3 E0.003", ("G187 P1 E0.003", "G187 E0.003")),
+    ("siemens-840d", "0.003,_ORI_FINISH", ("0.003,_ORI_ROUGH", "0.003,_ORI_SEMIFIN", "0.003,_FINISHED")),
+    ("heidenhain-tnc640", "HSC-MODE:0", ("HSC-MODE:1", "")),
+    ("fanuc-30i", "G05.1 Q1 R10", ("G05.1 Q1 R9", "G05.1 Q1", "G05.1 Q0", ""))])
+def test_another_level_at_the_same_tolerance_is_an_error_where_one_is_asked_for(controller: str, word: str,
+                                                                                 others: tuple[str, ...]) -> None:
+    """The first of the other words is a warning in an operation that asks for none, whose level the controller file has."""
+    made = good(convert(part(), MACHINE, controller, setup(ROUGH="roughing", FINE="finishing")))
+    plain = good(convert(part(), MACHINE, controller, setup()))
+    assert made.job is not None and plain.job is not None
+    at = made.text.index(word, made.text.index(LEVELS[controller][0]))
+    for other in others:
+        _, found = read_back(made.text[:at] + other + made.text[at + len(word):], made.job, "part.cls")
+        errors = [d for d in found if d.severity is Severity.ERROR]
+        assert [d.code for d in errors if "level" in d.message] == ["verify.smoothing"], other
+    usual = "G05.1 Q1" if controller == "fanuc-30i" else word
+    at = plain.text.rindex(usual)
+    _, found = read_back(plain.text[:at] + others[0] + plain.text[at + len(usual):], plain.job, "part.cls")
+    assert [(d.code, d.severity) for d in found if d.code == "verify.smoothing"] == [("verify.smoothing", Severity.WARNING)]
+
+
+@pytest.mark.parametrize(("controller", "word", "other", "code"), [
+    ("haas-ngc", "G187 P3", "G187 P4", "gcode.smoothing"),
+    ("heidenhain-tnc640", "HSC-MODE:0", "HSC-MODE:2", "gcode.smoothing")])
+def test_a_level_that_the_control_has_not_is_refused(controller: str, word: str, other: str, code: str) -> None:
+    made = good(convert(part(), MACHINE, controller, setup()))
+    assert made.job is not None and word in made.text
+    _, found = read_back(made.text.replace(word, other, 1), made.job, "part.cls")
+    assert code in {d.code for d in found if d.severity is Severity.ERROR}
+
+
+@pytest.mark.parametrize(("controller", "word", "others"), [
     ("siemens-840d", "_ORI_FINISH,0.015)", ("_ORI_FINISH,5)", "_ORI_FINISH)", "_FINISH,0.015)")),
     ("heidenhain-tnc640", " TA0.015", (" TA5", ""))])
 def test_more_than_the_tool_axis_may_lose_is_found_where_cuts_turn_it(controller: str, word: str,

@@ -9,6 +9,9 @@ import pytest
 
 from tests.postproc.reader_kit import TNC, executed, faults, good, words
 
+CENTRED = ("CYCL DEF 240 CENTERING ~\n Q200=2 ~\n Q343=0 ~\n Q201=-1 ~\n Q344=0 ~\n Q206=9 ~\n Q211=0 ~\n"
+           " Q203=0 ~\n Q204=50 ~\n {}=0")
+
 
 def program(body: str) -> str:
     """Numbered blocks with the frame; body lines with a leading blank go on in the block before."""
@@ -176,7 +179,10 @@ def test_labels_behind_the_end_and_other_files() -> None:
     "gcode.unknown_word"),
     ("CYCL DEF 208 BORE ~\n Q200=2", "gcode.cycle"), ("CALL LBL 77", "gcode.subprogram"), ("L X+1 X+2", "gcode.repeated"),
     ("PLANE RESET TURN FMAX", "gcode.mode"), ("FUNCTION TCPM F CONT AXIS POS PATHCTRL AXIS", "gcode.mode"),
-    ("FUNCTION TCPM F TCP AXIS POS PATHCTRL VECTOR", "gcode.mode"), ("PLANE SPATIAL SPA+0 SPB+0 TURN FMAX", "gcode.mode")])
+    ("FUNCTION TCPM F TCP AXIS POS PATHCTRL VECTOR", "gcode.mode"), ("PLANE SPATIAL SPA+0 SPB+0 TURN FMAX", "gcode.mode"),
+    ("PLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY R1", "gcode.mode"), ("L X+1 R1 F100", "gcode.unknown_word"),
+    ("L X+1 R1 F100 M128", "gcode.syntax"), (CENTRED.format("Q396"), "gcode.cycle"),
+    ("CYCL DEF 32.2 HSC-MODE:2", "gcode.smoothing")])
 def test_what_is_not_modelled_is_an_error_with_its_line(block: str, code: str) -> None:
     assert faults(TNC, program(f"L X+0 Y+0 Z+0 FMAX\n{block}\n"), "mill-3axis").get(code) == [3]
 

@@ -25,6 +25,8 @@ def test_tool_by_m6_and_length_by_d() -> None:
 def test_supa_with_a_length_in_force_is_refused() -> None:
     assert faults(SIEMENS, program("T1\nM6\nG0 SUPA Z400\n")) == {"gcode.machine_position": [6]}
     assert faults(SIEMENS, program("T1\nM6\nG0 SUPA X400\n")) == {}
+    assert faults(SIEMENS, program("G0 SUPA D1 Z400\n")) == {"gcode.machine_position": [4]}  # of the tool that stands there
+    assert faults(SIEMENS, program("G0 SUPA D0 Z400\n")) == {}
 
 
 def test_ic_and_ac_beat_the_modal_code() -> None:
@@ -154,6 +156,6 @@ def test_what_moves_nothing_is_passed(block: str) -> None:
 @pytest.mark.parametrize(("body", "line"), [
     ("TRAORI\nG0 A1\nTRAFOOF\n", 4), ("TRAORI\nORIAXES\nCYCLE800(0,\"\",0,57,0,0,0,0,0,0,0,0,0,1,0,1)\n", 6),
     ("CYCLE800(1,\"\",0,57,0,0,0,0,0,0,0,0,0,1,0,1)\n", 4), ("CYCLE800(0,\"\",1,57,0,0,0,0,0,0,0,0,0,1,0,1)\n", 4),
-    ("CYCLE800(0,\"\",0,192,0,0,0,0,0,0,0,0,0,1,0,1)\n", 4)])
+    ("CYCLE800(0,\"\",0,57,0,0,0,0,0,0,0,0,0,2,0,1)\n", 4), ("CYCLE800(0,\"\",0,192,0,0,0,0,0,0,0,0,0,1,0,1)\n", 4)])
 def test_modes_that_are_not_modelled_are_refused(body: str, line: int) -> None:
     assert faults(SIEMENS, program(body), "mikron-ucp710").get("gcode.mode") == [line]

@@ -9,6 +9,8 @@ import pytest
 
 from postproc.base import header_words as words
 from postproc.base.header_words import AxesNamed, ProgramHeader, SetupNamed, read_header, same_name, with_feeds_mark
+from postproc.base.length_text import INCH
+from postproc.base.options import Options
 from postproc.controllers.model import load_controller
 from postproc.writing.state import comment_room
 from toolpaths.diagnostics import read_value
@@ -34,6 +36,15 @@ def test_every_line_is_read_back(style: str) -> None:
     assert header.setup is not None and same_name(header.setup.name, "a b.toml")
     assert header == ProgramHeader(True, header.corrected, "89abcdef", False, AxesNamed("per-pass", "60"),
                         SetupNamed(header.setup.name, "0123abcd"), 0.0005, True, "00ff00ff")
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("mm", [0.01, 0.009, 0.0254, 0.00123456, 0.999999])
+def test_lengths_in_inches_come_back_in_mm(style: str, mm: float) -> None:
+    lines = [*Options(tolerance=mm, smoothing=0.00321).header(INCH)]
+    assert lines[0].startswith(f"tolerance {mm / 25.4:.7g} inch, ")
+    header = read_header(text([*BEGIN, *lines], style))
+    assert header.tolerance == mm and header.smoothing == 0.00321
 
 
 @pytest.mark.parametrize("style", STYLES)

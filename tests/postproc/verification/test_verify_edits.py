@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -91,7 +93,10 @@ def test_a_program_of_our_own_has_nothing_to_be_reported(controller: str) -> Non
     ("heidenhain-tnc640", "Q239=+1.5", "Q239=+1.75"),
     ("heidenhain-tnc640", "207 RIGID TAPPING ~", "206 TAPPING ~\nQ206=+600 ;FEED ~\nQ211=+0 ;DWELL ~")])
 def test_taps_keep_their_pitch_hand_and_kind(controller: str, old: str, new: str) -> None:
-    assert "verify.tap" in codes(found(part(controller), old, new))
+    result = part(controller)
+    if "206 TAPPING" in new:  # which has no pitch
+        result = replace(result, text=re.sub(r"Q239=[^\n]*\n", "", result.text))
+    assert "verify.tap" in codes(found(result, old, new))
 
 
 def test_taps_that_lose_what_couples_them_are_refused() -> None:

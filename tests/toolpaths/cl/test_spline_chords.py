@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from toolpaths.arrays import Floats
-from toolpaths.cl.spline_chords import DEGREE, de_boor, knots_of, spline_points
+from toolpaths.cl.curves import spline_arcs
+from toolpaths.cl.spline_chords import DEGREE, cubic_points, de_boor, knots_of, spline_points
 
 LOOKS = 8001
 
@@ -65,6 +66,14 @@ def least(control: Floats, inner: Floats, chord: float) -> int:
 def test_chords_keep_within_their_tolerance(seed: int) -> None:
     control, inner = curve(seed)
     assert 0.5 * 0.05 < worst(control, inner, 0.05) <= 0.05 * (1.0 + 1e-9)
+
+
+def test_chords_that_are_not_proved_are_none() -> None:
+    """So large a curve takes more chords than are made of one: none, in the place of chords of an unknown deviation."""
+    control = np.array([[0.0, 0.0, 0.0], [10.0, 10.0, 0.0], [0.0, 10.0, 5.0], [10.0, 0.0, 0.0]]) * 1e5
+    inner = np.array([1.0])
+    assert not len(spline_points(control, inner, 1e-4)) and not len(cubic_points(control, inner, 1e-4)[0])
+    assert not len(spline_arcs(control[:, [0, 1, 1]], inner, 1e-4))
 
 
 def test_few_more_chords_than_the_least() -> None:
