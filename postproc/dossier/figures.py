@@ -11,6 +11,7 @@ from pathlib import Path
 from machines.analysis.certificate_figure import certificate_figure
 from machines.analysis.chain_map import chain_map_figure
 from machines.analysis.choices import MapMeasure, MapNumber
+from machines.analysis.lever_map import lever_figure, moved_by_slides
 from machines.analysis.machine_figure import machine_figure
 from machines.analysis.maps import WORDS, map_figure, measured
 from machines.geometric_error.exchange.figures import model_figure
@@ -47,6 +48,9 @@ def figures(machine: Machine, errors: ErrorsOf | None) -> list[DossierFigure]:
     elif any(machine.rotary):
         made.append(DossierFigure("condition", "condition", "condition number over the rotary axes",
                                   partial(chain_map_figure, machine)))
+        if moved_by_slides(machine):
+            made.append(DossierFigure("force", "condition", "torque of the rotary axes under the part per force at the tip",
+                                      partial(lever_figure, machine)))
     if machine.certificate:
         content = json.loads(Path(machine.certificate).read_text("utf-8"))
         made.append(DossierFigure("certificate", "certificate", "boxes of the certificate in two planes",

@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 
 import machines
 from machines.analysis.chain_map import chain_map, chain_map_figure
+from machines.analysis.lever_map import lever_figure, lever_map, moved_by_slides
 from machines.analysis.levers import levers
 from machines.sheet.drawing import drawing
 from postproc.cli.app import app
@@ -56,7 +57,7 @@ def test_a_trunnion_s_page_says_limits_pivots_and_levers(tmp_path: Path) -> None
     assert "X.travel" in values["assumed"] and values["ok"]
     assert {row[0]: row[1] for row in cells(page, "condition") if len(row) == 3} == {
         letter: f"{row['mm']:.4g}" for letter, row in values["levers"].items()}
-    assert page.count("<img") == 2
+    assert page.count("<img") == 3
 
 
 def test_a_machine_on_legs_shows_maps_and_its_certificate(tmp_path: Path) -> None:
@@ -132,6 +133,17 @@ def test_levers_are_the_distances_that_random_positions_never_exceed(name: str) 
         assert float(np.linalg.norm(tip[1] - tip[0])) / (2 * h) == pytest.approx(row["mm"], rel=1e-4)
         ends = [m.kinematics.forward(q + s * h * np.eye(len(low))[j])[0] for s in (-1, 1)]
         assert float(np.linalg.norm(ends[1] - ends[0], axis=1).max()) / (2 * h) <= row["mm"] * (1 + 1e-4)
+
+
+def test_the_map_of_torque_is_the_distance_from_the_axis() -> None:
+    """A of the trunnion lies along X through the zero: the tip stands sqrt(y2 + z2) from it. Heads carry the tool along."""
+    m = machine("mikron-ucp710")
+    names, (y, z), arm = lever_map(m, "A")
+    assert names == ("Y", "Z") and arm == pytest.approx(np.hypot(y[:, None], z[None, :]), abs=1e-9)
+    assert arm.max() == pytest.approx(levers(m)["A"]["mm"]) and moved_by_slides(m) == ["A", "C"]
+    assert moved_by_slides(machine("fork-head-ab")) == [] == moved_by_slides(machine("uranesx"))
+    with pytest.raises(ValueError, match="no rotary axis"):
+        lever_figure(machine("fork-head-ab"), ".svg")
 
 
 def test_the_condition_of_a_trunnion_depends_on_its_tilt_alone_and_ends_where_it_is_singular() -> None:
