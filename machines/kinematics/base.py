@@ -311,7 +311,7 @@ class Kinematics(ABC):
 
     @property
     def drive_margins(self) -> tuple[tuple[str, bool], ...]:
-        """(name, True for rad) of drives whose travel is none of a joint: where joints are the control's own axes."""
+        """Names of drives whose travel is none of a joint, each with True for rad: where joints are the control's axes."""
         return ()
 
     def drive_margins_at(self, q: Floats) -> Floats:
