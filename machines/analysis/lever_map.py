@@ -32,8 +32,7 @@ def lever_map(machine: Machine, letter: str) -> tuple[tuple[str, str], tuple[Flo
     slides = np.flatnonzero(~np.array(machine.rotary) & ends).tolist()
     if not machine.kinematics.straight_slides or len(slides) < 2:
         raise ValueError(f"{machine.name} is no chain with two slides that have ends")
-    best = max((_over(machine, j, a, b) for a, b in combinations(slides, 2)), key=lambda one: float(np.ptp(one[2])))
-    return best
+    return max((_over(machine, j, a, b) for a, b in combinations(slides, 2)), key=lambda one: float(np.ptp(one[2])))
 
 
 def _over(machine: Machine, j: int, a: int, b: int) -> tuple[tuple[str, str], tuple[Floats, Floats], Floats]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from postproc.cli.shared.console import Json, refuse_overwriting, report, shown_errors
+from postproc.cli.shared.says import answer_line
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -71,16 +72,9 @@ def _ask(question: SheetQuestion) -> str:
     Raises:
         EOFError: where standard input has ended.
     """
-    import sys
-
     while True:
         typer.echo(question.prompt(), nl=False, err=True)
-        try:
-            line = sys.stdin.readline() if sys.stdin is not None else ""
-        except OSError:  # nothing there to be read
-            line = ""
-        if not line:
-            raise EOFError
+        line = answer_line()
         try:
             return question.parsed(line)
         except ValueError as wrong:

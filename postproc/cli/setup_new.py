@@ -26,7 +26,7 @@ from postproc.cli.shared.options import (
     ToleranceOption,
     UnitsOption,
 )
-from postproc.cli.shared.says import readable
+from postproc.cli.shared.says import answer_line, readable
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
@@ -128,7 +128,7 @@ class _Asking:
         one = question if question.default is not None else replace(question, default=self.last.get(question.kind))
         while True:
             typer.echo(readable(one.prompt()), nl=False, err=True)
-            value, wrong = parsed(one, _line())
+            value, wrong = parsed(one, answer_line())
             if value is not None and not wrong:
                 self.last[question.kind] = value
                 self.done.append((question, value))
@@ -178,20 +178,6 @@ def _terminal() -> bool:
     import sys
 
     return sys.stdin is not None and sys.stdin.isatty()
-
-
-def _line() -> str:
-    """One line of standard input.
-
-    Raises:
-        EOFError: where it has ended, or is closed.
-    """
-    import sys
-
-    line = sys.stdin.readline() if sys.stdin is not None else ""
-    if not line:
-        raise EOFError
-    return line
 
 
 def _given(lengths: list[str], speeds: list[str], feed: float | None, coolant: str, numbers: list[str],

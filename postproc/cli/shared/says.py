@@ -1,7 +1,8 @@
-"""How much a command says, by its options -q, -v and --strict; texts as a terminal may be given them."""
+"""How much a command says, by its options -q, -v and --strict; texts as a terminal may be given them; answers."""
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from unicodedata import category
 
@@ -37,3 +38,18 @@ def readable(text: str) -> str:
     if text.replace("\n", "").isprintable():
         return text
     return "".join("\N{REPLACEMENT CHARACTER}" if c != "\n" and category(c) in ("Cc", "Cf") else c for c in text)
+
+
+def answer_line() -> str:
+    """One line of standard input, where a question was asked.
+
+    Raises:
+        EOFError: where it has ended, is closed, or cannot be read.
+    """
+    try:
+        line = sys.stdin.readline() if sys.stdin is not None else ""
+    except OSError:
+        line = ""
+    if not line:
+        raise EOFError
+    return line

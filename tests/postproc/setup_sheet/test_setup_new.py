@@ -23,7 +23,7 @@ import postproc
 import toolpaths
 from postproc.base.options import Options
 from postproc.cli.app import app
-from postproc.cli.setup_new import _line as LINE
+from postproc.cli.shared.says import answer_line as LINE
 from postproc.controllers.model import load_controller
 from postproc.setup.model import load_setup, part_placement
 from postproc.setup_sheet.facts import facts_of
@@ -451,7 +451,7 @@ def test_wrong_registers_and_a_closed_standard_input_are_no_faults_of_ours(tmp_p
     (file := tmp_path / "part.cls").write_text(practice_file(nx, CASES["no spindle"]))
     words = ["setup", "new", file, "-m", "mill-3axis", "-o", tmp_path / "s.toml"]
     assert "no register" in run(*words, "--yes", "--work-offset-code", 'G54"', code=2).output
-    monkeypatch.setattr("postproc.cli.setup_new._line", lambda: setup_new_line(monkeypatch))
+    monkeypatch.setattr("postproc.cli.setup_new.answer_line", lambda: setup_new_line(monkeypatch))
     assert "setup.unanswered" in run(*words, code=1).output
 
 
