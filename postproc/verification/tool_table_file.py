@@ -223,10 +223,10 @@ def _klartext(lines: list[str], rows: _Rows) -> None:
     spans = {name: (begin, end)
              for (name, begin), end in zip(starts, [*(s for _, s in starts[1:]), None], strict=True)}
     parts: dict[str, Part] = {"L": "geometry", "DL": "wear"}
-    found = [(n, {name: line[slice(*spans[name])].strip() for name in ("T", "NAME", *parts) if name in spans})
-             for n, line in enumerate(lines[head + 1:], head + 2)]
-    comma = not any("." in cells.get(name, "") for _, cells in found for name in parts)
-    for n, cells in found:
+    cells_of = [(n, {name: line[slice(*spans[name])].strip() for name in ("T", "NAME", *parts) if name in spans})
+                for n, line in enumerate(lines[head + 1:], head + 2)]
+    comma = not any("." in cells.get(name, "") for _, cells in cells_of for name in parts)
+    for n, cells in cells_of:
         if not cells["T"].isdigit() or int(cells["T"]) == 0 or not cells["L"]:
             continue
         if cells.get("NAME"):
