@@ -67,7 +67,7 @@ def smoothing_plan(controller: ControllerFile, setup: SetupFile, options: Option
                                hint=why[1]))
         named[name] = one
     stated = _stated(controller, options, default, named)
-    named |= {} if stated == default else {name: stated for name in sorted(names - named.keys())}
+    named |= {} if stated == default else dict.fromkeys(sorted(names - named.keys()), stated)
     used = tuple(named.get(op.name, default) for op in toolpath.operations)
     return SmoothingPlan(default, named, used), found
 
