@@ -92,6 +92,23 @@ function toolLines(tip, axis, length, radius, lines) {
   lines.push([...tip, ...top, ...TOOL_COLOUR]);
 }
 
+// A tool whose form is known: rings at the corners of its pieces, and lines along their sides.
+const FORM_COLOURS = {cutter: [40, 40, 40], shank: [90, 90, 90], holder: [120, 60, 120]};
+const SIDES = 8, RING = 24;
+
+function formLines(tip, axis, form, lines) {
+  const u = across(axis), v = cross3(axis, u);
+  const at = ([r, z], a) => tip.map((t, i) => t + z * axis[i] + r * (u[i] * Math.cos(a) + v[i] * Math.sin(a)));
+  for (const {part, radius_height_mm: side} of form) {
+    const colour = FORM_COLOURS[part];
+    for (const k of new Set([0, Math.floor(side.length / 2), side.length - 1])) circle(lines, at([0, side[k][1]], 0), u, v, side[k][0], colour, RING);
+    for (let j = 0; j < SIDES; j++) {
+      const a = 2 * Math.PI * j / SIDES;
+      for (let k = 1; k < side.length; k++) lines.push([...at(side[k - 1], a), ...at(side[k], a), ...colour]);
+    }
+  }
+}
+
 // Legs at the place in time that lies between two that are known.
 function legLines(run, index, lines) {
   const known = run.legs.point, legs = run.info.points.legs.legs;
