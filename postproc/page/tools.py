@@ -15,8 +15,9 @@ from postproc.time_study.tables import by_tool
 
 
 def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
-    """`summary.tools_of` with its form, length register, s as `time` counts them (its change among them), mm and m that its
-    tip travels at feed against the part, arcs by their length, and its first position (axes in mm and degrees, part in mm)."""
+    """`summary.tools_of` with its form, length register, s as `time` counts them (its change among them), mm and m that
+    its tip travels at feed against the part, arcs by their length, and its first position (axes in mm and degrees, part in
+    mm)."""
     c, job, b = result.comparison, result.job, e.blocks
     if c is None or job is None or b.row is None:
         return []

@@ -6,7 +6,8 @@ Default 100, 10000, 1000000 points of `samples/make_big.py` on the three-axis ma
 trunnion. Each page is opened by three browsers that were just begun and three times by a warm one, in headless Chromium with
 software rendering, and brought into sight. Two times each, from the begin of the navigation: all is there, the picture on a
 plain canvas ("ready"), and WebGL draws it ("WebGL"). With them the least processor time of all processes of the browser
-until then, and that of an empty page, which a browser just begun needs too. Asked for: at most 3 MB and 16 bytes a point without texts, open within 1 s at 10,000 points and 3 s at a million.
+until then, and that of an empty page, which a browser just begun needs too. Asked for: at most 3 MB and 16
+bytes a point without texts, open within 1 s at 10,000 points and 3 s at a million.
 """
 
 from __future__ import annotations
