@@ -30,9 +30,8 @@ def test_an_outline_is_the_skin_of_its_piece(piece: tuple[float, ...]) -> None:
 
 def test_a_tool_whose_form_is_said_is_drawn_by_it() -> None:
     """A ball cutter of 16 mm of the CL file; of a tool of which nothing is said there is no form."""
-    lines = ("PARTNO P", "UNITS/MM", "TLDATA/MILL,16.0,8.0,75.0,0.0,0.0", "LOADTL/4", "SPINDL/RPM,1000,CLW", 
-             "FEDRAT/MMPM,600", "GOTO/0,0,50", "GOTO/0,0,0", "GOTO/20,0,0", "LOADTL/5", "SPINDL/RPM,1000,CLW", "GOTO/0,0,50", "GOTO/0,0,0",
-             "FINI")
+    cuts = ("SPINDL/RPM,1000,CLW", "FEDRAT/MMPM,600", "GOTO/0,0,50", "GOTO/0,0,0", "GOTO/20,0,0")
+    lines = ("PARTNO P", "UNITS/MM", "TLDATA/MILL,16.0,8.0,75.0,0.0,0.0", "LOADTL/4", *cuts, "LOADTL/5", *cuts, "FINI")
     made = reported(lines=lines)
     tools = {tool["number"]: tool for tool in made.values["runs"][0]["tools"]}
     pieces = [np.array(piece["radius_height_mm"]) for piece in tools[4]["form"] if piece["part"] == "cutter"]
