@@ -105,7 +105,7 @@ function drawNow() {
   for (const solid of run.solids) for (let k = 0; k < solid["edge 0"].length; k++) lines.push([0, 1, 2, 3, 4, 5].map((j) => solid["edge " + j][k]).concat(SOLID_COLOUR));
   if (byId("vectors").checked && run.info.errors) errorLines(run.info.errors, 0.12 * size, lines);
   const form = toolAt(run, now.next).form || [];
-  if (axis && form.length) formLines(tip, axis, form, lines);
+  if (axis && form.length) formLines(tip, axis, form, toolAt(run, now.next).gauge_length_mm || 0, lines);
   else if (axis) toolLines(tip, axis, toolLength(run, now.next), 0.012 * size, lines);
   const p = ["part x", "part y", "part z"].map((n) => run.columns[n][shown.point]), r = 0.015 * size;
   for (let k = 0; k < 3; k++) lines.push([...p.map((v, i) => v - (i === k ? r : 0)), ...p.map((v, i) => v + (i === k ? r : 0)), 156, 28, 18]);
