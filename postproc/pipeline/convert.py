@@ -212,7 +212,8 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         return replace(begun, diagnostics=tuple(found))
     asked, at_gauge = start.asked or start.setup, job.setup
     if tool_table:
-        from postproc.verification.tool_table import measured_lengths, read_tool_table, with_measured
+        from postproc.verification.tool_table import measured_lengths, with_measured
+        from postproc.verification.tool_table_file import read_tool_table
 
         measured, more = measured_lengths(read_tool_table(tool_table, spec), job, str(tool_table))
         begun, found, asked = replace(begun, measured=tuple(measured)), [*found, *more], with_measured(asked, measured)
