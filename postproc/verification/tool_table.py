@@ -84,8 +84,8 @@ class _Rows:
                        "leave the one that is not in force out")
 
 
-def read_tool_table(file: str | Path, controller: ControllerFile) -> ToolTable:
-    """The lengths of a file.
+def read_tool_table(file: str | Path, controller: ControllerFile, doubled: bool = False) -> ToolTable:
+    """The lengths of a file; `doubled`: those of `doubled_lengths`, which are 0 where all is right.
 
     Raises:
         DiagnosticError: where the file cannot be read, or holds no lengths in a form that is known.
@@ -94,10 +94,10 @@ def read_tool_table(file: str | Path, controller: ControllerFile) -> ToolTable:
         text = read_input(file).decode("utf-8", "replace").lstrip("\ufeff")
     except OSError as fault:
         raise DiagnosticError([unreadable(fault, "tool-table.open", file, _HINT)]) from fault
-    return table_of(text, controller, str(file))
+    return table_of(text, controller, str(file), doubled)
 
 
-def table_of(text: str, controller: ControllerFile, file: str) -> ToolTable:
+def table_of(text: str, controller: ControllerFile, file: str, doubled: bool = False) -> ToolTable:
     """Of the text of a table; errors as of `read_tool_table`."""
     lines, rows = text.splitlines(), _Rows(file)
     (_separated if _is_separated(lines) else _FORMS[controller.writer])(lines, rows)
@@ -107,7 +107,7 @@ def table_of(text: str, controller: ControllerFile, file: str) -> ToolTable:
         if "geometry" not in parts:
             rows.fault("wear", f"number {number} has a wear of {length:g} mm and no length", 1,
                        "write the table with geometry and wear")
-        elif not 0.0 < length <= LONGEST:
+        elif not (0.0 < length or doubled) or abs(length) > LONGEST:
             rows.fault("length", f"number {number} has a length of {length:g} mm, allowed is more than 0, at most "
                        f"{LONGEST:g}", 1, "lengths are mm from the gauge point of the spindle to the tip; leave unmeasured "
                        "tools out")
@@ -165,6 +165,18 @@ def with_allowed(found: list[MeasuredLength], margins: tuple[LengthMargin, ...],
     return result
 
 
+def lengths_at_machine(file: str | Path, job: Job) -> tuple[list[MeasuredLength], list[Diagnostic]]:
+    """What the table of the control says of the tools of a program: their lengths, which the program is then verified with;
+    none where its words hold the lengths already, so that those of the table must be 0.
+
+    Raises:
+        DiagnosticError: as of `read_tool_table`.
+    """
+    if job.controller.keeps_length and not job.control.length_on_z:
+        return [], doubled_lengths(read_tool_table(file, job.controller, doubled=True), job, str(file))
+    return measured_lengths(read_tool_table(file, job.controller), job, str(file))
+
+
 def measured_lengths(table: ToolTable, job: Job, file: str) -> tuple[list[MeasuredLength], list[Diagnostic]]:
     """The lengths of the tools that a CL file calls, in order of their numbers; errors for those that the table lacks."""
     wanted = sorted({(said.number, register) for said, register, _ in tool_loads(job.toolpath)})
@@ -181,6 +193,16 @@ def measured_lengths(table: ToolTable, job: Job, file: str) -> tuple[list[Measur
         faults.append(error("tool-table.apart", f"registers of one tool hold different lengths: T{apart[0]}", file=file,
                             hint="give each length a tool number of its own in the CL file"))
     return found, faults if has_errors(faults) else _questionable(found, job, file)
+
+
+def doubled_lengths(table: ToolTable, job: Job, file: str) -> list[Diagnostic]:
+    """Errors for tools whose lengths the control would add to words that hold them already: in its table they are 0."""
+    found, faults = measured_lengths(table, job, file)
+    wrong = [f"T{one.number}: {one.measured:g} mm" for one in found if one.measured != 0.0]
+    return [fault for fault in faults if fault.code == "tool-table.missing"] + ([error(
+        "tool.length_twice", "the words of the program hold the lengths of the tools already, and this controller adds those "
+        f"of its tool table with every tool change: {', '.join(dict.fromkeys(wrong))}", file=file, count=len(wrong),
+        hint="L and DL of these tools must be 0 in the control's tool table")] if wrong else [])
 
 
 def _questionable(found: list[MeasuredLength], job: Job, file: str) -> list[Diagnostic]:
