@@ -107,7 +107,7 @@ def table_of(text: str, controller: ControllerFile, file: str, doubled: bool = F
         if "geometry" not in parts:
             rows.fault("wear", f"number {number} has a wear of {length:g} mm and no length", 1,
                        "write the table with geometry and wear")
-        elif not (0.0 < length or doubled) or abs(length) > LONGEST:
+        elif not (length > 0.0 or doubled) or abs(length) > LONGEST:
             rows.fault("length", f"number {number} has a length of {length:g} mm, allowed is more than 0, at most "
                        f"{LONGEST:g}", 1, "lengths are mm from the gauge point of the spindle to the tip; leave unmeasured "
                        "tools out")
@@ -200,8 +200,8 @@ def doubled_lengths(table: ToolTable, job: Job, file: str) -> list[Diagnostic]:
     found, faults = measured_lengths(table, job, file)
     wrong = [f"T{one.number}: {one.measured:g} mm" for one in found if one.measured != 0.0]
     return [fault for fault in faults if fault.code == "tool-table.missing"] + ([error(
-        "tool.length_twice", "the words of the program hold the lengths of the tools already, and this controller adds those "
-        f"of its tool table with every tool change: {', '.join(dict.fromkeys(wrong))}", file=file, count=len(wrong),
+        "tool.length_twice", "the words of the program hold the lengths of the tools already, and this controller adds "
+        f"those of its tool table with every tool change: {', '.join(dict.fromkeys(wrong))}", file=file, count=len(wrong),
         hint="L and DL of these tools must be 0 in the control's tool table")] if wrong else [])
 
 
