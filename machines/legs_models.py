@@ -19,12 +19,22 @@ from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.tip_axes import TipAxes
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
-from machines.leg_layouts import BoundedVector, DriveModel, StarLayout, stray_keys
+from machines.leg_layouts import (
+    UNIT,
+    BoundedVector,
+    DriveModel,
+    PassiveModel,
+    StarLayout,
+    direction_problems,
+    held_by,
+    hinge_problems,
+    holds_of,
+    stray_keys,
+)
 from machines.legs_mobility import leg_faults, travel_faults
 from machines.machine import ControlKinematics
 from machines.models import KinematicsModel, Vector
 from machines.slider_models import (
-    UNIT,
     ClearanceModel,
     RotaryModel,
     WorkspaceModel,
@@ -37,7 +47,9 @@ from toolpaths.arrays import Floats
 
 Freedom = Literal["x", "y", "z", "a", "b", "c"]
 PLATFORMS = ("xy", "xyz", "xyza", "xyzb", "xyzc", "xyzabc")
-"""freedoms that a platform may have"""
+"""freedoms that a platform on rods may have"""
+COUPLED = ("zab", "xyz", "xyzab")
+"""those of a platform that hinges, a passive leg or rings hold besides: its other motions follow"""
 
 
 class CarrierModel(UserModel):
@@ -73,6 +85,8 @@ class LegsModel(KinematicsModel):
     """by axis letter; where the layout has a leg of that letter, in its place"""
     bars: dict[str, PlatformBarModel] = Field(default_factory=dict)
     """jointed parts of the platform, by name"""
+    passive: dict[str, PassiveModel] = Field(default_factory=dict)
+    """legs without a drive, by name"""
     carriers: dict[str, CarrierModel] = Field(default_factory=dict)
     """by axis letter"""
     rotary: RotaryModel | None = None
@@ -113,7 +127,24 @@ class LegsModel(KinematicsModel):
         redundant = ", which it moves along by itself too" if {"x", "y", "z"} <= set(self.freedoms) else ""
         carried = f", carried along {' '.join(self.carriers)}{redundant}" if self.carriers else ""
         where = "" if self.rotary is None else f", {self.rotary.place}"
-        return f"{kinds}, platform free in {' '.join(self.freedoms)} (Gruebler {self.gruebler}){carried}{where}"
+        rest = [letter for letter in FREEDOMS if letter not in self.freedoms] if self.held else []
+        follow = f", {' '.join(rest)} follow" if rest and "abc"[-1] in rest and not self.ringed else ""
+        return f"{kinds}, platform free in {' '.join(self.freedoms)} (Gruebler {self.gruebler}){follow}{carried}{where}"
+
+    @property
+    def held(self) -> int:
+        """Freedoms that hinges, rings and passive legs take."""
+        return held_by(self.drives.values(), self.passive.values())
+
+    @property
+    def in_series(self) -> None:
+        """None yet."""
+        return None
+
+    @property
+    def ringed(self) -> bool:
+        """True where every leg ends on a ring about the tool: its turn about itself is nobody's."""
+        return bool(self.drives) and all(leg.ring is not None for leg in self.drives.values())
 
     @property
     def gruebler(self) -> int:
@@ -121,8 +152,8 @@ class LegsModel(KinematicsModel):
 
         Of a platform whose pairs hold it twice it is less than what moves.
         """
-        rods = sum(max(len(leg.rods), 1) for leg in self.drives.values())
-        return len(self.drives) + (6 if "z" in self.freedoms else 3) + len(self.bars) - rods
+        rods = sum(max(len(leg.rods), 1) + (leg.hinge is not None) for leg in self.drives.values())
+        return len(self.drives) + (6 if "z" in self.freedoms else 3) + len(self.bars) - rods - 3 * len(self.passive)
 
     def build(self) -> Kinematics:
         """The kinematics at the gauge point."""
@@ -140,8 +171,12 @@ class LegsModel(KinematicsModel):
             on_bar = np.array([leg.bar is not None for leg in legs])[:, None]
             hinges = np.array([(0.0, 0.0, 0.0) if leg.bar is None else self.bars[leg.bar].hinge for leg in legs])
             joints, kept = np.where(on_bar, hinges, joints), np.where(on_bar, joints, 0.0)
+        own = tuple(sorted(self.freedoms, key=FREEDOMS.index))
+        holds = holds_of(legs, self.passive.values())
+        rings = np.array([leg.ring or 0.0 for leg in legs]) if any(leg.ring for leg in legs) else None
+        loops = Loops(drives, joints, own if holds is None else FREEDOMS, kept, holds, () if holds is None else own, rings)
         return OnLegs(
-            Loops(drives, joints, tuple(sorted(self.freedoms, key=FREEDOMS.index)), kept),
+            loops,
             self._space(), np.array(self.gauge), names,
             tuple(name in self.drives and self.drives[name].drive == "arm" for name in names),
             np.array([names.index(name) for name in self.drives]),
@@ -201,7 +236,8 @@ class LegsModel(KinematicsModel):
         yield from rail_problems(list(self.drives.values()), self.clearance)
         for name, leg in self.drives.items():
             yield from _letter(name, ("legs", name), ROTARY + LINEAR, leg.drive)
-            yield from _direction(leg.direction, ("legs", name, "direction"))
+            yield from hinge_problems(leg, ("legs", name))
+            yield from direction_problems(leg.direction, ("legs", name, "direction"))
             if leg.drive == "arm" and not 0.0 < np.linalg.norm(leg.arm) < 1e6:
                 yield KeyProblem("machine.geometry", ("legs", name), f"the arm of leg {name} is {list(leg.arm)}",
                                  "write arm = [x, y, z], from the axis to the rod's foot at 0")
@@ -214,9 +250,11 @@ class LegsModel(KinematicsModel):
             if (pair := _pair(leg)) is not None and np.linalg.norm(pair) < UNIT:
                 yield KeyProblem("machine.geometry", ("legs", name, "rods"), f"the two rods of leg {name} coincide",
                                  "write the place of each, or one rod")
+        for name, passive in self.passive.items():
+            yield from passive.problems(("passive", name))
         for name, carrier in self.carriers.items():
             yield from _letter(name, ("carriers", name), LINEAR, "carrier")
-            yield from _direction(carrier.direction, ("carriers", name, "direction"))
+            yield from direction_problems(carrier.direction, ("carriers", name, "direction"))
             if name in self.drives:
                 yield KeyProblem("machine.axis-letter", ("carriers", name), f"{name} drives a leg too",
                                  "choose another letter")
@@ -251,21 +289,43 @@ class LegsModel(KinematicsModel):
     def _freedom_problems(self) -> Iterator[KeyProblem]:
         yield from self._jointed_problems()
         own = "".join(sorted(self.freedoms, key=FREEDOMS.index))
-        if own not in PLATFORMS:
+        known = COUPLED if self.held else PLATFORMS
+        if own not in known:
             yield KeyProblem("machine.geometry", ("freedoms",), f"{list(self.freedoms)} is none of "
-                             + ", ".join(" ".join(p) for p in PLATFORMS), "write the freedoms that the legs leave "
-                             "the platform")
+                             + ", ".join(" ".join(p) for p in known) + (" of a platform with hinges, rings or a passive leg"
+                             if self.held else ""), "write the freedoms that the legs leave the platform")
             return
         if len(self.drives) != len(own):
             yield KeyProblem("machine.geometry", ("legs",), f"{len(self.drives)} legs for {len(own)} freedoms",
                              "write one [kinematics.legs.LETTER] table per freedom")
+        if self.held:
+            yield from self._held_problems(own)
         yield from self._carrier_problems(own)
         low, high = self.workspace.tilt
-        least, most = (0.0, 0.0) if own in ("xy", "xyz") else (0.0 if own.endswith("abc") else -90.0, 90.0)
+        about_all = own.endswith(("abc", "zab"))
+        least, most = (0.0, 0.0) if own in ("xy", "xyz") else (0.0 if about_all else -90.0, 90.0)
         if not (low == high == 0.0 or (least <= low <= 0.0 <= high < most and low > -90.0)):
             yield KeyProblem("machine.geometry", ("workspace", "tilt"), f"{[low, high]} degrees cannot be the tilt of "
                              f"this platform, free in {' '.join(own)}", "write tilt = [0, largest] with a b c, [lower, "
                              "upper] about one axis with a, b or c, less than 90 degrees; none without turns")
+
+    def _held_problems(self, own: str) -> Iterator[KeyProblem]:
+        """Hinges, rings and passive legs that do not go with the freedoms."""
+        if self.held + len(own) != len(FREEDOMS):
+            yield KeyProblem("machine.geometry", ("freedoms",), f"hinges, rings and passive legs take {self.held} of six "
+                             f"freedoms, {list(self.freedoms)} has {len(own)}", "a leg on a hinge takes one, a passive leg "
+                             "three, rings the turn of the tool about itself; write the freedoms that are left")
+        free = set(self.freedoms)
+        if (free == set("xyzab")) != self.ringed:
+            yield KeyProblem("machine.geometry", ("freedoms",), "x y z a b are the freedoms of a platform all of whose legs "
+                             "end on rings about the tool", "write ring = mm of every leg, or of none")
+        if free == set("zab") and len(self.carriers) != 2:
+            yield KeyProblem("machine.geometry", ("carriers",), f"{len(self.carriers)} carriers: a platform free in z a b "
+                             "goes aside as it tilts, and has nothing of its own to bring the tip back",
+                             "write two [kinematics.carriers.LETTER] tables, of slides along x and y")
+        if free == set("xyz") and self.in_series is None:
+            yield KeyProblem("machine.geometry", ("freedoms",), "the platform turns as it goes aside, and nothing turns the "
+                             "tool back", "write the axes of its wrist as [kinematics.spindle_axes.LETTER]")
 
     def _carrier_problems(self, own: str) -> Iterator[KeyProblem]:
         """Carriers add what the platform lacks; under one that moves along x, y and z they are redundant, all of them."""
@@ -287,9 +347,3 @@ def _letter(name: str, path: tuple[str, ...], allowed: str, what: str) -> Iterat
     if len(name) != 1 or name not in allowed:
         yield KeyProblem("machine.axis-letter", path, f"{name!r} is not a letter of {what}s", f"choose from "
                                                                                               f"{' '.join(allowed)}")
-
-
-def _direction(vector: Vector, path: tuple[str, ...]) -> Iterator[KeyProblem]:
-    length = float(np.linalg.norm(vector))
-    if abs(length - 1.0) > UNIT:
-        yield KeyProblem("machine.geometry", path, f"{list(vector)} has length {length:.6g}, not 1", "write a unit vector")

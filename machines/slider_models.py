@@ -17,15 +17,12 @@ from machines.kinematics.legs.rotary_axis import HeadAxis, TableAxis, TiltAbout
 from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
-from machines.leg_layouts import StarLayout
+from machines.leg_layouts import UNIT, StarLayout
 from machines.machine import ControlKinematics
 from machines.models import Interval, KinematicsModel, NotNegative, Positive, Vector
 from machines.user_model import UserModel
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
-
-UNIT = 1e-6
-"""how far the length of a direction may be from 1 (it is normalised)"""
 
 
 class LegModel(UserModel):
