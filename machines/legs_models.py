@@ -13,6 +13,7 @@ from machines.key_problem import KeyProblem
 from machines.kinematics.base import Kinematics
 from machines.kinematics.chain import LINEAR, ROTARY
 from machines.kinematics.legs.drives import Drives
+from machines.kinematics.legs.in_series import LegsInSeries
 from machines.kinematics.legs.loops import FREEDOMS, Loops
 from machines.kinematics.legs.module_pins import MODULES
 from machines.kinematics.legs.on_legs import OnLegs
@@ -37,10 +38,12 @@ from machines.models import KinematicsModel, Vector
 from machines.slider_models import (
     ClearanceModel,
     RotaryModel,
+    SeriesAxisModel,
     WorkspaceModel,
     clearance_sizes,
     lineardeltakins,
     rail_problems,
+    series_problems,
 )
 from machines.user_model import UserModel
 from toolpaths.arrays import Floats
@@ -89,6 +92,10 @@ class LegsModel(KinematicsModel):
     """legs without a drive, by name"""
     carriers: dict[str, CarrierModel] = Field(default_factory=dict)
     """by axis letter"""
+    table_axes: dict[str, SeriesAxisModel] = Field(default_factory=dict)
+    """rotary axes under the part, by letter, from the part to the bed"""
+    spindle_axes: dict[str, SeriesAxisModel] = Field(default_factory=dict)
+    """rotary axes between platform and spindle, by letter, from the platform to the spindle"""
     rotary: RotaryModel | None = None
     """rotary axis under the part or at the spindle, of a platform that tilts about x or y"""
     workspace: WorkspaceModel
@@ -112,7 +119,7 @@ class LegsModel(KinematicsModel):
     @property
     def axis_names(self) -> tuple[str, ...]:
         """Legs in the file's order, then carriers; linear ones before arms; last the rotary axis."""
-        return (*self._leg_axes, *(() if self.rotary is None else (self.rotary.letter,)))
+        return (*self._leg_axes, *self.in_series, *(() if self.rotary is None else (self.rotary.letter,)))
 
     @property
     def _leg_axes(self) -> tuple[str, ...]:
@@ -127,6 +134,8 @@ class LegsModel(KinematicsModel):
         redundant = ", which it moves along by itself too" if {"x", "y", "z"} <= set(self.freedoms) else ""
         carried = f", carried along {' '.join(self.carriers)}{redundant}" if self.carriers else ""
         where = "" if self.rotary is None else f", {self.rotary.place}"
+        for names, place in ((self.table_axes, "under the part"), (self.spindle_axes, "between platform and spindle")):
+            where += f", {' '.join(names)} {place}" if names else ""
         rest = [letter for letter in FREEDOMS if letter not in self.freedoms] if self.held else []
         follow = f", {' '.join(rest)} follow" if rest and "abc"[-1] in rest and not self.ringed else ""
         return f"{kinds}, platform free in {' '.join(self.freedoms)} (Gruebler {self.gruebler}){follow}{carried}{where}"
@@ -137,9 +146,9 @@ class LegsModel(KinematicsModel):
         return held_by(self.drives.values(), self.passive.values())
 
     @property
-    def in_series(self) -> None:
-        """None yet."""
-        return None
+    def in_series(self) -> tuple[str, ...]:
+        """Rotary axes before and behind the platform, from the part to the spindle."""
+        return (*self.table_axes, *self.spindle_axes)
 
     @property
     def ringed(self) -> bool:
@@ -157,6 +166,9 @@ class LegsModel(KinematicsModel):
 
     def build(self) -> Kinematics:
         """The kinematics at the gauge point."""
+        if self.in_series:
+            return LegsInSeries(self._on_legs(), *(tuple(one.joint(name) for name, one in axes.items())
+                                                   for axes in (self.table_axes, self.spindle_axes)))
         return self._on_legs() if self.rotary is None else self.rotary.on(self._on_legs(), np.array(self.gauge))
 
     def _on_legs(self) -> OnLegs:
@@ -200,7 +212,7 @@ class LegsModel(KinematicsModel):
         """
         legs = list(self.drives.values())
         if (made := MODULES.get(module)) is not None:
-            if self.carriers or self.rotary is not None:
+            if self.carriers or self.rotary is not None or self.in_series:
                 raise ValueError(f"{module} has no other axes than those of the legs")
             machine = self._on_legs()
             found = made(machine.loops, machine.gauge)
@@ -208,8 +220,8 @@ class LegsModel(KinematicsModel):
             zero = found.zero[list(found.order)]
             found = replace(found, order=tuple(at), zero=zero)
             return ControlKinematics(module, found.pins, found.tool_length_pin, legs=found, axes=TipAxes.of(machine))
-        if tuple(self.drives) != ("X", "Y", "Z") or self.carriers or {leg.drive for leg in legs} != {"slide"} \
-                or set(self.freedoms) != set("xyz"):
+        others = self.carriers or self.in_series or {leg.drive for leg in legs} != {"slide"}
+        if tuple(self.drives) != ("X", "Y", "Z") or others or set(self.freedoms) != set("xyz"):
             raise ValueError(f"module {module!r} is not known for this machine; a platform free in x y z on slides X, Y, Z "
                              "has lineardeltakins")
         rods = Legs(np.array([leg.point for leg in legs]), np.array([leg.direction for leg in legs]),
@@ -275,6 +287,8 @@ class LegsModel(KinematicsModel):
             if name not in held:
                 yield KeyProblem("machine.geometry", ("bars", name), f"no leg holds the bar {name!r}",
                                  f"write bar = {name!r} in the tables of its legs, or take the bar out")
+        if self.in_series:
+            yield from self._series_problems(turns)
         if self.rotary is not None:
             yield from self.rotary.problems((*self.drives, *self.carriers))
             if self.carriers:
@@ -285,6 +299,21 @@ class LegsModel(KinematicsModel):
                 yield KeyProblem("machine.geometry", ("rotary",), "a rotary axis goes with a platform that tilts about "
                                  f"x or y; this one is free in {' '.join(self.freedoms)}", "take [kinematics.rotary] "
                                  "out, or write the freedoms x y z a, or x y z b, where legs leave them")
+
+    def _series_problems(self, turns: str) -> Iterator[KeyProblem]:
+        """Rotary axes in series that do not go with the platform."""
+        yield from series_problems(self.table_axes, self.spindle_axes, self._leg_axes, bool(self.held), np.array(self.gauge))
+        if turns or self.rotary is not None:
+            yield KeyProblem("machine.geometry", ("table_axes" if self.table_axes else "spindle_axes",), "rotary axes in "
+                             "series go with a platform that moves along x, y and z alone; this one is free in "
+                             f"{' '.join(self.freedoms)}" + ", and has [kinematics.rotary]" * (self.rotary is not None),
+                             "take them out, or write [kinematics.rotary] of a platform that tilts about x or y")
+        moves = np.array([*(np.eye(3)["xyz".index(f)] for f in self.freedoms if f in "xyz"),
+                          *(np.array(c.direction) for c in self.carriers.values())])
+        if len(moves) != 3 or (self.held and self.carriers):
+            yield KeyProblem("machine.geometry", ("carriers",), "rotary axes in series need a tip that legs and carriers "
+                             f"bring to one place in one position; these move it in {len(moves)} directions",
+                             "write carriers for what the platform lacks, and no others")
 
     def _freedom_problems(self) -> Iterator[KeyProblem]:
         yield from self._jointed_problems()
@@ -323,7 +352,7 @@ class LegsModel(KinematicsModel):
             yield KeyProblem("machine.geometry", ("carriers",), f"{len(self.carriers)} carriers: a platform free in z a b "
                              "goes aside as it tilts, and has nothing of its own to bring the tip back",
                              "write two [kinematics.carriers.LETTER] tables, of slides along x and y")
-        if free == set("xyz") and self.in_series is None:
+        if free == set("xyz") and not self.in_series:
             yield KeyProblem("machine.geometry", ("freedoms",), "the platform turns as it goes aside, and nothing turns the "
                              "tool back", "write the axes of its wrist as [kinematics.spindle_axes.LETTER]")
 

@@ -140,6 +140,9 @@ class Rods:
     held: Array = field(default_factory=lambda: np.zeros(3))
     besides: HeldPlatform = field(default_factory=HeldPlatform)
     rings: dict[str, float] = field(default_factory=dict)
+    tables: dict[str, Array] = field(default_factory=dict)
+    wrist: dict[str, Array] = field(default_factory=dict)
+    """(direction, point) (2, 3) of rotary axes in series: from the part to the bed, from the platform to the spindle"""
     wrong: bool = False
     """every rod is a leg of its own, the platform turns as it must; of two pairs in a plane the mean of each counts"""
 
@@ -166,14 +169,36 @@ class Rods:
         if self.carries == "part":
             back = rotations(_UP, -turn)
             tip, axis = apply(back, tip), apply(back, axis)
+        for name, (along, point) in self.tables.items():
+            back = -q[:, letters.index(name)]
+            tip, axis = turned(along, back, tip - point) + point, turned(along, back, axis)
         for name, along in self.carriers.items():
             tip = tip - q[:, letters.index(name)][:, None] * along
         head = rotations(np.eye(3)[int(self.turns != "b")], turn * (self.carries == "spindle"))
         tool = apply(head, _UP[None])
+        if self.wrist:
+            tool, reach = self._at_wrist(q, letters)
+            least = _between(np.broadcast_to(tool, axis.shape), axis) if self.turns else np.eye(3)[None]
+            return self._closed(q, letters, (tip, axis, length), np.broadcast_to(least, (len(q), 3, 3)), (tool, reach))
         platform = self._nominal(axis * np.where(tool[:, 2:] < 0.0, -1.0, 1.0))  # past a quarter turn the head points back
         if self.wrong and self.turns != "c":
             platform = _between(np.broadcast_to(apply(platform, tool), axis.shape), axis) @ platform
-        expected, gauge, reach = apply(platform, tool), tip + length[:, None] * axis, apply(head, self.reach[None])
+        return self._closed(q, letters, (tip, axis, length), platform, (tool, apply(head, self.reach[None])))
+
+    def _at_wrist(self, q: Array, letters: tuple[str, ...]) -> tuple[Array, Array]:
+        """(tool axis, gauge point from the reference point) (N, 3) in directions of the platform."""
+        tool, reach = np.broadcast_to(_UP, (len(q), 3)), np.broadcast_to(self.reach, (len(q), 3))
+        for name, (along, point) in reversed(self.wrist.items()):
+            value = q[:, letters.index(name)]
+            tool, reach = turned(along, value, tool), turned(along, value, reach - point) + point
+        return tool, reach
+
+    def _closed(self, q: Array, letters: tuple[str, ...], claimed: tuple[Array, Array, Array], platform: Array,
+                carried: tuple[Array, Array]) -> tuple[Array, Array]:
+        """What `_placed` gives of a tip, axis and length that are `claimed`; `carried`: tool axis and gauge point on the
+        platform."""
+        (tip, axis, length), (tool, reach) = claimed, carried
+        expected, gauge = apply(platform, tool), tip + length[:, None] * axis
         if self.wrong or "c" in self.turns:  # the tool turns about itself between blocks
             platform, off = self._spun(q, letters, gauge, platform, reach, axis)
         else:
@@ -312,7 +337,9 @@ def rods(table: dict[str, Any]) -> Rods:
     return Rods(legs, "".join(sorted(set(freedoms) & set("abc"))), pivot, reach, rotary.get("letter", ""),
                 rotary.get("carries", ""), float(rotary.get("positive", 1)),
                 {name: unit(rows(one, "direction")[0]) for name, one in carriers.items()},
-                np.array([float(letter not in freedoms) for letter in "xyz"]), besides, rings)
+                np.array([float(letter not in freedoms) for letter in "xyz"]), besides, rings,
+                *({name: np.array([unit(np.array(one["direction"], np.float64)), one.get("point", (0.0, 0.0, 0.0))])
+                   for name, one in kinematics.get(key, {}).items()} for key in ("table_axes", "spindle_axes")))
 
 
 def _on_bar(leg: dict[str, Any], bars: dict[str, dict[str, Any]]) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from machines.geometric_error.actual.rods import RodErrors, guide_frame, inverte
 from machines.geometric_error.actual.transforms import turns
 from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import blocks
+from machines.kinematics.legs.in_series import LegsInSeries
 from machines.kinematics.legs.loops import FREEDOMS, Loops, turned
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.with_axis import LegsWithAxis
@@ -222,6 +223,10 @@ class _Frames:
     def legs(self, kinematics: OnLegs) -> LegFrame | None:
         """The rods."""
         return leg_frame(kinematics)
+
+    def in_series(self, kinematics: LegsInSeries) -> LegFrame | None:
+        """The rods."""
+        return leg_frame(kinematics.on_legs)
 
 
 def frame_of(kinematics: Kinematics) -> LegFrame | None:

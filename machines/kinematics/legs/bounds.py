@@ -22,6 +22,7 @@ from functools import cached_property
 
 import numpy as np
 
+from machines.kinematics import columns
 from machines.kinematics.legs.holds import Holds
 from machines.kinematics.legs.loops import Loops
 from machines.kinematics.rod_loops import UNBOUNDED
@@ -62,6 +63,18 @@ class PlatformJets:
     def direction(self, axis: Floats) -> TaylorVector:
         """A direction (3,) that turns with the platform."""
         return self._jet(axis, 0.0)
+
+    def carried(self, own: TaylorVector, moves: float) -> TaylorVector:
+        """A point (moves = 1, from the reference point) or a direction (0) that itself moves on the platform."""
+        n, w, bend = len(self.turn), self.first[:, 3:], self.second[:, 3:]
+        b, b1, b2 = ((self.turn @ columns.to_rows(part, n)[:, :, None])[:, :, 0] for part in (
+            own.value, own.first, own.second))
+        first = moves * self.first[:, :3] + cross(w, b) + b1
+        second = moves * self.second[:, :3] + cross(bend, b) + cross(w, cross(w, b)) + 2.0 * cross(w, b1) + b2
+        size = lengths(columns.to_rows(own.value, n)) + 0.5 * own.speed()
+        third = self.third * (moves + size / self.lever) + (3.0 * self.bend * self.spin + self.spin**3) * size
+        third = third + 3.0 * (self.bend + self.spin**2) * own.speed() + 3.0 * self.spin * own.bend() + own.third
+        return TaylorVector(list((moves * self.place + b).T), list(first.T), list(second.T), np.minimum(third, UNBOUNDED))
 
     def tilting(self, tilt: Floats, about: int) -> tuple[TaylorVector, TaylorAngle]:
         """The reference point, and the tilt (N,) of a platform that turns about x, y or z (0, 1, 2) alone."""

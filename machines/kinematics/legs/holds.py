@@ -83,6 +83,11 @@ class Holds:
         return np.hstack([np.broadcast_to(lengths(self.joints), (n, len(self.joints))),
                           lengths(self.through - place[:, None])])
 
+    def turn_rates(self, place: Floats, turn: Floats) -> Floats:
+        """(N, 3, 3) rad about x, y, z per mm of C along them, of a platform whose three turns follow from its place."""
+        rows = self.rows(place, turn, 1.0)
+        return np.asarray(-np.linalg.solve(rows[:, :, 3:], rows[:, :, :3]), dtype=np.float64)
+
     @cached_property
     def travels(self) -> Floats:
         """(H,) 1 of planes of the platform, whose e turns with it and whose a changes as C moves; 0 of those of the bed."""

@@ -162,6 +162,22 @@ class OnLegs(RedundantLegs):
         return (jets.point(self.gauge - self.tool_length * UP) + TaylorVector(shift, moved),
                 jets.direction(UP) if self.tilts else TaylorVector(UP.tolist()))
 
+    def carried_jets(self, q0: Floats, q1: Floats, tip: TaylorVector,
+                     axis: TaylorVector) -> tuple[TaylorVector, TaylorVector]:
+        """(point, direction) in the machine frame of ones that move in directions of the platform, the point from its
+        reference point, along straight moves q0 -> q1 (N, J)."""
+        if self.loops.closed_form:
+            return self.with_tool(0.0)._jets(q0, q1)[0] + (tip - TaylorVector(self.gauge.tolist())), axis
+        middle, step = 0.5 * (q0 + q1), q1 - q0
+        jets = self.moving(*self._platform(middle), middle, step)
+        shift, moved = (list((v[:, self.carriers_at] @ self.carriers).T) for v in (middle, step))
+        return jets.carried(tip, 1.0) + TaylorVector(shift, moved), jets.carried(axis, 0.0)
+
+    def platform_pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
+        """(place (N, 3) with the travel of the carriers, turn (N, 3, 3)) of joints q (N, J); see `pose` for `near`."""
+        place, turn = self._platform(q, near)
+        return place + q[:, self.carriers_at] @ self.carriers, turn
+
     def moving(self, place: Floats, turn: Floats, middle: Floats, step: Floats) -> PlatformJets:
         """The platform along straight moves by `step` (N, J); `place`, `turn` and joints `middle` (N, J) in their middle."""
         return MovingLoops(self.loops, place, turn, middle[:, self.legs_at], step[:, self.legs_at]).jets()
