@@ -20,10 +20,11 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
 from toolpaths.shapes import arrays
 
-SMOOTH_TURN, SMOOTH_SAG = 1.0, 40.0
-"""largest change of direction of neighbouring blocks on one curve, rad, and the sag of its chord in tolerances"""
-EVEN, SLIGHT = 1.5, 0.02
-"""on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad"""
+SMOOTH_TURN, SMOOTH_SAG, LEAST_SAG = 1.0, 40.0, 0.25
+"""largest change of direction of neighbouring blocks on one curve, rad, and the sag of its chord: in tolerances, or mm"""
+EVEN, SLIGHT, ROUNDED = 1.5, 0.02, 0.003
+"""on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad, or what points rounded to
+0.001 mm may turn: ROUNDED mm over the shorter chord"""
 FEW_TURN, FEW_EVEN, FEW_SUM = 1.85, 5.0, 2.6
 """a bend that few points show: what one vertex turns at most (2 sin of half the angle), how many times what both neighbours
 turn the same way, and all three together (those of a square turn by 4.2: corners)"""
@@ -221,10 +222,12 @@ def _curved(u: Floats, chord: Floats, path: CommandedPath) -> tuple[Bools, Float
     turn = np.linalg.norm(np.diff(u, axis=0), axis=1)
     sag = turn * np.maximum(chord[:-1], chord[1:]) / 8.0
     around = np.concatenate([[0.0], turn[:-1]]) + np.append(turn[1:], 0.0) if len(turn) else turn
-    even = turn <= np.maximum(EVEN * around, SLIGHT)
+    slight = np.maximum(SLIGHT, ROUNDED / np.minimum(chord[:-1], chord[1:]))
+    even = turn <= np.maximum(EVEN * around, slight)
     alike = _turned_alike(u, turn)
     few = (turn <= np.minimum(FEW_TURN, FEW_EVEN * alike)) & (turn + alike <= FEW_SUM)
-    smooth = (sag <= SMOOTH_SAG * path.tolerance[1:-1]) & ((turn <= SMOOTH_TURN) & even | few) & ~path.stop[1:-1]
+    near = sag <= np.maximum(SMOOTH_SAG * path.tolerance[1:-1], LEAST_SAG)
+    smooth = near & (path.tolerance[1:-1] > 0.0) & ((turn <= SMOOTH_TURN) & even | few) & ~path.stop[1:-1]
     return smooth, turn
 
 
