@@ -20,8 +20,9 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
 from toolpaths.shapes import arrays
 
-SMOOTH_TURN, SMOOTH_SAG, LEAST_SAG = 1.0, 40.0, 0.25
-"""largest change of direction of neighbouring blocks on one curve, rad, and the sag of its chord: in tolerances, or mm"""
+SMOOTH_TURN, SMOOTH_SAG = 1.0, 0.25
+"""largest change of direction of neighbouring blocks on one curve, rad, and the sag of its chord, mm: coarser points than any
+that a curve is turned into"""
 EVEN, SLIGHT, ROUNDED = 1.5, 0.02, 0.003
 """on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad, or what points rounded to
 0.001 mm may turn: ROUNDED mm over the shorter chord"""
@@ -202,7 +203,7 @@ def fitted(path: CommandedPath) -> tuple[Floats, Floats, Floats, Ints]:
     inner[part >= 1.0 - 1e-12] = flat[1:]
     wide = np.concatenate([flat[:1], inner])
     length = np.maximum(np.linalg.norm(np.diff(wide, axis=0), axis=1), 1e-12)
-    tolerance = np.minimum(path.tolerance[owner], path.tolerance[owner + 1])
+    tolerance = np.maximum(path.tolerance[owner], path.tolerance[owner + 1])
     tolerance = np.where(part >= 1.0 - 1e-12, path.tolerance[owner + 1], tolerance)
     return wide / path.weight, length, np.concatenate([path.tolerance[:1], tolerance]), owner
 
@@ -226,8 +227,7 @@ def _curved(u: Floats, chord: Floats, path: CommandedPath) -> tuple[Bools, Float
     even = turn <= np.maximum(EVEN * around, slight)
     alike = _turned_alike(u, turn)
     few = (turn <= np.minimum(FEW_TURN, FEW_EVEN * alike)) & (turn + alike <= FEW_SUM)
-    near = sag <= np.maximum(SMOOTH_SAG * path.tolerance[1:-1], LEAST_SAG)
-    smooth = near & (path.tolerance[1:-1] > 0.0) & ((turn <= SMOOTH_TURN) & even | few) & ~path.stop[1:-1]
+    smooth = (sag <= SMOOTH_SAG) & (path.tolerance[1:-1] > 0.0) & ((turn <= SMOOTH_TURN) & even | few) & ~path.stop[1:-1]
     return smooth, turn
 
 
