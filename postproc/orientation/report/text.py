@@ -47,10 +47,11 @@ def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Seque
 
 
 def header(choice: OrientationChoice, plan: Orientation, turned: bool = False) -> list[str]:
-    """Lines for the header of a program: the plan, what tool axes follow one another; `turned`: along cuts."""
+    """Lines for the header of a program: the plan, what tool axes follow; `turned`: some turn along cuts."""
     picked = choice.plans[plan].picked
     first = [k for k in range(len(picked)) if k == 0 or turns(picked[k - 1], picked[k])]
-    lines = [_against(choice, plan, turned), f"planned {seconds(choice.plans[plan].seconds)} s, with the axes of the CL file "
+    lines = [_against(choice, plan, turned),
+             f"planned {seconds(choice.plans[plan].seconds)} s, with the axes of the CL file "
              f"{seconds(choice.plans['keep'].seconds)} s"]
     for start, end in list(zip(first, [*first[1:], len(picked)], strict=True))[:RUNS]:
         made, before = (sum(one.seconds for one in some) for some in (

@@ -69,7 +69,7 @@ def reach_along(stretch: TurningStretch, made: TiltField, limits: JointLimits) -
 
 
 def _most(slope: Floats, taken: Floats, limit: Floats) -> Floats:
-    """(N,) largest x with |slope x + taken| <= limit (J,) in every joint, slope and taken (N, J); 0 where nothing is left."""
+    """(N,) largest x with |slope x + taken| <= limit (J,) in every joint, slope and taken (N, J); 0 where none is."""
     with np.errstate(divide="ignore", invalid="ignore"):
         left = (limit - np.sign(slope) * taken) / np.abs(slope)
     return np.asarray(np.maximum(np.where(slope == 0.0, np.inf, left).min(axis=1), 0.0))

@@ -1,9 +1,9 @@
 """The field of a run that takes the least time: axis and feed chosen together, inside all limits.
 
 Coefficients c = cone v/sqrt(1 + |v|^2) are inside the cone whatever v is; the other limits are penalties. The slope of the
-time by the joints goes back to v by the chain rule, the joints' own slopes by differences. A quasi-Newton method with limited
-memory (Liu and Nocedal, Mathematical Programming 45 (1989)) takes it from there. What it finds is drawn back towards the own
-axes until nothing is outside.
+time by the joints goes back to v by the chain rule, the joints' own slopes by differences. A quasi-Newton method with
+limited memory (Liu and Nocedal, Mathematical Programming 45 (1989)) takes it from there. What it finds is drawn back towards
+the own axes until nothing is outside.
 """
 
 from __future__ import annotations
@@ -163,15 +163,22 @@ class TiltSearch:
                 penalty, more = self.limits.penalty_of_joints(one.q)
                 total += penalty
                 slope += self._by_field(at, field, one, by_q / before + more)
-            penalty, by_axis = self.limits.penalty_of_axes(self._posed_axes(self._rows, field))
-            total += penalty
-            for k, nudge in enumerate(NUDGE * np.eye(3)):
-                moved = self._posed_axes(self._rows, field + nudge) - self._posed_axes(self._rows, field)
-                slope[:, k] += self._rows.basis.T @ (np.einsum("ni,ni->n", by_axis, moved) / NUDGE)
+            penalty, more = self._axes_penalty(field)
+            total, slope = total + penalty, slope + more
             share = LEAST / (self.run.cone**2 * len(field))
             total, slope = total + share * float((field**2).sum()), slope + 2.0 * share * field
             return total, back(slope)
         return merit
+
+    def _axes_penalty(self, field: Floats) -> tuple[float, Floats]:
+        """The penalty of the axes at the poses, and its slope by the coefficients (C, 3)."""
+        axis = self._posed_axes(self._rows, field)
+        penalty, by_axis = self.limits.penalty_of_axes(axis)
+        slope = np.zeros_like(field)
+        for k, nudge in enumerate(NUDGE * np.eye(3) if penalty > 0.0 else ()):
+            moved = self._posed_axes(self._rows, field + nudge) - axis
+            slope[:, k] = self._rows.basis.T @ (np.einsum("ni,ni->n", by_axis, moved) / NUDGE)
+        return penalty, slope
 
     def _measured(self, measure: Measure) -> list[Poses]:
         return self._sites if measure == "planned" else [self._rows]

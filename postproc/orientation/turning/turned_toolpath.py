@@ -48,7 +48,7 @@ def _rapids(work: PassContext, made: TiltField) -> list[tuple[Ints, Floats]]:
     while first > 0 and _stands(work, free, first - 1, run.axis[0]) and not (first > 1 and not free[first - 2]):
         first -= 1
     ends, axes = high, made.axes
-    if high + 1 < len(moves) and free[high + 1] and _stands(work, free, high, run.axis[-1]):
+    if high < len(moves) and _stands(work, free, high, run.axis[-1]) and (high + 1 == len(moves) or free[high + 1]):
         ends = high + 1
     parts = ((np.arange(first, low - 1), axes[0]), (np.arange(high, ends), axes[-1]))
     return [(moves.row[rows], np.tile(one, (len(rows), 1))) for rows, one in parts if len(rows)]
