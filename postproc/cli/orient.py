@@ -102,7 +102,7 @@ def orient(file: ClFile,
             if figure is not None and ending is not None:
                 from postproc.orientation.figures.sheet import draw
 
-                outputs[figure] = draw(choice, options.orient, shown, ending)
+                outputs[figure] = draw(choice, options.orient, shown, ending, turning)
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 

@@ -49,14 +49,13 @@ def as_dict(choice: TurningChoice) -> dict[str, Any]:
 
 def as_text(choice: TurningChoice) -> str:
     """Table of the cuts whose axes turn, why others keep theirs, and the times on the control."""
-    turned = sorted((one for one in choice.runs if one.turned), key=_saved, reverse=True)
+    turned, best = sorted((one for one in choice.runs if one.turned), key=_saved, reverse=True), most_gaining(choice)
     lines = [f"axes turned along {len(turned)} of {len(choice.runs)} cuts, the ball's centre kept"]
     rows = [_row(choice, one) for one in sorted(turned[:SHOWN], key=lambda one: one.run.number)]
     lines += table_text(rows, _HEADS, "rlrrllrrrr") if rows else []
     if len(turned) > SHOWN:
         lines.append(f"      and {len(turned) - SHOWN} cuts that gain less; all are in --json")
-    for one in turned[:1]:
-        lines += _reach_lines(choice, one)
+    lines += _reach_lines(choice, best) if best is not None else []
     return "\n".join([*lines, *control_lines(choice)])
 
 

@@ -12,6 +12,7 @@ from postproc.base.program_time import ProgramTime
 from postproc.controllers.model import ControllerFile, load_controller
 from postproc.cycle_time.conversion import program_clock
 from postproc.feedrate.limits import JointLimits
+from postproc.orientation.figures.turned_axes import panels_of, turned_panels
 from postproc.orientation.turning.block_time import block_time
 from postproc.orientation.turning.cutting_runs import CuttingRun, runs_of
 from postproc.orientation.turning.planned_time import PlannedTime
@@ -309,3 +310,17 @@ def test_equation_3_of_the_paper_is_what_the_joints_along_a_path_say() -> None:
     first, second = (jacobian[3] - jacobian[1]) / (2.0 * h), (jacobian[3] - 2.0 * jacobian[2] + jacobian[1]) / h**2
     assert jacobian[2] @ jolt + 2.0 * first @ bend + second @ rate == pytest.approx(third, rel=1e-3, abs=0.05)
     assert np.abs(2.0 * first @ bend + second @ rate).max() > 0.1 * np.abs(third).max(), "the axes turn"
+
+
+def test_the_drawing_shows_the_cut_that_gains_most(choice: TurningChoice) -> None:
+    from matplotlib.figure import Figure
+
+    sheet = Figure()
+    turned_panels(sheet, sheet.add_gridspec(3, 2), 0, choice)
+    speeds, _, angles = sheet.axes
+    own, now = speeds.lines[0], speeds.lines[2]
+    assert len(panels_of(choice)) == 3
+    assert np.trapezoid(1.0 / np.asarray(now.get_ydata()), now.get_xdata()) < np.trapezoid(
+        1.0 / np.asarray(own.get_ydata()), own.get_xdata())
+    assert np.max(angles.lines[0].get_ydata()) <= CONE == pytest.approx(angles.lines[1].get_ydata()[0])
+    assert panels_of(choice.taking([0])) == panels_of(None) == ()
