@@ -37,12 +37,14 @@ class Loops:
         freedoms: of FREEDOMS, in that order; one turn, or all three
         kept: (K, 3) mm from the hinge of a bar, which keeps its direction, to the joint of its leg (V-10: the sides of the
             symmetric H4's platform), 0 of joints on the platform itself; None without bars
+        bars: the number of the bar that each leg holds, -1 of none; () without bars
     """
 
     drives: Drives
     joints: Floats
     freedoms: tuple[str, ...]
     kept: Floats | None = None
+    bars: tuple[int, ...] = ()
 
     @cached_property
     def basis(self) -> Floats:

@@ -50,16 +50,15 @@ class OnLegs(RedundantLegs):
         return RodsOnSlides(self, self.loops.joints) if whole and not len(self.carriers) else None
 
     @property
-    def leg_geometry(self) -> LegGeometry | None:
-        """See the base class; None of platforms with bars, of those that turn about z alone, and of those carried twice."""
-        if self.loops.kept is not None or self.carried_twice or self.loops.turns not in ("", "a", "b", "abc"):
-            return None
+    def leg_geometry(self) -> LegGeometry:
+        """See the base class."""
         of, names = self.legs, np.array(self.axis_names)
         pairs = np.zeros((len(of.lengths), 3)) if self.clearance is None else pairs_of(
             len(of.lengths), self.clearance.leg, self.clearance.shift)
         return LegGeometry(self.leg_names, of.points, of.directions, of.arms, of.lengths, of.roots, of.slide, of.arm,
                            self.loops.joints, pairs, self.loops.freedoms, self.gauge,
-                           tuple(names[self.carriers_at].tolist()), self.carriers, self.workspace)
+                           tuple(names[self.carriers_at].tolist()), self.carriers, self.workspace,
+                           kept=self.loops.kept, bars=self.loops.bars)
 
     @property
     def leg_names(self) -> tuple[str, ...]:
