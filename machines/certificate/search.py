@@ -196,6 +196,8 @@ def _looks(asked: AskedProof) -> Floats:
 
 def _carried(asked: AskedProof) -> ProvedBoxes | None:
     """A corner of the region where a carrier would be outside its travel; what it does is linear in the pose."""
+    if asked.poses.legs.carried_twice:
+        return None
     shift = asked.poses.from_point
     corners = np.stack(np.meshgrid(*zip(asked.lower[:3], asked.upper[:3], strict=True)), axis=-1).reshape(-1, 3)
     carried = (corners + shift) @ asked.poses.split[1].T

@@ -1,4 +1,4 @@
-"""Commands that study a machine: `postproc machine analyse`, `certify`, `tolerance`, `stiffness`, `design`.
+"""Commands that study a machine: `postproc machine analyse`, `tolerance`, `stiffness`.
 
 Heavy packages are imported inside.
 """
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from machines.analysis.choices import MapMeasure, MapNumber
-from machines.layouts.choices import Goal, SlideLayout
 from postproc.cli.shared.console import Json, machine_of, own_files, refuse_overwriting, report, shown_errors
 from postproc.cli.shared.options import figure_ending, word_option
 
@@ -107,90 +106,6 @@ def _fixed(given: list[str] | None) -> dict[MapNumber, float]:
     return found
 
 
-CERTIFIED = "Examples: postproc machine certify uranesx -o uranesx.certificate.json; " \
-           "postproc machine certify --check uranesx.certificate.json"
-Name = Annotated[str, typer.Argument(metavar="[NAME]", help="name or TOML file; with --check left out: that of the file")]
-CertificateFile = Annotated[Path | None, typer.Option("-o", "--output", metavar="CERT.json", help="certificate to write")]
-CheckFile = Annotated[Path | None, typer.Option("--check", metavar="CERT.json", help="check a certificate instead")]
-BoxOption = Annotated[str, typer.Option("--box", metavar="BOX", help="of the tip, mm: 500x500x400 in the middle of the "
-                                        "workspace or -250:250,-250:250,-200:200; left out: the declared workspace of the "
-                                        "platform")]
-BoxTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, max=1e4,
-                                          help="length of the tool, with --box")]
-MarginOption = Annotated[float | None, typer.Option("--margin", metavar="SHARE", min=1e-6, max=1.0, help=(
-    "distance from singular positions, no unit; left out: half of the least that random poses have"))]
-TravelOption = Annotated[bool | None, typer.Option("--travel/--no-travel", help="whether drives must be inside their "
-                                                   "travel; left out: only where they are everywhere")]
-BoxesFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="boxes in two planes, .png or .svg")]
-
-
-def machine_certify(name: Name = "", output: CertificateFile = None, check: CheckFile = None, box: BoxOption = "",
-                    tool: BoxTool = 0.0, margin: MarginOption = None, travel: TravelOption = None,
-                    figure: BoxesFigure = None, json: Json = "") -> None:
-    """Prove that a machine on legs reaches its workspace, or a box, and is nowhere near a singular position."""
-    if check is not None:
-        _check(name, check, json, bool(output or box or figure or margin is not None or travel is not None))
-        return
-    if not name:
-        raise typer.BadParameter("a machine, or --check CERT.json, is missing", param_hint="NAME")
-    if tool and not box:
-        raise typer.BadParameter("the length of a tool matters to a box of tips: give --box", param_hint="--tool")
-    ending = figure_ending(figure)
-    refuse_overwriting({"-o": str(output or ""), "--figure": str(figure or ""), "--json": json}, own_files(name))
-    outputs: dict[Path, str | bytes] = {}
-    with shown_errors(json):
-        from machines.analysis.certify import Wanted, certify
-
-        machine = machine_of(name)
-        found = certify(machine, Wanted(box_of(machine, box, tool) if box else None, tool, margin, travel))
-    if output is not None:
-        outputs[output] = found.text
-    if figure is not None and ending is not None:
-        from json import loads
-
-        from machines.analysis.certificate_figure import certificate_figure
-
-        outputs[figure] = certificate_figure(loads(found.text), ending)
-    from postproc.cli.catalogue import analysis_text
-
-    report((), json, found.figures, analysis_text(found.figures), outputs)
-
-
-def box_of(machine: Machine, text: str, tool: float) -> tuple[Floats, Floats]:
-    """(lower, upper), each (3,) mm, of --box; wrong use where it is none."""
-    import numpy as np
-
-    wrong = typer.BadParameter(f"{text!r} is no box: write 500x500x400, or -250:250,-250:250,-200:200", param_hint="--box")
-    try:
-        if ":" in text:
-            ends = np.array([[float(v) for v in side.split(":")] for side in text.split(",")])
-        else:
-            size = np.array([float(v) for v in text.split("x")])
-            legs = machine.kinematics.leg_geometry
-            middle = np.zeros(3) if legs is None else legs.workspace.middle + legs.gauge - [0.0, 0.0, tool]
-            ends = np.stack([middle - 0.5 * size, middle + 0.5 * size], axis=1)
-    except ValueError:
-        raise wrong from None
-    if ends.shape != (3, 2) or not np.isfinite(ends).all() or not (ends[:, 0] <= ends[:, 1]).all():
-        raise wrong
-    return ends[:, 0], ends[:, 1]
-
-
-def _check(name: str, file: Path, json: str, more: bool) -> None:
-    if more:
-        raise typer.BadParameter("a certificate is checked as it is: leave the other options out", param_hint="--check")
-    refuse_overwriting({"--json": json}, {"the certificate": str(file)} | own_files(name))
-    figures: dict[str, Any] = {}
-    found: list[Diagnostic] = []
-    with shown_errors(json):
-        from postproc.certificate_check.run import checked
-
-        figures, found = checked(file, name)
-    from postproc.cli.catalogue import analysis_text
-
-    report(tuple(found), json, figures | {"diagnostics": [d.as_dict() for d in found]}, analysis_text(figures))
-
-
 TOLERATED = "Example: postproc machine tolerance uranesx --tool 120 --error 0.02 --cost guide=3 --csv uranesx.csv"
 TipTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, max=1e4,
                                           help="length of the tool whose tip is meant")]
@@ -282,53 +197,3 @@ def machine_stiffness(name: Annotated[str, typer.Argument(help="name or TOML fil
         if figure is not None and ending is not None:
             outputs[figure] = stiffness_map(machine, asked, ending)
     report((), json, found, analysis_text(found), outputs)
-
-
-DESIGNED = "Example: postproc machine design --layout parallel-z --box 500x500x400 --max bulk=1475 -o delta.toml"
-LayoutOption = Annotated[SlideLayout, word_option("--layout", SlideLayout, "how the slides stand")]
-BoxSides = Annotated[str, typer.Option("--box", metavar="XxYxZ", help="sides of the workspace, mm")]
-PlatformOption = Annotated[float, typer.Option("--platform", metavar="MM", min=1.0, max=1e5, help="from the middle of the "
-                                                 "platform to its joints")]
-GoalOption = Annotated[Goal, word_option("--least", Goal, "what is to be least")]
-MaxOption = Annotated[list[str] | None, typer.Option("--max", metavar="FIGURE=VALUE", help="largest condition, bulk (mm, "
-                                                     "across z, of the contracted model), speed or rod (mm)")]
-MachineFile = Annotated[Path | None, typer.Option("-o", "--output", metavar="MACHINE.toml", help="machine file to write")]
-AgainstOption = Annotated[Goal | None, word_option("--front", Goal, "also the machines of which none is better in both")]
-FrontFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="the front drawn, .png or .svg")]
-
-
-def machine_design(layout: LayoutOption = "parallel-z", box: BoxSides = "500x500x400", platform: PlatformOption = 100.0,
-                   goal: GoalOption = "condition", most: MaxOption = None, output: MachineFile = None,
-                   against: AgainstOption = None, figure: FrontFigure = None, json: Json = "") -> None:
-    """Find radius or height and rods of three slides for a box within limits, and write the machine file."""
-    import numpy as np
-
-    from postproc.cli.catalogue import analysis_text
-    from postproc.cli.error_files import pairs
-
-    ending = figure_ending(figure)
-    try:
-        sides = np.array([float(v) for v in box.split("x")])
-    except ValueError:
-        sides = np.zeros(0)
-    if sides.shape != (3,) or not (np.isfinite(sides).all() and (sides > 0.0).all() and (sides < 1e5).all()):
-        raise typer.BadParameter(f"{box!r} is no box: write 500x500x400, mm", param_hint="--box")
-    given = pairs("--max", most, get_args(Goal))
-    if figure is not None and against is None:
-        raise typer.BadParameter("it is of a front: --front FIGURE is missing", param_hint="--figure")
-    if against == goal:
-        raise typer.BadParameter(f"{goal} is the goal: name another figure", param_hint="--front")
-    refuse_overwriting({"-o": str(output or ""), "--figure": str(figure or ""), "--json": json}, {})
-    outputs: dict[Path, str | bytes] = {}
-    with shown_errors(json):
-        from machines.layouts.design import design, front_figure
-        from machines.layouts.search import LayoutQuestion
-
-        asked = LayoutQuestion(layout, sides, platform, goal, {key: given[key] for key in get_args(Goal) if key in given})
-        found = design(asked, against)
-    if output is not None:
-        outputs[output] = found.text
-    if figure is not None and ending is not None and against is not None:
-        outputs[figure] = front_figure(asked, against, found.front, ending)
-    text = analysis_text({key: value for key, value in found.figures.items() if key != "front"})
-    report((), json, found.figures, text if output is not None else f"{text}\n\n{found.text}", outputs)
