@@ -14,7 +14,7 @@ from machines.analysis.certify_chain import WantedOfChain, certify_chain
 from machines.certificate.lookup import SHIPPED
 from machines.loader import builtin
 
-MARGINS = {"hexapod": 0.1, "hexaslide-cone": 0.1}
+MARGINS = {"hexapod": 0.1, "hexaslide-cone": 0.1, "h4-rotary": 0.05}
 """where half of the least would make a large file"""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from machines.analysis.singularity import lipschitz_points
+from machines.analysis.singularity import annex_d_boxes, lipschitz_halved, lipschitz_points
 from machines.certificate.certificate_file import SHARE, RegionOfPoses, certificate
 from machines.certificate.clearances import PartsOfLegs, pair_names
 from machines.certificate.enclosure import columns
@@ -230,4 +230,9 @@ def _figures(of: Certified) -> dict[str, Any]:
         found[key] = pose_words(of.outside.place, asked.poses.legs)
     found |= _clearance_figures(of)
     points = lipschitz_points(machine.kinematics, asked.margin)
-    return found | ({} if points is None else {"lipschitz_squares_of_a_slice": points})
+    if points is not None:
+        found |= {"lipschitz_squares_of_a_slice": points,
+                  "lipschitz_squares_halved": lipschitz_halved(machine.kinematics, asked.margin)}
+    if (annex_d := annex_d_boxes(asked.poses.legs, asked.margin)) is not None:
+        found |= {"annex_d_boxes_of_a_grid": annex_d[0], "annex_d_boxes_halved_about": annex_d[1]}
+    return found

@@ -24,7 +24,6 @@ from machines.certificate.chains import (
     AskedOfChain,
     ChainOfAxes,
     ProvedChain,
-    looked,
     prove_chain,
 )
 from machines.certificate.lookup import key_of
@@ -36,8 +35,8 @@ from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
-LOOKS, PER_AXIS, SPARE = 2000, 25, 0.9
-"""random positions looked at for a margin; positions per rotary axis for the largest box, and the part of it that is asked"""
+LOOKS, PER_AXIS, SPARE = 20_001, 25, 0.9
+"""positions of the second rotary axis looked at for a margin; positions per rotary axis for the largest box, and the part of it that is asked"""
 LEAST = 1e-3
 """least sine of the pole's angle that counts as none"""
 NO_BOX = 1.0
@@ -197,9 +196,10 @@ def _positions(turns: Floats, per_axis: int) -> Floats:
 
 
 def _nearest_pole(chain: ChainOfAxes, turns: Floats) -> tuple[float, Floats]:
-    """(least sine between the tool and the rotary axis nearest the part on a grid of positions, the position (R,))."""
-    at = np.concatenate([_positions(turns, 181 if len(turns) < 2 else 61),
-                         np.random.default_rng(0).uniform(*turns.T, (LOOKS, len(turns)))])
+    """(least sine between the tool and the rotary axis nearest the part, the position (R,)); it is the second's alone."""
+    at = np.tile(np.clip(0.0, *turns.T), (LOOKS, 1))
+    if len(turns) > 1:
+        at[:, 1] = np.linspace(*turns[1], LOOKS)
     pole = chain.reached(np.zeros((1, 3)), spanned(at))[1].lo
     k = int(pole.argmin())
     return float(pole[k]), at[k]
@@ -252,7 +252,3 @@ def range_words(chain: ChainOfAxes, turns: Floats) -> str:
     return ", ".join(f"{joint.name} {lo / DEG:g} to {hi / DEG:g} degrees" for joint, (lo, hi) in zip(
         chain.turns, turns, strict=True)) or "its places"
 
-
-def least_seen(asked: AskedOfChain, positions: Floats) -> Floats:
-    """(3,) least of CHAIN_NAMES over rotary positions (N, R): what no bound may exceed."""
-    return np.asarray(looked(asked, spanned(positions))[0].min(axis=0))
