@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from machines.analysis.choices import MapMeasure, MapNumber
+from machines.analysis.choices import MapMeasure, MapNumber, SizeNumber
 from postproc.cli.shared.console import Json, machine_of, own_files, refuse_overwriting, report, shown_errors
 from postproc.cli.shared.options import figure_ending, word_option
 
@@ -26,8 +26,11 @@ SingularOption = Annotated[float | None, typer.Option("--singular-above", metava
                                                       help="prove by a grid that the singular values of a linear Delta with "
                                                       "slides along z stay above this")]
 MapOption = Annotated[MapMeasure | None, word_option("--map", MapMeasure, "measure of a map or a curve")]
-AlongOption = Annotated[list[str] | None, typer.Option("--along", metavar="x|y|z|tilt", help="with --map: once a curve, "
-                                                       "twice a slice; left out: x and y")]
+AlongOption = Annotated[list[str] | None, typer.Option("--along", metavar="x|y|z|tilt|SIZE=LOW:HIGH", help=(
+    "with --map: once a curve, twice a slice; left out: x and y. With a size (rod, radius or offset, mm) the extremes over the "
+    "workspace against it"))]
+OffsetOption = Annotated[float, typer.Option("--offset", metavar="MM", min=-1e5, max=1e5, help="with --map rod-inertia: centre "
+                                             "of mass above the platform's reference point")]
 AtOption = Annotated[list[str] | None, typer.Option("--at", metavar="x|y|z|tilt=VALUE", help="with --map: the others, mm or "
                                                     "degrees; left out: the middle of the workspace")]
 MapCsv = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="the map or curve as a table")]
@@ -37,7 +40,7 @@ MapFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help
 
 def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")], singular_above: SingularOption = None,
                     measure: MapOption = None, along: AlongOption = None, at: AtOption = None, csv: MapCsv = None,
-                    figure: MapFigure = None, json: Json = "") -> None:
+                    figure: MapFigure = None, offset: OffsetOption = 0.0, json: Json = "") -> None:
     """Condition number, transmission of speed and force over the workspace, reachable box and what ends it."""
     from postproc.cli.catalogue import analysis_text
 
@@ -56,11 +59,25 @@ def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file"
                 outputs[figure] = _condition_figure(machine, ending)
         report((), json, found, analysis_text(found), outputs)
         return
+    if any("=" in one for one in along or ()):
+        if at:
+            raise typer.BadParameter("the whole workspace is looked at for each size: leave it out", param_hint="--at")
+        ranges = _sizes(along or [])
+        with shown_errors(json):
+            from machines.analysis.sizes import over_sizes, size_figure
+
+            study = over_sizes(machine_of(name), measure, ranges, offset)
+        if csv is not None:
+            outputs[csv] = study.csv
+        if figure is not None and ending is not None:
+            outputs[figure] = size_figure(study, ending)
+        report((), json, study.figures, analysis_text(study.figures), outputs)
+        return
     places, fixed = _along(along), _fixed(at)
     with shown_errors(json):
         from machines.analysis.maps import map_figure, measured
 
-        values = measured(machine_of(name), measure, places, fixed)
+        values = measured(machine_of(name), measure, places, fixed, offset)
     if csv is not None:
         outputs[csv] = values.csv
     if figure is not None and ending is not None:
@@ -89,6 +106,24 @@ def _along(given: list[str] | None) -> tuple[MapNumber, ...]:
     if len(names) > 2 or len(set(names)) < len(names) or not set(names) <= set(known):
         raise typer.BadParameter(f"{' '.join(names)}: write one or two of {', '.join(known)}", param_hint="--along")
     return tuple(known[name] for name in names)
+
+
+def _sizes(given: list[str]) -> dict[SizeNumber, tuple[float, float]]:
+    """mm, of --along rod=1000:2000; wrong use where it is none."""
+    found: dict[SizeNumber, tuple[float, float]] = {}
+    for text in given:
+        name, _, ends = text.partition("=")
+        try:
+            low, high = (float(v) for v in ends.split(":"))
+        except ValueError:
+            low, high = 1.0, 0.0
+        key: SizeNumber | None = next((one for one in get_args(SizeNumber) if one == name), None)
+        least = -1e6 if key == "offset" else 0.0
+        if key is None or key in found or not least <= low < high < 1e6 or len(given) > 2:
+            raise typer.BadParameter(f"{text!r}: write one or two of {', '.join(get_args(SizeNumber))}, = and two lengths in mm "
+                                     "with : between them, the smaller first", param_hint="--along")
+        found[key] = low, high
+    return found
 
 
 def _fixed(given: list[str] | None) -> dict[MapNumber, float]:
