@@ -187,7 +187,8 @@ class LegsModel(KinematicsModel):
         own = tuple(sorted(self.freedoms, key=FREEDOMS.index))
         holds = holds_of(legs, self.passive.values())
         rings = np.array([leg.ring or 0.0 for leg in legs]) if any(leg.ring for leg in legs) else None
-        loops = Loops(drives, joints, own if holds is None else FREEDOMS, kept, holds, () if holds is None else own, rings, on)
+        loops = Loops(drives, joints, own if holds is None else FREEDOMS, kept, holds, () if holds is None else own, rings,
+                      on)
         return OnLegs(
             loops,
             self._space(), np.array(self.gauge), names,
