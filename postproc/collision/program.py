@@ -180,4 +180,5 @@ def _lines(row: int, motion: Motion, served: tuple[Moves, Ints]) -> tuple[int, i
 def _unbounded(motion: Motion, moves: Moves, owner: Ints, rows: Ints, faults: Faults) -> Diagnostic:
     return faults.warning("collision.bound", "between its ends a block is looked at in places only: the path of the tool "
                           "has no bound there", *_lines(int(rows[0]), motion, (moves, owner)), count=len(rows),
-                          hint="it comes near to where the machine is singular")
+                          hint="move the part in the set-up (part.origin), away from where the machine is singular, or take "
+                          "a smaller --tolerance (shorter blocks)")

@@ -89,8 +89,8 @@ def staged(result: PostResult, progress: Progress | None = None,
            left: ExcludedPasses = frozenset()) -> PostResult:
     """A conversion through all stages, up to the first that finds an error; `left`: passes that --smooth leaves."""
     made: Any = BegunStage(result.options, result.machine, result.controller, result.controller_name, result.setup,
-                           result.diagnostics, result.toolpath, result.choice, result.source, result.asked, left,
-                           result.refused, result.control_plan)
+                           result.diagnostics, result.toolpath, result.choice, result.turning, result.source,
+                           result.asked, left, result.refused, result.control_plan)
     for number, stage in enumerate(STAGES):
         made, found = stage.run(made, _named(progress, stage.name, number))
         result = replace(_recorded(result, made, found), reached=stage.name)

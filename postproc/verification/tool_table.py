@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from postproc.job.job import Job
 from postproc.readback.comparison.length_margins import MUCH, LengthMargin
 from postproc.reference.events import tool_loads
 from postproc.setup.model import SetupFile, ToolSetup
-from postproc.verification.tool_table_file import ToolTable, no_length
+from postproc.verification.tool_table_file import ToolTable, no_length, read_tool_table
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.units import MM_PER_INCH
 
@@ -64,13 +65,26 @@ def with_allowed(found: list[MeasuredLength], margins: tuple[LengthMargin, ...],
     return result
 
 
+def lengths_at_machine(file: str | Path, job: Job) -> tuple[list[MeasuredLength], list[Diagnostic]]:
+    """What the table of the control says of the tools of a program: their lengths, which the program is then verified with;
+    none where its words hold the lengths already, so that those of the table must be 0.
+
+    Raises:
+        DiagnosticError: as of `read_tool_table`.
+    """
+    doubled = job.controller.keeps_length and not job.control.length_on_z
+    table = read_tool_table(file, job.controller, zeros=doubled)
+    return ([], doubled_lengths(table, job, str(file))) if doubled else measured_lengths(table, job, str(file))
+
+
 def measured_lengths(table: ToolTable, job: Job, file: str) -> tuple[list[MeasuredLength], list[Diagnostic]]:
     """The lengths of the tools that a CL file calls, in order of their numbers; errors for those that the table lacks."""
-    wanted = sorted({(said.number, register) for said, register, _ in tool_loads(job.toolpath)})
-    rows = {one: _rows(table, job, *one) for one in wanted}
+    rows = _called_rows(table, job)
     found = [MeasuredLength(number, register, job.length_of(number), table.lengths[n])
              for (number, register), at in rows.items() for n in at if n in table.lengths]
-    faults = _lacking(table, job, rows, file)
+    unmeasured = {n: table.unusable[n] for at in rows.values() for n in at if n in table.unusable}
+    faults = [no_length(unmeasured, ", and the program calls it", file)] if unmeasured else []
+    faults += _lacking(table, job, rows, file)
     apart = sorted({one.number for one in found for other in found
                     if one.number == other.number and one.measured != other.measured})
     if apart:
@@ -80,6 +94,22 @@ def measured_lengths(table: ToolTable, job: Job, file: str) -> tuple[list[Measur
                             hint="leave those that do not stand in the spindle out of the table" if sisters
                             else "give each length a tool number of its own in the CL file"))
     return found, faults if has_errors(faults) else _questionable(found, job, file)
+
+
+def doubled_lengths(table: ToolTable, job: Job, file: str) -> list[Diagnostic]:
+    """Errors for tools whose lengths the control would add to words that hold them already: in its table they are 0."""
+    rows, mm = _called_rows(table, job), {**table.unusable, **table.lengths}
+    wrong = [f"T{number}: {mm[n]:g} mm" for (number, _), at in rows.items() for n in at if mm.get(n, 0.0) != 0.0]
+    return _lacking(table, job, rows, file) + ([error(
+        "tool.length_twice", "the words of the program hold the lengths of the tools already, and this controller adds "
+        f"those of its tool table with every tool change: {', '.join(dict.fromkeys(wrong))}", file=file, count=len(wrong),
+        hint="L and DL of these tools must be 0 in the control's tool table")] if wrong else [])
+
+
+def _called_rows(table: ToolTable, job: Job) -> dict[tuple[int, int], list[int]]:
+    """Numbers of the table's rows by tool number and length register that a CL file calls."""
+    wanted = sorted({(said.number, register) for said, register, _ in tool_loads(job.toolpath)})
+    return {one: _rows(table, job, *one) for one in wanted}
 
 
 def _name(job: Job, number: int) -> str:
@@ -104,17 +134,15 @@ def _called(table: ToolTable, job: Job, number: int, register: int) -> str:
 
 
 def _lacking(table: ToolTable, job: Job, rows: dict[tuple[int, int], list[int]], file: str) -> list[Diagnostic]:
-    """Errors for tools without a row, and for those whose length is none."""
-    none = {n: table.unusable[n] for at in rows.values() for n in at if n in table.unusable}
+    """The error of tools without a row."""
     without = [one for one, at in rows.items() if not any(n in table.lengths or n in table.unusable for n in at)]
-    faults = [no_length(none, ", and the program calls it", file)] if none else []
-    if without:
-        said = ", ".join(dict.fromkeys(_called(table, job, *one) for one in without))
-        names = ", ".join(f'"{name}"' for name in list(table.names.values())[:6])
-        faults.append(error("tool-table.missing", f"no length of {said}, which the program calls", file=file,
-                            hint=f"tools of the table are called {names}: write the name as `called` into [tools.N]"
-                            if table.named else "measure these tools, and write the table once more"))
-    return faults
+    if not without:
+        return []
+    said = ", ".join(dict.fromkeys(_called(table, job, *one) for one in without))
+    names = ", ".join(f'"{name}"' for name in list(table.names.values())[:6])
+    return [error("tool-table.missing", f"no length of {said}, which the program calls", file=file,
+                  hint=f"tools of the table are called {names}: write the name as `called` into [tools.N]"
+                  if table.named else "measure these tools, and write the table once more")]
 
 
 def _questionable(found: list[MeasuredLength], job: Job, file: str) -> list[Diagnostic]:

@@ -92,8 +92,8 @@ class _Rows:
                        "leave the one that is not in force out")
 
 
-def read_tool_table(file: str | Path, controller: ControllerFile) -> ToolTable:
-    """The lengths of a file.
+def read_tool_table(file: str | Path, controller: ControllerFile, zeros: bool = False) -> ToolTable:
+    """The lengths of a file; `zeros`: a table without a length of more than 0 is none the less a table.
 
     Raises:
         DiagnosticError: where the file cannot be read, or holds no lengths in a form that is known.
@@ -102,10 +102,10 @@ def read_tool_table(file: str | Path, controller: ControllerFile) -> ToolTable:
         text = read_input(file).decode("utf-8", "replace").lstrip("\ufeff")
     except OSError as fault:
         raise DiagnosticError([unreadable(fault, "tool-table.open", file, _HINT)]) from fault
-    return table_of(text, controller, str(file))
+    return table_of(text, controller, str(file), zeros)
 
 
-def table_of(text: str, controller: ControllerFile, file: str) -> ToolTable:
+def table_of(text: str, controller: ControllerFile, file: str, zeros: bool = False) -> ToolTable:
     """Of the text of a table; errors as of `read_tool_table`."""
     lines, rows = text.splitlines(), _Rows(file)
     (_separated if _is_separated(lines) else _FORMS[controller.writer])(lines, rows)
@@ -116,7 +116,7 @@ def table_of(text: str, controller: ControllerFile, file: str) -> ToolTable:
             rows.fault("wear", f"number {number} has a wear of {length:g} mm and no length", 1,
                        "write the table with geometry and wear")
         (found if parts.get("geometry") and 0.0 < length <= LONGEST else unusable)[number] = length
-    if not found and not rows.faults:
+    if not found and not rows.faults and not (zeros and unusable):
         rows.faults.append(no_length(unusable, "", file) if unusable else error(
             "tool-table.empty", f"no length of a tool as {controller.writer} controls write it", file=file, hint=_HINT))
     require(rows.faults)

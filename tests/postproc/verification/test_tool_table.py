@@ -216,3 +216,18 @@ def test_every_register_of_a_punched_table(tmp_path: Path) -> None:
     assert code == 0 and "90.2500 mm (+0.2500" in text
     code, text = verified_with(tmp_path, "fanuc-30i", table.replace("90.250", "0.000"))
     assert code == 1 and "tool-table.length" in text
+
+
+@pytest.mark.parametrize(("length", "code"), [("0", 0), ("110", 1), ("-3", 1)])
+def test_a_length_is_0_where_the_words_hold_it_and_the_control_adds_its_own(length: str, code: int, tmp_path: Path) -> None:
+    """A machine on legs under a control that keeps the length of its tool table in force: the words have it already."""
+    on = ["-m", "delta-parallel-z", "-c", "heidenhain-tnc640", "--setup", str(tmp_path / "s.toml")]
+    (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 110.0\n[part]\norigin = [0.0, 0.0, -60.0]\n")
+    (tmp_path / "a.apt").write_text("UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/MMPM,600\nRAPID\nGOTO/0,0,5\n"
+                                    "GOTO/0,0,0\nGOTO/9,0,0\nRAPID\nGOTO/9,0,5\nFINI\n")
+    (tmp_path / "t.csv").write_text(f"tool,length\n1,{length}\n")
+    made = CliRunner().invoke(app, ["convert", str(tmp_path / "a.apt"), *on, "-o", str(tmp_path / "p.h")])
+    assert made.exit_code == 0 and "tool.length_twice" in made.stderr
+    found = CliRunner().invoke(app, ["verify", str(tmp_path / "p.h"), str(tmp_path / "a.apt"), *on, "--tool-table",
+                                     str(tmp_path / "t.csv")])
+    assert found.exit_code == code and ("error [tool.length_twice]" in found.stderr) == bool(code)
