@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def fills(run: dict[str, Any], columns: dict[str, Floats]) -> dict[str, Fill]:
     return made
 
 
-def _pieces(columns: dict[str, Floats]) -> tuple[Floats, Floats]:
+def _pieces(columns: dict[str, Floats]) -> tuple[Floats, Ints]:
     """Both ends (N, 2, 2) mm on the sheet of every piece that cuts, and the point (N,) where each ends; at most MOST."""
     flat = np.stack([columns[f"part {name}"] for name in "xyz"], axis=1) @ VIEW.T
     ends = np.flatnonzero(columns["kind"] > 0)
@@ -145,7 +145,7 @@ def _errors(sheet: Figure, found: dict[str, Any]) -> None:
     for key, colour, text in (("vector_um", COLOURS[1], "before"), ("vector_after_um", COLOURS[0], "after")):
         vector = scale * np.array([one[key] for one in found["places"]]) @ VIEW.T
         place.quiver(*tip.T, *vector.T, angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.0025, label=text)
-    place.scatter(*tip.T, s=3.0, color="#50575f")
+    place.plot(*tip.T, linestyle="", marker=".", markersize=2.0, color="#50575f")
     known = found["uncertainty_k2_um"]
     place.set_aspect("equal")
     place.margins(0.15)
