@@ -120,6 +120,10 @@ def ending_of(file: Path, endings: Any, option: str, wrong: str) -> Any:
         need("matplotlib", "drawings need")
     return ending
 
+SearchWorkers = Annotated[int, typer.Option("-j", "--workers", metavar="N", min=0, max=1024, help="processes that search; "
+                                            "default: as many as there are cores")]
+SchedulerOption = Annotated[str, typer.Option("--scheduler", metavar="ADDRESS", help="search on the cluster of this Dask "
+                                              "scheduler (tcp://HOST:8786)")]
 ModelOfControl = Annotated[str, typer.Option("--model", metavar="MODEL", help="cycle-time model of the control that choices "
                                              "and times go by: a name, or a file of time --calibrate; default: the "
                                              "controller's")]
