@@ -22,14 +22,16 @@ from typing import Generic, Literal, Protocol, TypeVar, cast
 S = TypeVar("S")
 V = TypeVar("V")
 R = TypeVar("R")
+V_contra = TypeVar("V_contra", contravariant=True)
+R_co = TypeVar("R_co", covariant=True)
 StartMethod = Literal["fork", "spawn"]
 
 
-class Crew(Protocol[V, R]):
+class Crew(Protocol[V_contra, R_co]):
     """Workers that hold what is shared."""
 
     @abstractmethod
-    def results(self, items: Sequence[V]) -> Iterator[R]:
+    def results(self, items: Sequence[V_contra]) -> Iterator[R_co]:
         """What the function gives for each item, in order; what it raises is raised."""
 
     @abstractmethod
@@ -101,9 +103,12 @@ class _Pool(Generic[V, R]):
         self.number = next(_NUMBERS)
         self.alone: Callable[[V], R] = lambda item: function(shared, item)
         _TASKS[self.number] = function, shared
-        begin, packed = (_ignore_interrupt, ()) if method == "fork" else (_unpack, (
-            self.number, pickle.dumps((function, shared), pickle.HIGHEST_PROTOCOL)))
-        self.pool = ProcessPoolExecutor(size, multiprocessing.get_context(method), begin, packed)
+        context = multiprocessing.get_context(method)
+        if method == "fork":
+            self.pool = ProcessPoolExecutor(size, context, _ignore_interrupt)
+        else:
+            packed = pickle.dumps((function, shared), pickle.HIGHEST_PROTOCOL)
+            self.pool = ProcessPoolExecutor(size, context, _unpack, (self.number, packed))
 
     def results(self, items: Sequence[V]) -> Iterator[R]:
         """See `Crew`: where a process was killed, this one does what is left."""

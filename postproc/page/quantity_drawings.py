@@ -75,9 +75,9 @@ def _valued(sheet: Figure, run: dict[str, Any], columns: dict[str, Floats], name
     (pieces, at), (column, unit) = _pieces(columns), QUANTITIES[name]
     values = tilt(run, columns)[at] if name == "tilt" else columns[column][at]
     place, known = _place(sheet, pieces), np.isfinite(values)
-    place.add_collection(LineCollection(pieces[~known], colors="#9a9a9a", linewidths=0.8))
+    place.add_collection(LineCollection(list(pieces[~known]), colors="#9a9a9a", linewidths=0.8))
     if known.any():
-        drawn = LineCollection(pieces[known], array=values[known], cmap="viridis", linewidths=0.9)
+        drawn = LineCollection(list(pieces[known]), array=values[known], cmap="viridis", linewidths=0.9)
         place.add_collection(drawn)
         sheet.colorbar(drawn, ax=place, label=f"{column}, {unit}")
 
@@ -91,7 +91,7 @@ def _named(sheet: Figure, run: dict[str, Any], columns: dict[str, Floats], name:
     for k, value in enumerate(np.unique(values).tolist()):
         text = run["causes"][value].replace("_", " ") if name == "cause" else _limit(run, value)
         colour = COLOURS[k % len(COLOURS)]
-        place.add_collection(LineCollection(pieces[values == value], colors=colour, linewidths=0.9, label=text))
+        place.add_collection(LineCollection(list(pieces[values == value]), colors=colour, linewidths=0.9, label=text))
     place.legend(loc="upper right", fontsize="small")
 
 
