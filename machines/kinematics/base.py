@@ -267,11 +267,6 @@ class Kinematics(ABC):
         """
         return by_samples.jets(self.forward, q0, q1)
 
-    def coarse_bends(self, q0: Floats, q1: Floats) -> Floats | None:
-        """(2, N) what |second derivative| of tip (mm) and axis (rad) nowhere exceeds on straight moves q0 -> q1 (N, J) in
-        t, at a fraction of the time of `jets` and larger; None where it would save nothing, or nothing is known."""
-        return None
-
     def tip_jets(self, q0: Floats, q1: Floats, tip0: Floats, tip1: Floats,
                  solved: Ints) -> tuple[TaylorVector, TaylorVector]:
         """(tip, tool axis) where the control runs the kinematics: tips straight from `tip0` to `tip1` (N, 3),

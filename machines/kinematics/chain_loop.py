@@ -67,14 +67,18 @@ class ChainLoop:
         """(1 + C, N, 3), see `chain_poses`."""
         return compiled(chain_poses)(q, *self._turned(q), self.turn, self.column, self.along, self.place, carried)
 
-    def bends(self, q0: Floats, q1: Floats, tip_at_zero: Floats) -> Floats:
-        """(2, N), see `chain_bends`."""
-        return compiled(chain_bends)(q0, q1, self.turn, self.column, self.along, self.place, tip_at_zero)
-
     def at_tip(self, tip: Floats, q: Floats, at_zero: Floats, from_slides: Floats) -> Floats:
         """(N, J), see `chain_at_tip`; only where no rotary joint stands between the slides."""
         chain = self.turn, self.column, self.along, self.place
         return compiled(chain_at_tip)(tip, q, *self._turned(q), *chain, *self.sliding, at_zero, from_slides)
+
+
+def coarse_bends(chain: Sequence[Joint], axis_names: Sequence[str], tip: Floats, q0: Floats, q1: Floats) -> Floats | None:
+    """(2, N), see `chain_bends`, of the tip (3,) at zero: cheaper than `jets`; None of few moves, and of no chain."""
+    if not chain or not pays(len(q0)):
+        return None
+    loops = ChainLoop.of(chain, axis_names)
+    return compiled(chain_bends)(q0, q1, loops.turn, loops.column, loops.along, loops.place, tip)
 
 
 @loop(takes=(_ROWS, _ROWS, _ROWS, _INDEX, _INDEX, _ROWS, _ROWS, _ROWS))

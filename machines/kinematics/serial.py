@@ -220,10 +220,6 @@ class Serial(Kinematics):
                 tip = tip.slid(direction, by)
         return tip, axis
 
-    def coarse_bends(self, q0: Floats, q1: Floats) -> Floats | None:
-        """See the base class: of many moves."""
-        return self._loop.bends(q0, q1, self._ends[0]) if pays(len(q0)) else None
-
     # ---- errors, pivots ------------------------------------------------------------------------------------
 
     @property

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from machines.kinematics.base import Kinematics
+from machines.kinematics.chain_loop import coarse_bends
 from toolpaths.arrays import Floats, Ints
 from toolpaths.compiled import compiled, loop
 from toolpaths.shape import Curves
@@ -30,13 +31,13 @@ _ROWS, _COLUMN = ("float64", 2), ("float64", 1)
 def coarse_bounds(kin: Kinematics, curves: Curves, q: tuple[Floats, Floats], start: tuple[Floats, Floats],
                   end: tuple[Floats, Floats], short: float) -> Floats | None:
     """(2, N) bounds (mm, rad) of blocks straight in joints q[0] -> q[1] (N, J) from straight curves; infinite on arcs and
-    where nothing is said; None where the kinematics has no cheap bound.
+    where nothing is said; None of few blocks, and of machines that are no chain.
 
     Args:
         start, end: tip and axis (N, 3) at both ends of the blocks
         short: mm; on shorter curves tip and axis are compared at one parameter
     """
-    bends = kin.coarse_bends(*q)
+    bends = coarse_bends(kin.chain, kin.axis_names, -kin.tool_length * kin.tool_axis, *q) if kin.jets_proved else None
     if bends is None:
         return None
     found: Floats = compiled(coarse)(curves.start, curves.end, curves.axis0, curves.axis1, *start, *end, bends, short)

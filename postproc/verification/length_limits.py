@@ -113,6 +113,7 @@ def length_margins(trial: LengthTrial, motion: Motion, executed: BlockPoses, c: 
     look.bounds_of_reach()
     if matters:
         _prove(_Proof(trial, motion, executed, c), ends)
+    executed.forget()
     return tuple(_margin(job, ends, t) for t in range(len(numbers)))
 
 

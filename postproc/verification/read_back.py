@@ -138,7 +138,6 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     if margins and not has_errors([*comparison.diagnostics]):
         trial = LengthTrial(whole, offsets, job)
         comparison = replace(comparison, lengths=length_margins(trial, motion, executed, comparison))
-    executed.forget()
     return comparison, [*diagnostics, *noted]
 
 

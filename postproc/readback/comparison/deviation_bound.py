@@ -69,7 +69,7 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
     """
     ends = _Ends(rows, owner, begin, share)
     worst, whole = BoundSearch(allowed, judge), _coarse(motion, executed, moves, ends, poses)
-    known = ~np.isfinite(whole).all(axis=0)
+    known = np.asarray(~np.isfinite(whole).all(axis=0))
     if len(rows) and not known.all():
         known[highest(np.where(known, 0.0, whole))] = True
     for rest in (False, True):

@@ -24,7 +24,7 @@ def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
     """The loops as they stand, of as few blocks as there are."""
     for module in (chain_loop, coarse_bound):
         monkeypatch.setattr(module, "compiled", lambda function: function)
-    monkeypatch.setattr("machines.kinematics.serial.pays", lambda n: True)
+    monkeypatch.setattr(chain_loop, "pays", lambda n: True)
 
 
 def blocks(name: str, size: float, count: int = 40, seed: int = 3) -> CurveBlocks:
@@ -42,7 +42,7 @@ def blocks(name: str, size: float, count: int = 40, seed: int = 3) -> CurveBlock
 @pytest.mark.parametrize("name", CHAINS)
 def test_bends_are_above_those_of_the_closer_bound(name: str, interpreted: None) -> None:
     kin, b = machine(name).kinematics.with_tool(80.0), blocks(name, 1.0)
-    coarse = kin.coarse_bends(b.q0, b.q1)
+    coarse = chain_loop.coarse_bends(kin.chain, kin.axis_names, -80.0 * kin.tool_axis, b.q0, b.q1)
     assert coarse is not None
     q = b.q0 + np.linspace(0.0, 1.0, 21)[:, None, None] * (b.q1 - b.q0)
     for found, x in zip(coarse, zip(*(kin.forward(one) for one in q), strict=True), strict=True):
