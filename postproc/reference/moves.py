@@ -94,7 +94,7 @@ class Moves:
 
     def curves(self, rows: Ints | slice = slice(None)) -> Curves:
         """The reference motion of every row, or of some; linked rows stand still at their end."""
-        ends = np.arange(len(self))[rows]
+        ends = np.arange(len(self))[rows] if isinstance(rows, slice) else rows
         first = np.where(self.link[rows], ends, np.maximum(ends - 1, 0))
         return Curves(self.tip[first], self.tip[rows], taken(self.axis, first), taken(self.axis, rows),
                       *self._arcs_of(rows))
