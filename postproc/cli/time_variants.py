@@ -199,7 +199,7 @@ def _fitted(asked: Asked, all_timed: list[Timed]) -> tuple[CalibratedModel | Non
             runs += [] if run is None else [run]
     if len(runs) < len(asked.logs):
         return None, found
-    fit, more = calibrate(runs, all_timed[0].model.quick(), ", ".join(asked.logs), all_timed[0].machine)
+    fit, more = calibrate(runs, all_timed[0].model, ", ".join(asked.logs), all_timed[0].machine)
     return fit, [*found, *more]
 
 
