@@ -8,7 +8,8 @@ import pytest
 from postproc.cycle_time.estimate import timed, total
 from tests.postproc.time_kit import blocks, machine, model
 
-CUTS = "G0 X0. Y0.\nG1 F3000.\n" + "\n".join(f"X{8.0 * (k // 2 % 2):.1f} Y{4.0 * ((k + 1) // 2):.1f}" for k in range(40)) + "\nG0 Z50.\nM5\n"
+CUTS = "G0 X0. Y0.\nG1 F3000.\n" + "\n".join(
+    f"X{8.0 * (k // 2 % 2):.1f} Y{4.0 * ((k + 1) // 2):.1f}" for k in range(40)) + "\nG0 Z50.\nM5\n"
 
 
 def seconds(head: str, controller: str, name: str) -> float:
