@@ -101,6 +101,7 @@ def test_moves_that_show_what_the_program_asks_are_taken_first() -> None:
     assert known.variance([1]) == pytest.approx(25.0 / 51.0)
 
 
+@pytest.mark.slow
 def test_without_a_program_the_test_shows_what_every_kind_of_move_depends_on() -> None:
     made = plan_calibration(None, machine(timing=True), "generic-iso", model("lookahead"), SetupFile(), BUDGET, "t.nc")
     assert made.seconds <= BUDGET and len(made.moves) > 3
