@@ -1,4 +1,4 @@
-"""Cuts between rapids whose tool axis may be turned along the way, or why it may not."""
+"""Cuts between rapids whose tool axis may be turned along it, or why it may not."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from postproc.orientation.candidates.ranking import load_compiler
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.turning.cutting_runs import CuttingRun, runs_of
 from postproc.orientation.turning.tilt_limits import TiltLimits, limits_of
-from postproc.orientation.turning.tilt_search import Measure, TiltField, TiltSearch
+from postproc.orientation.turning.tilt_search import TiltField, TiltSearch, TimeMeasure
 from postproc.orientation.turning.turned_toolpath import turned_toolpath
 from postproc.planning.planned import limits_at_feed
 from toolpaths.smoothing.smooth import Tolerance
@@ -111,7 +111,7 @@ def _tried(work: PassContext, run: CuttingRun, options: Options) -> RunChoice:
     limits = limits_of(work, run, work.machine, options.tolerance, options.max_tilt * DEG)
     most = limits_at_feed(work.machine, run.whole.kin, cutting_force=run.whole.cutting_force)
     jerky = bool(np.isfinite(most.jerk).all())
-    measures: tuple[Measure, ...] = ("planned", "blocks") if jerky else ("blocks",)
+    measures: tuple[TimeMeasure, ...] = ("planned", "blocks") if jerky else ("blocks",)
     search = TiltSearch(run, limits, most)
     fields = [search.kept()]
     for measure in measures:
