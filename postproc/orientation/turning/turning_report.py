@@ -38,7 +38,7 @@ def noted(choice: TurningChoice) -> list[Diagnostic]:
     if some:
         unknown = sum(one.run.contact.unknown for one in some)
         places = unknown + sum(len(one.run.contact) for one in some)
-        found.append(info("orient.no_normal", f"at {unknown} of {places} places along cuts whose axes turn no surface normal "
+        found.append(info("orient.no_normal", f"at {unknown} of {places} places along cuts whose axes turn no normal "
                           "is known: no lead or tilt is looked at there", file=file,
                           lines=[int(one.run.line[1]) for one in some][:_LINES], count=len(some)))
     if choice.passed:
