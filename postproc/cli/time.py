@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -83,6 +84,7 @@ def time(files: TimedFiles,
          json: Json = "") -> None:
     """Estimate how long programs take, with a band, and where the time goes; several side by side."""
     logs, ending = calibrate or [], figure_ending(figure)
+    _check_factors(what_if or [])
     _check(output, logs, len(files))
     test = plan_calibration
     _check_plan(test, len(files) * (1 + len(with_machine or []) + len(with_setup or []) + len(what_if or [])), bool(logs))
@@ -121,3 +123,12 @@ def _check_plan(test: Path | None, variants: int, logs: bool) -> None:
     if test is not None and (variants > 1 or logs):
         raise typer.BadParameter("a test is planned for one file on one machine, before it is measured",
                                  param_hint="--plan-calibration")
+
+
+def _check_factors(what_if: list[str]) -> None:
+    """Wrong use where no factor stands behind a name; whether the machine has it is seen later."""
+    from postproc.time_study.what_if import FACTOR, factor_of
+
+    wrong = next((part.strip() for text in what_if for part in text.split(",") if isnan(factor_of(part)[1])), None)
+    if wrong is not None:
+        raise typer.BadParameter(f"{wrong!r}: {FACTOR}", param_hint="--what-if")

@@ -305,15 +305,15 @@ def _findings(fit: CalibratedModel, before: Floats, clock: float, file: str) -> 
     if record.rms_after > max(1.02 * record.rms_before, 2.0 * clock) or off > max(was, WORSE * measured.sum(), 2.0 * clock):
         return [error("log.fit", f"the fitted model is farther off than the one before: sections {record.rms_after:.3g} s, "
                       f"before {record.rms_before:.3g} s; all {off:.3g} s of {measured.sum():.4g} s, before {was:.3g} s",
-                      file=file, hint="is it this program, this machine, without a feed hold?")]
+                      file=file, hint="log a run of this program on this machine, without a feed hold")]
     if record.relative > UNLIKE:
         return [error("log.fit", f"no values of the model explain the run: {fit.modelled.sum():.4g} s fitted, "
                       f"{measured.sum():.4g} s measured, {100 * record.relative:.0f} % off in parts of it", file=file,
-                      hint="is it this program, this machine, without a feed hold?")]
+                      hint="log a run of this program on this machine, without a feed hold")]
     if record.period > 0.0:
         found.append(info("log.polled", f"the log was polled, one sample every {record.period:.3g} s: a line is seen up to "
                           f"that much late, which is allowed for; {record.samples} sections", file=file))
     if record.relative > 0.1:
         found.append(warning("log.fit", f"the model is {100 * record.relative:.0f} % off in parts of the run", file=file,
-                             hint="is it this program, this machine, without a feed hold?"))
+                             hint="log a run of this program on this machine, without a feed hold"))
     return found

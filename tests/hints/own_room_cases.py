@@ -85,6 +85,8 @@ _TABLES = [
          Edit("t.csv", "", "\\1,\\2\n1,110\n"), first=(f"convert part.apt {ON} -o p.nc",)),
     _own("tool-table.missing", f"verify p.nc part.apt {ON} --tool-table t.csv", "measure these tools",
          Edit("t.csv", "7,110", "1,110"), first=(f"convert part.apt {ON} -o p.nc",), t_csv="register,length\n7,110\n"),
+    _own("tool-table.length", f"verify p.nc part.apt {ON} --tool-table t.csv", "measure the tool",
+         Edit("t.csv", "1,0", "1,110"), first=(f"convert part.apt {ON} -o p.nc",), t_csv="register,length\n1,0\n2,90\n"),
     convert("tool.called", START + CUT, r"take `(called)` out of \[tools\.N\]", sheet('called = "EM10"\n', ""), setup=NAMED),
     convert("tool.called", "UNITS/MM\n" + nx("A", 1, 5) + nx("B", 2, 6), "give each tool a name of its own",
             sheet("em10", "em20"), setup=NAMED + '[tools.2]\ngauge_length = 80.0\ncalled = "em10"\n',

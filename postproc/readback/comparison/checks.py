@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from postproc.control.control import Control
@@ -130,9 +132,10 @@ def _turning_points(depth: Floats) -> Bools:
     return np.asarray((travel[:-1] > 0.0) & (travel[1:] < 0.0))
 
 
-def check_travel(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints,
-                 faults: Faults) -> list[Diagnostic]:
-    """Travel of every axis at the ends of all blocks and between them, whatever the blocks are for."""
+def check_travel(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, faults: Faults,
+                 where: Callable[[Ints], str]) -> list[Diagnostic]:
+    """Travel of every axis at the ends of all blocks and between them, whatever the blocks are for; `where` says at which
+    place moves (K,) are made."""
     limits, machine = executed.control.machine.limits, executed.control.machine
     slack = ROUNDING_SLACK / executed.control.unit
     rows, worst = _beyond_travel(motion, executed, slack)
@@ -146,7 +149,7 @@ def check_travel(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints
             line = int(moves.line[owner[k]]) if owner[k] < len(moves) else 0
             lower, upper = limits.lower[j] * unit, limits.upper[j] * unit
             result.append(faults.error("verify.travel", f"axis {name} goes {worst[at, j] * unit:.4f} beyond its travel "
-                                       f"{lower:g} to {upper:g}", line, int(motion.line[k]), len(bad)))
+                                       f"{lower:g} to {upper:g}{where(owner[[k]])}", line, int(motion.line[k]), len(bad)))
     return result
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.job.job import Job
+from postproc.job.places import at_place
 from postproc.path.model import FEED, TRAVERSE
 from postproc.readback.alignment.align import EndPoses, aligned, unreached
 from postproc.readback.alignment.split_as_written import split_as_written
@@ -133,7 +134,7 @@ def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gco
     diagnostics += check_low_rapids(motion, executed, job, moves, owner, faults)
     diagnostics += check_rewinds(motion, executed, number, tip, axis, job.space, tolerance,
                                  grain[1] + _kept(job), faults)
-    diagnostics += check_travel(motion, executed, moves, owner, faults)
+    diagnostics += check_travel(motion, executed, moves, owner, faults, at_place(job.places, job.repeats, moves))
     diagnostics += check_reach_bounds(motion, executed, moves, owner, faults)
     diagnostics += check_smoothing(motion, job, moves, owner, faults)
     diagnostics += check_smoothing_levels(code, motion, job, moves, owner, faults)
