@@ -58,6 +58,7 @@ BORDERS = {
     "postproc/time_study/side_by_side.py": FIGURES,
     "postproc/orientation/figures/polytope_edges.py": FIGURES,
     "postproc/orientation/report/figures_of_choice.py": FIGURES,
+    "postproc/orientation/turning/turning_report.py": FIGURES,
     "postproc/proof/file.py": "the proof file, JSON", "postproc/proof/hashes.py": TABLES,
     "postproc/proof/changes.py": FIGURES,
     "postproc/batch/index.py": FIGURES, "postproc/differences/report.py": FIGURES,
