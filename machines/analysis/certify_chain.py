@@ -135,7 +135,7 @@ def certify_chain(machine: Machine, wanted: WantedOfChain) -> CertifiedChain:
                                      "kinematics gives no bounds", file=machine.file,
                                      hint="certify machines of the kinds serial, legs, linear-delta and h4-linear")])
     chain = chain_of(machine, wanted.tool)
-    turns = _turns(machine, chain, wanted.turns or {})
+    turns = rotary_ranges(machine, chain, wanted.turns or {})
     (lower, upper), turns = (wanted.box, turns) if wanted.box is not None else _with_box(machine, chain, turns, wanted)
     value, at = _nearest_pole(chain, turns)
     margin = wanted.margin if wanted.margin is not None else (0.0 if value < LEAST else float(np.floor(5e3 * value) / 1e4))
@@ -171,7 +171,7 @@ def _with_box(machine: Machine, chain: ChainOfAxes, turns: Floats,
                                  hint="narrow the rotary axes with --turn A=-30:30, or ask for a smaller --box")])
 
 
-def _turns(machine: Machine, chain: ChainOfAxes, given: Mapping[str, tuple[float, float]]) -> Floats:
+def rotary_ranges(machine: Machine, chain: ChainOfAxes, given: Mapping[str, tuple[float, float]]) -> Floats:
     """(R, 2) rad; an axis of more than a turn counts from -180 to 180 degrees, or from its lower end."""
     found = []
     for joint in chain.turns:
