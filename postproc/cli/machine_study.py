@@ -5,6 +5,7 @@ Heavy packages are imported inside.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
@@ -29,6 +30,8 @@ MapOption = Annotated[MapMeasure | None, word_option("--map", MapMeasure, "measu
 AlongOption = Annotated[list[str] | None, typer.Option("--along", metavar="x|y|z|tilt|SIZE=LOW:HIGH", help=(
     "with --map: once a curve, twice a slice; left out: x and y. With a size (rod, radius or offset, mm) the extremes over the "
     "workspace against it"))]
+AnalysedTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, max=1e4, help="length of the tool whose tip is "
+                                              "meant, of reach and of chains of axes")]
 OffsetOption = Annotated[float, typer.Option("--offset", metavar="MM", min=-1e5, max=1e5, help="with --map rod-inertia: centre "
                                              "of mass above the platform's reference point")]
 AtOption = Annotated[list[str] | None, typer.Option("--at", metavar="x|y|z|tilt=VALUE", help="with --map: the others, mm or "
@@ -40,7 +43,7 @@ MapFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help
 
 def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")], singular_above: SingularOption = None,
                     measure: MapOption = None, along: AlongOption = None, at: AtOption = None, csv: MapCsv = None,
-                    figure: MapFigure = None, offset: OffsetOption = 0.0, json: Json = "") -> None:
+                    figure: MapFigure = None, offset: OffsetOption = 0.0, tool: AnalysedTool = 0.0, json: Json = "") -> None:
     """Condition number, transmission of speed and force over the workspace, reachable box and what ends it."""
     from postproc.cli.catalogue import analysis_text
 
@@ -54,7 +57,7 @@ def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file"
 
         with shown_errors(json):
             machine = machine_of(name)
-            found = analyse(machine, singular_above)
+            found = analyse(replace(machine, kinematics=machine.kinematics.with_tool(tool)), singular_above)
             if figure is not None and ending is not None:
                 outputs[figure] = _condition_figure(machine, ending)
         report((), json, found, analysis_text(found), outputs)
