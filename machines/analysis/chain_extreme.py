@@ -1,8 +1,8 @@
 """The condition number of a chain of axes over its rotary positions, proved: boxes of angles that cannot hold a larger one.
 
-J as `analysis/chain.py` has it, slides at home. In a box J = J0 + D with |D| at most d (Frobenius) by intervals of the turns, so
-the singular values move by d at most (Weyl) and cond J <= (s1 + d) / (sn - d). Where the chain is singular inside its range the
-condition number is infinite there, and that is the answer.
+J as `analysis/chain.py` has it, slides at home. In a box J = J0 + D with |D| at most d (Frobenius) by intervals of the
+turns, so the singular values move by d at most (Weyl) and cond J <= (s1 + d) / (sn - d). Where the chain is singular
+inside its range the condition number is infinite there, and that is the answer.
 """
 
 from __future__ import annotations

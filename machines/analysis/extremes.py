@@ -4,8 +4,8 @@ N = Jq^-1 Jx takes rates of the platform to those of the drives (mm per mm: turn
 ends), J its inverse. In a box N = N0 (I + E), with |E| at most e by the rates of N (`certificate/enclosure.py`), so that
 cond N <= cond N0 (1 + e) / (1 - e), a row of N is at most (1 + e) times, a column of J at most 1 / (1 - e) times that in the
 middle, |det N| at least (1 - e)^K times. The acceleration of a slide per speed squared is |I - u j|^2 |j| / L, j a row of N
-and L the rod (III.6.5). Boxes that may hold more than the largest value seen are halved (branch and bound). Source of the measures: Company
-2000, II-24, III.6.
+and L the rod (III.6.5). Boxes that may hold more than the largest value seen are halved (branch and bound). Source of the
+measures: Company 2000, II-24, III.6.
 """
 
 from __future__ import annotations
@@ -97,7 +97,8 @@ def slide_acceleration(legs: LegGeometry) -> RateMeasure:
 @dataclass(frozen=True, eq=False)
 @arrays(lower="N 5", upper="N 5", middle="N K K", e="N", share="N 5")
 class BoxesOfRates:
-    """Boxes of poses with N0 in the middle of each, e over it (infinite where nothing is known), share of each number in e."""
+    """Boxes of poses with N0 in the middle of each, e over it (infinite where nothing is known), share of each number in
+    e."""
 
     lower: Floats
     upper: Floats

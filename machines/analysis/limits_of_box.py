@@ -74,8 +74,8 @@ def least_margins(machine: Machine) -> dict[str, dict[str, Any]]:
 
 
 def extents(machine: Machine) -> dict[str, Any]:
-    """How far along x, y and z the drives' joints come over the workspace, mm, and those of the contracted model, whose platform
-    joints are one point (table III-5, annex C of Company 2000); nothing of a machine without a platform."""
+    """How far along x, y and z the drives' joints come over the workspace, mm, and those of the contracted model, whose
+    platform joints are one point (table III-5, annex C of Company 2000); nothing of a machine without a platform."""
     kinematics = machine.kinematics
     over, legs = kinematics.over_workspace, kinematics.leg_geometry
     if over is None or legs is None:

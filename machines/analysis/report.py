@@ -36,8 +36,8 @@ from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.units import DEG
 
 _WHERE = {True: "the tip of a tool of tool_mm, directions and turns by a lever (lever_mm)",
-          False: "transmission and condition: the platform's reference point, turns by half the largest distance of its joints; "
-                 "reach: the tip of a tool of tool_mm"}
+          False: "transmission and condition: the platform's reference point, turns by half the largest distance of its "
+                 "joints; reach: the tip of a tool of tool_mm"}
 GRID, COARSE = (11, 11, 11, 7), (5, 5, 5, 3)
 """places and tilts at which a worst value is first looked for; coarse where a tilt has several directions"""
 
@@ -101,7 +101,9 @@ def _transmission(kinematics: Transmission, legs: LegGeometry | None) -> dict[st
         "manipulability": _largest(manipulability, kinematics, several),
         "conditioning_factor": _least(conditioning_factor, kinematics, several)}
     over = None if legs is None else rates_over(legs, kinematics.lever)
-    for key, measure in MEASURES.items() if over is not None else ():
+    for key, measure in MEASURES.items():
+        if over is None:
+            break
         extreme = largest_over(over, measure)
         if key == "conditioning_lost":
             factor = found["conditioning_factor"]

@@ -98,7 +98,8 @@ def star_of(machine: Machine, task: MachiningTask, rod: float | None = None) -> 
 
 
 def _rates(legs: StudiedLegs, poses: PlatformPoses, task: MachiningTask) -> Floats:
-    """N (N, K, F): rates of the drives (arms: of their ends) per v at the tip and omega of the freedoms; NaN out of reach."""
+    """N (N, K, F): rates of the drives (arms: of their ends) per v at the tip and omega of the freedoms; NaN out of
+    reach."""
     loops = legs.transmits.loops
     q = loops.drives.solve(loops.ends(poses.place, poses.turn), loops.drives.roots)
     _, rods = loops.matrix_at(poses.place, poses.turn, q)
@@ -128,7 +129,8 @@ def _columns(legs: StudiedLegs, poses: PlatformPoses, rates: Floats, task: Machi
     forces = _cutting(poses, drives, task)
     rods = _rod_maps(legs, poses, task)
     speeds = np.abs(translating @ (flat.T @ DIRECTIONS.T))
-    inertia = task.drive_mass * translating + task.platform_mass * _at_reference(legs, poses, drives, task)[:, :, free[moves]]
+    felt = _at_reference(legs, poses, drives, task)[:, :, free[moves]]
+    inertia = task.drive_mass * translating + task.platform_mass * felt
     pushed = np.abs(inertia @ (flat.T @ DIRECTIONS.T)) * task.acceleration
     return [np.linalg.norm(translating, axis=2).max(axis=1) * task.rapid * 1e-3,
             np.linalg.norm(turning, axis=2).max(axis=1) * task.turn * 1e-3,

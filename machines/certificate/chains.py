@@ -37,7 +37,8 @@ ChainShortfall = Literal["", "travel", "pole", "slides", "undecided"]
 @dataclass(frozen=True, eq=False)
 @arrays(tool_axis="3", travel="3 2")
 class ChainOfAxes:
-    """Three slides and up to two rotary axes from the workpiece to the tool, and the travel of the slides in chain order, mm."""
+    """Three slides and up to two rotary axes from the workpiece to the tool, and the travel of the slides in chain order,
+    mm."""
 
     joints: tuple[Joint, ...]
     tool_axis: Floats
@@ -76,7 +77,8 @@ class ChainOfAxes:
 
     def rates(self, slides: Floats, angles: Span) -> Span:
         """J (N, 6, J): rates of tip and tool axis in the table frame per joint, in chain order, slides at (3,) mm, boxes of
-        angles (N, R): a rotary axis w moves the tip by w x (tip - point), the axis by w x axis, both turned by what is before it.
+        angles (N, R): a rotary axis w moves the tip by w x (tip - point), the axis by w x axis, both turned by what is
+        before it.
         """
         n, at = len(angles.lo), dict(zip((joint.name for joint in self.slides), slides.tolist(), strict=True))
         cos_sin = {joint.name: turned_by(angles[:, k]) for k, joint in enumerate(self.turns)}
@@ -161,7 +163,8 @@ def _size(matrix: Span) -> Span:
 @dataclass(frozen=True, eq=False)
 @arrays(lower="3", upper="3", turns="R 2")
 class AskedOfChain:
-    """Tips between `lower` and `upper` (3,) mm in the table frame, rotary axes in `turns` (R, 2) rad; least sine of the pole."""
+    """Tips between `lower` and `upper` (3,) mm in the table frame, rotary axes in `turns` (R, 2) rad; least sine of the
+    pole."""
 
     chain: ChainOfAxes
     lower: Floats
@@ -178,7 +181,8 @@ class AskedOfChain:
 @dataclass(frozen=True, eq=False)
 @arrays(bounds="N 3", tip="3", turned="R")
 class ProvedChain:
-    """Boxes of rotary positions by the path of halves to each, with bounds (N, 3) of CHAIN_NAMES; or what is short, and where."""
+    """Boxes of rotary positions by the path of halves to each, with bounds (N, 3) of CHAIN_NAMES; or what is short, and
+    where."""
 
     paths: tuple[str, ...]
     bounds: Floats

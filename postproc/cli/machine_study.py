@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
@@ -17,9 +17,7 @@ from postproc.cli.shared.options import figure_ending, word_option
 
 if TYPE_CHECKING:
     from machines.machine import Machine
-    from toolpaths.arrays import Floats
     from toolpaths.choices import FigureEnding
-    from toolpaths.diagnostics import Diagnostic
 
 ANALYSED = "Examples: postproc machine analyse uranesx --json -; " \
            "postproc machine analyse uranesx --map condition --along x --along y --at z=-100 --figure map.svg --csv map.csv"
@@ -28,11 +26,14 @@ SingularOption = Annotated[float | None, typer.Option("--singular-above", metava
                                                       "slides along z stay above this")]
 MapOption = Annotated[MapMeasure | None, word_option("--map", MapMeasure, "measure of a map or a curve")]
 AlongOption = Annotated[list[str] | None, typer.Option("--along", metavar="x|y|z|tilt|SIZE=LOW:HIGH", help=(
-    "with --map: once a curve, twice a slice; left out: x and y. With a size (rod, radius or offset, mm) the extremes over the "
+    "with --map: once a curve, twice a slice; left out: x and y. With a size (rod, radius or offset, mm) the extremes "
+    "over the "
     "workspace against it"))]
-AnalysedTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, max=1e4, help="length of the tool whose tip is "
+AnalysedTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, max=1e4,
+                                             help="length of the tool whose tip is "
                                               "meant, of reach and of chains of axes")]
-OffsetOption = Annotated[float, typer.Option("--offset", metavar="MM", min=-1e5, max=1e5, help="with --map rod-inertia: centre "
+OffsetOption = Annotated[float, typer.Option("--offset", metavar="MM", min=-1e5, max=1e5,
+                                             help="with --map rod-inertia: centre "
                                              "of mass above the platform's reference point")]
 AtOption = Annotated[list[str] | None, typer.Option("--at", metavar="x|y|z|tilt=VALUE", help="with --map: the others, mm or "
                                                     "degrees; left out: the middle of the workspace")]
@@ -123,7 +124,8 @@ def _sizes(given: list[str]) -> dict[SizeNumber, tuple[float, float]]:
         key: SizeNumber | None = next((one for one in get_args(SizeNumber) if one == name), None)
         least = -1e6 if key == "offset" else 0.0
         if key is None or key in found or not least <= low < high < 1e6 or len(given) > 2:
-            raise typer.BadParameter(f"{text!r}: write one or two of {', '.join(get_args(SizeNumber))}, = and two lengths in mm "
+            raise typer.BadParameter(f"{text!r}: write one or two of {', '.join(get_args(SizeNumber))}, = and two lengths "
+                                     "in mm "
                                      "with : between them, the smaller first", param_hint="--along")
         found[key] = low, high
     return found

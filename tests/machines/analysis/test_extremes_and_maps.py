@@ -73,7 +73,8 @@ def test_the_acceleration_of_slides_per_speed_squared_is_proved(name: str) -> No
 def test_the_condition_number_of_the_h4a_is_below_six_everywhere() -> None:
     """V.7, over the declared workspace and 45 degrees to both sides: proved, not seen."""
     kin = machines.load("h4a-c-table").kinematics
-    assert largest_over(rates_over(kin.leg_geometry, kin.transmits.lever), MEASURES["condition_number"], close=0.03).most < 6.0
+    assert largest_over(rates_over(kin.leg_geometry, kin.transmits.lever), MEASURES["condition_number"],
+                        close=0.03).most < 6.0
 
 
 def test_manipulability_says_nothing_of_a_lost_direction() -> None:

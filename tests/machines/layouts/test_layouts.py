@@ -31,7 +31,8 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 ANNEX_C: dict[str, tuple[search.SlideLayout, dict[str, float], float]] = {
     "along x": ("parallel-x", {"y1": 900.0, "y2": 0.0, "y3": 900.0, "z1": 800.0, "z2": 1200.0, "z3": 800.0}, 1700.0),
-    "along x, compact": ("parallel-x", {"y1": 850.0, "y2": -150.0, "y3": 500.0, "z1": 450.0, "z2": 950.0, "z3": 750.0}, 1350.0),
+    "along x, compact": ("parallel-x", {"y1": 850.0, "y2": -150.0, "y3": 500.0, "z1": 450.0, "z2": 950.0, "z3": 750.0},
+                         1350.0),
     "along z": ("parallel-z", {"radius": 850.0}, 1400.0), "along z, compact": ("parallel-z", {"radius": 700.0}, 1350.0),
     "coplanar": ("coplanar", {"half": 800.0, "middle": 0.0, "height": 1000.0}, 1700.0),
     "star": ("star", {"height": 850.0}, 1500.0),
