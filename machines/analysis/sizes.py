@@ -82,8 +82,9 @@ def over_sizes(machine: Machine, measure: MapMeasure, ranges: Mapping[SizeNumber
     least, largest = np.full(len(sizes), np.nan), np.full(len(sizes), np.nan)
     where = np.full((len(sizes), 4), np.nan)
     for k, row in enumerate(sizes.tolist()):
-        value = legs.resized(**dict(zip(ranges, row, strict=True))).value(measure, place, tilt)
-        if not np.isnan(value).any():
+        other = legs.resized(**dict(zip(ranges, row, strict=True)))
+        if all(np.isfinite(other.transmits.loops_at(place, tilt, float(h))[1]).all() for h in other.transmits.headings):
+            value = other.value(measure, place, tilt)
             j = int(value.argmax())
             least[k], largest[k], where[k] = value.min(), value[j], [*place[j], tilt[j] / DEG]
     if not np.isfinite(largest).any():

@@ -32,7 +32,8 @@ MICRO, ARCSEC = 1e-3, ANGLES["arcsec"]
 @dataclass(frozen=True, eq=False)
 @arrays(reading="N", position="N", way="N")
 class RepeatedReadings:
-    """Readings, where they were taken (one number where no column says) and from which side (1, -1, 0 not known); mm, rad."""
+    """Readings, where they were taken (one number where no column says) and from which side (1, -1, 0 not known); mm,
+    rad."""
 
     reading: Floats
     position: Floats
@@ -105,7 +106,8 @@ def _checked(table: CsvTable, found: list[Diagnostic]) -> tuple[RepeatedReadings
     few = [place for place, side in groups if ((position == place) & (way == side)).sum() < LEAST]
     if few:
         rows = [table.lines[k] for k in np.flatnonzero(np.isin(position, few))]
-        return None, [*found, error("repeatability.few", f"{len(few)} positions have one reading from a side: they say nothing "
+        return None, [*found, error("repeatability.few", f"{len(few)} positions have one reading from a side: they say "
+                                                         "nothing "
                                     "of repeatability", file=table.file, lines=rows[:6], count=len(few),
                                     hint="read each position at least twice from each side, or leave it out")]
     return made, found

@@ -180,4 +180,5 @@ def repeatability(file: Annotated[Path, typer.Argument(metavar="READINGS.csv", h
             outputs[figure] = repeated_figure(found, file.stem, ending)
     words = {key: value for key, value in figures.items() if key != "positions"} | (
         {"positions": len(figures["positions"])} if figures else {})
-    report(tuple(diagnostics), json, figures | {"diagnostics": [d.as_dict() for d in diagnostics]}, analysis_text(words), outputs)
+    report(tuple(diagnostics), json, figures | {"diagnostics": [d.as_dict() for d in diagnostics]}, analysis_text(words),
+           outputs)

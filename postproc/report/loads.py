@@ -84,6 +84,6 @@ def motor_load_lines(found: dict[str, Any] | None) -> list[str]:
     if found is None:
         return []
     steady, ramp = found["steady"], found["starting_and_stopping"]
-    return [f"motors: {steady['motor']} gives at most {steady['share']:.0%} of its limit in steady cuts (T{steady['tool']}, line "
-            f"{steady['line']}); {ramp['motor']} {ramp['share']:.0%} if all axes start or stop at their full acceleration there "
-            f"(line {ramp['line']})"]
+    return [f"motors: {steady['motor']} gives at most {steady['share']:.0%} of its limit in steady cuts (T{steady['tool']}, "
+            f"line {steady['line']}); {ramp['motor']} {ramp['share']:.0%} if all axes start or stop at their full "
+            f"acceleration there (line {ramp['line']})"]

@@ -19,7 +19,8 @@ def test_42_readings_of_one_position(tmp_path: Path) -> None:
     readings = (readings - readings.min()) / np.ptp(readings) * 1.81
     file = tmp_path / "c.csv"
     file.write_text("reading [arcsec]\n" + "\n".join(map(repr, readings.tolist())) + "\n", encoding="utf-8")
-    done = CliRunner().invoke(app, ["errors", "repeatability", str(file), "--figure", str(tmp_path / "c.png"), "--json", "-"])
+    done = CliRunner().invoke(app, ["errors", "repeatability", str(file), "--figure", str(tmp_path / "c.png"), "--json",
+                                    "-"])
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     s = np.sqrt(((readings - readings.mean()) ** 2).sum() / 41)
@@ -33,7 +34,8 @@ def test_42_readings_of_one_position(tmp_path: Path) -> None:
 def test_both_sides_of_two_positions(tmp_path: Path) -> None:
     """s of (a, b) is |a - b| / sqrt 2; reversal 5 um at 100 mm, bi-directional 2 s + 2 s + 5."""
     file = tmp_path / "x.csv"
-    file.write_text("position [mm],way,reading [um]\n0,1,1\n0,1,2\n0,-1,1\n0,-1,2\n100,1,6\n100,1,8\n100,-1,1\n100,-1,3\n", encoding="utf-8")
+    file.write_text("position [mm],way,reading [um]\n0,1,1\n0,1,2\n0,-1,1\n0,-1,2\n100,1,6\n100,1,8\n100,-1,1\n100,-1,3\n",
+                    encoding="utf-8")
     found, diagnostics = read_repeated(file)
     assert found is not None and not diagnostics
     figures, s = found.figures, np.sqrt(2.0)
