@@ -192,6 +192,25 @@ def test_two_cuts_next_to_each_other_turn_each_by_its_own_field() -> None:
     assert (angle_between(both.axis, path.axis) > 1e-3).all(), "every rapid leads to a cut or draws back from it"
 
 
+@pytest.mark.parametrize("between", [["$$ ->FEATNO/FINISH"], ["CUTTER/10,5", "LOADTL/2"]])
+def test_rapids_of_another_operation_or_tool_keep_their_axes(between: list[str]) -> None:
+    """Two rapids behind the first cut and two before the second, all along the axis that the second begins with."""
+    x = np.linspace(-20.0, 20.0, 9)
+    rows = [f"{np.sin(0.01 * at):.9f},0,{np.cos(0.01 * at):.9f}" for at in x]
+    cut = ["RAPID", f"GOTO/{x[0]},0,0,{rows[0]}", *(f"GOTO/{at},0,0,{row}" for at, row in zip(x[1:], rows[1:], strict=True))]
+    cut.insert(2, "FEDRAT/MMPM,3000")
+    above = ["RAPID", f"GOTO/{x[0]},0,30,{rows[0]}"]
+    records = [*cut, "RAPID", f"GOTO/{x[-1]},0,20,{rows[-1]}", *above, *between, *above, *cut, "RAPID",
+               f"GOTO/{x[-1]},0,20,{rows[-1]}"]
+    first = len(x) + 2  # positions of the first
+    path = toolpath("$$ ->FEATNO/ROUGH", *records, head=BALL)
+    work = context(path, with_cone())
+    last = runs_of(work, Tolerance(OPTIONS.tolerance, OPTIONS.axis_tolerance * DEG), 1.0)[-1]
+    made = turned_toolpath(work, [leaned(last)])
+    assert np.array_equal(made.axis[:first], path.axis[:first]) and np.array_equal(made.tip[:first], path.tip[:first])
+    assert (angle_between(made.axis[first:], path.axis[first:]) > 1e-3).all()
+
+
 FLAT = ["UNITS/MM", "CUTTER/6,1", *BALL[2:]]
 
 
