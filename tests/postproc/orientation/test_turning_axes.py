@@ -150,6 +150,22 @@ def test_a_field_is_smooth_along_the_cut(best: TiltField) -> None:
     assert np.linalg.norm(bend, axis=1).max() < 12.0 * np.radians(CONE) / step**2
 
 
+def test_what_is_outside_a_limit_is_broken_and_the_own_axes_are_not() -> None:
+    """Each limit by itself: travel of the joints, an angle from the normal, the ball's path between two poses."""
+    search = searched(swing(normals=True), with_cone(lead=(-5.0, 40.0)))
+    limits, axes, q = search.limits, search.run.axis, search.joints(search.kept())
+    assert not limits.broken(axes, q)
+    over = q.copy()
+    over[len(q) // 2, 0] = limits.upper[0] + 1e-3
+    assert limits.broken(axes, over) and limits.broken(axes, np.full_like(q, np.nan))
+    for lean, only in ((-0.6, replace(limits, slack=1e9)), (0.1, limits)):
+        field = np.zeros_like(axes)
+        field[len(axes) // 2, 0] = lean
+        assert only.broken(turned_axes(axes, field), q), "one pose is turned, its neighbours are not"
+    free = replace(limits, row=limits.row[:0], side=limits.side[:0], most=limits.most[:0])
+    assert not replace(free, slack=1e9).broken(turned_axes(axes, np.full_like(axes, 0.3)), q)
+
+
 def test_lead_tilt_and_dead_centre_hold_at_every_pose() -> None:
     """Own axes: 25 degrees off the normal. Inside 24 to 27 with a lead and a tilt that they nearly fill, less is gained."""
     keys = {"off_centre": 24.0, "lead": [-5.0, 25.0], "tilt": [-25.0, 25.0]}
