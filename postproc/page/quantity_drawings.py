@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Quantity = Literal["feed", "deviation", "correction", "tilt"]
-Reason = Literal["limit", "cause"]
+PathReason = Literal["limit", "cause"]
 QUANTITIES: dict[Quantity, tuple[str, str]] = {
     "feed": ("feed reached", "mm/min"), "deviation": ("deviation", "um"), "correction": ("correction", "um"),
     "tilt": ("tilt", "deg")}
@@ -85,7 +85,7 @@ def _valued(run: dict[str, Any], columns: dict[str, Floats], name: Quantity, she
         sheet.colorbar(drawn, ax=place, label=f"{column}, {unit}")
 
 
-def _named(run: dict[str, Any], columns: dict[str, Floats], name: Reason, sheet: Figure) -> None:
+def _named(run: dict[str, Any], columns: dict[str, Floats], name: PathReason, sheet: Figure) -> None:
     """The cuts by what limits them, or by where their time goes."""
     from matplotlib.collections import LineCollection
 
