@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from postproc.base.options import Options
     from postproc.base.progress import Progress
     from postproc.orientation.plans.choice import OrientationChoice
+    from postproc.pipeline.result import PostResult
     from toolpaths.diagnostics import Diagnostic
 
 EXAMPLES = """\b
@@ -95,17 +96,23 @@ def orient(file: ClFile,
             from postproc.batch.run import Where
 
             stack.enter_context(spread(Where(workers, scheduler)))
-        choice, found = _chosen(file, machine_of(machine), controller_of(controller), options, progress, model)
+        made = _chosen(file, machine_of(machine), controller_of(controller), options, progress, model)
+        choice, turning, found = made.choice, made.turning, list(made.diagnostics)
         if choice is not None:
             from postproc.orientation.report.figures_of_choice import as_dict
             from postproc.orientation.report.text import as_text
 
             shown = _known(passes or [], choice)
             values, text = as_dict(choice, options.orient), as_text(choice, options.orient, shown)
+            if turning is not None:
+                from postproc.orientation.turning import turning_report
+
+                values["turning"] = turning_report.as_dict(turning)
+                text += "\n\n" + turning_report.as_text(turning)
             if figure is not None and ending is not None:
                 from postproc.orientation.figures.sheet import draw
 
-                outputs[figure] = draw(choice, options.orient, shown, ending)
+                outputs[figure] = draw(choice, options.orient, shown, ending, turning)
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
@@ -117,15 +124,14 @@ def _check(passes: list[int]) -> None:
 
 
 def _chosen(file: Path, machine: Machine, controller: str, options: Options,
-            progress: Progress, model: str) -> tuple[OrientationChoice | None, list[Diagnostic]]:
-    """The choice for a file; None where a diagnostic is an ERROR."""
+            progress: Progress, model: str) -> PostResult:
+    """The choice for a file, none where a diagnostic is an ERROR."""
     from postproc.cycle_time.conversion import program_clock
     from postproc.pipeline.convert import choose_axes
 
     path, found = read_cl(file, options, progress)
-    result = choose_axes(path, machine, controller, options, [*found, *_errors(options, machine)], progress,
-                         program_clock(model))
-    return result.choice, list(result.diagnostics)
+    return choose_axes(path, machine, controller, options, [*found, *_errors(options, machine)], progress,
+                       program_clock(model))
 
 
 def _errors(options: Options, machine: Machine) -> list[Diagnostic]:
