@@ -50,7 +50,9 @@ BORDERS = {
     "machines/analysis/report.py": FIGURES, "machines/geometric_error/exchange/survey.py": FIGURES,
     "postproc/report/loads.py": FIGURES, "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,
     **{f"postproc/page/{name}.py": FIGURES for name in (
-        "columns", "document", "drawings", "run", "skeleton", "solids", "tabs", "tools", "what_if")},
+        "columns", "document", "drawings", "quantity_drawings", "run", "skeleton", "solids", "tabs", "tool_outlines",
+        "tools", "what_if")},
+    "postproc/base/team.py": "what workers are given and give back",
     "postproc/base/program_time.py": FIGURES, "postproc/cycle_time/toppra_check.py": FIGURES,
     "postproc/report/summary.py": FIGURES, "postproc/report/trace.py": FIGURES, "postproc/report/unwinding.py": FIGURES,
     "postproc/placement/report.py": FIGURES, "postproc/cycle_time/report.py": FIGURES,
@@ -104,6 +106,7 @@ ANYTHING = {
     "postproc/setup/model.py": "the value of any key",
     "postproc/setup/spindle.py": "a value before pydantic checks it",
     "postproc/cli/shared/options.py": "words of a Literal",
+    "postproc/batch/cluster.py": "clients and futures of distributed, which states no types",
     "postproc/batch/run.py": "clients and futures of distributed, which states no types",
     "postproc/feedrate/rest_to_rest.py": "a profile of ruckig, which states no types",
     "postproc/placement/bodies.py": "managers of trimesh, which states no types",
