@@ -36,7 +36,8 @@ BORDERS = {
     "machines/exchange/draft.py": TABLES, "machines/sheet/file_text.py": TABLES,
     "machines/value_words.py": "what pydantic says of a fault",
     **{f"machines/{name}.py": FIGURES for name in (
-        "analysis/certify", "analysis/certify_chain", "analysis/chain", "analysis/limits_of_box", "analysis/maps", "layouts/design",
+        "analysis/certify", "analysis/certify_chain", "analysis/chain", "analysis/limits_of_box", "analysis/maps",
+        "layouts/design",
         "dynamics/report", "dynamics/rods", "stiffness/report", "tolerances/report")},
     **{f"{name}.py": CERTIFICATES for name in (
         "machines/analysis/certificate_figure", "machines/certificate/certificate_file", "machines/certificate/lookup",
