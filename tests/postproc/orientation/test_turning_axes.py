@@ -226,6 +226,8 @@ def test_the_program_is_proved_faster_and_says_so(controller: str) -> None:
     assert made.ok, [str(d) for d in made.diagnostics]
     assert made.turning is not None
     assert made.turning.programs["turned"].seconds < 0.97 * made.turning.programs["keep"].seconds
+    assert made.choice is not None
+    assert made.choice.toolpath("auto").equals(made.toolpath), "what Python takes from the choice"
     assert made.witness is not None
     assert not made.witness.findings
     assert {one.what for one in made.witness.compared} >= {"positions", "feeds"}
