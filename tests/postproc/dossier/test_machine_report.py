@@ -58,7 +58,7 @@ def test_a_trunnion_s_page_says_limits_pivots_and_levers(tmp_path: Path) -> None
     assert "X.travel" in values["assumed"] and values["ok"]
     assert {row[0]: row[1] for row in cells(page, "condition") if len(row) == 3} == {
         letter: f"{row['mm']:.4g}" for letter, row in values["levers"].items()}
-    assert page.count("<img") == 3
+    assert page.count("<img") == 4
 
 
 def test_a_machine_on_legs_shows_maps_and_its_certificate(tmp_path: Path) -> None:
