@@ -45,8 +45,10 @@ BORDERS = {
         "postproc/certificate_check/parts", "postproc/certificate_check/machine_file",
         "postproc/certificate_check/run")},
     **{f"postproc/dossier/{name}.py": FIGURES for name in ("content", "page", "words")},
-    "machines/analysis/levers.py": FIGURES, "postproc/cli/machine_report.py": FIGURES,
-    "postproc/cli/machine_study.py": FIGURES, "postproc/cli/machine_certify.py": FIGURES,
+    "machines/analysis/levers.py": FIGURES, "machines/analysis/sizes.py": FIGURES, "machines/analysis/star.py": FIGURES,
+    "machines/layouts/cranks.py": FIGURES, "machines/calibration/repeatability.py": FIGURES,
+    "postproc/cli/machine_report.py": FIGURES,
+    "postproc/cli/machine_certify.py": FIGURES, "postproc/cli/machine_design.py": FIGURES,
     "machines/analysis/report.py": FIGURES, "machines/geometric_error/exchange/survey.py": FIGURES,
     "postproc/report/loads.py": FIGURES, "postproc/report/places.py": FIGURES, "postproc/cli/report.py": FIGURES,
     **{f"postproc/page/{name}.py": FIGURES for name in (

@@ -128,15 +128,11 @@ class CertifiedChain:
 
 
 def certify_chain(machine: Machine, wanted: WantedOfChain) -> CertifiedChain:
-    """The certificate.
+    """The certificate, of a machine that is a chain of axes.
 
     Raises:
         DiagnosticError: where it cannot be had, with the place and what stands against it.
     """
-    if not machine.kinematics.chain:
-        raise DiagnosticError([error("certificate.kind", f"no workspace of {machine.name} is proved: what is known of its "
-                                     "kinematics gives no bounds", file=machine.file,
-                                     hint="certify machines of the kinds serial, legs, linear-delta and h4-linear")])
     chain = chain_of(machine, wanted.tool)
     turns = rotary_ranges(machine, chain, wanted.turns or {})
     (lower, upper), turns = (wanted.box, turns) if wanted.box is not None else _with_box(machine, chain, turns, wanted)

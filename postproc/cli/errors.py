@@ -162,7 +162,7 @@ def errors_schema() -> None:
 
 @errors_app.command("repeatability", epilog="Example: postproc errors repeatability C-42.csv --figure C-42.svg")
 def repeatability(file: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="column reading [arcsec] or [um]; where "
-                                                       "there are several, position [deg] or [mm], and way (1, -1)")],
+                                                       "there are several, position [deg] or [mm], and approach (1, -1)")],
                   figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="the readings drawn, .png or "
                                                               ".svg")] = None, json: Json = "") -> None:
     """Repeatability of an axis from repeated readings: interval, standard deviation, reversal (ISO 230-2)."""

@@ -9,7 +9,7 @@ from pkgutil import resolve_name
 
 import pytest
 
-from machines.certificate import search
+from machines.analysis import certify
 from machines.geometric_error.exchange import survey
 from machines.layouts import search as layouts
 from tests.explained_codes import DATA
@@ -36,8 +36,9 @@ def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a model of errors does at each of many places changes figures of `errors check`, and no hint; so do the boxes
     after which a certificate gives up, and the layouts that are tried."""
     monkeypatch.setattr(survey, "PLACES", 500)
-    monkeypatch.setattr(search, "MOST", 6_000)
-    for name, value in (("RESTARTS", 1), ("ROUNDS", 12), ("CROWD", 6), ("GRID", (3, 3, 2, 1))):
+    monkeypatch.setattr(certify, "MOST", 6_000)
+    monkeypatch.setattr(certify, "FEW", 3_000)
+    for name, value in (("RESTARTS", 1), ("ROUNDS", 12), ("CROWD", 6), ("GRID", (3, 3, 2))):
         monkeypatch.setattr(layouts, name, value)
 
 

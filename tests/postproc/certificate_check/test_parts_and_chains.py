@@ -30,11 +30,11 @@ Content = dict[str, Any]
 
 
 def table_of(name: str) -> Content:
-    return json.loads(json.dumps(values_of_machine(machines.load(name))))  # type: ignore[no-any-return]  # JSON
+    return json.loads(json.dumps(values_of_machine(machines.load(name))))
 
 
 def some_boxes(name: str, lower: list[float], upper: list[float]) -> Content:
-    return json.loads(certify(machines.load(name), Wanted((np.array(lower), np.array(upper)), 0.0)).text)  # type: ignore[no-any-return]  # JSON
+    return json.loads(certify(machines.load(name), Wanted((np.array(lower), np.array(upper)), 0.0)).text)
 
 
 URANESX = json.loads(certify(machines.load("uranesx"), Wanted()).text)
