@@ -179,15 +179,17 @@ class LegsModel(KinematicsModel):
             np.array([float(leg.rod) for leg in legs]), np.array([float(leg.root) for leg in legs]),
             np.array([leg.arm if leg.drive == "arm" else (0.0, 0.0, 0.0) for leg in legs]),
             np.array([leg.drive == "slide" for leg in legs]), np.array([leg.drive == "arm" for leg in legs]))
-        joints, kept = np.array([leg.joint for leg in legs]), None
+        joints, kept, on = np.array([leg.joint for leg in legs]), None, tuple[int, ...]()
         if self.bars:
             on_bar = np.array([leg.bar is not None for leg in legs])[:, None]
             hinges = np.array([(0.0, 0.0, 0.0) if leg.bar is None else self.bars[leg.bar].hinge for leg in legs])
             joints, kept = np.where(on_bar, hinges, joints), np.where(on_bar, joints, 0.0)
+            on = tuple(-1 if leg.bar is None else list(self.bars).index(leg.bar) for leg in legs)
         own = tuple(sorted(self.freedoms, key=FREEDOMS.index))
         holds = holds_of(legs, self.passive.values())
         rings = np.array([leg.ring or 0.0 for leg in legs]) if any(leg.ring for leg in legs) else None
-        loops = Loops(drives, joints, own if holds is None else FREEDOMS, kept, holds, () if holds is None else own, rings)
+        loops = Loops(drives, joints, own if holds is None else FREEDOMS, kept, holds, () if holds is None else own, rings,
+                      on)
         return OnLegs(
             loops,
             self._space(), np.array(self.gauge), names,

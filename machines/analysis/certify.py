@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from machines.analysis.singularity import lipschitz_points
-from machines.certificate.certificate_file import RegionOfPoses, certificate
+from machines.analysis.singularity import annex_d_boxes, lipschitz_halved, lipschitz_points
+from machines.certificate.certificate_file import SHARE, RegionOfPoses, certificate
+from machines.certificate.clearances import PartsOfLegs, pair_names
 from machines.certificate.enclosure import columns
 from machines.certificate.poses import PosesOfBoxes
-from machines.certificate.search import AskedProof, ProvedBoxes, Shortfall, look, prove
+from machines.certificate.search import FARTHEST, GAPS, MOST, AskedProof, ProvedBoxes, Shortfall, look, prove
 from machines.certificate.spans import spanned
 from machines.kinematics.leg_geometry import LegGeometry
 from machines.loader import values_of_machine
@@ -29,7 +30,10 @@ _WORDS: Mapping[Shortfall, str] = {
     "reach": "a leg does not reach", "travel": "a drive is outside its travel",
     "direct": "the platform yields with the drives held (distance from a direct singularity)",
     "inverse": "a rod is nearly square to the motion of its drive (distance from an inverse singularity)",
-    "held": "legs and pairs of rods hardly hold the platform (least singular value of what they hold, V-4)"}
+    "held": "legs and pairs of rods hardly hold the platform (least singular value of what they hold, V-4)",
+    "": "", "parts": "two parts touch", "stops": "a joint is beyond its stop", "undecided": "not decided"}
+FEW = 40_000
+"""boxes looked at for clearances that were not asked for"""
 
 
 @dataclass(frozen=True)
@@ -42,23 +46,33 @@ class Wanted:
         tool: mm
         margin: least distance from singular positions, free of units; None: half of the least that random poses have
         travel: whether the drives have to be inside their travel; None: where they are
+        clearance: whether rods, spindle and slides have to clear each other, and joints their stops; None: where they do
     """
 
     box: tuple[Floats, Floats] | None = None
     tool: float = 0.0
     margin: float | None = None
     travel: bool | None = None
+    clearance: bool | None = None
 
 
 @dataclass(frozen=True)
 class Certified:
-    """A proof of a workspace: what was asked, what was found, and where the travel of a drive stands against it."""
+    """A proof of a workspace: what was asked, what was found, and what stands against the travel of a drive, or
+    clearances."""
 
     machine: Machine
     region: RegionOfPoses
     asked: AskedProof
     proved: ProvedBoxes
     outside: ProvedBoxes | None
+    touching: ProvedBoxes | None = None
+    held_apart: PartsOfLegs | None = None
+
+    @property
+    def wanted_parts(self) -> AskedProof:
+        """What was asked before clearances were left out."""
+        return replace(self.asked, parts=self.held_apart)
 
     @property
     def content(self) -> dict[str, Any]:
@@ -73,7 +87,7 @@ class Certified:
     @property
     def figures(self) -> dict[str, Any]:
         """Region, margins, bounds, number of boxes."""
-        return _figures(self.machine, self.asked, self.content, self.proved, self.outside)
+        return _figures(self)
 
 
 def certify(machine: Machine, wanted: Wanted) -> Certified:
@@ -95,13 +109,32 @@ def certify(machine: Machine, wanted: Wanted) -> Certified:
                                      hint="leave --box out: the declared workspace of the platform is proved")])
     asked, region = _asked(machine, legs, wanted)
     proved = prove(asked)
-    outside = None
-    if proved.lack in ("travel", "undecided") and wanted.travel is None:
-        asked, region = _asked(machine, legs, Wanted(wanted.box, wanted.tool, wanted.margin, False))
-        outside, proved = proved, prove(asked)
-    if proved.lack:
-        raise DiagnosticError([_refusal(machine, asked, proved)])
-    return Certified(machine, region, asked, proved, outside)
+    outside, touching, parts = None, None, asked.parts
+    while proved.lack:
+        what = proved.open or proved.lack
+        if what == "travel" and wanted.travel is None and outside is None:
+            outside, asked = proved, _without_travel(asked)
+        elif what in GAPS and wanted.clearance is None and touching is None:
+            touching, asked = proved, replace(asked, parts=None, most=MOST)
+        else:
+            raise DiagnosticError([_refusal(machine, asked, proved)])
+        proved = prove(asked)
+    return Certified(machine, region, asked, proved, outside, touching, parts)
+
+
+def _without_travel(asked: AskedProof) -> AskedProof:
+    legs, carriers = (np.tile([-np.inf, np.inf], (len(one), 1)) for one in (asked.travel, asked.carrier_travel))
+    return replace(asked, travel=legs, carrier_travel=carriers)
+
+
+def _parts(machine: Machine, legs: LegGeometry, wanted: Wanted) -> PartsOfLegs | None:
+    """What is to be held apart; None where nothing is, and of a spindle that an axis between it and the platform turns."""
+    placed = machine.kinematics.clearance_parts
+    if wanted.clearance is False or placed is None or placed.clearance is None:
+        return None
+    sizes = replace(placed.clearance, spindle_radius=None) if legs.head else placed.clearance
+    found = PartsOfLegs.of(sizes, placed.middle_rig())
+    return found if found.any else None
 
 
 def _asked(machine: Machine, legs: LegGeometry, wanted: Wanted) -> tuple[AskedProof, RegionOfPoses]:
@@ -116,8 +149,9 @@ def _asked(machine: Machine, legs: LegGeometry, wanted: Wanted) -> tuple[AskedPr
     keep = wanted.travel is not False
     asked = AskedProof(PosesOfBoxes(legs, shift), lower, upper, kept if keep else free, own if keep else none, endless, 0.0)
     margin = _margin(asked) if wanted.margin is None else wanted.margin
-    whole = wanted.box is None
-    return AskedProof(asked.poses, lower, upper, asked.travel, asked.carrier_travel, endless, margin), RegionOfPoses(
+    whole, parts = wanted.box is None, _parts(machine, legs, wanted)
+    most = FEW if parts is not None and wanted.clearance is None else MOST
+    return replace(asked, margin=margin, parts=parts, most=most), RegionOfPoses(
         "platform" if whole else "tip", 0.0 if whole else wanted.tool, whole)
 
 
@@ -139,11 +173,37 @@ def _refusal(machine: Machine, asked: AskedProof, proved: ProvedBoxes) -> Diagno
     if proved.lack == "undecided":
         return error("certificate.undecided", f"{proved.tried} boxes and no end, the last round {where} of the {of}: "
                      f"nothing keeps clear of the margin {asked.margin:g} by enough to prove it", file=machine.file,
-                     hint="ask for a smaller --margin or a smaller --box, or leave the travel out with --no-travel")
-    due = asked.travel_margin if proved.lack == "travel" else asked.margin
-    value = "" if np.isnan(proved.value) else f" ({proved.value:.4g}, asked for {due:g})"
-    return error("certificate.short", f"{_WORDS[proved.lack]}{value} at {where} of the {of}", file=machine.file,
+                     hint="ask for a smaller --margin or a smaller --box, or leave the travel out with --no-travel, "
+                     "clearances with --no-clearance")
+    return error("certificate.short", f"{_short_words(asked, proved)} at {where} of the {of}", file=machine.file,
                  hint="make the workspace or --box smaller, move the drives, or ask for a smaller --margin")
+
+
+def _short_words(asked: AskedProof, proved: ProvedBoxes) -> str:
+    """What falls short, with its value."""
+    if proved.lack == "parts" and asked.parts is not None:
+        return f"{pair_names(asked.poses.legs, asked.parts)[proved.pair]}: {-proved.value:.4g} mm into each other"
+    if proved.lack == "stops":
+        return f"a rod is {-proved.value / DEG:.4g} degrees beyond the stop of its joint"
+    due = asked.travel_margin if proved.lack == "travel" else asked.margin
+    return _WORDS[proved.lack] + ("" if np.isnan(proved.value) else f" ({proved.value:.4g}, asked for {due:g})")
+
+
+def _clearance_figures(of: Certified) -> dict[str, Any]:
+    """What is proved of parts and stops, or the place that stands against it; {} of machines that state no parts."""
+    least = of.content["proved"]
+    found: dict[str, Any] = {}
+    if of.asked.parts is not None:
+        found["clearance_proved"] = True
+        if least["parts"] < FARTHEST * SHARE:
+            found["parts_apart_mm"] = least["parts"]
+        if least["stops"] < FARTHEST * SHARE:
+            found["stops_apart_deg"] = least["stops"] / DEG
+    elif of.touching is not None:
+        words = _short_words(of.wanted_parts, of.touching) if of.touching.lack in GAPS else "nothing proves them apart"
+        found["clearance_proved"] = False
+        found["parts_meet"] = f"{words} at {pose_words(of.touching.place, of.asked.poses.legs)}"
+    return found
 
 
 def pose_words(pose: Floats, legs: LegGeometry) -> str:
@@ -155,8 +215,8 @@ def pose_words(pose: Floats, legs: LegGeometry) -> str:
     return words + (f" towards {heading / DEG:.4g}" if legs.tilts_everywhere else "")
 
 
-def _figures(machine: Machine, asked: AskedProof, content: dict[str, Any], proved: ProvedBoxes,
-             outside: ProvedBoxes | None) -> dict[str, Any]:
+def _figures(of: Certified) -> dict[str, Any]:
+    machine, asked, content, proved = of.machine, of.asked, of.content, of.proved
     region = {key: [v / DEG for v in value] if key.endswith("_rad") else value
               for key, value in content["region"].items()}
     found: dict[str, Any] = {
@@ -166,8 +226,14 @@ def _figures(machine: Machine, asked: AskedProof, content: dict[str, Any], prove
         "proved_held": content["proved"]["held"] if columns(asked.poses.legs)[0] != columns(asked.poses.legs)[1] else None,
         "travel_proved": content["travel_proved"], "boxes": len(proved.paths),
         "boxes_looked_at": proved.tried}
-    if outside is not None:
-        key = "outside_travel_at" if outside.lack == "travel" else "at_end_of_travel_at"
-        found[key] = pose_words(outside.place, asked.poses.legs)
+    if of.outside is not None:
+        key = "outside_travel_at" if of.outside.lack == "travel" else "at_end_of_travel_at"
+        found[key] = pose_words(of.outside.place, asked.poses.legs)
+    found |= _clearance_figures(of)
     points = lipschitz_points(machine.kinematics, asked.margin)
-    return found | ({} if points is None else {"lipschitz_squares_of_a_slice": points})
+    if points is not None:
+        found |= {"lipschitz_squares_of_a_slice": points,
+                  "lipschitz_squares_halved": lipschitz_halved(machine.kinematics, asked.margin)}
+    if (annex_d := annex_d_boxes(asked.poses.legs, asked.margin)) is not None:
+        found |= {"annex_d_boxes_of_a_grid": annex_d[0], "annex_d_boxes_halved_about": annex_d[1]}
+    return found

@@ -12,14 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from machines.analysis.choices import MapMeasure, MapNumber
-from machines.analysis.transmission import (
-    condition_number,
-    conditioning_factor,
-    force_transmission,
-    manipulability,
-    speed_transmission,
-)
-from machines.kinematics.rod_platform import Transmission
+from machines.analysis.measures import WORDS, studied
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
@@ -32,11 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MAP_NUMBERS: tuple[MapNumber, ...] = ("x", "y", "z", "tilt")
-OF = {"condition": condition_number, "conditioning": conditioning_factor, "manipulability": manipulability,
-      "speed": speed_transmission, "force": force_transmission}
-WORDS: Mapping[MapMeasure, str] = {
-    "condition": "condition number", "conditioning": "conditioning factor", "manipulability": "manipulability |det J|",
-    "speed": "drive speed per speed of the platform", "force": "drive force per force on the platform"}
 POINTS = 41
 """per direction"""
 
@@ -78,17 +66,15 @@ class MeasuredPlaces:
 
 
 def measured(machine: Machine, measure: MapMeasure, along: tuple[MapNumber, ...],
-             at: Mapping[MapNumber, float]) -> MeasuredPlaces:
-    """Over the workspace's range of one or two numbers, the others as `at` has them (mm, degrees), else in the middle.
+             at: Mapping[MapNumber, float], offset: float = 0.0) -> MeasuredPlaces:
+    """Over the workspace's range of one or two numbers, the others as `at` has them (mm, degrees), else in the middle;
+    `offset` is the height of the centre of mass above the reference point, mm.
 
     Raises:
         DiagnosticError: of a machine without legs.
     """
-    transmits = machine.kinematics.transmits
-    if transmits is None:
-        raise DiagnosticError([error("analysis.map", f"{machine.name} has no legs: its slides pass their speed on as it is",
-                                     file=machine.file, hint="leave --map out: machine analyse has the indices of a chain")])
-    space = transmits.workspace
+    legs = studied(machine, measure).resized(offset=offset)
+    space = legs.legs.workspace
     low, high = np.append(space.lower, space.tilt[0]), np.append(space.upper, space.tilt[1])
     middle = np.append(space.middle, np.clip(0.0, *space.tilt))
     for name, value in at.items():
@@ -98,13 +84,12 @@ def measured(machine: Machine, measure: MapMeasure, along: tuple[MapNumber, ...]
     places = np.tile(middle, (sides[0].size, 1))
     for i, side in zip(axes, sides, strict=True):
         places[:, i] = side.ravel()
-    values = _values(transmits, measure, places)
+    values = legs.value(measure, places[:, :3], places[:, 3])
+    if not np.isfinite(values).any():
+        raise DiagnosticError([error("analysis.reach", f"{machine.name} reaches none of these places, or is singular at "
+                                                       "all of "
+                                     "them", file=machine.file, hint="name places of its workspace with --at")])
     return MeasuredPlaces(machine.name, measure, along, places / np.array([1.0, 1.0, 1.0, DEG]), values)
-
-
-def _values(transmits: Transmission, measure: MapMeasure, places: Floats) -> Floats:
-    with np.errstate(invalid="ignore"):
-        return OF[measure](transmits, places[:, :3], places[:, 3])
 
 
 def map_figure(found: MeasuredPlaces, ending: FigureEnding) -> bytes:

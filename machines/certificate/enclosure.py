@@ -7,7 +7,9 @@ With w = B - P, r = B - A and the law of each drive (`LegGeometry`):
     length   r = w,  q = |w| - L
 
 h / L, or h / (L a), is the cosine of the angle between rod and motion of the drive: 0 in an inverse singularity. Rows of the
-matrices: (r / l, (R b) x (r / l) / lever) of each leg, (0, (r / l) x s / lever) of each pair with s from rod to rod.
+matrices: (r / l, (R b) x (r / l) / lever) of each leg, (0, (r / l) x s / lever) of each pair with s from rod to rod. A bar,
+hinged about a, turns about a by itself: what a rod or a pair says about that turn stands in a column of its own, about all
+others the bar is one with the platform.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ import numpy as np
 from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import Span, angle_of, crossed, dotted, joined, spanned, stacked, turned_by
 from machines.kinematics.leg_geometry import LegGeometry
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, Ints
 
 FREEDOMS = "xyzabc"
 
@@ -33,7 +35,8 @@ class Enclosure:
         cosine: (N, K)
         cosine_change: (N, 5, K) by the five numbers of a pose
         q: (N, K) mm or rad
-        matrix, change: (N, R, 6) and by the five numbers of a pose (N, 5, R, 6): legs, then pairs
+        matrix, change: (N, R, 6 + bars) and by the five numbers of a pose (N, 5, R, 6 + bars): legs, then pairs
+        rods, rods_by: (N, K, 3) r / l, and by the five numbers (N, 5, K, 3)
     """
 
     under: Span
@@ -42,6 +45,8 @@ class Enclosure:
     q: Span
     matrix: Span
     change: Span
+    rods: Span
+    rods_by: Span
 
 
 def enclosed(poses: PosesOfBoxes, pose: Span) -> Enclosure:
@@ -55,15 +60,52 @@ def enclosed(poses: PosesOfBoxes, pose: Span) -> Enclosure:
         lever = 1.0 / legs.lever
         moment, moment_by = crossed(arms, along) * lever, (
             crossed(arms_by, along[:, None]) + crossed(arms[:, None], along_by)) * lever
-        rows, changes = [joined([along, moment], -1)], [joined([along_by, moment_by], -1)]
+        swing, swing_by = (_of_bars(legs, crossed(spanned(legs.kept), rod) * lever) for rod in (along, along_by)) \
+            if legs.kept is not None else (_none(along), _none(along_by))
+        rows = [joined([along, moment + swing[..., :3], swing[..., 3:]], -1)]
+        changes = [joined([along_by, moment_by + swing_by[..., :3], swing_by[..., 3:]], -1)]
         paired = np.flatnonzero(legs.pairs.any(axis=1))
         if len(paired):
             apart = spanned(legs.pairs[paired] * lever)
             held, held_by = crossed(along[:, paired], apart), crossed(along_by[:, :, paired], apart)
-            rows.append(joined([held * 0.0, held], -1))
-            changes.append(joined([held_by * 0.0, held_by], -1))
+            whole, whole_by = (_pairs_of_bars(legs, one, paired) for one in (held, held_by))
+            rows.append(joined([held * 0.0, whole], -1))
+            changes.append(joined([held_by * 0.0, whole_by], -1))
         cosine_by = stacked([one[5] for one in each], 2)
-        return Enclosure(under, cosine, cosine_by, q, joined(rows, 1), joined(changes, 2))
+        return Enclosure(under, cosine, cosine_by, q, joined(rows, 1), joined(changes, 2), along, along_by)
+
+
+def _none(rods: Span) -> Span:
+    """What `_of_bars` gives of a platform without bars: no moments, no columns."""
+    return spanned(np.zeros((*rods.lo.shape[:-1], 3)))
+
+
+def _about(legs: LegGeometry) -> Floats:
+    """(3,): the axis of a platform's one turn."""
+    return np.asarray(np.eye(3)["abc".index(legs.turns)], dtype=np.float64)
+
+
+def _of_bars(legs: LegGeometry, moments: Span, at: Ints | None = None) -> Span:
+    """(..., K, 3 + bars): moments (..., K, 3) on bars less what is about their hinge, which stands in the column of the
+    bar."""
+    bars = np.asarray(legs.bars)[np.arange(len(legs.bars)) if at is None else at]
+    about, own = _about(legs), np.equal.outer(bars, np.arange(bar_count(legs))).astype(np.float64)
+    turn = dotted(moments, spanned(about))
+    return joined([moments.by(np.eye(3) - np.outer(about, about)), turn[..., None] * own], -1)
+
+
+def _pairs_of_bars(legs: LegGeometry, held: Span, at: Ints) -> Span:
+    """(..., P, 3 + bars): what pairs of legs `at` hold: of those on a bar its turn about the hinge, not the platform's."""
+    if legs.kept is None:
+        return held
+    on = (np.asarray(legs.bars)[at] >= 0)[:, None]
+    split, whole = _of_bars(legs, held, at), joined([held, spanned(np.zeros((*held.lo.shape[:-1], bar_count(legs))))], -1)
+    return Span(np.where(on, split.lo, whole.lo), np.where(on, split.hi, whole.hi))
+
+
+def bar_count(legs: LegGeometry) -> int:
+    """Bars of a platform."""
+    return max(legs.bars, default=-1) + 1
 
 
 LegSpans = tuple[Span, Span, Span, Span, Span, Span]
@@ -129,7 +171,7 @@ def columns(legs: LegGeometry) -> tuple[list[int], list[int]]:
     Where a file states too few rods to hold all motions (a linear Delta without its pairs), these are the freedoms alone.
     """
     free = [FREEDOMS.index(letter) for letter in legs.freedoms]
-    every = [0, 1, 2, 3, 4, 5] if "z" in legs.freedoms else [0, 1, 5]
+    every = ([0, 1, 2, 3, 4, 5] if "z" in legs.freedoms else [0, 1, 5]) + list(range(6, 6 + bar_count(legs)))
     return free, every if len(legs.names) + int(legs.pairs.any(axis=1).sum()) >= len(every) else free
 
 

@@ -14,6 +14,10 @@ NEXT_TO_IT = ".certificate.json"
 """what the name of a certificate next to a machine file ends in"""
 APART = ("clearance", "assumed", "source", "family")
 """keys of `[kinematics]` that the proof does not rest on"""
+CHAIN = "serial"
+"""a kind of machine of which a box of tips inside its travel is proved: its travel counts too"""
+DISTANCES = ("direct", "inverse", "held")
+"""bounds that the margin is of"""
 WHOLE = "workspace"
 """what a certificate of the whole declared workspace covers"""
 
@@ -22,6 +26,8 @@ def key_of(values: Mapping[str, Any]) -> str:
     """The hash of a machine file's merged values."""
     kinematics = values.get("kinematics", {})
     table = {"kind": kinematics.get("family")} | {k: v for k, v in kinematics.items() if k not in APART}
+    if table["kind"] == CHAIN:
+        table["travel"] = {letter: axis.get("travel", "") for letter, axis in values.get("axes", {}).items()}
     text = json.dumps(_plain(table), sort_keys=True, separators=(",", ":"))
     return sha256(text.encode()).hexdigest()
 
@@ -56,11 +62,20 @@ def comes_with_package(file: str) -> bool:
 
 
 def _is_whole(file: Path, key: str) -> bool:
-    """True of the whole, unchanged certificate of a workspace with that key: nobody has edited its boxes or its margin."""
+    """True of the whole, unchanged certificate with that key, of a workspace or of a box of a chain: nobody has edited its
+    boxes or its margin."""
     try:
         found = json.loads(file.read_text("utf-8")) if file.is_file() else None
-        return isinstance(found, dict) and found["key"] == key and found["covers"] == WHOLE and bool(
-            found["digest"] == sha256("\n".join(found["boxes"]).encode()).hexdigest()
-            and 0.0 < float(found["margin"]) <= min(float(v) for v in found["proved"].values()))
+        if not isinstance(found, dict) or found["key"] != key or not _unchanged(found):
+            return False
+        least = found["proved"]
+        if "chain" in found:
+            return bool(min(float(v) for v in least.values()) >= 0.0)
+        proved = min(float(least[name]) for name in DISTANCES)
+        return bool(found["covers"] == WHOLE and 0.0 < float(found["margin"]) <= proved)
     except (OSError, ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError):
         return False
+
+
+def _unchanged(found: Mapping[str, Any]) -> bool:
+    return bool(found["digest"] == sha256("\n".join(found["boxes"]).encode()).hexdigest())

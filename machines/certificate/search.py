@@ -1,18 +1,20 @@
 """Boxes of poses halved until each is proved: every leg reaches, inside its travel, and no singular position is near.
 
 What is proved of a box: each leg has its solution, stands inside the travel of its drive, the
-cosine between rod and drive and the least singular values of the platform's matrices stay above a margin. A box is halved
+cosine between rod and drive and the least singular values of the platform's matrices stay above a margin, and where that is
+asked for no two parts touch and no joint comes to its stop. A box is halved
 across the number of the pose that adds most to the bound. Where the pose in its middle falls short itself, that place is
 the answer.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
+from machines.certificate.clearances import Gaps, PartsOfLegs, gaps
 from machines.certificate.enclosure import columns, enclosed, least_singular
 from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import Span, spanned
@@ -21,13 +23,17 @@ from toolpaths.shapes import arrays
 
 MOST, AT_ONCE, DEEPEST = 300_000, 2_000, 48
 """boxes that a search may look at; at a time; halvings of one"""
+FARTHEST = 1e6
+"""mm, rad: a bound that is stated of what cannot touch"""
 LOOKS = 1_000
 """random poses that are looked at first"""
 HALVES = "xyztn", "XYZTN"
 """letters of the path to a box: lower and upper half across x, y, z, tilt, heading"""
 NAMES: tuple[Literal["direct", "inverse", "held"], ...] = ("direct", "inverse", "held")
 """what the margins are of"""
-Shortfall = Literal["", "reach", "travel", "direct", "inverse", "held", "undecided"]
+GAPS: tuple[Literal["parts", "stops"], ...] = ("parts", "stops")
+"""what distances are of: mm, rad"""
+Shortfall = Literal["", "reach", "travel", "direct", "inverse", "held", "parts", "stops", "undecided"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +48,8 @@ class AskedProof:
         endless: (K,) angles, which may be counted whole turns apart
         margin: free of units, of the distances from singular positions
         travel_margin: mm, rad of arms
+        parts: what is held apart, None where nothing is
+        most: boxes looked at before the search is given up
     """
 
     poses: PosesOfBoxes
@@ -52,17 +60,21 @@ class AskedProof:
     endless: Bools
     margin: float
     travel_margin: float = 0.0
+    parts: PartsOfLegs | None = None
+    most: int = MOST
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(bounds="N 3", place="5")
+@arrays(bounds="N M", place="5")
 class ProvedBoxes:
     """Boxes that cover the region, by the path of halves to each, with what is proved of it; `place` where it is not.
 
     Attributes:
-        bounds: (N, 3) of NAMES
+        bounds: (N, 3) of NAMES, (N, 5) with GAPS where parts are held apart
         lack: what is short, "" of a proof; at the pose `place` (5,) it is `value`
         tried: boxes looked at
+        open: of an undecided search, what was not proved of the last boxes
+        pair: which of `clearances.pair_names` is too near, of parts
     """
 
     paths: tuple[str, ...]
@@ -71,6 +83,8 @@ class ProvedBoxes:
     lack: Shortfall = ""
     place: Floats = field(default_factory=lambda: np.zeros(5))
     value: float = 0.0
+    open: Shortfall = ""
+    pair: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +99,24 @@ class Looked:
     travel_at: Floats
     reaches: Bools
     reaches_at: Bools
+    apart: Gaps | None = None
+
+    def proved(self, margin: float) -> Bools:
+        """True (N,) of boxes of which all is proved."""
+        good = self.inside & self.reaches & (self.bounds >= margin).all(axis=1)
+        return np.asarray(good if self.apart is None else good & (self.apart.gap >= 0.0).all(axis=1))
+
+    def lacks(self, margin: float) -> Shortfall:
+        """What is not proved of the first box of which something is not."""
+        k = int(np.flatnonzero(~self.proved(margin))[0])
+        if (self.bounds[k] < margin).any():
+            return NAMES[int(self.bounds[k].argmin())]
+        return "travel" if not self.inside[k] or self.apart is None else GAPS[int(self.apart.gap[k].argmin())]
+
+    @property
+    def whole(self) -> Floats:
+        """(N, 3) or (N, 5): all bounds; a machine without such parts is as far from touching as can be written."""
+        return self.bounds if self.apart is None else np.column_stack([self.bounds, np.minimum(self.apart.gap, FARTHEST)])
 
 
 def look(asked: AskedProof, pose: Span) -> Looked:
@@ -104,7 +136,12 @@ def look(asked: AskedProof, pose: Span) -> Looked:
     spread = half * over_ends(asked, pose)
     share = np.where(np.isfinite(direct[2]) & np.isfinite(whole[2]), direct[2] + whole[2] + 1e-3 * spread, spread)
     left, left_at = _travel_left(asked, here.q, over.q)
-    return Looked(bounds, at, share, left >= asked.travel_margin, left_at, reaches, reaches_at)
+    apart = None
+    if asked.parts is not None:
+        apart = gaps(asked.poses, asked.parts, pose, here, over)
+        only = (bounds >= asked.margin).all(axis=1) & (apart.gap < 0.0).any(axis=1) & np.isfinite(apart.share).all(axis=1)
+        share = np.where((only & (apart.share.sum(axis=1) > 0.0))[:, None], apart.share, share)
+    return Looked(bounds, at, share, left >= asked.travel_margin, left_at, reaches, reaches_at, apart)
 
 
 def over_ends(asked: AskedProof, pose: Span) -> Floats:
@@ -131,19 +168,21 @@ def prove(asked: AskedProof) -> ProvedBoxes:
         return short
     todo = [("", asked.lower, asked.upper)]
     paths, bounds, tried = list[str](), list[Floats](), 0
+    open_: Shortfall = ""
     while todo:
-        if tried > MOST or len(todo[-1][0]) > DEEPEST:
+        if tried > asked.most or len(todo[-1][0]) > DEEPEST:
             _, lower, upper = todo[-1]
-            return _nothing(tried, "undecided", 0.5 * (lower + upper), float(asked.margin))
+            return replace(_nothing(tried, "undecided", 0.5 * (lower + upper), float(asked.margin)), open=open_)
         some, todo = todo[-AT_ONCE:], todo[:-AT_ONCE]
         pose = Span(np.array([lower for _, lower, _ in some]), np.array([upper for _, _, upper in some]))
         found = look(asked, pose)
         tried += len(some)
         if (short := _short(asked, pose, found, tried)) is not None:
             return short
-        good = found.inside & found.reaches & (found.bounds >= asked.margin).all(axis=1)
+        good = found.proved(asked.margin)
+        open_ = open_ if good.all() else found.lacks(asked.margin)
         paths += [some[k][0] for k in np.flatnonzero(good)]
-        bounds.append(found.bounds[good])
+        bounds.append(found.whole[good])
         todo += [half for k in np.flatnonzero(~good) for half in _halves(some[k], found.share[k], pose.radius[k])]
     order = sorted(range(len(paths)), key=lambda k: paths[k])
     return ProvedBoxes(tuple(paths[k] for k in order), np.concatenate(bounds)[order], tried)
@@ -157,6 +196,8 @@ def _looks(asked: AskedProof) -> Floats:
 
 def _carried(asked: AskedProof) -> ProvedBoxes | None:
     """A corner of the region where a carrier would be outside its travel; what it does is linear in the pose."""
+    if asked.poses.legs.carried_twice:
+        return None
     shift = asked.poses.from_point
     corners = np.stack(np.meshgrid(*zip(asked.lower[:3], asked.upper[:3], strict=True)), axis=-1).reshape(-1, 3)
     carried = (corners + shift) @ asked.poses.split[1].T
@@ -176,6 +217,11 @@ def _short(asked: AskedProof, pose: Span, found: Looked, tried: int) -> ProvedBo
     if float(at.min()) < asked.margin:
         row, column = np.unravel_index(int(at.argmin()), at.shape)
         return _nothing(tried, NAMES[int(column)], pose.middle[row], float(at[row, column]))
+    apart = found.apart
+    if apart is not None and float(apart.at.min()) < 0.0:
+        row, column = np.unravel_index(int(apart.at.argmin()), apart.at.shape)
+        return replace(_nothing(tried, GAPS[int(column)], pose.middle[row], float(apart.at[row, column])),
+                       pair=int(apart.worst[row]))
     return None
 
 

@@ -24,7 +24,8 @@ from toolpaths.arrays import Floats
 def rod_forces_in_motion(machine: Machine, dynamics: LegDynamics, joints: tuple[Floats, Floats, Floats], force: Floats,
                          tool: float) -> dict[str, Any]:
     """N in each rod at joints (1, J) with rates and accelerations, under a force (3,) N at the tip; {} of legs with bars."""
-    if machine.kinematics.leg_geometry is None:
+    legs = machine.kinematics.leg_geometry
+    if legs is None or not legs.plain:
         return {}
     rods = rods_of(machine)
     load = dynamics.loads(*joints)
@@ -40,7 +41,8 @@ def rod_forces_in_motion(machine: Machine, dynamics: LegDynamics, joints: tuple[
 
 def rod_figures(machine: Machine, dynamics: LegDynamics) -> dict[str, Any]:
     """Largest force in a rod over the workspace, per load on the platform; {} of legs with bars."""
-    if machine.kinematics.leg_geometry is None:
+    legs = machine.kinematics.leg_geometry
+    if legs is None or not legs.plain:
         return {}
     rods = rods_of(machine)
     poses = poses_over(rods.legs)

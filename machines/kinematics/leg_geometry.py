@@ -16,7 +16,7 @@ from toolpaths.shapes import arrays
 
 @dataclass(frozen=True, eq=False)
 @arrays(points="K 3", directions="K 3", arms="K 3", lengths="K", roots="K", slide="K", arm="K", joints="K 3", pairs="K 3",
-        gauge="3", carriers="M 3")
+        gauge="3", carriers="M 3", kept="K 3")
 class LegGeometry:
     """K legs under a platform, in the machine frame, mm.
 
@@ -35,6 +35,9 @@ class LegGeometry:
         carrier_names, carriers: slides under legs and platform, or under the part, and how they move the tool
         workspace: of the reference point and the tilt
         head: True where an axis between platform and spindle turns the tool: its tip is not at rest on the platform
+        kept: (K, 3) mm from the hinge of a bar, which keeps its direction, to the joint of its leg; `joints` are then the
+            hinges. None without bars
+        bars: the number of the bar that each leg holds, -1 of none; () without bars
     """
 
     names: tuple[str, ...]
@@ -53,6 +56,8 @@ class LegGeometry:
     carriers: Floats
     workspace: Workspace
     head: bool = False
+    kept: Floats | None = None
+    bars: tuple[int, ...] = ()
 
     @property
     def turns(self) -> str:
@@ -63,6 +68,16 @@ class LegGeometry:
     def tilts_everywhere(self) -> bool:
         """True of a platform that turns about x, y and z: its tool tilts in every direction."""
         return len(self.turns) == len("abc")
+
+    @property
+    def carried_twice(self) -> bool:
+        """True where carriers move the tool where the platform moves it too: poses are those seen from the carriers."""
+        return bool(self.carrier_names) and set("xyz") <= set(self.freedoms)
+
+    @property
+    def plain(self) -> bool:
+        """True without bars, a turn about z alone, and carriers that are redundant."""
+        return self.kept is None and self.turns != "c" and not self.carried_twice
 
     @property
     def lever(self) -> float:

@@ -8,10 +8,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from machines.analysis.extremes import MEASURES, largest_over
+from machines.analysis.extremes import MEASURES, largest_over, rates_over
+from machines.kinematics.leg_geometry import LegGeometry
 from machines.kinematics.legs.drives import Drives
 from machines.layouts.choices import Goal
-from machines.layouts.search import LEAN, LayoutFound, LayoutQuestion, best, front, geometry
+from machines.layouts.forms import FORMS
+from machines.layouts.search import (
+    LayoutFound,
+    LayoutQuestion,
+    best,
+    box_grid,
+    contracted,
+    extents,
+    front,
+    geometry,
+    slides_of,
+)
+from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.drawing import image
@@ -21,8 +34,8 @@ if TYPE_CHECKING:
 
 SPARE, GRID = 20.0, (9, 9, 9, 1)
 """mm of travel beyond what the box needs; places at which it is looked at"""
-WORDS: dict[Goal, str] = {"condition": "condition number", "bulk": "extent across z, mm", "speed": "drive speed per speed",
-                          "rod": "rods, mm"}
+WORDS: dict[Goal, str] = {"condition": "condition number", "bulk": "larger extent across z, mm",
+                          "width": "smaller extent across z, mm", "speed": "drive speed per speed", "rod": "rods, mm"}
 
 
 @dataclass(frozen=True)
@@ -42,13 +55,16 @@ class Design:
     def figures(self) -> dict[str, Any]:
         """Dimensions, figures over the box, the condition number proved."""
         asked, found = self.asked, self.found
-        proved = largest_over(geometry(asked, found.size, found.rod), 0.0, MEASURES["condition_number"])
+        proved = largest_over(rates_over(geometry(asked, found.numbers, found.rod), 0.0), MEASURES["condition_number"])
+        slides = slides_of(asked, found.numbers)
+        size = extents(slides, contracted(slides, found.rod, box_grid(asked))[1])
         return {
             "layout": asked.layout, "box_mm": asked.box.tolist(), "platform_radius_mm": asked.platform, "goal": asked.goal,
-            "height_mm" if asked.layout == "star" else "radius_mm": found.size, "rod_mm": found.rod,
+            **{f"{name}_mm": value for name, value in found.numbers.items()}, "rod_mm": found.rod,
+            "slides_through_mm": slides.points.tolist(),
             "condition_number": found.figures["condition"], "condition_number_nowhere_more_than": proved.most,
             "speed_transmission": found.figures["speed"], "extent_across_z_mm": found.figures["bulk"],
-            "front": [_row(one) for one in self.front]}
+            "extents_mm": dict(zip("xyz", size.tolist(), strict=True)), "front": [_row(one) for one in self.front]}
 
 
 def design(asked: LayoutQuestion, against: Goal | None = None, points: int = 7) -> Design:
@@ -67,32 +83,50 @@ def design(asked: LayoutQuestion, against: Goal | None = None, points: int = 7) 
 
 
 def _row(one: LayoutFound) -> dict[str, float]:
-    return {"size_mm": one.size, "rod_mm": one.rod, "condition_number": one.figures["condition"],
-            "extent_across_z_mm": one.figures["bulk"], "speed_transmission": one.figures["speed"]}
+    return {**{f"{name}_mm": value for name, value in one.numbers.items()}, "rod_mm": one.rod,
+            "condition_number": one.figures["condition"], "extent_across_z_mm": one.figures["bulk"],
+            "smaller_extent_across_z_mm": one.figures["width"], "speed_transmission": one.figures["speed"]}
 
 
 def machine_file(asked: LayoutQuestion, found: LayoutFound) -> str:
     """A machine file of kind legs; dynamics are assumed, travel is what the box needs."""
-    legs = geometry(asked, found.size, found.rod)
+    legs = geometry(asked, found.numbers, found.rod)
     place, _ = legs.workspace.grid(GRID)
     drives = Drives(legs.points, legs.directions, legs.lengths, legs.roots, legs.arms, legs.slide, legs.arm)
     q = drives.solve(np.concatenate([place, np.zeros((1, 3))])[:, None] + legs.joints, legs.roots)
     low, high = np.floor(q.min(axis=0) - SPARE), np.ceil(q.max(axis=0) + SPARE)
-    star = asked.layout == "star"
     half = (0.5 * asked.box).tolist()
+    ring = FORMS[asked.layout].ring
     lines = [
         f'description = "{asked.layout} layout for {" x ".join(map(str, asked.box))} mm, dimensions by machine design"', "",
-        "[kinematics]", 'kind = "legs"', 'freedoms = ["x", "y", "z"]', "", "[kinematics.layout]", 'form = "star"',
-        'drive = "slide"', 'letters = ["X", "Y", "Z"]', f"radius = {(0.0 if star else found.size) + asked.platform:.6f}",
-        f"height = {found.size if star else 0.0:.6f}", f"lean = {LEAN[asked.layout]:g}",
-        f"joint_radius = {asked.platform:.6f}",
-        f"rod = {found.rod:.6f}", f"pair = {2.0 * asked.platform:.6f}", "", "[kinematics.workspace]",
+        "[kinematics]", 'kind = "legs"', 'freedoms = ["x", "y", "z"]', "",
+        *(_leg_lines(legs) if ring is None else _ring_lines(asked, found, ring)), "[kinematics.workspace]",
         *(f"{letter} = [{-v:g}, {v:g}]" for letter, v in zip("xyz", half, strict=True)), ""]
     for k, letter in enumerate(legs.names):
         lines += [f"[axes.{letter}]", f"travel = [{low[k]:g}, {high[k]:g}]", "velocity = 1000", "acceleration = 10000",
                   "jerk = 100000", f"home = {q[-1, k]:.3f}", 'assumed = ["travel", "velocity", "acceleration", "jerk"]', ""]
     lines += ["[timing]", "tool_change = 5", "clamp = 0", "unclamp = 0", 'assumed = ["tool_change", "clamp", "unclamp"]']
     return "\n".join(lines) + "\n"
+
+
+def _ring_lines(asked: LayoutQuestion, found: LayoutFound, lean: float) -> list[str]:
+    return ["[kinematics.layout]", 'form = "star"', 'drive = "slide"', 'letters = ["X", "Y", "Z"]',
+            f"radius = {found.numbers.get('radius', 0.0) + asked.platform:.6f}",
+            f"height = {found.numbers.get('height', 0.0):.6f}", f"lean = {lean:g}", f"joint_radius = {asked.platform:.6f}",
+            f"rod = {found.rod:.6f}", f"pair = {2.0 * asked.platform:.6f}", ""]
+
+
+def _leg_lines(legs: LegGeometry) -> list[str]:
+    def row(v: Floats) -> str:
+        return f"[{', '.join(f'{x + 0.0:.6f}' for x in v)}]"
+
+    lines = []
+    for k, letter in enumerate(legs.names):
+        half = 0.5 * legs.pairs[k]
+        lines += [f"[kinematics.legs.{letter}]", 'drive = "slide"', f"point = {row(legs.points[k])}",
+                  f"direction = {row(legs.directions[k])}", f"joint = {row(legs.joints[k])}", f"rod = {legs.lengths[k]:.6f}",
+                  f"root = {legs.roots[k]:.0f}", f"rods = [{row(half)}, {row(-half)}]", ""]
+    return lines
 
 
 def front_figure(asked: LayoutQuestion, against: Goal, found: Sequence[LayoutFound], ending: FigureEnding) -> bytes:

@@ -31,7 +31,7 @@ def tip_compliance(machine: Machine, kinematics: Kinematics, q: Floats) -> Float
     if (parts := kinematics.leg_parts) is None:
         return _of_chain(given, kinematics, q)
     legs, placed = kinematics.leg_geometry, kinematics.clearance_parts
-    if given.rod is None or legs is None or legs.head or placed is None or placed.clearance is None:
+    if given.rod is None or legs is None or not legs.plain or legs.head or placed is None or placed.clearance is None:
         return None
     motion = kinematics.leg_motion(q, np.zeros_like(q), np.zeros_like(q))
     poses = PlatformPoses(motion.place, motion.turn, np.zeros((len(q), 5)))

@@ -129,7 +129,7 @@ def rods_of(machine: Machine) -> RodsOfLegs:
         DiagnosticError: of a machine without legs.
     """
     legs, parts = machine.kinematics.leg_geometry, machine.kinematics.clearance_parts
-    if legs is None or parts is None or parts.clearance is None:
+    if legs is None or not legs.plain or parts is None or parts.clearance is None:
         raise DiagnosticError([error(
             "sensitivity.legs", f"{machine.name} has no platform on legs, or one with bars, with a turn about z alone, or "
             "carried twice", file=machine.file,

@@ -17,15 +17,16 @@ import numpy as np
 
 from postproc.certificate_check.balls import Ball, FloatArray, ball, product, spectral
 from postproc.certificate_check.legs import legs_in, moving
+from postproc.certificate_check.parts import apart
 
 DEEPEST, AT_ONCE = 14, 1_000
 """cuts of a box of the file; boxes at a time"""
 LOWER, UPPER = "xyztn", "XYZTN"
 SPANS = ("x_mm", "y_mm", "z_mm", "tilt_rad", "heading_rad")
-BOUNDS = ("direct", "inverse", "held")
-FORM, COVERS = 1, ("workspace", "region")
+BOUNDS, GAPS = ("direct", "inverse", "held"), ("parts", "stops")
+FORM, COVERS = 2, ("workspace", "region")
 """of the file that this check reads; what a certificate may be of"""
-_LINE = re.compile(r"(\.|[xyztnXYZTN]{1,64}) (\S+) (\S+) (\S+)")
+_LINE = re.compile(r"(\.|[xyztnXYZTN]{1,64})((?: \S+)+)")
 
 
 class Rejected(ValueError):
@@ -38,7 +39,7 @@ NO_CERTIFICATE = (KeyError, TypeError, ValueError, IndexError, AttributeError, A
 
 @dataclass(frozen=True)
 class StatedBox:
-    """A box of the file, or a part of it: its path, ends (5,), what is stated of it (3,), cuts so far."""
+    """A box of the file, or a part of it: its path, ends (5,), what is stated of it (3,) or (5,), cuts so far."""
 
     path: str
     lower: FloatArray
@@ -57,11 +58,14 @@ def confirmed(found: dict[str, Any]) -> dict[str, Any]:
         margin = _margins(found)
         boxes = _boxes(found)
         least = np.min([box.stated for box in boxes], axis=0)
-        if {name: float(v) for name, v in zip(BOUNDS, least, strict=True)} != found["proved"]:
+        if {name: float(v) for name, v in zip(_names(found), least, strict=True)} != found["proved"]:
             raise Rejected(f"`proved` says {found['proved']}, the boxes have {least.tolist()}")
-        if not least.min() >= margin:
-            box = min(boxes, key=lambda one: float(one.stated.min()))
-            raise Rejected(f"box {box.path or '.'} states {box.stated.min():g}, less than the margin {margin:g}")
+        if not least[:3].min() >= margin:
+            box = min(boxes, key=lambda one: float(one.stated[:3].min()))
+            raise Rejected(f"box {box.path or '.'} states {box.stated[:3].min():g}, less than the margin {margin:g}")
+        if len(least) > len(BOUNDS) and not least[3:].min() >= 0.0:
+            box = min(boxes, key=lambda one: float(one.stated[3:].min()))
+            raise Rejected(f"box {box.path or '.'} states that parts touch ({box.stated[3:].min():g})")
         _carriers(found)
         looked, region = _prove(found, boxes), _region(found["region"])
     except NO_CERTIFICATE as fault:
@@ -69,7 +73,12 @@ def confirmed(found: dict[str, Any]) -> dict[str, Any]:
             raise
         raise Rejected(f"it is no certificate of this form: {type(fault).__name__}: {fault}") from fault
     return {"region": region} | {"boxes": len(boxes), "looked_at": looked, "margin": margin} | {
-        f"{name}_at_least": float(v) for name, v in zip(BOUNDS, least, strict=True)}
+        f"{name}_at_least": float(v) for name, v in zip(_names(found), least, strict=True)}
+
+
+def _names(found: dict[str, Any]) -> tuple[str, ...]:
+    """What a box states: with the distances of parts where the geometry has them."""
+    return BOUNDS if found["geometry"]["parts"] is None else (*BOUNDS, *GAPS)
 
 
 def _region(region: dict[str, Any]) -> dict[str, Any]:
@@ -105,14 +114,14 @@ def _boxes(found: dict[str, Any]) -> list[StatedBox]:
         path = "" if read[1] == "." else read[1]
         if path in stated:
             raise Rejected(f"box {read[1]} is there twice")
-        stated[path] = np.array([float(v) for v in read.groups()[1:]])
-        if not np.isfinite(stated[path]).all():
-            raise Rejected(f"{line!r} states no numbers")
+        stated[path] = np.array([float(v) for v in read[2].split()])
+        if not np.isfinite(stated[path]).all() or len(stated[path]) != len(_names(found)):
+            raise Rejected(f"{line!r} states no {len(_names(found))} numbers")
     spans = np.array([found["region"][name] for name in SPANS], np.float64)
     if not (np.isfinite(spans).all() and (spans[:, 0] <= spans[:, 1]).all()):
         raise Rejected(f"the region {spans.tolist()} is empty")
     boxes: list[StatedBox] = []
-    todo = [StatedBox("", spans[:, 0], spans[:, 1], np.zeros(3))]
+    todo = [StatedBox("", spans[:, 0], spans[:, 1], np.zeros(len(_names(found))))]
     inner = {path[:k] for path in stated for k in range(len(path))}
     letters = {path[:k]: LOWER.index(path[k].lower()) for path in stated for k in range(len(path))}
     while todo:
@@ -176,11 +185,12 @@ def _looked(found: dict[str, Any], shift: FloatArray, lower: FloatArray, upper: 
     geometry = found["geometry"]
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
     radius = half * (1.0 + 1e-12) + 1e-12 * np.abs(middle)
-    here = legs_in(geometry, shift, [ball(middle[:, i]) for i in range(5)])
-    over = legs_in(geometry, shift, [Ball(middle[:, i], radius[:, i]) for i in range(5)])
+    poses = [ball(middle[:, i]) for i in range(5)], [Ball(middle[:, i], radius[:, i]) for i in range(5)]
+    here, over = (legs_in(geometry, shift, pose) for pose in poses)
     count = len(geometry["legs"])
     free = ["xyzabc".index(letter) for letter in geometry["freedoms"]]
     held = [0, 1, 2, 3, 4, 5] if "z" in geometry["freedoms"] else [0, 1, 5]
+    held += range(6, len(here.rows[0]))
     held = held if len(here.rows) >= len(held) else free  # the file states too few rods to hold more
     matrix, rates = _matrix(here.rows), [_matrix([row[i] for row in over.rates]) for i in range(5)]
     direct = _least(matrix[:, :count][:, :, free], [rate[:, :count][:, :, free] for rate in rates], radius)
@@ -190,9 +200,14 @@ def _looked(found: dict[str, Any], shift: FloatArray, lower: FloatArray, upper: 
     good = reaches & (direct[0] >= stated[:, 0]) & (cosine >= stated[:, 1]) & (whole[0] >= stated[:, 2])
     inside, outside = _travel(found, here.q, over.q)
     at = np.stack([direct[1], np.min([one.most() for one in here.cosine], axis=0), whole[1]], axis=1)
+    share = np.where(np.isfinite(direct[2] + whole[2]), direct[2] + whole[2], half)
+    if geometry["parts"] is not None:
+        gap, gap_at, moved = apart(geometry, shift, poses, here, over, half)
+        only = good & (gap < stated[:, 3:]).any(axis=1) & (moved.sum(axis=1) > 0.0)
+        share = np.where(only[:, None], moved, share)
+        good, at = good & (gap >= stated[:, 3:]).all(axis=1), np.column_stack([at, gap_at])
     against = [_against(at[k], stated[k], bool(outside[k]), bool(np.any([one.most()[k] < 0.0 for one in here.under])))
                for k in range(len(lower))]
-    share = np.where(np.isfinite(direct[2] + whole[2]), direct[2] + whole[2], half)
     return good & inside, against, np.where(half > 0.0, share, -1.0).argmax(axis=1)
 
 
@@ -201,8 +216,8 @@ def _against(at: FloatArray, stated: FloatArray, outside: bool, short: bool) -> 
         return "a leg does not reach"
     if outside:
         return "a drive is outside its travel"
-    less = [f"{name} is {value:.4g}, stated {due:g}" for name, value, due in zip(BOUNDS, at, stated, strict=True)
-            if value < due * (1.0 - 1e-9)]
+    less = [f"{name} is {value:.4g}, stated {due:g}" for name, value, due in zip(
+        (*BOUNDS, *GAPS)[:len(at)], at, stated, strict=True) if value < due * (1.0 - 1e-9) - 1e-9]
     return "; ".join(less)
 
 
@@ -245,7 +260,8 @@ def _travel(found: dict[str, Any], here: list[Ball], over: list[Ball]) -> tuple[
 
 def _carriers(found: dict[str, Any]) -> None:
     """Carriers inside their travel over the whole region; what they do is linear in it."""
-    if found["travel_proved"] is not True or not found["geometry"]["carriers"]:
+    if found["travel_proved"] is not True or not found["geometry"]["carriers"] \
+            or set(found["geometry"]["freedoms"]) >= set("xyz"):  # seen from the carriers, wherever they are
         return
     share, shift = moving(found["geometry"])[1], _shift(found["region"], found["geometry"])
     spans = np.array([found["region"][name] for name in SPANS[:3]], np.float64) + shift[:, None]

@@ -21,13 +21,18 @@ Vectors = list[Ball]
 @dataclass(frozen=True, eq=False)
 class Bounds:
     """Of N boxes and K legs: what the square root is taken of (K of (N,)), |cosine|, position of the drive, rows of the
-    matrices (R of six (N,)), and their rates by the five numbers of a pose."""
+    matrices (R of six (N,) and one for each bar), and their rates by the five numbers of a pose; platform joints, rods as
+    unit vectors, and the rates of both."""
 
     under: list[Ball]
     cosine: list[Ball]
     q: list[Ball]
     rows: list[list[Ball]]
     rates: list[list[list[Ball]]]
+    ends: list[Vectors]
+    ends_by: list[list[Vectors]]
+    rods: list[Vectors]
+    rods_by: list[list[Vectors]]
 
 
 def legs_in(geometry: dict[str, Any], shift: FloatArray, pose: list[Ball]) -> Bounds:
@@ -35,32 +40,72 @@ def legs_in(geometry: dict[str, Any], shift: FloatArray, pose: list[Ball]) -> Bo
     legs = geometry["legs"]
     turned, turned_by = _turning(geometry, pose)
     lever = 1.0 / max([1.0, *(math.hypot(*leg["joint"]) for leg in legs)])
-    found = Bounds([], [], [], [], [])
+    found = Bounds([], [], [], [], [], [], [], [], [])
+    bars = 1 + max([-1, *(int(leg.get("bar", -1)) for leg in legs)])
+    hinge = [i for i, name in enumerate("abc") if name in geometry["freedoms"]][:1] if bars else []
     pairs: list[tuple[list[Ball], list[list[Ball]]]] = []
-    still = _still(geometry)
-    place = [sum((pose[j] * float(still[i, j]) for j in range(1, 3)), pose[0] * float(still[i, 0])) for i in range(3)]
     for leg in legs:
-        joint = np.array(leg["joint"], np.float64)
-        far = joint + shift if turned is not None else joint + still @ shift
+        joint, kept = np.array(leg["joint"], np.float64), [float(v) for v in leg.get("kept", (0.0, 0.0, 0.0))]
         arm, arm_by = _turn(turned, turned_by, joint, pose[0])
-        end, end_by = _turn(turned, turned_by, far, pose[0])
-        w = [place[i] + end[i] - float(leg["point"][i]) for i in range(3)]
-        by = [[ball(np.full_like(pose[0].m, still[i, j])) for i in range(3)] for j in range(3)] + end_by
+        end, by = carried(geometry, shift, pose, joint)
+        end = [x + v for x, v in zip(end, kept, strict=True)]
+        w = [end[i] - float(leg["point"][i]) for i in range(3)]
         under, cosine, q, rod, rod_by = _leg(leg, w, by)
+        found.ends.append(end)
+        found.ends_by.append(by)
+        found.rods.append(rod)
+        found.rods_by.append(rod_by)
         found.under.append(under)
         found.cosine.append(cosine)
         found.q.append(q)
-        found.rows.append(rod + [m * lever for m in vector(arm, rod)])
+        still = [ball(np.full_like(pose[0].m, v)) for v in kept]
+        side, side_by = ([_swung(vector(still, r), hinge, int(leg.get("bar", -1)), bars, lever) for r in some]
+                         for some in ([rod], rod_by))
+        found.rows.append(_sum(rod + [m * lever for m in vector(arm, rod)], side[0]))
         none = [arm[0] * 0.0] * 3
         moments = [[x + y for x, y in zip(vector(a, rod), vector(arm, d), strict=True)]
                    for a, d in zip([none, none, none, *arm_by], rod_by, strict=True)]
-        found.rates.append([d + [m * lever for m in moment] for d, moment in zip(rod_by, moments, strict=True)])
+        found.rates.append([_sum(d + [m * lever for m in moment], s)
+                            for d, moment, s in zip(rod_by, moments, side_by, strict=True)])
         if any(leg["pair"]):
             apart = [ball(np.full_like(pose[0].m, v)) * lever for v in leg["pair"]]
-            pairs.append((none + vector(rod, apart), [none + vector(d, apart) for d in rod_by]))
+            bar = int(leg.get("bar", -1))
+            held = [_swung(vector(r, apart), hinge if bar >= 0 else [], bar, bars, 1.0) for r in (rod, *rod_by)]
+            pairs.append((_sum([*none, *none], held[0]), [_sum([*none, *none], h) for h in held[1:]]))
     found.rows.extend(row for row, _ in pairs)
     found.rates.extend(rate for _, rate in pairs)
     return found
+
+
+def carried(geometry: dict[str, Any], shift: FloatArray, pose: list[Ball], point: FloatArray, turns: bool = True,
+            moves: bool = True) -> tuple[Vectors, list[Vectors]]:
+    """Where a point (3,) of the platform is, from its reference point as it stands level, and its rates by the five numbers.
+
+    Without `turns` a direction at rest, without `moves` a direction that turns with the platform.
+    """
+    turned, turned_by = _turning(geometry, pose) if turns else (None, None)
+    if not moves:
+        there, by = _turn(turned, turned_by, point, pose[0])
+        return there, [[pose[0] * 0.0] * 3 for _ in range(3)] + by
+    still = _still(geometry)
+    far = point + shift if turned is not None else point + still @ shift
+    end, end_by = _turn(turned, turned_by, far, pose[0])
+    place = [sum((pose[j] * float(still[i, j]) for j in range(1, 3)), pose[0] * float(still[i, 0])) for i in range(3)]
+    return ([place[i] + end[i] for i in range(3)],
+            [[ball(np.full_like(pose[0].m, still[i, j])) for i in range(3)] for j in range(3)] + end_by)
+
+
+def _swung(moment: Vectors, hinge: list[int], bar: int, bars: int, lever: float) -> list[Ball]:
+    """A moment on a bar: about its hinge it is the bar's own and stands in its column, about the others the platform's."""
+    none = moment[0] * 0.0
+    about = [none if i in hinge else m * lever for i, m in enumerate(moment)]
+    own = moment[hinge[0]] * lever if hinge else none
+    return about + [own if k == bar else none for k in range(bars)]
+
+
+def _sum(row: list[Ball], side: list[Ball]) -> list[Ball]:
+    """A row of six with what is on a bar: moments added, columns of the bars behind."""
+    return row[:3] + [x + y for x, y in zip(row[3:], side[:3], strict=True)] + side[3:]
 
 
 def _still(geometry: dict[str, Any]) -> FloatArray:
@@ -71,10 +116,10 @@ def _still(geometry: dict[str, Any]) -> FloatArray:
 def moving(geometry: dict[str, Any]) -> tuple[FloatArray, FloatArray]:
     """((3, 3) part of a place that the platform takes, (M, 3) travel of its carriers)."""
     free = [np.eye(3)[i] for i in range(3) if "xyz"[i] in geometry["freedoms"]]
-    carried = [np.array(one["direction"], np.float64) for one in geometry["carriers"]]
-    columns = np.array([*free, *carried]).T
-    if columns.shape == (3, 3) and not carried:
-        return np.eye(3), np.zeros((0, 3))
+    slides = [np.array(one["direction"], np.float64) for one in geometry["carriers"]]
+    columns = np.array([*free, *slides]).T
+    if len(free) == 3:  # carriers of a platform that moves by itself: poses are those seen from them
+        return np.eye(3), np.zeros((len(slides), 3))
     shares = np.linalg.lstsq(columns, np.eye(3), rcond=None)[0]
     return columns[:, :len(free)] @ shares[:len(free)], shares[len(free):]
 
@@ -84,6 +129,8 @@ def _turning(geometry: dict[str, Any], pose: list[Ball]) -> tuple[Any, Any]:
     turns = "".join(sorted(set(geometry["freedoms"]) & set("abc")))
     if not turns:
         return None, None
+    if turns == "c":
+        return _about_z(pose[3])
     heading = pose[4] if turns == "abc" else ball(np.full_like(pose[4].m, -0.5 * np.pi if turns == "a" else 0.0))
     (ct, st), (ch, sh) = cos_sin(pose[3]), cos_sin(heading)
     if turns != "abc":  # known to the last digit
@@ -97,6 +144,14 @@ def _turning(geometry: dict[str, Any], pose: list[Ball]) -> tuple[Any, Any]:
     twice, apart = xy * left * 2.0, (yy - xx) * left
     by_heading = [[twice, apart, -(sh * st)], [apart, -twice, ch * st], [sh * st, -(ch * st), zero]]
     return turn, [by_tilt, by_heading]
+
+
+def _about_z(angle: Ball) -> tuple[Any, Any]:
+    """The same of a platform that turns about z alone."""
+    c, s = cos_sin(angle)
+    zero, one = c * 0.0, ball(np.ones_like(c.m))
+    rate = [[-s, -c, zero], [c, -s, zero], [zero, zero, zero]]
+    return [[c, -s, zero], [s, c, zero], [zero, zero, one]], [rate, [[zero] * 3] * 3]
 
 
 def _turn(turned: Any, turned_by: Any, v: FloatArray, like: Ball) -> tuple[Vectors, list[Vectors]]:

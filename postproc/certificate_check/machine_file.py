@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from postproc.certificate_check.balls import ball
+from postproc.certificate_check.chains import about_chain
 from postproc.certificate_check.check import Rejected
+from postproc.certificate_check.legs import carried, legs_in
 from postproc.witness.machine import legs_of
 
 NEAR = 1e-9
@@ -21,6 +24,8 @@ def hash_of(table: dict[str, Any]) -> str:
     """The hash of a machine file's merged values, as certificates have it."""
     kinematics = dict(table.get("kinematics", {}))
     kept = {"kind": kinematics.get("family"), **{k: v for k, v in kinematics.items() if k not in LEFT_OUT}}
+    if kept["kind"] == "serial":  # what is proved of a chain is a box inside its travel
+        kept["travel"] = {letter: axis.get("travel", "") for letter, axis in table.get("axes", {}).items()}
     return sha256(json.dumps(_numbers(kept), sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
@@ -40,8 +45,10 @@ def about(found: dict[str, Any], table: dict[str, Any]) -> None:
     """
     if found.get("key") != hash_of(table):
         raise Rejected("its key is not the hash of the machine file: the file has changed, or it is another machine's")
+    if "chain" in found:
+        about_chain(found, table)
+        return
     kinematics, geometry = table["kinematics"], found["geometry"]
-    _plain(kinematics)
     if found["region"]["of"] == "tip" and kinematics.get("rotary", {}).get("carries") == "spindle":
         raise Rejected("an axis between platform and spindle moves the tip about: only the platform's places are proved")
     own, given = legs_of(kinematics), geometry["legs"]
@@ -49,7 +56,8 @@ def about(found: dict[str, Any], table: dict[str, Any]) -> None:
         raise Rejected(f"it has legs {[leg['letter'] for leg in given]}, the machine file {list(own)}")
     sides = _sides(kinematics)
     for (letter, leg), one in zip(own.items(), given, strict=True):
-        for what, value in _of_file(leg, table["axes"][letter], one["drive"], sides.get(letter, (0.0, 0.0))).items():
+        for what, value in _of_file(leg, table["axes"][letter], one["drive"], sides.get(letter, (0.0, 0.0)),
+                                    kinematics.get("bars", {})).items():
             proved = what != "travel" or found["travel_proved"] is True
             if proved and not _same(value, one[what]):
                 raise Rejected(f"{what} of leg {letter} is {one[what]}, in the machine file {value}")
@@ -64,28 +72,61 @@ def about(found: dict[str, Any], table: dict[str, Any]) -> None:
         due = {"direction": _unit(carrier["direction"]), "travel": _travel(table["axes"][letter], "slide")}
         if letter not in carriers or not all(_same(v, carriers[letter][k]) for k, v in due.items()):
             raise Rejected(f"carrier {letter} is another in the machine file")
+    if geometry["parts"] is not None:
+        _parts(geometry, kinematics)
     _whole(found, kinematics)
 
 
-def _plain(kinematics: dict[str, Any]) -> None:
-    """Machines that the geometry of a certificate cannot describe are proved by none."""
-    freedoms = set(kinematics.get("freedoms", "xyz"))
-    for what, there in (("a platform with bars", kinematics.get("bars")),
-                        ("a platform that turns about z alone", freedoms & set("abc") == {"c"}),
-                        ("a platform carried twice", kinematics.get("carriers") and freedoms >= set("xyz"))):
-        if there:
-            raise Rejected(f"the machine file is of {what}: no certificate of this form describes it")
+def _parts(geometry: dict[str, Any], kinematics: dict[str, Any]) -> None:
+    """What is held apart, as the machine file has it; where rods stand in the middle is computed from the geometry."""
+    given, legs = kinematics.get("clearance", {}), legs_of(kinematics)
+    rails = given.get("rail_radius") is not None and all(leg.get("rail_ends") is not None for leg in legs.values())
+    head = kinematics.get("rotary", {}).get("carries") == "spindle"
+    rods = [{"leg": k, "shift": list(shift)} for k, leg in enumerate(legs.values())
+            for shift in leg.get("rods") or [(0.0, 0.0, 0.0)]]
+    due = {"rod_radius": given.get("rod_radius"), "spindle_radius": None if head else given.get("spindle_radius"),
+           "spindle": list(given.get("spindle", (0.0, 1.0))), "rail_radius": given["rail_radius"] if rails else None,
+           "rail_offset": [list(leg.get("rail_offset", (0.0, 0.0, 0.0))) for leg in legs.values()] if rails else None,
+           "rail_ends": [list(leg["rail_ends"]) for leg in legs.values()] if rails else None,
+           **{f"{end}_angle": None if given.get(f"{end}_angle") is None else math.radians(given[f"{end}_angle"])
+              for end in ("carriage", "platform")}, **_in_the_middle(geometry, kinematics["workspace"])}
+    stated = geometry["parts"]
+    if [one["leg"] for one in stated["rods"]] != [one["leg"] for one in rods] or not all(
+            _same(a["shift"], b["shift"]) for a, b in zip(rods, stated["rods"], strict=True)):
+        raise Rejected("its rods are not those of the machine file")
+    for what, value in due.items():
+        if not _same(value, stated[what]):
+            raise Rejected(f"{what} is {stated[what]}, by the machine file {value}")
 
 
-def _of_file(leg: dict[str, Any], axis: dict[str, Any], drive: str, side: tuple[float, float]) -> dict[str, Any]:
+def _in_the_middle(geometry: dict[str, Any], space: dict[str, Any]) -> dict[str, Any]:
+    """Rods and platform joints in the middle of the workspace, as level as the platform can be."""
+    low, high = (math.radians(v) for v in space.get("tilt", (0.0, 0.0)))
+    number = [0.5 * sum(space[axis]) for axis in "xyz"] + [min(max(0.0, low), high), 0.0]
+    pose = [ball(np.array([v])) for v in number]
+    at = legs_in(geometry, np.zeros(3), pose)
+    turn = np.array([[x.m[0] for x in carried(geometry, np.zeros(3), pose, e, True, False)[0]] for e in np.eye(3)])
+    rods = np.array([[x.m[0] for x in rod] for rod in at.rods])
+    return {"middle": rods.tolist(), "middle_ends": [[float(x.m[0]) for x in end] for end in at.ends],
+            "level": (rods @ turn.T).tolist()}
+
+
+def _of_file(leg: dict[str, Any], axis: dict[str, Any], drive: str, side: tuple[float, float],
+             bars: dict[str, Any]) -> dict[str, Any]:
     """What the certificate says of a leg; `side` is round the ring of a layout."""
+    bar: dict[str, Any] = {}
+    if bars:
+        name = leg.get("bar")
+        own = list(leg.get("joint", (0, 0, 0)))
+        bar = {"bar": list(bars).index(name) if name else -1, "kept": own if name else [0.0] * 3,
+               "joint": list(bars[name]["hinge"]) if name else own}
     rods: list[Any] = leg.get("rods") or []
     apart = float(leg.get("pair") or 0.0)
     pair = np.subtract(rods[0], rods[1]).tolist() if len(rods) == 2 else [apart * side[0], apart * side[1], 0.0]
     return {"drive": leg.get("drive", "slide"), "point": list(leg.get("slide", leg.get("point", (0, 0, 0)))),
             "direction": _unit(leg.get("direction", (0, 0, 1))), "arm": list(leg["arm"]) if drive == "arm" else [0.0] * 3,
             "joint": list(leg.get("joint", (0, 0, 0))), "rod": leg["rod"], "root": leg.get("root", 1), "pair": pair,
-            "travel": _travel(axis, drive)}
+            "travel": _travel(axis, drive), **bar}
 
 
 def _sides(kinematics: dict[str, Any]) -> dict[str, tuple[float, float]]:
@@ -118,7 +159,7 @@ def _whole(found: dict[str, Any], kinematics: dict[str, Any]) -> None:
     region, space = found["region"], kinematics["workspace"]
     moves = {*found["geometry"]["freedoms"], *("z" for one in found["geometry"]["carriers"] if one["direction"][2])}
     low, high = space.get("tilt", (0.0, 0.0))
-    heading = [0.0, 2.0 * math.pi] if "c" in moves and high > 0.0 else [0.0, 0.0]
+    heading = [0.0, 2.0 * math.pi] if moves >= set("abc") and high > 0.0 else [0.0, 0.0]
     due = {"x_mm": space["x"], "y_mm": space["y"], "z_mm": space["z"] if "z" in moves else [0.0, 0.0],
            "tilt_rad": [math.radians(low), math.radians(high)], "heading_rad": heading, "of": "platform"}
     if not all(_same(v, region[k]) for k, v in due.items()):

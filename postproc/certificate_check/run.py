@@ -8,6 +8,7 @@ from typing import Any
 
 from machines.loader import builtin
 from machines.user_file import base_chain, values_of
+from postproc.certificate_check.chains import chain_confirmed
 from postproc.certificate_check.check import NO_CERTIFICATE, Rejected, confirmed
 from postproc.certificate_check.machine_file import about
 from postproc.witness.machine import merged
@@ -37,7 +38,7 @@ def checked(file: Path, machine: str = "") -> tuple[dict[str, Any], list[Diagnos
                                ]) from fault
     try:
         about(found, table)
-        figures = confirmed(found)
+        figures = chain_confirmed(found) if "chain" in found else confirmed(found)
     except Rejected as fault:
         return {"machine": source, "confirmed": False}, [error(
             "certificate.rejected", str(fault), file=str(file),

@@ -145,7 +145,7 @@ def _certificate(dossier: Mapping[str, Any]) -> Iterator[str]:
     if (found := dossier["certificate"]) is None:
         legs = dossier["machine"]["workspace"] is not None
         yield "<p>None: the workspace was sampled. postproc machine certify makes one.</p>" if legs else \
-            "<p>Certificates are for machines on legs; a chain of axes reaches what its travel says.</p>"
+            "<p>None. postproc machine certify proves a box of tips.</p>"
         return
     proved = ", ".join(f"{name} {value:g}" for name, value in found["proved"].items())
     yield _table(("", ""), [("file", found["file"]), ("boxes", str(found["boxes"])), ("region", _region(found["region"])),
@@ -159,7 +159,8 @@ def _certificate(dossier: Mapping[str, Any]) -> Iterator[str]:
 def _region(region: Mapping[str, Any]) -> str:
     """What was proved of which part and tool, ranges in mm and degrees."""
     ranges = []
-    for key, ends in region.items():
+    turns = {f"{letter}_rad": ends for letter, ends in region.get("turns_rad", {}).items()}
+    for key, ends in {**region, **turns}.items():
         name, _, unit = key.rpartition("_")
         if isinstance(ends, list):
             low, high = (value / DEG if unit == "rad" else value for value in ends)

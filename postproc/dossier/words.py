@@ -41,8 +41,9 @@ def machine_dict(machine: Machine) -> dict[str, Any]:
 
 
 def workspace_dict(machine: Machine) -> dict[str, str] | None:
-    """How the workspace of a machine on legs was looked at when it was loaded; None of any other."""
-    if machine.kinematics.leg_geometry is None:
+    """How the workspace of a machine on legs was looked at when it was loaded, or that a box of a chain is proved; None of
+    any other."""
+    if machine.kinematics.leg_geometry is None and not (machine.kinematics.chain and machine.certificate):
         return None
     return {"examined": "proved" if machine.certificate else "sampled", "certificate": machine.certificate}
 
@@ -51,6 +52,8 @@ def workspace_words(machine: Machine) -> str:
     """The same as a line, "" of a machine without legs."""
     if (found := workspace_dict(machine)) is None:
         return ""
+    if machine.kinematics.chain:
+        return f"a box of tips proved to be in reach: {found['certificate']}"
     return "workspace proved to be reached and free of singular positions: " + found["certificate"] if found["certificate"] \
         else "workspace sampled, not proved: postproc machine certify proves it"
 

@@ -12,7 +12,7 @@ from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.readback.comparison.compare import Comparison
 from postproc.readback.comparison.length_margins import margin_lines
 from postproc.reference.events import cutting, spindle_states
-from postproc.report.loads import deflection, deflection_lines
+from postproc.report.loads import deflection, deflection_lines, motor_load, motor_load_lines
 from postproc.report.places import place_lines, places
 from postproc.report.unwinding import unwinding, unwinding_lines
 from postproc.verification.proof_text import statement
@@ -51,6 +51,7 @@ def as_dict(result: PostResult, output: str, estimate: Estimate | None = None) -
         "linearising_bound": _bound(result),
         "feed_reduced_blocks": int(result.feeds.slowed.sum()) if result.feeds is not None else 0,
         "deflection": deflection(result),
+        "motor_load": motor_load(result),
         "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
         "optimised": result.optimised.as_dict() if result.optimised else None,
         "feed_times": result.feed_times.as_dict() if result.feed_times else None,
@@ -121,8 +122,10 @@ def _orientation(result: PostResult) -> dict[str, Any] | None:
     if result.choice is None:
         return None
     from postproc.orientation.report.figures_of_choice import chosen
+    from postproc.orientation.turning.turning_report import as_dict
 
-    return chosen(result.choice, result.options.orient)
+    turning = None if result.turning is None else as_dict(result.turning)
+    return chosen(result.choice, result.options.orient) | {"turning": turning}
 
 
 def _axes_on_the_control(result: PostResult) -> list[str]:
@@ -130,8 +133,9 @@ def _axes_on_the_control(result: PostResult) -> list[str]:
     if result.choice is None or not result.choice.programs:
         return []
     from postproc.orientation.report.figures_of_choice import control_line
+    from postproc.orientation.turning.turning_report import control_lines
 
-    return [control_line(result.choice)]
+    return [control_line(result.choice), *(control_lines(result.turning) if result.turning is not None else [])]
 
 
 def witness_dict(said: Testimony | None) -> dict[str, Any] | None:
@@ -269,7 +273,7 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None,
         lines += result.compensation.lines() + ([] if proof is None else [proof.line()])
     if d["feed_reduced_blocks"]:
         lines.append(f"feed reduced for an axis limit in {d['feed_reduced_blocks']} blocks")
-    lines += deflection_lines(d["deflection"])
+    lines += deflection_lines(d["deflection"]) + motor_load_lines(d["motor_load"])
     if d["singular_events"]:
         lines.append(f"singular directions passed: {d['singular_events']}")
     if d["rewinds"]:

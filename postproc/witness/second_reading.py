@@ -61,13 +61,23 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
 
 
 def _reoriented(c: Commanded, axes: Array) -> Commanded:
-    """With other tool axes: balls, and arcs, stay where they are; a tool that is turned and no ball is not known."""
+    """With other tool axes: balls, and arcs, stay where they are; a tool that is turned and no ball is not known. A straight
+    cut whose tip goes farther or less far for it takes the time that it had."""
     turned = np.abs(axes - c.axis).max(axis=1) > 1e-12
     move = np.where(turned[:, None], c.ball[:, None] * (c.axis - axes), 0.0)
     centre, arcs = c.centre.copy(), np.flatnonzero(c.arc >= 0)
     centre[c.arc[arcs]] += move[arcs]
     return replace(c, tip=c.tip + move, axis=np.where(turned[:, None], axes, c.axis), centre=centre,
-                   known=c.known & np.isfinite(move).all(axis=1))
+                   known=c.known & np.isfinite(move).all(axis=1), feed=c.feed * _longer(c, turned, move))
+
+
+def _longer(c: Commanded, turned: Array, move: Array) -> Array:
+    """(N,) how far the tip goes over how far it went in straight cuts between poses that are turned, else 1."""
+    ratio, now = np.ones(len(c)), c.tip + move
+    old, new = (np.sqrt((np.diff(tip, axis=0) ** 2).sum(axis=1)) for tip in (c.tip, now))
+    cuts = (c.kind[1:] == LINE) & (turned[1:] | turned[:-1]) & ~c.inverse[1:] & (np.minimum(old, new) > 1e-6)
+    ratio[1:][cuts] = new[cuts] / old[cuts]
+    return np.where(np.abs(ratio - 1.0) > 1e-9, ratio, 1.0)
 
 
 def _machine(case: Case, table: dict[str, object]) -> Chain | ErrorChain | Rods | None:

@@ -45,6 +45,7 @@ class Loops:
         free: freedoms that the drives set by themselves where others follow; () all
         rings: (K,) mm, radii about z of the platform, round its joints, on which legs of changing length end; 0 of others;
             None without any
+        bars: the number of the bar that each leg holds, -1 of none; () without bars
     """
 
     drives: Drives
@@ -54,6 +55,7 @@ class Loops:
     holds: Holds | None = None
     free: tuple[str, ...] = ()
     rings: Floats | None = None
+    bars: tuple[int, ...] = ()
 
     @cached_property
     def basis(self) -> Floats:

@@ -24,7 +24,8 @@ from postproc.cli.app import app
 from tests.certificates import on_legs
 from toolpaths.diagnostics import DiagnosticError
 
-KINDS = ["uranesx", "rotary-delta", "hexapod", "hexaslide-cone", "h4a-c-table", "planar-delta-z", "triaglide"]
+KINDS = ["uranesx", "rotary-delta", "hexapod", "hexaslide-cone", "h4a-c-table", "planar-delta-z", "triaglide", "h4-rotary",
+         "macro-micro"]
 
 
 def boxes(m: Machine, n: int, seed: int = 0) -> tuple[PosesOfBoxes, Span, Span]:
@@ -62,7 +63,8 @@ def test_figures_of_a_pose_are_those_of_the_machine(name: str) -> None:
     turn = poses.turn(pose)[0].lo
     tip = pose.lo[:, :3] + (turn @ legs.gauge if legs.turns else legs.gauge)
     own = [m.axis_names.index(letter) for letter in legs.names]
-    branches = kin.inverse(tip, turn[:, :, 2] if legs.turns else np.tile([0.0, 0.0, 1.0], (50, 1)))
+    axis, spin = turn[:, :, 2] if legs.turns else np.tile([0.0, 0.0, 1.0], (50, 1)), pose.lo[:, 3] * (legs.turns == "c")
+    branches = kin.joints_with(tip, axis, spin, np.zeros((50, 3))) if legs.carried_twice else kin.inverse(tip, axis, spin)
     nearest = np.abs(branches[:, :, own] - at.q.lo).max(axis=2).argmin(axis=0)  # of an H4 the one that leaves C at 0
     q = branches[nearest, np.arange(50)]
     distance = kin.singular_distance(q)
