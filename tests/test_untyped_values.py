@@ -75,7 +75,7 @@ BORDERS = {
     "postproc/cli/setup_align.py": FIGURES, "postproc/alignment/report.py": FIGURES,
     "postproc/cli/shared/job_defaults.py": "defaults of options", "postproc/setup_sheet/text.py": TABLES,
     "postproc/verification/second_witness.py": TABLES, "postproc/witness/states.py": TABLES,
-    "postproc/witness/sides.py": TABLES,
+    "postproc/witness/sides.py": TABLES, "postproc/witness/held.py": TABLES,
     "postproc/witness/place.py": TABLES, "postproc/witness/errors.py": TABLES,
     "postproc/witness/machine.py": TABLES, "postproc/witness/evidence.py": TABLES,
     "postproc/witness/motion.py": TABLES, "postproc/witness/second_reading.py": TABLES, "postproc/setup/files.py": TABLES,

@@ -209,7 +209,9 @@ def there_and_back(machine: Machine, folder: Path) -> Machine:
     return back
 
 
-EXPRESSED = [name for name in machines.names() if export_linuxcnc(machines.load(name), name)[0]]
+EXPRESSED = [name for name in machines.names() if export_linuxcnc(machines.load(name), name)[0] and (
+    (control := machines.load(name).control_kinematics) is None or control.legs is None)]
+"""but for modules of struts and arms, which the import refuses; `tests/linuxcnc/test_modules.py` holds their pins"""
 
 
 @pytest.mark.parametrize("name", EXPRESSED)
