@@ -1,14 +1,16 @@
-"""One leg of a platform as a table, and legs that stand in a ring about z, from a few sizes."""
+"""One leg of a platform as a table, legs that stand in a ring about z, from a few sizes, and what else holds a platform."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from math import cos, sin
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from machines.key_problem import KeyProblem
+from machines.kinematics.legs.holds import Holds, hinges, telescope, together, untwisted
 from machines.models import Interval, Vector
 from machines.user_model import UserModel
 from toolpaths.units import DEG
@@ -18,9 +20,11 @@ Size = Annotated[float, Field(gt=-1e6, lt=1e6)]
 """mm; no machine is a kilometre long"""
 Length = Annotated[float, Field(ge=0, lt=1e6)]
 BoundedVector = tuple[Size, Size, Size]
+UNIT = 1e-6
+"""how far the length of a direction may be from 1 (it is normalised)"""
 _UP = (0.0, 0.0, 1.0)
 _GOES_WITH = {"direction": ("slide", "arm"), "lean": ("slide",), "arm": ("arm",), "root": ("slide", "arm"),
-              "rail_offset": ("slide",), "rail_ends": ("slide",)}
+              "rail_offset": ("slide",), "rail_ends": ("slide",), "ring": ("length",)}
 """keys that not every drive has"""
 
 
@@ -37,6 +41,10 @@ class DriveModel(UserModel):
     """arm: from the axis to the rod's foot at q = 0, square to the axis"""
     joint: BoundedVector
     """platform joint relative to the platform's reference point, or to the hinge of its bar"""
+    hinge: Vector | None = None
+    """unit vector of a hinge at the foot, which keeps the leg in the plane square to it; default: free in all turns"""
+    ring: Annotated[float, Field(gt=0, lt=1e6)] | None = None
+    """length: radius of a ring about z of the platform, round `joint`, that turns freely and that the leg ends on"""
     bar: str | None = None
     """name of the bar of the platform that the joint is on, which keeps its direction; default: on the platform itself"""
     rod: Length
@@ -49,6 +57,69 @@ class DriveModel(UserModel):
     """from the line of the foot to the middle of the rail"""
     rail_ends: Interval | None = None
     """q of the rail's ends; without it the rail is left out of the clearances"""
+
+
+class PassiveModel(UserModel):
+    """One `[kinematics.passive.NAME]` table: a leg without a drive, fixed to the platform, which slides through a universal
+    joint of the bed and leaves the platform two turns about it and its travel along it, as in the middle of a Tricept."""
+
+    point: BoundedVector
+    """middle of the universal joint, in the machine frame, mm"""
+    joint: BoundedVector = (0.0, 0.0, 0.0)
+    """a point of the leg's line, mm from the reference point of the level platform"""
+    line: Vector = (0.0, 0.0, 1.0)
+    """unit vector along the leg, platform level"""
+    hinge: Vector
+    """unit vector: axis of the universal joint that is fixed to the bed, square to `line`"""
+
+    def problems(self, path: tuple[str, ...]) -> Iterator[KeyProblem]:
+        """Directions that are none, or not square to each other."""
+        yield from direction_problems(self.line, (*path, "line"))
+        yield from direction_problems(self.hinge, (*path, "hinge"))
+        if abs(float(np.dot(self.line, self.hinge))) > UNIT:
+            yield KeyProblem("machine.geometry", (*path, "hinge"), f"{list(self.hinge)} is not square to the leg along "
+                             f"{list(self.line)}", "turn hinge until it is, with the platform level")
+
+
+def direction_problems(vector: Vector, path: tuple[str, ...]) -> Iterator[KeyProblem]:
+    """A vector at `path` that is no direction."""
+    length = float(np.linalg.norm(vector))
+    if abs(length - 1.0) > UNIT:
+        yield KeyProblem("machine.geometry", path, f"{list(vector)} has length {length:.6g}, not 1", "write a unit vector")
+
+
+def held_by(legs: Collection[DriveModel], passive: Collection[PassiveModel]) -> int:
+    """How many of six freedoms of a platform hinges, rings and passive legs take."""
+    return sum(leg.hinge is not None for leg in legs) + any(leg.ring is not None for leg in legs) + 3 * len(passive)
+
+
+def holds_of(legs: Collection[DriveModel], passive: Collection[PassiveModel]) -> Holds | None:
+    """What holds a platform besides its legs; None where nothing does."""
+    arm = max(1.0, *(float(np.linalg.norm(leg.joint)) for leg in legs))
+    hinged = [leg for leg in legs if leg.hinge is not None]
+    parts = [telescope(np.array(one.point), np.array(one.joint), np.array(one.line), np.array(one.hinge), arm)
+             for one in passive]
+    if hinged:
+        normals = np.array([leg.hinge for leg in hinged], dtype=np.float64)
+        parts.append(hinges(normals / np.linalg.norm(normals, axis=1)[:, None], np.array([leg.point for leg in hinged]),
+                            np.array([leg.joint for leg in hinged])))
+    if any(leg.ring is not None for leg in legs):
+        parts.append(untwisted(arm))
+    return together(parts) if parts else None
+
+
+def hinge_problems(leg: DriveModel, path: tuple[str, ...]) -> Iterator[KeyProblem]:
+    """A hinge that is no direction, or whose plane the leg's drive would leave."""
+    if leg.hinge is None:
+        return
+    yield from direction_problems(leg.hinge, (*path, "hinge"))
+    along, drive = float(np.dot(leg.hinge, leg.direction)), np.array(leg.direction)
+    if leg.drive == "slide" and abs(along) > UNIT:
+        yield KeyProblem("machine.geometry", (*path, "hinge"), f"the slide along {list(leg.direction)} leaves the plane of "
+                         f"the hinge {list(leg.hinge)}", "write a hinge that is square to the slide")
+    if leg.drive == "arm" and np.linalg.norm(np.cross(leg.hinge, drive)) > UNIT:
+        yield KeyProblem("machine.geometry", (*path, "hinge"), f"the arm about {list(leg.direction)} leaves the plane of "
+                         f"the hinge {list(leg.hinge)}", "write a hinge along the axis of the arm")
 
 
 class StarLayout(UserModel):
@@ -84,6 +155,8 @@ class StarLayout(UserModel):
     """length of the arms"""
     rod: Length
     """length of the rods, of a leg of changing length at q = 0"""
+    hinged: bool = False
+    """true where every leg swings about a hinge at its foot, square to z and to its direction"""
     pair: Annotated[float, Field(gt=0, lt=1e6)] | None = None
     """mm between the two rods of a leg; default: single rods"""
     root: Literal[1, -1] = 1
@@ -119,7 +192,8 @@ class StarLayout(UserModel):
             drive=self.drive, rod=self.rod, root=self.root, direction=direction,
             point=_sum((self.radius, out), (aside, side), (self.height, _UP)),
             joint=_sum((self.joint_radius, joint_out), (aside, joint_side), (self.joint_height, _UP)),
-            arm=_sum((self.arm or 0.0, out)), rail_ends=self.rail_ends, rail_offset=_sum((self.rail_offset, out)),
+            hinge=side if self.hinged else None, arm=_sum((self.arm or 0.0, out)), rail_ends=self.rail_ends,
+            rail_offset=_sum((self.rail_offset, out)),
             rods=() if self.pair is None else tuple(_sum((half, side)) for half in (0.5 * self.pair, -0.5 * self.pair)))
 
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from machines.key_problem import KeyProblem
 from machines.kinematics.legs.attitudes import attitude
+from machines.kinematics.legs.loops import Loops
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.mobility import LEAST, place_words, sign_fault
 from toolpaths.arrays import Floats
@@ -38,8 +39,7 @@ def examined(kinematics: OnLegs) -> tuple[Floats, Floats, Floats]:
         heading = np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False)
         place, tilt, heading = (np.repeat(place, HEADINGS, axis=0), np.repeat(tilt, HEADINGS), np.tile(heading, len(place)))
     axis, spin = attitude(kinematics.loops.turns, tilt, heading)
-    turn, held = kinematics.turn_of(axis, spin), kinematics.loops.basis[:3].any(axis=1)
-    return np.where(held, place, 0.0), turn, tilt
+    return *kinematics.posed(place, axis, spin), tilt
 
 
 def leg_faults(kinematics: OnLegs, pairs: Sequence[Floats | None], bars: Sequence[str | None]) -> Iterator[KeyProblem]:
@@ -61,9 +61,17 @@ def leg_faults(kinematics: OnLegs, pairs: Sequence[Floats | None], bars: Sequenc
         return
     jx, rods = loops.matrix_at(place, turn, q)
     yield from sign_fault("machine.singular", "det Jx (rods as unit vectors, moments by the longest arm)",
-                          np.linalg.det(jx / legs.spans(q)[:, :, None]), partial(place_words, place, tilt),
+                          np.linalg.det(jx / loops.sizes(q)[:, :, None]), partial(place_words, place, tilt),
                           "the platform is singular there: move the drives or make the workspace smaller")
-    held = Constraints(kinematics, pairs, bars, unit(rods), ends - place[:, None, :])
+    holds = loops.holds
+    if holds is not None and (least := least_singular(_following(loops, place, turn))) < LEAST:
+        yield KeyProblem("machine.mobility", ("freedoms",), "what follows from the freedoms "
+                         f"{list(loops.free)} does not follow everywhere (least singular value {least:.3g})",
+                         "write the freedoms that the hinges, rings or the passive leg leave the platform")
+        return
+    none = np.zeros((len(place), 0, 6))
+    held = Constraints(kinematics, pairs, bars, unit(rods), ends - place[:, None, :],
+                       none if holds is None else holds.rows(place, turn, loops.lever))
     yield from held.faults(partial(place_words, place, tilt))
 
 
@@ -92,7 +100,7 @@ def travel_faults(kinematics: OnLegs, travel: Floats, home: Floats) -> Iterator[
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(rods="N K 3", arms="N K 3")
+@arrays(rods="N K 3", arms="N K 3", held="N H 6")
 class Constraints:
     """What legs and pairs hold, at N places.
 
@@ -100,6 +108,7 @@ class Constraints:
         pairs, bars: as of `leg_faults`
         rods: (N, K, 3) unit vectors
         arms: (N, K, 3) mm from the reference point to the joints
+        held: (N, H, 6) rows of what holds the platform besides
     """
 
     kinematics: OnLegs
@@ -107,6 +116,7 @@ class Constraints:
     bars: Sequence[str | None]
     rods: Floats
     arms: Floats
+    held: Floats
 
     def faults(self, at: Callable[[int], str]) -> Iterator[KeyProblem]:
         """Pairs that stop what is to move, motions that nothing holds; `at` gives the words of a place."""
@@ -114,7 +124,7 @@ class Constraints:
         yield from stopped
         if stopped:
             return
-        rows, freedoms = self._rows(), list(self.kinematics.loops.freedoms)
+        rows, freedoms = self._rows(), list(self.kinematics.loops.free or self.kinematics.loops.freedoms)
         value = np.linalg.det(rows) if rows.shape[1] == rows.shape[2] else np.ones(1)
         least = least_singular(rows) if rows.shape[1] >= rows.shape[2] else 0.0
         pairs = sum(pair is not None for pair in self.pairs)
@@ -124,9 +134,10 @@ class Constraints:
                              "them is a place where they do not (V-4)", "make the workspace smaller, or let the pairs "
                              "reach the platform from other sides")
         elif least < LEAST:
-            yield KeyProblem("machine.mobility", ("legs",), f"{self.rods.shape[1]} legs and {pairs} pairs of rods do not "
-                             f"hold the platform everywhere (least singular value {least:.3g}): it moves otherwise than "
-                             f"freedoms = {freedoms}",
+            besides = " with hinges, rings or passive legs" if self.held.shape[1] else ""
+            yield KeyProblem("machine.mobility", ("legs",), f"{self.rods.shape[1]} legs and {pairs} pairs of rods{besides} "
+                             f"do not hold the platform everywhere (least singular value {least:.3g}): it moves otherwise "
+                             f"than freedoms = {freedoms}",
                              "give `rods` of the legs that are pairs, or the freedoms that the machine has")
 
     def _across(self, k: int) -> Floats:
@@ -161,8 +172,16 @@ class Constraints:
             if pair is not None:
                 across = self._across(k)
                 rows.append(np.column_stack([0.0 * across, across, (across @ about)[:, None] * own]))
+        bare = np.zeros((len(self.held), len(bars)))
+        rows += [np.column_stack([one, bare]) for one in np.swapaxes(self.held, 0, 1)]
         columns = [0, 1, 2, 3, 4, 5] if "z" in loops.freedoms else [0, 1, 5]
         return np.stack(rows, axis=1)[:, :, columns + list(range(6, 6 + len(bars)))]
+
+
+def _following(loops: Loops, place: Floats, turn: Floats) -> Floats:
+    """(N, H, H): rows of the holds in the freedoms that follow from the others."""
+    assert loops.holds is not None
+    return loops.holds.rows(place, turn, loops.lever)[:, :, [name not in loops.free for name in loops.freedoms]]
 
 
 def least_singular(rows: Floats) -> float:

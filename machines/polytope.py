@@ -66,6 +66,8 @@ class Polytope:
         normals, offsets = self.normals[at], self.offsets[at]
         if not np.isfinite(normals).all() or np.linalg.matrix_rank(normals) < 3:
             raise ValueError("no bounded polytope at this pose")
+        normals = _distinct(normals / offsets[:, None])  # drives that bound the same: such planes meet anywhere
+        offsets = np.ones(len(normals))
         scale = offsets.min() / np.linalg.norm(normals, axis=1).max()
         try:
             found = HalfspaceIntersection(np.column_stack([normals * scale, -offsets]), np.zeros(3)).intersections

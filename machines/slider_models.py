@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Literal, Protocol
 
 import numpy as np
 from pydantic import Field
 
 from machines.key_problem import KeyProblem
-from machines.kinematics.chain import LINEAR
+from machines.kinematics.chain import LINEAR, ROTARY, Joint
 from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.rotary_axis import HeadAxis, TableAxis, TiltAbout
+from machines.kinematics.legs.series_poses import meeting_point
 from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.sliders import Legs
 from machines.kinematics.workspace import Workspace
-from machines.leg_layouts import StarLayout
+from machines.leg_layouts import UNIT, StarLayout, direction_problems
 from machines.machine import ControlKinematics
 from machines.models import Interval, KinematicsModel, NotNegative, Positive, Vector
 from machines.user_model import UserModel
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
 
-UNIT = 1e-6
-"""how far the length of a direction may be from 1 (it is normalised)"""
+MOST_AXES, INDEPENDENT, MEETS = 2, 1e-3, 1e-6
+"""rotary axes in series with a platform; least sine between two; mm by which lines may pass each other that meet"""
 
 
 class LegModel(UserModel):
@@ -224,6 +225,57 @@ def lineardeltakins(module: str, legs: Legs, joints: Floats) -> ControlKinematic
     if len(set(legs.lengths)) > 1 or np.any(legs.roots < 0):
         raise ValueError(f"{module} needs rods of one length and root = 1")
     return ControlKinematics(module, {"lineardeltakins.L": float(legs.lengths[0]), "lineardeltakins.R": radius})
+
+
+class SeriesAxisModel(UserModel):
+    """`[kinematics.table_axes.LETTER]`, `[kinematics.spindle_axes.LETTER]`: a rotary axis in series with a platform.
+
+    Tables come from the part to the bed, axes of the spindle from the platform to the spindle, in the order of the file.
+    """
+
+    direction: Vector
+    """unit vector: how positive values turn the tool, seen from the part; all axes at 0"""
+    point: Vector = (0.0, 0.0, 0.0)
+    """a point of the axis, mm: of a table in the machine frame, else from the platform's reference point"""
+
+    def joint(self, name: str) -> Joint:
+        """As an axis of a chain."""
+        return Joint(name, True, np.array(self.direction), np.array(self.point))
+
+
+def series_problems(tables: Mapping[str, SeriesAxisModel], head: Mapping[str, SeriesAxisModel], taken: Collection[str],
+                    follows: bool, gauge: Floats) -> Iterator[KeyProblem]:
+    """Letters, directions, axes that turn the tool about itself; a head that a platform which turns cannot have."""
+    axes = [(("table_axes", name), name, one) for name, one in tables.items()]
+    axes += [(("spindle_axes", name), name, one) for name, one in head.items()]
+    for path, name, one in axes:
+        yield from direction_problems(one.direction, (*path, "direction"))
+        if name not in ROTARY or name in taken or (name in tables and name in head):
+            yield KeyProblem("machine.axis-letter", path, f"{name!r} is no letter of a rotary axis, or another axis has it",
+                             "choose from A B C what no leg, carrier or other axis has")
+    if len(axes) > MOST_AXES:
+        yield KeyProblem("machine.geometry", axes[MOST_AXES][0], f"{len(axes)} rotary axes in series with the platform",
+                         "two turn the tool in every direction: take one out")
+        return
+    ends = [*(one.direction for _, _, one in axes), (0.0, 0.0, 1.0)]
+    for (path, name, one), other in zip(axes, ends[1:], strict=True):
+        if np.linalg.norm(np.cross(one.direction, other)) < INDEPENDENT and not (len(axes) == 1 and name in tables):
+            yield KeyProblem("machine.geometry", path, f"{name} turns about the same direction as what comes behind it",
+                             "an axis of a pair is not parallel to the other, the one at the tool not to the tool")
+    if not follows:
+        return
+    if tables or len(head) < MOST_AXES:
+        yield KeyProblem("machine.geometry", ("spindle_axes",), "a platform that turns as it goes aside needs two axes "
+                         "between it and the spindle, and no table", "write two [kinematics.spindle_axes.LETTER] tables")
+        return
+    lines = [(np.array(one.direction), np.array(one.point)) for one in head.values()]
+    at = meeting_point([one.joint(name) for name, one in head.items()])
+    off = max(float(np.linalg.norm(np.cross(along, at - point))) for along, point in
+              [*lines, (np.array([0.0, 0.0, 1.0]), gauge)])
+    if off > MEETS:
+        yield KeyProblem("machine.geometry", ("spindle_axes",), f"the axes and the line of the tool pass each other by "
+                         f"{off:.4g} mm; under a platform that turns as it goes aside they meet in one point",
+                         "correct `point` and `gauge`")
 
 
 class RotaryModel(UserModel):

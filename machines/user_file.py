@@ -128,11 +128,18 @@ def wrong_keys(file: UserFile, model: type[BaseModel]) -> list[KeyPath]:
     return []
 
 
+LISTED, NEAR = 40, 5
+"""most words that a hint lists; of more, so many are named"""
+
+
 def nearest(word: str, known: Sequence[str]) -> str:
-    """A hint: the known word nearest to `word`, else the list of all."""
+    """A hint: the known word nearest to `word`, else the list of all, of a long one those that are most alike."""
     match = nearest_word(word, known)
     if match is not None:
         return f"did you mean {match!r}?"
+    if len(known) > LISTED:
+        some = difflib.get_close_matches(word.lower(), known, n=NEAR, cutoff=0.0)
+        return f"most alike of {len(known)} are: {', '.join(some)}"
     return "known: " + ", ".join(sorted(known)) if known else ""
 
 
@@ -190,7 +197,7 @@ def _text(path: FilePath, source: str, builtin: Mapping[str, FilePath], kind: st
     except FileNotFoundError:
         what = f"no {kind} is called {source!r}" + ("" if source in builtin else " and there is no such file")
         return None, error("file.not-found", what, file=file, lines=lines,
-                           hint=nearest(source, sorted(builtin)))
+                           hint=nearest(source.removesuffix(".toml"), sorted(builtin)))
     except OSError as fault:
         return None, error("file.unreadable", f"cannot read {shown(path)}: {reason(fault)}", file=file, lines=lines,
                            hint=remedy(fault, f"name a TOML file of a {kind}"))
@@ -304,8 +311,9 @@ def _diagnostic(file: UserFile, model: type[BaseModel], fault: _Fault) -> Diagno
     path, key = fault.path, dotted(fault.path)
     code = _CODES.get(fault.kind)
     if fault.kind == "extra_forbidden":
+        elsewhere = getattr(model, "ELSEWHERE", {}).get(key)
         return file.problem("file.unknown-key", path, f"unknown key {key!r}",
-                            nearest(str(path[-1]), _known_keys(model, path[:-1])))
+                            elsewhere or nearest(str(path[-1]), _known_keys(model, path[:-1])))
     if fault.kind == "missing":
         return file.problem("file.missing-key", path, f"key {key!r} is missing", _added(model, path))
     if code:

@@ -62,6 +62,7 @@ FLOORS = (
     ("postproc.orientation.passes", "3+2 passes, their limits and poses"),
     ("postproc.orientation.candidates", "tool axes of one pass, timed and ranked"),
     ("postproc.orientation.plans", "plans over all passes, the choice"),
+    ("postproc.orientation.turning", "tool axes that turn along cuts, chosen together with the feed"),
     ("postproc.orientation.report", "the choice as figures and text"),
     ("postproc.orientation.figures", "the choice as pictures"),
     ("postproc.pipeline", "the table of stages; convert, verify, choose_axes"),

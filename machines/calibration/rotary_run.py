@@ -51,7 +51,7 @@ def reversal(run: CalibrationRun, given: ReversalModel, table: CsvTable) -> Cali
     figures = _reversal_figures(run, given, fitted, readings, sigma)
     if not fitted.result.supported:
         run.problem("calibrate.rank", "the readings do not distinguish axis and indexer: rank "
-                    f"{fitted.conditioning.rank} of {fitted.conditioning.unknowns}: measure one more set-up, the indexer "
+                    f"{fitted.conditioning.rank} of {fitted.conditioning.unknowns}", "measure one more set-up, the indexer "
                     "turned by a number of increments that has no divisor in common with the number of steps")
         return CalibrationOutcome(None, figures)
     name = ErrorName(DIRECTIONS.index(given.axis), False, given.axis)

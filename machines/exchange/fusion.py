@@ -3,15 +3,16 @@
 Sources: Autodesk, Fusion API, adsk.cam: RotaryMachineAxisInput.rotationAxis (machine coordinates, right-handed),
 MachineAxis, MachineAxisConfiguration (`isReversed`, `coordinate`, speeds), MachineAxisCoordinates; for the keys of the file,
 machine files in public: MakeraInc/CarveraProfiles, "Carvera 4-axis.mch" (commit 3e1d5408), MillenniumMachines/MillenniumOS,
-milo-v1.5-std.mch (27e0a006). Speeds are per minute there: 4000 mm/min, 21600 degrees/min.
+milo-v1.5-std.mch (27e0a006), Autodesk/cam-posteditor, "autodesk 5ax table bc head
+yxz.mch" (5cc74f79). Speeds are per minute there: 4000 mm/min, 21600 degrees/min.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ValidationError
 
@@ -119,12 +120,15 @@ class FusionName(BaseModel):
     model: str = ""
 
 
+_Section = TypeVar("_Section", FusionTree, FusionControl, FusionTimes)
+
+
 class FusionFile(BaseModel):
     """A machine file; what the CAM system alone reads (collisions, post, pictures, tools) is left out."""
 
-    kinematics: dict[Literal["default"], FusionTree]
-    controller: dict[Literal["default"], FusionControl] = {}
-    machining: dict[Literal["default"], FusionTimes] = {}
+    kinematics: dict[str, FusionTree]
+    controller: dict[str, FusionControl] = {}
+    machining: dict[str, FusionTimes] = {}
     general: FusionName = FusionName()
 
 
@@ -154,8 +158,8 @@ def read_fusion(path: Path, text: str, stated: Sequence[str]) -> tuple[Draft, di
             draft.error("import.number", f"{'.'.join(keys) or 'the file'}: {fault['msg']}", _line(text, *keys),
                         "export the machine from Fusion's machine library again")
         return draft, {}
-    tree = file.kinematics.get("default", FusionTree(parts=[], units=FusionUnits(length="mm", angle="degrees")))
-    control = file.controller.get("default", FusionControl())
+    tree = _current(file.kinematics, FusionTree(parts=[], units=FusionUnits(length="mm", angle="degrees")))
+    control = _current(file.controller, FusionControl())
     movers = list(_movers(draft, tree, control, text))
     scale = LENGTHS.get(tree.units.length)
     hand = tree.conventions.get("rotation", "right-handed")
@@ -177,11 +181,16 @@ def read_fusion(path: Path, text: str, stated: Sequence[str]) -> tuple[Draft, di
     return draft, {mover.letter: mover.letter in ROTARY for mover in movers}
 
 
+def _current(section: Mapping[str, _Section], without: _Section) -> _Section:
+    """What a section says: its configuration "default", else the first, as "synced_configuration" of newer files."""
+    return section["default"] if "default" in section else next(iter(section.values()), without)
+
+
 def _of_control(draft: Draft, file: FusionFile, head: FusionPart, scale: float, text: str) -> None:
     """Largest feed and spindle speed, time of a tool change: 0 states none."""
-    feed = file.controller.get("default", FusionControl()).max_normal_speed
+    feed = _current(file.controller, FusionControl()).max_normal_speed
     speed = head.spindle.max_speed if head.spindle is not None else 0.0
-    seconds = file.machining.get("default", FusionTimes()).tool_change_time
+    seconds = _current(file.machining, FusionTimes()).tool_change_time
     for path, value, unit, keys in (
             (("control", "largest_feed"), feed, scale, ("controller", "max_normal_speed")),
             (("control", "largest_spindle_speed"), speed, 1.0, ("kinematics", "max_speed")),
@@ -220,7 +229,7 @@ def _movers(draft: Draft, tree: FusionTree, control: FusionControl, text: str) -
         for part in branches[0][:-1]:
             if part.type != "static":
                 mover = _Mover(_letter(part, control), part, control.parts.get(part.id, FusionAxis()), end == "table")
-                if wrong := _wrong(mover, letters):
+                if wrong := _wrong(mover, letters, f"kinematics.axes.{mover.letter}.point" in draft.stated):
                     draft.error("import.geometry", f"part {part.id}: {wrong}", _line(text, "kinematics", part.id), _BY_HAND)
                 letters.add(mover.letter)
                 yield mover
@@ -233,15 +242,28 @@ def _letter(part: FusionPart, control: FusionControl) -> str:
     return known[coordinate] if coordinate is not None and 0 <= coordinate < 3 else part.id
 
 
-def _wrong(mover: _Mover, letters: set[str]) -> str:
-    """Why an axis is not read; "" where it is."""
+def _on_line(part: FusionPart) -> bool:
+    """True where `offset` is 0, or a place of the line about which a part turns: nothing that `point` does not say."""
+    line = part.axis_of_rotation
+    if line is None or not any(part.offset):
+        return not any(part.offset)
+    apart = [o - p for o, p in zip(part.offset, line.point, strict=True)]
+    along = sum(a * d for a, d in zip(apart, line.direction, strict=True))
+    return all(abs(a - along * d) < 1e-6 for a, d in zip(apart, line.direction, strict=True))
+
+
+def _wrong(mover: _Mover, letters: set[str], stated: bool) -> str:
+    """Why an axis is not read; "" where it is. `stated`: somebody has said where its line is."""
     part, known = mover.part, ROTARY if mover.part.type == "rotary" else "XYZUVW"
     if mover.letter not in known or mover.letter in letters:
         return f"{'two axes are' if mover.letter in letters else 'no coordinate; it is'} programmed as {mover.letter!r}"
     if part.control != "driven":
         return f"control = {part.control!r}, no driven axis"
-    if any(part.offset) or mover.control.zero_position_offset:
-        return "its offset is not 0, and what it counts from is not documented"
+    if mover.control.zero_position_offset:
+        return "its zero_position_offset is not 0, and what it counts from is not documented"
+    if not _on_line(part) and not stated:
+        return (f"its offset {list(part.offset)} is no place of its line, and what it counts from is not documented: --set "
+                f"kinematics.axes.{mover.letter}.point=[0,0,-400] states a place of the line, all axes at 0")
     line = part.axis_of_rotation if part.type == "rotary" else part.direction
     return "" if line is not None else "no direction"
 

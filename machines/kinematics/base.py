@@ -62,6 +62,9 @@ class ErrorForms(Protocol[ErrorForm]):
     def legs(self, kinematics: Any) -> ErrorForm:
         """Of a platform on any legs."""
 
+    def in_series(self, kinematics: Any) -> ErrorForm:
+        """Of one in series with rotary axes."""
+
 
 class Kinematics(ABC):
     """Inverse and forward of one machine, vectorised; frozen: `with_tool` gives a changed copy."""

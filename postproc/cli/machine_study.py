@@ -50,7 +50,9 @@ def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file"
 
     ending = figure_ending(figure)
     if measure is None and (along or at or csv):
-        raise typer.BadParameter(f"of what? write one of {', '.join(get_args(MapMeasure))}", param_hint="--map")
+        _along(along), _fixed(at)
+        raise typer.BadParameter(f"this is of a map or curve; write --map with one of {', '.join(get_args(MapMeasure))} too",
+                                 param_hint="--along" if along else "--at" if at else "--csv")
     refuse_overwriting({"--csv": str(csv or ""), "--figure": str(figure or ""), "--json": json}, own_files(name))
     outputs: dict[Path, str | bytes] = {}
     if measure is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,6 +28,8 @@ from postproc.cli.shared.options import (
     MachineName,
     MaxTilt,
     ModelOfControl,
+    SchedulerOption,
+    SearchWorkers,
     ToleranceOption,
     UnitsOption,
     figure_ending,
@@ -38,6 +41,7 @@ if TYPE_CHECKING:
     from postproc.base.options import Options
     from postproc.base.progress import Progress
     from postproc.orientation.plans.choice import OrientationChoice
+    from postproc.pipeline.result import PostResult
     from toolpaths.diagnostics import Diagnostic
 
 EXAMPLES = """\b
@@ -69,6 +73,8 @@ def orient(file: ClFile,
            dialect: DialectOption = "",
            allow_unknown: Allow = None,
            model: ModelOfControl = "",
+           workers: SearchWorkers = 0,
+           scheduler: SchedulerOption = "",
            json: Json = "") -> None:
     """Choose the tool orientation of 3+2 passes for the least planned time, and say why."""
     ending = figure_ending(figure)
@@ -84,18 +90,29 @@ def orient(file: ClFile,
     values: dict[str, Any] = {}
     text = ""
     outputs: dict[Path, str | bytes] = {}
-    with shown_errors(json), progress_bar() as progress:
-        choice, found = _chosen(file, machine_of(machine), controller_of(controller), options, progress, model)
+    with shown_errors(json), progress_bar() as progress, ExitStack() as stack:
+        if workers or scheduler:
+            from postproc.batch.cluster import spread
+            from postproc.batch.run import Where
+
+            stack.enter_context(spread(Where(workers, scheduler)))
+        made = _chosen(file, machine_of(machine), controller_of(controller), options, progress, model)
+        choice, turning, found = made.choice, made.turning, list(made.diagnostics)
         if choice is not None:
             from postproc.orientation.report.figures_of_choice import as_dict
             from postproc.orientation.report.text import as_text
 
             shown = _known(passes or [], choice)
             values, text = as_dict(choice, options.orient), as_text(choice, options.orient, shown)
+            if turning is not None:
+                from postproc.orientation.turning import turning_report
+
+                values["turning"] = turning_report.as_dict(turning)
+                text += "\n\n" + turning_report.as_text(turning)
             if figure is not None and ending is not None:
                 from postproc.orientation.figures.sheet import draw
 
-                outputs[figure] = draw(choice, options.orient, shown, ending)
+                outputs[figure] = draw(choice, options.orient, shown, ending, turning)
     report(tuple(found), json, values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 
@@ -107,15 +124,14 @@ def _check(passes: list[int]) -> None:
 
 
 def _chosen(file: Path, machine: Machine, controller: str, options: Options,
-            progress: Progress, model: str) -> tuple[OrientationChoice | None, list[Diagnostic]]:
-    """The choice for a file; None where a diagnostic is an ERROR."""
+            progress: Progress, model: str) -> PostResult:
+    """The choice for a file, none where a diagnostic is an ERROR."""
     from postproc.cycle_time.conversion import program_clock
     from postproc.pipeline.convert import choose_axes
 
     path, found = read_cl(file, options, progress)
-    result = choose_axes(path, machine, controller, options, [*found, *_errors(options, machine)], progress,
-                         program_clock(model))
-    return result.choice, list(result.diagnostics)
+    return choose_axes(path, machine, controller, options, [*found, *_errors(options, machine)], progress,
+                       program_clock(model))
 
 
 def _errors(options: Options, machine: Machine) -> list[Diagnostic]:

@@ -25,8 +25,8 @@ SLIGHT = 0.1
 """share of a jerk: bends that take less do not become slower"""
 GENTLE = 0.95
 """of the accelerations and jerks has the braking curve, so that the motion can come up to it from below"""
-BACKWARD = -0.5
-"""cosine of the change of direction below which the axes rest"""
+BACKWARD = -0.94
+"""cosine of the change of direction below which the axes rest: 160 degrees"""
 NEAR, LEAST = 2, 0.8
 """cycles around such a place that become slower, and the share of the speed that is left at least each time"""
 
@@ -125,7 +125,7 @@ def looked_over(commanded: CommandedPath, settings: ControlSettings) -> tuple[Bl
 
 
 def _turns_back(commanded: CommandedPath) -> Bools:
-    """(V,) where the path turns by more than 120 degrees, at which the axes rest."""
+    """(V,) where the path turns back, at which the axes rest."""
     step = np.diff(commanded.points, axis=0) * commanded.weight
     moving = np.flatnonzero(np.linalg.norm(step, axis=1) > NO_MOTION)
     u = step[moving] / np.linalg.norm(step[moving], axis=1)[:, None]

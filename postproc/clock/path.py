@@ -20,10 +20,15 @@ from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
 from toolpaths.shapes import arrays
 
-SMOOTH_TURN, SMOOTH_SAG = 1.0, 40.0
-"""largest change of direction of neighbouring blocks on one curve, rad, and the sag of its chord in tolerances"""
-EVEN, SLIGHT = 1.5, 0.02
-"""on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad"""
+SMOOTH_TURN, SMOOTH_SAG = 1.0, 0.25
+"""largest change of direction of neighbouring blocks on one curve, rad, and the sag of its chord, mm: coarser than points of
+a curve"""
+EVEN, SLIGHT, ROUNDED = 1.5, 0.02, 0.003
+"""on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad, or what points rounded to
+0.001 mm may turn: ROUNDED mm over the shorter chord"""
+FEW_TURN, FEW_EVEN, FEW_SUM = 1.85, 5.0, 2.6
+"""a bend that few points show: what one vertex turns at most (2 sin of half the angle), how many times what both neighbours
+turn to the same side, and all three together (those of a square turn by 4.2: corners)"""
 BY_CHORD = 0.5
 """power of the chord by which splines are parametrised: centripetal (E. T. Y. Lee, Computer-Aided Design 21, 1989)"""
 PIECE_TURN, MOST_PIECES = 0.005, 96
@@ -32,7 +37,7 @@ WIDTHS = 0.01 * 1.3 ** np.arange(30)
 """mm (rad of rotary blocks): widths that are tried, 0.01 to 20"""
 MEAN_SHARE = 1.6
 """by which the mean over a width deviates more than the kernel, at least"""
-SLOPE = 0.5
+SLOPE = 2.0
 """by which the width may change with the path"""
 PLACES = np.array([-0.5, -0.3, -0.14, 0.0, 0.14, 0.3, 0.5])
 """of a width where derivatives are taken"""
@@ -198,7 +203,7 @@ def fitted(path: CommandedPath) -> tuple[Floats, Floats, Floats, Ints]:
     inner[part >= 1.0 - 1e-12] = flat[1:]
     wide = np.concatenate([flat[:1], inner])
     length = np.maximum(np.linalg.norm(np.diff(wide, axis=0), axis=1), 1e-12)
-    tolerance = np.minimum(path.tolerance[owner], path.tolerance[owner + 1])
+    tolerance = np.maximum(path.tolerance[owner], path.tolerance[owner + 1])
     tolerance = np.where(part >= 1.0 - 1e-12, path.tolerance[owner + 1], tolerance)
     return wide / path.weight, length, np.concatenate([path.tolerance[:1], tolerance]), owner
 
@@ -218,14 +223,28 @@ def _curved(u: Floats, chord: Floats, path: CommandedPath) -> tuple[Bools, Float
     turn = np.linalg.norm(np.diff(u, axis=0), axis=1)
     sag = turn * np.maximum(chord[:-1], chord[1:]) / 8.0
     around = np.concatenate([[0.0], turn[:-1]]) + np.append(turn[1:], 0.0) if len(turn) else turn
-    even = turn <= np.maximum(EVEN * around, SLIGHT)
-    smooth = (turn <= SMOOTH_TURN) & (sag <= SMOOTH_SAG * path.tolerance[1:-1]) & even & ~path.stop[1:-1]
+    slight = np.maximum(SLIGHT, ROUNDED / np.minimum(chord[:-1], chord[1:]))
+    even = turn <= np.maximum(EVEN * around, slight)
+    alike = _turned_alike(u, turn)
+    few = (turn <= np.minimum(FEW_TURN, FEW_EVEN * alike)) & (turn + alike <= FEW_SUM)
+    smooth = (sag <= SMOOTH_SAG) & (path.tolerance[1:-1] > 0.0) & ((turn <= SMOOTH_TURN) & even | few) & ~path.stop[1:-1]
     return smooth, turn
 
 
+def _turned_alike(u: Floats, turn: Floats) -> Floats:
+    """(N - 1,) what both neighbours of a vertex turn to the same side as it does."""
+    cosine = (u[1:] * u[:-1]).sum(axis=1)
+    same = (u[2:] * u[:-2]).sum(axis=1) < cosine[1:] * cosine[:-1]
+    result = np.zeros(len(turn))
+    result[1:] += np.where(same, turn[:-1], 0.0)
+    result[:-1] += np.where(same, turn[1:], 0.0)
+    return result
+
+
 def _tangents(u: Floats, chord: Floats, smooth: Bools) -> tuple[Floats, Floats]:
-    """(N, A) derivatives at begin and end of each block: of cubic splines through smooth points, without curvature where
-    they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV).
+    """(N, A) derivatives at begin and end of each block: of cubic splines through smooth points, of one curvature in the
+    blocks in which they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV): where a curve ends at a corner it
+    bends up to there. Blocks of no curve are straight.
 
     `chord` (N,) are the lengths of their parameter.
     """
@@ -235,8 +254,10 @@ def _tangents(u: Floats, chord: Floats, smooth: Bools) -> tuple[Floats, Floats]:
     bands, right = np.zeros((4, 2 * n)), np.zeros((2 * n, u.shape[1]))
     left, joined = np.concatenate([[False], smooth]), np.append(smooth, False)
     begin, end = 2 * np.arange(n), 2 * np.arange(n) + 1
-    bands[1, begin], bands[0, end], right[begin] = 2.0, np.where(left, 0.0, 1.0), 3.0 * u
-    bands[1, end], right[end] = np.where(joined, 1.0, 2.0), np.where(joined[:, None], 0.0, 3.0 * u)
+    alone = np.where(left | joined, 1.0, 2.0)
+    slope = (1.0 + alone)[:, None] * u
+    bands[1, begin], bands[0, end], right[begin] = np.where(left, 2.0, alone), np.where(left, 0.0, 1.0), slope
+    bands[1, end], right[end] = np.where(joined, 1.0, alone), np.where(joined[:, None], 0.0, slope)
     bands[2, begin] = np.where(joined, 0.0, 1.0)
     k = np.flatnonzero(smooth)
     bands[0, begin[k + 1]] = -1.0

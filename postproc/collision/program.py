@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from postproc.collision.bodies import Scene, Touch, scene, touches
 from postproc.collision.executed_path import path_of
 from postproc.collision.form import PARTS, ToolForm, lever_of, tool_form
 from postproc.collision.swept import Swept
+from postproc.job.places import at_place
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, begins
@@ -35,7 +37,7 @@ def check_bodies(motion: Motion, executed: BlockPoses, job: Job, owner: Ints,
     for one in travels:
         lost = one.unbounded
         found += [] if not len(lost) else [_unbounded(motion, one.moves, owner, lost, faults)]
-        found += _noted(one, motion, owner, faults)
+        found += _noted(one, motion, owner, faults, at_place(job.places, job.repeats, one.moves))
     return found
 
 
@@ -136,16 +138,17 @@ def _drilling(moves: Moves) -> Bools:
     return np.asarray((moves.hole >= 0) & (moves.phase > Phase.APPROACH))
 
 
-def _noted(one: _ToolMotion, motion: Motion, owner: Ints, faults: Faults) -> list[Diagnostic]:
-    """One error per pair, at its worst place; else what was compared."""
+def _noted(one: _ToolMotion, motion: Motion, owner: Ints, faults: Faults,
+           where: Callable[[Ints], str]) -> list[Diagnostic]:
+    """One error per pair, at its worst place; else what was compared. `where`: the part's place at which moves are made."""
     result: list[Diagnostic] = []
     found = one.touches(np.arange(len(one.travel)))
     if not found and len(one.travel):
         return [_clear(one.bodies, one.form, faults)]
     for touch in found:
         code = "collision.gouge" if touch.limit < 0.0 else "collision.near" if touch.distance > 0.0 else "collision.touch"
-        where = _lines(touch.place, motion, (one.moves, owner))
-        result.append(faults.error(code, str(touch), *where, hint=_hint(touch, motion)))
+        lines = _lines(touch.place, motion, (one.moves, owner))
+        result.append(faults.error(code, f"{touch}{where(owner[[touch.place]])}", *lines, hint=_hint(touch, motion)))
     return result
 
 
@@ -177,4 +180,5 @@ def _lines(row: int, motion: Motion, served: tuple[Moves, Ints]) -> tuple[int, i
 def _unbounded(motion: Motion, moves: Moves, owner: Ints, rows: Ints, faults: Faults) -> Diagnostic:
     return faults.warning("collision.bound", "between its ends a block is looked at in places only: the path of the tool "
                           "has no bound there", *_lines(int(rows[0]), motion, (moves, owner)), count=len(rows),
-                          hint="it comes near to where the machine is singular")
+                          hint="move the part in the set-up (part.origin), away from where the machine is singular, or take "
+                          "a smaller --tolerance (shorter blocks)")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.clock.control import ControlMotion, execute
+from postproc.clock.control import BACKWARD, ControlMotion, execute
 from postproc.clock.path import CommandedPath
 from postproc.clock.settings import ControlSettings
 from postproc.cycle_time.blocks import CornerMode, MotionBlocks
@@ -21,8 +21,6 @@ ARM = 50.0
 """mm from a rotary axis at which its deviations count"""
 ARC_PIECE = 0.1
 """rad of an arc that one piece stands for; the control fits a curve through them"""
-BACKWARD = -0.5
-"""cosine of the change of direction in X, Y, Z below which the axes rest"""
 SHORTEST = 1e-9
 """mm or rad that a block counts at least"""
 MOST_BLOCKS, MOST_STOPS = 300_000, 5_000

@@ -81,7 +81,7 @@ def plan(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, st
     stretches = _stretches(path, stops, options.ease)
     options = replace(options, method=options.method.settled())
     for eased in stretches:
-        sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
+        sigma = knots if knots is not None else mesh_between(eased, limits, allowed, options.knots)
         felt = limits if forces_bind(eased, sigma, limits, allowed) else replace(limits, forces=None)
         profile, report, slower = _solve(MotionKnots(eased, sigma, felt, allowed), options)
         pieces.append(MotionPiece(eased, profile, shares(report.weights, len(limits.velocity), float(profile.times[-1]))))
@@ -102,7 +102,7 @@ def plan_second_order(path: ParametricPath, limits: JointLimits, feed: FeedLimit
     allowed = AllowedFeed(feed, options.override)
     pieces = []
     for eased in _stretches(path, stops, 0.0):
-        sigma = knots if knots is not None else _mesh(eased, limits, allowed, options.knots)
+        sigma = knots if knots is not None else mesh_between(eased, limits, allowed, options.knots)
         at = eased.derivatives(sigma)
         cap = np.minimum(squared_speed(at.dq, limits.velocity), allowed(eased.parameter(sigma)[0]) ** 2)
         most, dq, d2q = limits.acceleration, at.dq, at.d2q
@@ -116,7 +116,7 @@ def plan_second_order(path: ParametricPath, limits: JointLimits, feed: FeedLimit
     return Plan(tuple(pieces), limits, allowed, options.step)
 
 
-def _mesh(eased: Eased, limits: JointLimits, feed: AllowedFeed, spacing: Spacing) -> Floats:
+def mesh_between(eased: Eased, limits: JointLimits, feed: AllowedFeed, spacing: Spacing) -> Floats:
     """Knots between two stops, fine enough next to them and where the feed changes."""
     ends = np.array([eased.first, np.nextafter(eased.last, eased.first)])
     ramp = ramp_time(eased.path.derivatives(ends).dq, limits, feed(ends))

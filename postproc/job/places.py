@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,10 +12,12 @@ from postproc.base.options import Options
 from postproc.control.control import Control
 from postproc.control.modes import ASKED, OutputModes
 from postproc.job.turned_places import turned
+from postproc.reference.moves import Moves
 from postproc.reference.repeated import Repeated, repeated
 from postproc.setup.model import Placement, SetupFile, at_places, part_placement
 from postproc.setup.places import PlaceOrder
 from postproc.setup.system import standing
+from toolpaths.arrays import Ints
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Frame, Toolpath
 
@@ -34,6 +36,19 @@ class Place:
     def code(self) -> str:
         """The register that holds its work offset, as the set-up names it."""
         return self.setup.work_offset_code
+
+
+def at_place(places: tuple[Place, ...], repeats: Repeated | None, moves: Moves) -> Callable[[Ints], str]:
+    """' at the place "left"', for people, of rows (K,) of `moves`: where they are made. "" where the part stands at one
+    place alone; behind the last move the last one counts."""
+    def said(rows: Ints) -> str:
+        if repeats is None or len(places) < 2:
+            return ""
+        of = repeats.place[moves.row[np.minimum(rows, len(moves) - 1)]]
+        names = [f'"{places[k].name}"' for k in np.unique(of).tolist()]
+        return f" at the place{'s' if len(names) > 1 else ''} {', '.join(names)}"
+
+    return said
 
 
 def places_of(setup: SetupFile, toolpath: Toolpath, machine: Machine,

@@ -70,7 +70,7 @@ class Lanes {
     const w = canvas.clientWidth, h = canvas.clientHeight;
     if (!run || !run.count || !w) return;
     if (!this.drawn || this.drawn.width !== Math.round(w * ratio)) this.paint(w, h, ratio);
-    const context = canvas.getContext("2d");
+    const context = canvas.getContext("2d", SOFT);
     context.setTransform(1, 0, 0, 1, 0, 0);
     canvas.width = this.drawn.width; canvas.height = this.drawn.height;
     context.drawImage(this.drawn, 0, 0);
@@ -82,7 +82,7 @@ class Lanes {
   paint(w, h, ratio) {
     const run = this.run, drawn = this.drawn = document.createElement("canvas");
     drawn.width = Math.round(w * ratio); drawn.height = Math.round(h * ratio);
-    const g = drawn.getContext("2d"), lanes = this.lanes(), high = (h - 20) / lanes.length, wide = w - this.left - 10;
+    const g = drawn.getContext("2d", SOFT), lanes = this.lanes(), high = (h - 20) / lanes.length, wide = w - this.left - 10;
     g.scale(ratio, ratio); g.fillStyle = "#fff"; g.fillRect(0, 0, w, h); g.font = "12px sans-serif"; g.textBaseline = "middle";
     const first = pointAt(run, this.from), last = Math.min(pointAt(run, this.to) + 1, run.count - 1);
     lanes.forEach(([name, unit, low, top, ...curves], k) => {

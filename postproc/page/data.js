@@ -1,6 +1,7 @@
 // The report and its columns: read once, kept by run.
 const report = JSON.parse(document.getElementById("report").textContent);
 const byId = (id) => document.getElementById(id);
+const SOFT = {willReadFrequently: true}; // plain canvases are painted without the graphics process, which a browser just begun has to start
 
 // A text of a file as it can be read: what turns the direction of writing, and control characters, show as a mark.
 const HIDDEN = /[\u0000-\u0008\u000b\u000c\u000e-\u001f\u007f-\u009f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]/g;

@@ -19,8 +19,8 @@ from toolpaths.toolpath import Toolpath
 
 SCHEMA_VERSION = 1
 """of the report; it rises where a key changes its meaning or goes"""
-SCRIPTS = ("data.js", "view.js", "scene.js", "machine.js", "labels.js", "vectors.js", "polytope.js", "texts.js", "charts.js",
-           "tables.js", "page.js")
+SCRIPTS = ("data.js", "view.js", "flat.js", "scene.js", "machine.js", "labels.js", "vectors.js", "polytope.js", "texts.js",
+           "charts.js", "tables.js", "page.js")
 """in the order in which they run"""
 POLICY = ("default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; "
           "form-action 'none'")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from postproc.page import quantity_drawings
 from postproc.page.columns import unpacked
 from toolpaths.arrays import Floats
 from toolpaths.drawing import FORMATS, image, plain
@@ -15,7 +16,7 @@ from toolpaths.drawing import FORMATS, image, plain
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-KINDS = ("path", "time", "axes", "travel")
+KINDS = ("path", "time", "axes", "travel", *quantity_drawings.KINDS)
 SIZE = (10.0, 7.0)
 """inches"""
 MOST = 20_000
@@ -27,7 +28,7 @@ RIGHT, UP = np.array([0.765, 0.644, 0.0]), np.array([-0.375, 0.445, 0.813])
 
 
 def names(runs: int) -> list[str]:
-    """Files of a report of so many runs."""
+    """Files that a report of so many runs may have."""
     return [f"{kind}-{k + 1}{ending}" for k in range(runs) for kind in KINDS for ending in FORMATS]
 
 
@@ -41,13 +42,14 @@ def drawings(report: dict[str, Any]) -> dict[str, bytes]:
         title = f"{report['part']} on {run['machine']}, {run['controller']}"
         for kind, fill in _fills(run, columns).items():
             for ending in FORMATS:
-                made[f"{kind}-{k + 1}{ending}"] = image(SIZE, f"{title}: {kind}", fill, ending)
+                made[f"{kind}-{k + 1}{ending}"] = image(SIZE, f"{title}: {kind.replace('path-', 'path by ')}", fill, ending)
     return made
 
 
 def _fills(run: dict[str, Any], columns: dict[str, Floats]) -> dict[str, Callable[[Figure], None]]:
     return {"path": lambda sheet: _path(sheet, run, columns), "time": lambda sheet: _time(sheet, run),
-            "axes": lambda sheet: _axes(sheet, run, columns), "travel": lambda sheet: _travel(sheet, run)}
+            "axes": lambda sheet: _axes(sheet, run, columns), "travel": lambda sheet: _travel(sheet, run),
+            **quantity_drawings.fills(run, columns)}
 
 
 def _path(sheet: Figure, run: dict[str, Any], columns: dict[str, Floats]) -> None:

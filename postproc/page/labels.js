@@ -11,12 +11,17 @@ function partDirections(view) {
   });
 }
 
-// `named`: [letters, place in the part] of what has a name.
-function drawLabels(view, canvas, named) {
-  const ratio = Math.min(window.devicePixelRatio || 1, 2), w = view.canvas.clientWidth, h = view.canvas.clientHeight;
-  canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio); // clears it
-  const g = canvas.getContext("2d"), from = [ARROW + 18, h - ARROW - 18];
+// An empty sheet over the picture, in pixels of the page.
+function cleared(view, canvas) {
+  const ratio = Math.min(window.devicePixelRatio || 1, 2), g = canvas.getContext("2d", SOFT);
+  canvas.width = Math.round(view.canvas.clientWidth * ratio); canvas.height = Math.round(view.canvas.clientHeight * ratio);
   g.scale(ratio, ratio);
+  return g;
+}
+
+// `named`: [letters, place in the part] of what has a name.
+function drawLabels(view, g, named) {
+  const w = view.canvas.clientWidth, h = view.canvas.clientHeight, from = [ARROW + 18, h - ARROW - 18];
   g.font = "bold 13px sans-serif"; g.textAlign = "center"; g.textBaseline = "middle"; g.lineWidth = 2.5;
   const word = (text, x, y, colour) => { g.strokeStyle = "#fff"; g.strokeText(text, x, y); g.fillStyle = colour; g.fillText(text, x, y); };
   const way = partDirections(view);
@@ -35,7 +40,8 @@ function drawLabels(view, canvas, named) {
 function pictureOf(view, labels) {
   const made = document.createElement("canvas");
   made.width = view.canvas.width; made.height = view.canvas.height;
-  const g = made.getContext("2d");
+  const g = made.getContext("2d", SOFT);
+  g.fillStyle = "#fff"; g.fillRect(0, 0, made.width, made.height);
   g.drawImage(view.canvas, 0, 0);
   g.drawImage(labels, 0, 0, made.width, made.height);
   return made.toDataURL("image/png");

@@ -92,6 +92,24 @@ function toolLines(tip, axis, length, radius, lines) {
   lines.push([...tip, ...top, ...TOOL_COLOUR]);
 }
 
+// A tool whose form is known, with its axis as far as the gauge length: rings at the corners of its pieces, and lines along their sides.
+const FORM_COLOURS = {cutter: [40, 40, 40], shank: [90, 90, 90], holder: [120, 60, 120]};
+const SIDES = 8, RING = 24;
+
+function formLines(tip, axis, form, length, lines) {
+  const u = across(axis), v = cross3(axis, u);
+  const at = ([r, z], a) => tip.map((t, i) => t + z * axis[i] + r * (u[i] * Math.cos(a) + v[i] * Math.sin(a)));
+  lines.push([...tip, ...tip.map((t, i) => t + length * axis[i]), ...TOOL_COLOUR]); // to the spindle
+  for (const {part, radius_height_mm: side} of form) {
+    const colour = FORM_COLOURS[part];
+    for (const k of new Set([0, Math.floor(side.length / 2), side.length - 1])) circle(lines, at([0, side[k][1]], 0), u, v, side[k][0], colour, RING);
+    for (let j = 0; j < SIDES; j++) {
+      const a = 2 * Math.PI * j / SIDES;
+      for (let k = 1; k < side.length; k++) lines.push([...at(side[k - 1], a), ...at(side[k], a), ...colour]);
+    }
+  }
+}
+
 // Legs at the place in time that lies between two that are known.
 function legLines(run, index, lines) {
   const known = run.legs.point, legs = run.info.points.legs.legs;
@@ -100,9 +118,11 @@ function legLines(run, index, lines) {
   const next = Math.min(k + 1, known.length - 1);
   const share = next === k ? 0 : Math.min(1, (index - known[k]) / (known[next] - known[k]));
   const value = (j) => run.legs["joint " + j][k] + share * (run.legs["joint " + j][next] - run.legs["joint " + j][k]);
+  const parts = 12; // numbers of a leg: its drive joint and platform joint, two ends of what it moves on
   let last = null, first = null;
   for (let leg = 0; leg < legs; leg++) {
-    const p = [0, 1, 2, 3, 4, 5].map((i) => value(6 * leg + i));
+    const p = [0, 1, 2, 3, 4, 5].map((i) => value(parts * leg + i)), drive = [6, 7, 8, 9, 10, 11].map((i) => value(parts * leg + i));
+    if (drive.some((v, i) => i < 3 && v !== drive[i + 3])) lines.push([...drive, ...AXIS_COLOUR]);
     lines.push([...p, 0, 114, 178]);
     if (last) lines.push([...last, ...p.slice(3), 213, 94, 0]); else first = p.slice(3);
     last = p.slice(3);

@@ -104,20 +104,24 @@ function drawNow() {
   if (withMachine && run.legs) legLines(run, now.i + now.share, lines);
   for (const solid of run.solids) for (let k = 0; k < solid["edge 0"].length; k++) lines.push([0, 1, 2, 3, 4, 5].map((j) => solid["edge " + j][k]).concat(SOLID_COLOUR));
   if (byId("vectors").checked && run.info.errors) errorLines(run.info.errors, 0.12 * size, lines);
-  if (axis) toolLines(tip, axis, toolLength(run, now.next), 0.012 * size, lines);
+  const form = toolAt(run, now.next).form || [];
+  if (axis && form.length) formLines(tip, axis, form, toolAt(run, now.next).gauge_length_mm || 0, lines);
+  else if (axis) toolLines(tip, axis, toolLength(run, now.next), 0.012 * size, lines);
   const p = ["part x", "part y", "part z"].map((n) => run.columns[n][shown.point]), r = 0.015 * size;
   for (let k = 0; k < 3; k++) lines.push([...p.map((v, i) => v - (i === k ? r : 0)), ...p.map((v, i) => v + (i === k ? r : 0)), 156, 28, 18]);
   shown.lines = lines;
   view.done = shown.fade ? now.i + 1 : 1e9; // what is still to come is pale while time runs
   view.draw(lines);
-  drawLabels(view, byId("labels"), named);
+  const sheet = cleared(view, byId("labels"));
+  if (!view.gl) drawFlat(view, sheet, lines);
+  drawLabels(view, sheet, named);
 }
 
-// Gauge length of the tool that runs at a point, mm; where none is stated something that can be seen.
-function toolLength(run, i) {
-  const tool = run.info.tools.find((t) => t.number === run.columns.tool[i]);
-  return (tool && tool.gauge_length_mm) || 0.3 * shown.view.span;
-}
+// The tool that runs at a point.
+const toolAt = (run, i) => run.info.tools.find((t) => t.number === run.columns.tool[i]) || {};
+
+// Its gauge length, mm; where none is stated something that can be seen.
+const toolLength = (run, i) => toolAt(run, i).gauge_length_mm || 0.3 * shown.view.span;
 
 function setTime(seconds, follow) {
   shown.time = Math.min(Math.max(seconds, 0), shown.run.end);
@@ -276,12 +280,29 @@ async function begin() {
   words(0, report.runs[0]);
   await new Promise((after) => requestAnimationFrame(() => setTimeout(after)));  // words first: a picture may take a moment
   shown.view = new View(byId("view"));
-  if (!shown.view.gl) byId("view-note").textContent = "This browser has no WebGL2: the path is not drawn; all else is there.";
   shown.lanes = new Lanes(byId("lanes"), (t) => { stop(); setTime(t); });
   shown.texts = new Texts(byId("text"), (kind, line) => pointOfLine(kind, line));
   listen(); handleCanvas(byId("view"));
   await pickRun(0);
-  requestAnimationFrame(() => requestAnimationFrame(() => { document.documentElement.dataset.ready = String(Math.round(performance.now())); }));
+  requestAnimationFrame(() => setTimeout(() => { document.documentElement.dataset.ready = String(Math.round(performance.mark("ready").startTime)); whenSeen(byId("view"), attach); }));
+}
+
+// WebGL draws from when the picture is first in sight: in a browser that was just begun, its graphics process starts for that.
+function attach() {
+  const canvas = byId("view"), picture = document.documentElement.dataset;
+  canvas.addEventListener("webglcontextlost", () => { shown.view.gl = null; picture.picture = "flat"; draw(); });
+  picture.picture = shown.view.attach() ? "webgl" : "flat";
+  performance.mark(picture.picture);
+  if (!shown.view.gl) byId("view-note").append(` This browser has no WebGL2: of long paths ${FLAT_MOST} points are drawn.`);
+  drawNow();
+}
+
+function whenSeen(element, what) {
+  const seen = new IntersectionObserver((found) => {
+    if (!found.some((one) => one.isIntersecting)) return;
+    seen.disconnect(); setTimeout(what);
+  });
+  seen.observe(element);
 }
 
 begin().catch((fault) => { document.documentElement.dataset.ready = "failed"; byId("verdict").className = "bad"; byId("verdict").textContent = "This page cannot be shown: " + fault.message; throw fault; });

@@ -82,7 +82,7 @@ def points_dict(run: Run) -> dict[str, Any]:
 
 
 def _legs(result: PostResult, known: Mapping[str, Floats]) -> dict[str, Any] | None:
-    """Legs at some points: which ones, and the two joints of each leg there."""
+    """Legs at some points: which ones, and the joints of each leg and its drive there."""
     job, names = result.job, result.machine.axis_names
     if job is None or result.machine.kinematics.chain:
         return None

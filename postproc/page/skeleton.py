@@ -48,7 +48,8 @@ def places_in_time(count: int) -> Floats:
 
 
 def legs(job: Job, q: Floats) -> Floats | None:
-    """(S, K, 6) drive and platform joint of each leg in the part frame, mm, at joints q (S, J), mm and rad.
+    """(S, K, 12) each leg in the part frame, mm, at joints q (S, J), mm and rad: drive and platform joint, then the ends of
+    what it moves on: of a slide its rail, of an arm its axis and the drive joint, of a leg of changing length nothing.
 
     None of a machine without legs, and where the tool that the legs carry is not where the kinematics has it.
     """
@@ -59,16 +60,30 @@ def legs(job: Job, q: Floats) -> Floats | None:
     if not rig.carriages.shape[1]:
         return None
     tip, axis = kinematics.forward(q)
-    gauge, feet, ends = (seen_from_table(kinematics, q, points) for points in (
-        rig.gauge[:, None], rig.carriages, rig.ends))
+    gauge, *parts = (seen_from_table(kinematics, q, points) for points in (
+        rig.gauge[:, None], rig.carriages, rig.ends, *drives(job.machine, kinematics, q, rig.carriages)))
     off = tip + kinematics.tool_length * axis - gauge[:, 0]
     if not _carried(kinematics):  # parts are seen from what carries the whole platform
-        feet, ends, off = feet + off[:, None], ends + off[:, None], np.zeros_like(off)
+        parts, off = [part + off[:, None] for part in parts], np.zeros_like(off)
     if not np.abs(off).max(initial=0.0) < SAME:
         return None
     back = job.placement.inverse()
-    both = [back.points(part.reshape(-1, 3)).reshape(part.shape) for part in (feet, ends)]
-    return np.concatenate(both, axis=2)
+    return np.concatenate([back.points(part.reshape(-1, 3)).reshape(part.shape) for part in parts], axis=2)
+
+
+def drives(machine: Machine, kinematics: Kinematics, q: Floats, feet: Floats) -> tuple[Floats, Floats]:
+    """Two points (S, K, 3) of what moves each foot (S, K, 3) at joints q (S, J), seen as the feet are: the ends of its
+    slide's travel, or its arm's axis and the foot itself; the foot twice of a leg of changing length and where nobody
+    knows."""
+    made = kinematics.leg_geometry
+    if made is None or len(made.names) != feet.shape[1] or not set(made.names) <= set(machine.axis_names):
+        return feet, feet
+    at = [machine.axis_names.index(name) for name in made.names]
+    ends = [np.where(np.isfinite(limit[at]), limit[at], 0.0) for limit in (machine.limits.lower, machine.limits.upper)]
+    there = [np.where(made.slide, end - q[:, at], 0.0)[..., None] * made.directions for end in ends]
+    arm = feet - made.points
+    out = np.where(made.arm[:, None], arm - np.sum(arm * made.directions, axis=2, keepdims=True) * made.directions, 0.0)
+    return feet - out + there[0], feet + there[1]
 
 
 def _carried(kinematics: Kinematics) -> list[int]:

@@ -16,8 +16,12 @@ from toolpaths.choices import LengthUnit
 
 FLAT = 0.35
 """rad: edges between triangles that meet flatter than this are left out"""
+EVEN = 1e-3
+"""rad: triangles that meet flatter than this are one face"""
 MOST = 20_000
 """edges of a solid at most: the sharpest"""
+FEW, LEAST = 6, 600
+"""sharp edges below which a solid is a round one, and how many edges of that are drawn, so that it is seen too"""
 
 
 def solids(result: PostResult) -> list[dict[str, Any]]:
@@ -55,5 +59,8 @@ def _edges(folder: Path, file: str | None, units: LengthUnit) -> Floats:
         return np.zeros((0, 6))
     angle = np.asarray(mesh.face_adjacency_angles)
     order = np.argsort(-angle, kind="stable")[:MOST]
-    pairs = np.asarray(mesh.face_adjacency_edges)[order[angle[order] > FLAT]]
+    drawn = angle[order] > FLAT
+    if np.count_nonzero(drawn) < FEW:
+        drawn = (np.arange(len(order)) < LEAST) & (angle[order] > EVEN)
+    pairs = np.asarray(mesh.face_adjacency_edges)[order[drawn]]
     return np.asarray(np.asarray(mesh.vertices)[pairs].reshape(-1, 6), dtype=np.float64)

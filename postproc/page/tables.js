@@ -119,7 +119,7 @@ function grouped(rejected) {
 }
 
 const PLAN_TEXT = {keep: "keep: the axes of the CL file", per_pass: "per pass: each pass under its own fastest axis", whole_part: "whole part: one axis for all passes",
-  auto: "auto: the least of all, turning between passes counted", paper_per_pass: "vertex-aligned: each pass with a corner of its polytope (below) turned into the cut, for comparison"};
+  auto: "auto: the least of all, turning between passes counted", paper_per_pass: "vertex-aligned: each pass with a corner of its polytope (above) turned into the cut, for comparison"};
 
 function orientationParts(k) {
   const found = report.runs[k].orientation, base = `runs.${k}.orientation`;

@@ -8,14 +8,16 @@ import numpy as np
 
 from postproc.cycle_time.estimate import Estimate
 from postproc.cycle_time.shares import shares
+from postproc.page.tool_outlines import outlines
 from postproc.pipeline.result import PostResult
 from postproc.report.summary import tools_of
 from postproc.time_study.tables import by_tool
 
 
 def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
-    """`summary.tools_of` with length register, s as `time` counts them (its change among them), mm and m that its tip
-    travels at feed against the part, arcs by their length, and its first position (axes in mm and degrees, part in mm)."""
+    """`summary.tools_of` with its form, length register, s as `time` counts them (its change among them), mm and m that
+    its tip travels at feed against the part, arcs by their length, and its first position (axes in mm and degrees, part in
+    mm)."""
     c, job, b = result.comparison, result.job, e.blocks
     if c is None or job is None or b.row is None:
         return []
@@ -23,7 +25,8 @@ def tool_rows(result: PostResult, e: Estimate) -> list[dict[str, Any]]:
     number = motion.tool[row]
     timed = {line["tool"]: line for line in by_tool(e, shares(e))}
     back, unit, found = job.placement.inverse(), job.control.unit, list[dict[str, Any]]()
-    for tool in tools_of(result):
+    for known in tools_of(result):
+        tool = known | {"form": outlines(job, known["number"])}
         blocks = np.flatnonzero(number == tool["number"])
         if not len(blocks):
             found.append(tool | {"length_register": None, "time_s": 0.0, "cutting_mm": 0.0, "cutting_m": 0.0,

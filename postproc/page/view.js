@@ -12,9 +12,13 @@ class View {
   constructor(canvas) {
     this.canvas = canvas;
     this.turn = [-0.7, 0.95]; this.middle = [0, 0, 0]; this.span = 100; this.count = 0; this.done = 0; this.coarse = false;
-    this.model = null;
-    const gl = this.gl = canvas.getContext("webgl2", {antialias: report.runs.every((run) => !run.points || run.points.count <= SMOOTH_TO), preserveDrawingBuffer: true});
-    if (!gl) return;
+    this.model = null; this.gl = null; this.places = new Float32Array(0); this.colours = new Uint8Array(0);
+  }
+
+  // From here on WebGL draws; false where the browser has none. The first call of a browser starts its graphics process.
+  attach() {
+    const gl = this.canvas.getContext("webgl2", {antialias: report.runs.every((run) => !run.points || run.points.count <= SMOOTH_TO), preserveDrawingBuffer: true});
+    if (!gl || gl.isContextLost()) return false;
     const program = this.program = gl.createProgram();
     for (const [kind, text] of [[gl.VERTEX_SHADER, LINE_VERTEX], [gl.FRAGMENT_SHADER, LINE_PIXEL]]) {
       const shader = gl.createShader(kind);
@@ -24,6 +28,9 @@ class View {
     gl.linkProgram(program);
     this.uniform = Object.fromEntries(["matrix", "done", "stride"].map((n) => [n, gl.getUniformLocation(program, n)]));
     this.buffers = {place: gl.createBuffer(), colour: gl.createBuffer(), linePlace: gl.createBuffer(), lineColour: gl.createBuffer()};
+    this.gl = gl;
+    this.fill("place", this.places); this.fill("colour", this.colours);
+    return true;
   }
 
   fill(buffer, data, use) {
@@ -47,7 +54,7 @@ class View {
     this.fill("place", data);
   }
 
-  setColours(rgba) { this.fill("colour", rgba); }
+  setColours(rgba) { this.colours = rgba; this.fill("colour", rgba); }
 
   // Show all between two corners.
   fit(low, high) {
@@ -102,8 +109,8 @@ class View {
   // Lines: [x0, y0, z0, x1, y1, z1, r, g, b] in part coordinates, bytes.
   draw(lines) {
     const gl = this.gl;
-    if (!gl || !this.centre) return;
     this.resize();
+    if (!gl || !this.centre) return;
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
     gl.clearColor(1, 1, 1, 1); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.BLEND); gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);

@@ -57,8 +57,9 @@ def _arc_extremes(path: JointPath, law: Control, k: Ints, at_start: Floats, low:
 
 
 def check_travel(path: JointPath, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
-                 file: str = "") -> tuple[list[Diagnostic], dict[str, tuple[float, float]]]:
-    """(excesses as errors, extents of each axis in mm or degrees)."""
+                 file: str = "", where: Callable[[Ints], str] = lambda moves: "",
+                 ) -> tuple[list[Diagnostic], dict[str, tuple[float, float]]]:
+    """(excesses as errors, extents of each axis in mm or degrees); `where` says at which place moves (K,) are made."""
     machine, limits = control.machine, control.machine.limits
     lowest, highest = np.full(len(limits.lower), np.inf), np.full(len(limits.lower), -np.inf)
     beyond: list[tuple[Ints, Floats, Floats]] = []
@@ -76,7 +77,8 @@ def check_travel(path: JointPath, moves: Moves, control: Control, kinematics: Ca
         over = np.maximum(limits.lower[j] - low[:, j], high[:, j] - limits.upper[j])
         bad = over > TRAVEL_SLACK
         if bad.any():
-            diagnostics.append(_excess(path, moves, control, j, rows[bad], low[bad, j], high[bad, j], over[bad], file))
+            diagnostics.append(_excess(path, moves, control, j, rows[bad], low[bad, j], high[bad, j], over[bad], file,
+                                       where(path.move[rows[bad]])))
     return diagnostics, extents
 
 
@@ -107,8 +109,8 @@ def extremes(path: JointPath, moves: Moves, control: Control, kinematics: Callab
 
 
 def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, low: Floats, high: Floats, over: Floats,
-            file: str) -> Diagnostic:
-    """Axis j goes beyond its travel in the blocks `bad` (K,), to `low`, `high`, by `over` (K,)."""
+            file: str, where: str) -> Diagnostic:
+    """Axis j goes beyond its travel in the blocks `bad` (K,), to `low`, `high`, by `over` (K,), at a place."""
     machine = control.machine
     rotary = machine.rotary[j]
     unit, name = (1.0 / DEG, "degrees") if rotary else (1.0, "mm")
@@ -124,6 +126,6 @@ def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, 
         hint = "turn the part in the set-up, or split the operation"
     elif linking:
         hint += ", lower clearance.margin, or use a shorter tool (gauge_length)"
-    return error("travel.exceeded", f"axis {machine.axis_names[j]} goes to {value * unit:.4f} {name}{linking}, allowed "
-                 f"{lower:.4f} to {upper:.4f} {name}", file=file,
+    return error("travel.exceeded", f"axis {machine.axis_names[j]} goes to {value * unit:.4f} {name}{linking}{where}, "
+                 f"allowed {lower:.4f} to {upper:.4f} {name}", file=file,
                  lines=[first, *(n for n in lines[:6].tolist() if n != first)], count=len(lines), hint=hint)

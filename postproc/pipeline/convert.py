@@ -212,9 +212,9 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         return replace(begun, diagnostics=tuple(found))
     asked, at_gauge = start.asked or start.setup, job.setup
     if tool_table:
-        from postproc.verification.tool_table import measured_lengths, read_tool_table, with_measured
+        from postproc.verification.tool_table import lengths_at_machine, with_measured
 
-        measured, more = measured_lengths(read_tool_table(tool_table, spec), job, str(tool_table))
+        measured, more = lengths_at_machine(tool_table, job)
         begun, found, asked = replace(begun, measured=tuple(measured)), [*found, *more], with_measured(asked, measured)
         if has_errors(more):
             return replace(begun, diagnostics=tuple(found))

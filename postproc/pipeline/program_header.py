@@ -109,8 +109,10 @@ def _orientations(made: CompiledStage) -> list[str]:
     if made.choice is None:
         return []
     from postproc.orientation.report.text import header
+    from postproc.orientation.turning.turning_report import header as turning_header
 
-    return header(made.choice, made.options.orient)
+    turned = turning_header(made.turning) if made.turning is not None else []
+    return [*header(made.choice, made.options.orient, bool(turned)), *turned]
 
 
 def _corrections(made: CompiledStage) -> list[str]:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from postproc.correction.compensation import ErrorCorrection
     from postproc.correction.written_deviation import AfterFormatting
     from postproc.orientation.plans.choice import OrientationChoice
+    from postproc.orientation.turning.turning_choice import TurningChoice
     from postproc.planning.planned import PlannedMotion
     from postproc.verification.tool_table import MeasuredLength
     from postproc.witness.evidence import Testimony
@@ -61,6 +62,8 @@ class PostResult:
     """texts of subprograms in files of their own, by file name"""
     choice: OrientationChoice | None = None
     """of the tool axes that `toolpath` has instead of the CL file's, where --orient asked for one"""
+    turning: TurningChoice | None = None
+    """of axes that turn along cuts, where the set-up has a cone"""
     source: ClSource | None = None
     """of the path as it was read, for the second witness"""
     asked: SetupFile | None = None

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from postproc.correction.compensation import ErrorCorrection
     from postproc.correction.written_deviation import AfterFormatting
     from postproc.orientation.plans.choice import OrientationChoice
+    from postproc.orientation.turning.turning_choice import TurningChoice
     from postproc.planning.planned import PlannedMotion
     from postproc.witness.evidence import Testimony
 
@@ -47,6 +48,7 @@ class BegunStage:
     diagnostics: tuple[Diagnostic, ...]
     toolpath: Toolpath
     choice: OrientationChoice | None
+    turning: TurningChoice | None
     source: ClSource | None
     asked: SetupFile | None
     left: ExcludedPasses

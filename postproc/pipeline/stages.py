@@ -18,6 +18,7 @@ from postproc.compile.cycle_refusals import only_canned
 from postproc.compile.feed import PlannedTimes as PlannedFeeds
 from postproc.compile.word_rows import block_tools
 from postproc.job.job import Job, prepare
+from postproc.job.places import at_place
 from postproc.path.build import build_path
 from postproc.path.model import JointPath
 from postproc.path.reach import check_reach
@@ -88,8 +89,8 @@ def staged(result: PostResult, progress: Progress | None = None,
            left: ExcludedPasses = frozenset()) -> PostResult:
     """A conversion through all stages, up to the first that finds an error; `left`: passes that --smooth leaves."""
     made: Any = BegunStage(result.options, result.machine, result.controller, result.controller_name, result.setup,
-                           result.diagnostics, result.toolpath, result.choice, result.source, result.asked, left,
-                           result.refused, result.control_plan)
+                           result.diagnostics, result.toolpath, result.choice, result.turning, result.source,
+                           result.asked, left, result.refused, result.control_plan)
     for number, stage in enumerate(STAGES):
         made, found = stage.run(made, _named(progress, stage.name, number))
         result = replace(_recorded(result, made, found), reached=stage.name)
@@ -169,7 +170,7 @@ def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage
     from postproc.correction.compensation import compensate
 
     options, file, moves = job.options, made.toolpath.file, made.moves
-    far = check_travel(path, job.moves, job.control, job.kinematics, file)[0]
+    far = check_travel(path, job.moves, job.control, job.kinematics, file, at_place(job.places, job.repeats, job.moves))[0]
     far += check_reach(path, job.moves, job.control, file)
     if has_errors(far):
         return made, with_system(far, job.work_system, job.placement, job.moves.axis)
@@ -184,7 +185,8 @@ def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage
 def checked(made: CorrectedStage, progress: Progress | None) -> tuple[CheckedStage, DiagnosticList]:
     """Travel, reach, distance from singular positions."""
     job, path, file = made.job, made.path, made.toolpath.file
-    found, extents = check_travel(path, job.moves, job.control, job.kinematics, file)
+    found, extents = check_travel(path, job.moves, job.control, job.kinematics, file,
+                                  at_place(job.places, job.repeats, job.moves))
     found += check_reach(path, job.moves, job.control, file)
     found += check_singular(path, job.moves, job.control, job.setup.joints.singular_distance, file)
     return handed_on(CheckedStage, made, extents=extents), with_system(found, job.work_system, job.placement, job.moves.axis)

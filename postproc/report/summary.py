@@ -122,8 +122,10 @@ def _orientation(result: PostResult) -> dict[str, Any] | None:
     if result.choice is None:
         return None
     from postproc.orientation.report.figures_of_choice import chosen
+    from postproc.orientation.turning.turning_report import as_dict
 
-    return chosen(result.choice, result.options.orient)
+    turning = None if result.turning is None else as_dict(result.turning)
+    return chosen(result.choice, result.options.orient) | {"turning": turning}
 
 
 def _axes_on_the_control(result: PostResult) -> list[str]:
@@ -131,8 +133,9 @@ def _axes_on_the_control(result: PostResult) -> list[str]:
     if result.choice is None or not result.choice.programs:
         return []
     from postproc.orientation.report.figures_of_choice import control_line
+    from postproc.orientation.turning.turning_report import control_lines
 
-    return [control_line(result.choice)]
+    return [control_line(result.choice), *(control_lines(result.turning) if result.turning is not None else [])]
 
 
 def witness_dict(said: Testimony | None) -> dict[str, Any] | None:

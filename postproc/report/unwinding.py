@@ -30,6 +30,14 @@ def unwinding(result: PostResult) -> dict[str, dict[str, Any]]:
     return found
 
 
+def _remedy(result: PostResult, letter: str) -> str:
+    """What the machine file is to say, where the axis rolls over at the machine; an axis that is modulo already has the
+    controller's rule "none"."""
+    machine = result.machine
+    key = 'rollover = "shortest" or "sign"' if machine.turns[machine.axis_names.index(letter)].modulo else "modulo = true"
+    return f"none with {key} in the machine file, where the axis rolls over"
+
+
 def unwinding_lines(result: PostResult) -> list[str]:
     """The same for people, where there is any."""
     lines = []
@@ -38,6 +46,5 @@ def unwinding_lines(result: PostResult) -> list[str]:
             lines.append(f"{letter} unwinds whole turns for {figures['in_program_s']:.1f} s")
         if figures["turns_left"]:
             lines.append(f"{letter} is left {abs(figures['turns_left'])} turns from home: the next start unwinds them in "
-                         f"{figures['next_start_s']:.1f} s (none with modulo = true in the machine file, where the axis "
-                         "rolls over)")
+                         f"{figures['next_start_s']:.1f} s ({_remedy(result, letter)})")
     return lines

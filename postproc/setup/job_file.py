@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
@@ -21,6 +21,10 @@ _NAMES = ("machine", "controller")
 
 class JobFile(UserModel):
     """What a job is converted with; every key has an option that takes precedence. Files are named from its folder."""
+
+    ELSEWHERE: ClassVar[dict[str, str]] = {"jobs": "this file is one job; several are the file of postproc batch JOBS.toml, "
+                                                   "under another name"}
+    """what a key says that belongs to another file"""
 
     machine: Annotated[str, Field(min_length=1)] | None = None
     """as -m"""

@@ -30,8 +30,8 @@ def _checked(tables: CriterionTables) -> CriterionTables:
 AngleRange = Annotated[tuple[LimitAngle, LimitAngle], BeforeValidator(pair), AfterValidator(_ordered)]
 
 
-class OrientationLimits(UserModel):
-    """Tool axes that a re-oriented pass may take, at every point of it; --max-tilt holds besides.
+class AxisLimits(UserModel):
+    """Tool axes that a cut may take, at every point of it; --max-tilt holds besides.
 
     The angles are those between axis and surface normal, looked at against the feed direction (LEAD and TILT
     as in Siemens, SINUMERIK 840D programming guide Advanced, "tool orientation with LEAD and TILT"). They
@@ -47,13 +47,12 @@ class OrientationLimits(UserModel):
     """least angle between axis and surface normal, degrees, so that a ball does not cut with its dead centre"""
     contact_radius: float | None = Field(default=None, gt=0.0)
     """the same as least distance of the contact from the tool axis, mm"""
-    fixed_operations: tuple[str, ...] = ()
-    """names of operations that keep the axes of the CL file"""
-    criteria: Annotated[CriterionTables, AfterValidator(_checked)] = Field(default_factory=dict)
-    """limits of installed packages, a table for each by its name, with the keys that the package says"""
+    cone: float | None = Field(default=None, ge=0.0, le=45.0)
+    """degrees by which the axis of a ball may be turned at each point of a cut, differently from point to point, away from
+    where it stands there: that of the CL file, or the one chosen for the pass; without it no axis turns along a cut"""
 
     @model_validator(mode="after")
-    def _one_centre(self) -> OrientationLimits:
+    def _one_centre(self) -> AxisLimits:
         if self.off_centre is not None and self.contact_radius is not None:
             raise ValueError("off_centre and contact_radius say the same: give one of them")
         return self
@@ -62,3 +61,28 @@ class OrientationLimits(UserModel):
     def need_normals(self) -> bool:
         """True where surface normals must be known."""
         return any(value is not None for value in (self.lead, self.tilt, self.off_centre, self.contact_radius))
+
+
+class OrientationLimits(AxisLimits):
+    """Tool axes that `orient` and --orient may choose: of all operations, of some of their own, and which keep theirs."""
+
+    fixed_operations: tuple[str, ...] = ()
+    """names of operations that keep the axes of the CL file"""
+    operations: dict[str, AxisLimits] = Field(default_factory=dict)
+    """limits of single operations, a table for each by its name: what it states goes before what holds for all"""
+    criteria: Annotated[CriterionTables, AfterValidator(_checked)] = Field(default_factory=dict)
+    """limits of installed packages, a table for each by its name, with the keys that the package says"""
+
+    @property
+    def turns(self) -> bool:
+        """True where the axis of some cut may turn along it."""
+        return bool(self.cone) or any(own.cone for own in self.operations.values())
+
+    def of(self, operation: str) -> OrientationLimits:
+        """The limits of one operation."""
+        own = self.operations.get(operation)
+        if own is None:
+            return self
+        stated = {name: getattr(own, name) for name in own.model_fields_set}
+        centre = {"off_centre": None, "contact_radius": None} if {"off_centre", "contact_radius"} & set(stated) else {}
+        return self.model_copy(update=centre | stated)

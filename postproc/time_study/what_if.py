@@ -19,6 +19,8 @@ MODEL = ("spindle_time", "corner_tolerance", "block_time", "stop_time", "rapid",
 MOST = 100.0
 """largest factor, and 1 over the smallest"""
 
+FACTOR = f"a factor from {1.0 / MOST:g} to {MOST:g} stands behind ="
+
 
 @dataclass(frozen=True)
 class WhatIf:
@@ -38,19 +40,23 @@ def parsed(text: str, *machines: Machine) -> WhatIf:
         DiagnosticError: names the values that there are.
     """
     known = {f"{axis}.{limit}" for m in machines for axis in m.axis_names for limit in LIMITS} | {*LIMITS, *TIMING, *MODEL}
-    factors = []
-    for part in text.split(","):
-        name, sign, number = (word.strip() for word in part.partition("="))
-        try:
-            factor = float(number)
-        except ValueError:
-            factor = math.nan
+    factors = tuple(factor_of(part) for part in text.split(","))
+    for name, factor in factors:
         if name not in known:
             raise _wrong(f"{name!r} is no value of {', '.join(m.name for m in machines)}")
-        if not sign or not 1.0 / MOST <= factor <= MOST:
-            raise _wrong(f"{part.strip()!r}: a factor from {1 / MOST:g} to {MOST:g} stands behind =")
-        factors.append((name, factor))
-    return WhatIf(text, tuple(factors))
+        if math.isnan(factor):
+            raise _wrong(f"{text!r}: {FACTOR}")
+    return WhatIf(text, factors)
+
+
+def factor_of(part: str) -> tuple[str, float]:
+    """The name and the factor of "X.acceleration=1.3"; NaN where it is none."""
+    name, _, number = (word.strip() for word in part.partition("="))
+    try:
+        factor = float(number)
+    except ValueError:
+        factor = math.nan
+    return name, factor if 1.0 / MOST <= factor <= MOST else math.nan
 
 
 def _wrong(what: str) -> DiagnosticError:

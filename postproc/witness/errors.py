@@ -322,7 +322,7 @@ def error_rods(table: dict[str, Any], model: dict[str, Any]) -> Rods | None:
             start = start + (0.0 if drive == "arm" else guide @ own + (drive == "slide") * more * u)
             rod = size + mm * (given.get("length") or {k: 0.0})[k] + (drive == "length") * more
             found.append((name, drive, np.array([start, u, joint + shift + end, arms, kept]), rod, root))
-    due = len(nominal.legs) if bars else 6 - 2 * nominal.held[2]
+    due = len(nominal.legs) if bars or nominal.besides.any or nominal.rings else 6 - 2 * nominal.held[2]
     return replace(nominal, legs=tuple(found), wrong=True) if len(found) == due else None
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from postproc.witness.commanded import unit
+from postproc.witness.held import HeldPlatform, held
 from postproc.witness.text import Array
 
 _ALONG = {"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1), "U": (1, 0, 0), "V": (0, 1, 0), "W": (0, 0, 1),
@@ -98,8 +100,18 @@ def rotations(along: Array, angle: Array) -> Array:
 
 def turned(along: Array, angle: Array, v: Array) -> Array:
     """Vectors (N, 3) or (1, 3) turned about a unit vector by angles (N,): `rotations` without their matrices."""
-    angle, first = angle[:1] if len(angle) and (angle == angle[0]).all() else angle, np.cross(along, v)
-    return np.asarray(v + np.sin(angle)[:, None] * first + (1.0 - np.cos(angle))[:, None] * np.cross(along, first))
+    angle = angle[:1] if len(angle) and (angle == angle[0]).all() else angle
+    sine, rest, result = np.sin(angle), 1.0 - np.cos(angle), np.empty((max(len(angle), len(v)), 3))
+    columns = np.ascontiguousarray(v.T)
+    first = across(along, columns)
+    for k, (value, once, twice) in enumerate(zip(columns, first, across(along, first), strict=True)):
+        result[:, k] = value + sine * once + rest * twice
+    return result
+
+
+def across(along: Array, v: Sequence[Array] | Array) -> list[Array]:
+    """The vector product of one vector with others, these and that by columns."""
+    return [along[j] * v[k] - along[k] * v[j] for j, k in ((1, 2), (2, 0), (0, 1))]
 
 
 def apply(turns: Array, v: Array) -> Array:
@@ -137,6 +149,11 @@ class Rods:
     sense: float = 1.0
     carriers: dict[str, Array] = field(default_factory=dict)
     held: Array = field(default_factory=lambda: np.zeros(3))
+    besides: HeldPlatform = field(default_factory=HeldPlatform)
+    rings: dict[str, float] = field(default_factory=dict)
+    tables: dict[str, Array] = field(default_factory=dict)
+    wrist: dict[str, Array] = field(default_factory=dict)
+    """(direction, point) (2, 3) of rotary axes in series: from the part to the bed, from the platform to the spindle"""
     wrong: bool = False
     """every rod is a leg of its own, the platform turns as it must; of two pairs in a plane the mean of each counts"""
 
@@ -163,14 +180,36 @@ class Rods:
         if self.carries == "part":
             back = rotations(_UP, -turn)
             tip, axis = apply(back, tip), apply(back, axis)
+        for name, (along, point) in self.tables.items():
+            back = -q[:, letters.index(name)]
+            tip, axis = turned(along, back, tip - point) + point, turned(along, back, axis)
         for name, along in self.carriers.items():
             tip = tip - q[:, letters.index(name)][:, None] * along
         head = rotations(np.eye(3)[int(self.turns != "b")], turn * (self.carries == "spindle"))
         tool = apply(head, _UP[None])
+        if self.wrist:
+            tool, reach = self._at_wrist(q, letters)
+            least = _between(np.broadcast_to(tool, axis.shape), axis) if self.turns else np.eye(3)[None]
+            return self._closed(q, letters, (tip, axis, length), np.broadcast_to(least, (len(q), 3, 3)), (tool, reach))
         platform = self._nominal(axis * np.where(tool[:, 2:] < 0.0, -1.0, 1.0))  # past a quarter turn the head points back
         if self.wrong and self.turns != "c":
             platform = _between(np.broadcast_to(apply(platform, tool), axis.shape), axis) @ platform
-        expected, gauge, reach = apply(platform, tool), tip + length[:, None] * axis, apply(head, self.reach[None])
+        return self._closed(q, letters, (tip, axis, length), platform, (tool, apply(head, self.reach[None])))
+
+    def _at_wrist(self, q: Array, letters: tuple[str, ...]) -> tuple[Array, Array]:
+        """(tool axis, gauge point from the reference point) (N, 3) in directions of the platform."""
+        tool, reach = np.broadcast_to(_UP, (len(q), 3)), np.broadcast_to(self.reach, (len(q), 3))
+        for name, (along, point) in reversed(self.wrist.items()):
+            value = q[:, letters.index(name)]
+            tool, reach = turned(along, value, tool), turned(along, value, reach - point) + point
+        return tool, reach
+
+    def _closed(self, q: Array, letters: tuple[str, ...], claimed: tuple[Array, Array, Array], platform: Array,
+                carried: tuple[Array, Array]) -> tuple[Array, Array]:
+        """What `_placed` gives of a tip, axis and length that are `claimed`; `carried`: tool axis and gauge point on the
+        platform."""
+        (tip, axis, length), (tool, reach) = claimed, carried
+        expected, gauge = apply(platform, tool), tip + length[:, None] * axis
         if self.wrong or "c" in self.turns:  # the tool turns about itself between blocks
             platform, off = self._spun(q, letters, gauge, platform, reach, axis)
         else:
@@ -196,14 +235,16 @@ class Rods:
               axis: Array) -> tuple[Array, Array]:
         """(platform (N, 3, 3), mm by which each rod misses its length (K, N)) where the tool is turned about itself as the
         rods have it; `level` without."""
-        best, found = level, np.full((len(self.legs), len(q)), np.inf)
+        best, found = level, np.full((1, len(q)), np.inf)
         for start in SPINS:
             platform, spin = level, np.full(len(q), start)
             for _ in range(SPIN_STEPS):
                 platform = _spun(axis, np.where(np.isfinite(spin), spin, 0.0)) @ platform
                 off, slope = self._legs(q, letters, gauge, platform, reach, axis)
-                if not np.abs(spin := -(off * slope).sum(axis=0) / (slope * slope).sum(axis=0)).max(initial=0.0) > SPUN:
+                steep = np.maximum((slope * slope).sum(axis=0), 1e-300)
+                if not np.abs(spin := -(off * slope).sum(axis=0) / steep).max(initial=0.0) > SPUN:
                     break
+            found = np.broadcast_to(found, off.shape)
             missed, least = (np.abs(self._middles(one)).max(axis=0) for one in (off, found))
             better = missed < least
             best, found = np.where(better[:, None, None], platform, best), np.where(better, off, found)
@@ -220,10 +261,18 @@ class Rods:
             crank = apply(rotations(along, value), arm[None]) if drive == "arm" else 0.0
             rod = foot + (value[:, None] * along if drive == "slide" else crank) - gauge - own - kept
             moved = along if drive == "slide" else np.cross(along, crank) if drive == "arm" else 0.0
+            if letter in self.rings:
+                z = platform[:, :, 2]
+                up = (rod * z).sum(axis=1)
+                aside = np.sqrt(np.maximum((rod * rod).sum(axis=1) - up * up, 1e-300))
+                rod = up[:, None] * z + ((aside - self.rings[letter]) / aside)[:, None] * (rod - up[:, None] * z)
             long, due = np.sqrt((rod * rod).sum(axis=1)), size + value * (drive == "length")
             wrong = ((rod * moved).sum(axis=1) * root < 0.0) | (due <= 0.0)
             offs.append(np.where(wrong, np.inf, long - due))
             slopes.append(-(rod * np.cross(axis, own)).sum(axis=1) / long)
+        for off, slope in self.besides.misses(gauge, self.pivot + reach, platform, axis):
+            offs.append(off)
+            slopes.append(slope)
         return np.array(offs), np.array(slopes)
 
 
@@ -263,6 +312,7 @@ def ring(layout: dict[str, Any]) -> dict[str, dict[str, Any]]:
         level = 1j * out if layout["drive"] == "arm" else math.sin(lean) * out
         found[name] = {
             **layout, "direction": (level.real, level.imag, 0.0 if layout["drive"] == "arm" else math.cos(lean)),
+            "hinge": ((1j * out).real, (1j * out).imag, 0.0) if layout.get("hinged") else None,
             "point": (foot.real, foot.imag, layout.get("height", 0.0)), "arm": (arm * out.real, arm * out.imag, 0.0),
             "joint": (end.real, end.imag, layout.get("joint_height", 0.0)),
             "rail_offset": (rail.real, rail.imag, 0.0),
@@ -292,10 +342,15 @@ def rods(table: dict[str, Any]) -> Rods:
         leg[1] = unit(leg[1])
     pivot, gauge = rows(rotary, "pivot")[0], kinematics.get("gauge", 0.0)
     reach = rows(kinematics, "gauge")[0] - pivot if kinematics.get("kind") == "legs" else -float(gauge) * _UP
+    tables = legs_of(kinematics)
+    besides, rings = held(kinematics, tables), {name: float(leg["ring"]) for name, leg in tables.items() if leg.get("ring")}
+    freedoms = "xyzabc" if besides.any or rings else freedoms
     return Rods(legs, "".join(sorted(set(freedoms) & set("abc"))), pivot, reach, rotary.get("letter", ""),
                 rotary.get("carries", ""), float(rotary.get("positive", 1)),
                 {name: unit(rows(one, "direction")[0]) for name, one in carriers.items()},
-                np.array([float(letter not in freedoms) for letter in "xyz"]))
+                np.array([float(letter not in freedoms) for letter in "xyz"]), besides, rings,
+                *({name: np.array([unit(np.array(one["direction"], np.float64)), one.get("point", (0.0, 0.0, 0.0))])
+                   for name, one in kinematics.get(key, {}).items()} for key in ("table_axes", "spindle_axes")))
 
 
 def _on_bar(leg: dict[str, Any], bars: dict[str, dict[str, Any]]) -> dict[str, Any]:

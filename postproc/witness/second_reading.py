@@ -17,13 +17,15 @@ from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Fi
 from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged, other_limits
 from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
-from postproc.witness.rests import check_rests
 from postproc.witness.sides import check_sides
 from postproc.witness.splines import check_curves
 from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities, tools_of, with_spindle
 from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
 from postproc.witness.text import Array
 from postproc.witness.turning import check_turning
+
+REST = 2e-3
+"""s"""
 
 ZERO = 1e-6
 """mm that reckoning may move the zero of the work offset"""
@@ -59,13 +61,23 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
 
 
 def _reoriented(c: Commanded, axes: Array) -> Commanded:
-    """With other tool axes: balls, and arcs, stay where they are; a tool that is turned and no ball is not known."""
+    """With other tool axes: balls, and arcs, stay where they are; a tool that is turned and no ball is not known. A straight
+    cut whose tip goes farther or less far for it takes the time that it had."""
     turned = np.abs(axes - c.axis).max(axis=1) > 1e-12
     move = np.where(turned[:, None], c.ball[:, None] * (c.axis - axes), 0.0)
     centre, arcs = c.centre.copy(), np.flatnonzero(c.arc >= 0)
     centre[c.arc[arcs]] += move[arcs]
     return replace(c, tip=c.tip + move, axis=np.where(turned[:, None], axes, c.axis), centre=centre,
-                   known=c.known & np.isfinite(move).all(axis=1))
+                   known=c.known & np.isfinite(move).all(axis=1), feed=c.feed * _longer(c, turned, move))
+
+
+def _longer(c: Commanded, turned: Array, move: Array) -> Array:
+    """(N,) how far the tip goes over how far it went in straight cuts between poses that are turned, else 1."""
+    ratio, now = np.ones(len(c)), c.tip + move
+    old, new = (np.sqrt((np.diff(tip, axis=0) ** 2).sum(axis=1)) for tip in (c.tip, now))
+    cuts = (c.kind[1:] == LINE) & (turned[1:] | turned[:-1]) & ~c.inverse[1:] & (np.minimum(old, new) > 1e-6)
+    ratio[1:][cuts] = new[cuts] / old[cuts]
+    return np.where(np.abs(ratio - 1.0) > 1e-9, ratio, 1.0)
 
 
 def _machine(case: Case, table: dict[str, object]) -> Chain | ErrorChain | Rods | None:
@@ -189,3 +201,36 @@ def _misfits(poses: Poses) -> list[Finding]:
     if math.isinf(worst[0]):
         said = "a carriage stands on the wrong side of its rod"
     return [Finding("rods", f"{said} where the tool is said to be", 0, int(poses.executed.line[worst[1]]))]
+
+
+def check_rests(w: Walked, c: Commanded, match: Array) -> tuple[list[Finding], int]:
+    """Rests of another length and stops that the program lacks; how many were compared."""
+    e, found, count = w.poses.executed, list[Finding](), len(c.stops)
+    rests, asked, taken = dict[tuple[int, int], float](), dict[tuple[int, int], int](), set[int]()
+    for row, seconds, line in c.rests:
+        here = _between(w, match, row)
+        rests[here] = rests.get(here, 0.0) + seconds
+        asked.setdefault(here, line)
+    for (first, last), seconds in rests.items():
+        drilled = first >= 0 and w.targets.kind[np.searchsorted(match, first, side="right") - 1] == BOTTOM
+        given = float(e.dwell[max(first + int(drilled), 0):last].sum())
+        count += seconds == seconds
+        if abs(given - seconds) > REST + 0.01 * seconds:
+            found.append(Finding("rest", f"the tool rests for {given:g} s here, the CL file says {seconds:g} s",
+                                 asked[first, last], int(e.line[max(first, 0)])))
+    for row, kind, line in c.stops:
+        first, last = _between(w, match, row)
+        own = [k for k, (at, number) in enumerate(e.stops) if number == kind and first < at <= last and k not in taken]
+        taken.update(own[:1])
+        if not own:
+            found.append(Finding("rest", f"the program has no M{kind:g} here, where the CL file stops", line,
+                                 int(e.line[max(first, 0)])))
+    return found, count
+
+
+def _between(w: Walked, match: Array, row: int) -> tuple[int, int]:
+    """(block that ends at the last position before a row, -1; block that ends at the first one behind it, or all)."""
+    at = int(np.searchsorted(w.targets.row, row))
+    first = int(match[at - 1]) if at else -1
+    behind = int(np.searchsorted(match, first, side="right"))
+    return first, int(match[behind]) if behind < len(match) else len(w.owner)

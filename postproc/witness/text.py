@@ -101,15 +101,12 @@ def read(data: bytes) -> ClText:
     spans = [m.span() for m in _OTHER.finditer(text)]
     raw = np.frombuffer(text, np.uint8)
     ends = np.flatnonzero((raw == 10) | (raw == JOIN[0]))
-    kept, at = [], 0
-    for first, last in spans:
-        kept.append(text[at:first])
-        at = last + 1
-    kept.append(text[at:])
-    lengths = [part.count(b"\n") + (1 if k == len(kept) - 1 and part.strip() and not part.endswith(b"\n") else 0)
-               for k, part in enumerate(kept)]
+    kept = list(zip([0, *(last + 1 for _, last in spans)], [*(first for first, _ in spans), len(text)], strict=True))
+    lengths = [text.count(b"\n", *part) for part in kept]
+    rest = text[kept[-1][0]:]
+    lengths[-1] += bool(rest.strip()) and not rest.endswith(b"\n")
     before = np.cumsum(lengths)
-    rows = _numbers(b"".join(kept))
+    rows = _numbers(b"".join(memoryview(text)[first:last] for first, last in kept))
     starts = np.searchsorted(ends, [first for first, _ in spans]) if spans else np.zeros(0, np.int64)
     found = [_record(text[first:last]) for first, last in spans]
     used = [k for k, r in enumerate(found) if r.major or r.body]
@@ -147,10 +144,14 @@ def _plain(data: bytes) -> bytes:
 
 
 def without_carriage_returns(data: bytes) -> bytes:
-    """UTF-8 or single bytes with LF, without NULs."""
-    for bom, encoding in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
+    """UTF-8 or single bytes with LF, without NULs; UTF-16 without its mark has a NUL for every other byte."""
+    for bom, encoding in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
+                          (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
         if data.startswith(bom):
             data = data.decode(encoding, "replace").encode("utf-8")
+    for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if len(data) >= 8 and data[first:400:2].count(0) > 0.8 * len(data[first:400:2]):
+            data = data.decode(encoding, "replace").encode("utf-8", "replace")
     for old, new in ((b"\r\n", b"\n"), (b"\r", b"\n"), (b"\x00", b" "), (b"\x1a", b" ")):
         if old in data:
             data = data.replace(old, new)

@@ -52,7 +52,8 @@ def _own_length(controller: ControllerFile, program: Program, file: str,
     names = ", ".join(f"T{tool:g}" for tool in tools)
     return [warning("tool.length_twice", f"the words hold the lengths of {names} already, and this controller adds that of "
                     "its tool table with every tool change", file=file, count=len(tools),
-                    hint="L and DL of these tools must be 0 in the control's tool table")]
+                    hint="L and DL of these tools must be 0 in the control's tool table; verify --tool-table TOOL.T "
+                    "looks whether they are")]
 
 
 def _radius_registers(controller: ControllerFile, program: Program, file: str) -> list[Diagnostic]:
@@ -65,7 +66,8 @@ def _radius_registers(controller: ControllerFile, program: Program, file: str) -
         return []
     return [warning("cutcom.own_register", "the register of CUTCOM is not written: this controller takes the radius of the "
                     "tool in the spindle", file=file, lines=lines[:6], count=len(lines),
-                    hint="put what the register would hold into the tool's own data")]
+                    hint="leave the register out of CUTCOM (CUTCOM/LEFT) where the tool's own data in the "
+                    "control holds that radius")]
 
 
 def _pitches(controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...],

@@ -29,6 +29,9 @@ PLACE = """() => { const i = shown.run.columns["CL line"].indexOf(14), p = shown
 DARK = """() => { drawNow(); const g = shown.view.gl, w = g.drawingBufferWidth, h = g.drawingBufferHeight;
   const p = new Uint8Array(4 * w * h); g.readPixels(0, 0, w, h, g.RGBA, g.UNSIGNED_BYTE, p);
   return p.some((v, i) => i % 4 < 3 && v < 160); }"""
+FLAT = """() => { drawNow(); const c = byId("labels"), d = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+  let found = 0; for (let i = 0; i < d.length; i += 4) if (d[i + 3] > 40) found++; return found; }"""
+"""pixels that the plain canvas has painted"""
 OFF = """() => { const run = shown.run, s = run.info.skeleton; let most = 0;
   for (let i = 0; i < run.count; i++) {
     const f = framesOf(s, (a) => run.columns[a][i]), last = f[f.length - 1], axis = turned(last, s.tool_axis);
@@ -89,6 +92,14 @@ def until(page: Any, what: str) -> None:
     raise AssertionError(f"never: {what}")
 
 
+def settled(page: Any) -> None:
+    """Wait until all is there and the picture, brought into sight, is drawn as it stays."""
+    page.wait_for_selector("html[data-ready]", state="attached")
+    if page.is_visible("#view"):
+        page.evaluate("byId('path').scrollIntoView()")
+        page.wait_for_selector("html[data-picture]", state="attached")
+
+
 @pytest.fixture(scope="module")
 def opened() -> Iterator[Session]:
     with playwright.sync_playwright() as driver:
@@ -98,7 +109,7 @@ def opened() -> Iterator[Session]:
         session.page.on("pageerror", lambda fault: session.said.append(str(fault)))
         session.page.on("request", lambda request: session.asked.append(request.url))
         session.page.goto(small().page.as_uri())
-        session.page.wait_for_selector("html[data-ready]", state="attached")
+        settled(session.page)
         yield session
         browser.close()
 
@@ -237,6 +248,31 @@ def test_every_colouring_paints_and_says_what_the_colours_mean(opened: Session) 
         assert page.evaluate(DARK), name
 
 
+def test_the_path_is_there_before_webgl_and_without_it(opened: Session) -> None:
+    """A plain canvas has the same lines at the same places: before the picture is in sight, in a browser that has no WebGL2,
+    and after a graphics process was lost."""
+    context = opened.page.context.browser.new_context(viewport={"width": 500, "height": 300})
+    page = context.new_page()
+    page.goto(small().page.as_uri())
+    page.wait_for_selector("html[data-ready]", state="attached")
+    assert page.get_attribute("html", "data-picture") is None and page.evaluate("shown.view.gl === null")
+    drawn = page.evaluate(FLAT)
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = new Proxy(HTMLCanvasElement.prototype.getContext, "
+                         "{apply: (f, on, [kind, ...rest]) => kind === 'webgl2' ? null : f.apply(on, [kind, ...rest])})")
+    page.reload()
+    settled(page)
+    assert page.get_attribute("html", "data-picture") == "flat" and page.evaluate(FLAT) == drawn
+    assert "no WebGL2" in page.inner_text("#view-note")
+    context.close()
+    opened.page.evaluate("pickRun(0)")
+    letters = opened.page.evaluate(FLAT)
+    lost = "byId('view').dispatchEvent(new Event('webglcontextlost', {cancelable: true}))"
+    opened.page.evaluate(f"globalThis.kept = shown.view.gl; {lost}")
+    without = opened.page.evaluate(FLAT)
+    opened.page.evaluate("shown.view.gl = kept; document.documentElement.dataset.picture = 'webgl'; drawNow()")
+    assert without > letters + 500 and drawn > 500
+
+
 def test_the_page_moves_the_axes_as_the_kinematics_does(opened: Session) -> None:
     """The tool that the axes carry ends at the drawn tip, at every point."""
     off = opened.page.evaluate(OFF)
@@ -295,7 +331,7 @@ def test_errors_and_orientation_are_drawn_and_read_back(opened: Session) -> None
     """The colouring by correction, vectors at places, the polytope of a pass with its reach."""
     page = opened.page
     page.goto(turned().page.as_uri())
-    page.wait_for_selector("html[data-ready]", state="attached")
+    settled(page)
     keys = read_back(page, turned())
     assert {"runs.0.errors.worst_before_um", "runs.0.errors.uncertainty_k2_um", "runs.0.errors.worst.0.after_um",
             "runs.0.errors.worst.0.uncertainty_k2_um",

@@ -48,6 +48,8 @@ class HintCase:
         code_left: the code may still be said, of another thing; the message is gone
         stops: errors of other codes that are left: what else is wrong in the same files
         packages: the folder is one in which packages are installed
+        stands_in: a fault that no small file makes, by what stands in the place of a name: (module.name, value)
+        ends: what the hint asks for ends it, as installing a package does, or running once more
     """
 
     code: str
@@ -60,6 +62,8 @@ class HintCase:
     code_left: bool = False
     stops: tuple[str, ...] = field(default=())
     packages: bool = False
+    stands_in: tuple[tuple[str, Any], ...] = ()
+    ends: bool = False
 
     def begin(self, folder: Path) -> None:
         """The files, and what the first commands write."""

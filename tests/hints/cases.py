@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tests.hints.align_cases import ALIGN
 from tests.hints.batch_cases import BATCH
+from tests.hints.calibration_cases import CALIBRATION
 from tests.hints.cl_cases import CL
 from tests.hints.cl_word_cases import CL_WORDS
 from tests.hints.convert_cases import CONVERT
@@ -18,8 +19,9 @@ from tests.hints.macro_cases import MACROS
 from tests.hints.own_room_cases import OWN_ROOMS
 from tests.hints.package_cases import PACKAGES
 from tests.hints.place_cases import PLACE
+from tests.hints.rare_cases import RARE
 from tests.hints.tool_cases import TOOLS
 from tests.hints.verify_cases import VERIFY
 
 CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE, *ALIGN, *PLACE, *VERIFY, *EXCHANGE,
-         *OWN_ROOMS, *MACROS, *BATCH, *DESIGN, *PACKAGES]
+         *OWN_ROOMS, *MACROS, *BATCH, *DESIGN, *PACKAGES, *CALIBRATION, *RARE]

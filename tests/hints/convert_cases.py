@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from tests.hints.case import COMMAND, Edit, HintCase
 from tests.hints.machine_cases import machine_text
 
@@ -33,6 +35,7 @@ def convert(
     more: str = "",
     stops: tuple[str, ...] = (),
     code_left: bool = False,
+    stands_in: tuple[tuple[str, Any], ...] = (),
     **files: str,
 ) -> HintCase:
     """A conversion of part.apt with s.toml; files of `files` end in .toml."""
@@ -47,6 +50,7 @@ def convert(
         does,
         stops=stops,
         code_left=code_left,
+        stands_in=stands_in,
     )
 
 

@@ -144,24 +144,26 @@ _ERRORS = [
 ]
 
 
-def _sample(name: str) -> str:
+def sample(name: str) -> str:
     return (SAMPLES / "calibration" / name).read_text("utf-8")
 
 
-def _measured(code: str, says: str, table: str, old: str, new: str, *does: Edit) -> HintCase:
+def measured(code: str, says: str, table: str, old: str, new: str, *does: Edit, harm: tuple[Edit, ...] = ()) -> HintCase:
+    """A calibration of the samples; what is wrong is in its table, or is done by `harm`."""
     name = table.removesuffix(".csv")
-    starts = {n: _sample(n) for n in ("start.toml", "screw-start.toml", "screw-start-X.csv", "bar-start.toml")}
+    starts = {n: sample(n) for n in ("start.toml", "screw-start.toml", "screw-start-X.csv", "bar-start.toml")}
     return HintCase(
         code,
         f"calibrate {name}.toml -o out.toml",
-        {f"{name}.toml": _sample(f"{name}.toml"), table: _sample(table).replace(old, new, 1), **starts},
+        {f"{name}.toml": sample(f"{name}.toml"), table: sample(table).replace(old, new, 1), **starts},
         says,
         does,
+        harm=harm,
     )
 
 
 _CALIBRATION = [
-    _measured(
+    measured(
         "calibrate.unit",
         "write reading .unit. with one of (?:.*, )?(arcsec)|write .* one of .*(arcsec)",
         "reversal.csv",
@@ -169,11 +171,11 @@ _CALIBRATION = [
         "[um]",
         Edit("reversal.csv", "[um]", "[arcsec]"),
     ),
-    _measured(
+    measured(
         "calibrate.unit", "write (X way) alone", "laser.csv", "X way", "X way [mm]", Edit("laser.csv", "X way [mm]", r"\1")
     ),
-    _measured("calibrate.column", "write (X way)", "laser.csv", "X way", "x way", Edit("laser.csv", "x way", r"\1")),
-    _measured(
+    measured("calibrate.column", "write (X way)", "laser.csv", "X way", "x way", Edit("laser.csv", "x way", r"\1")),
+    measured(
         "calibrate.slip",
         r"reading in (arcsec) \(write (\[arcsec\]) in the header\)",
         "reversal.csv",
@@ -181,7 +183,7 @@ _CALIBRATION = [
         "[urad]",
         Edit("reversal.csv", "[urad]", r"\2"),
     ),
-    _measured(
+    measured(
         "calibrate.distance",
         r"write (distance \[mm\])",
         "ball_bar.csv",
@@ -189,7 +191,7 @@ _CALIBRATION = [
         "distance [um]",
         Edit("ball_bar.csv", "distance [um]", r"\1"),
     ),
-    _measured(
+    measured(
         "calibrate.travel",
         "look at the unit of X",
         "ball_bar.csv",

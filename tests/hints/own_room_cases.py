@@ -85,6 +85,8 @@ _TABLES = [
          Edit("t.csv", "", "\\1,\\2\n1,110\n"), first=(f"convert part.apt {ON} -o p.nc",)),
     _own("tool-table.missing", f"verify p.nc part.apt {ON} --tool-table t.csv", "measure these tools",
          Edit("t.csv", "7,110", "1,110"), first=(f"convert part.apt {ON} -o p.nc",), t_csv="register,length\n7,110\n"),
+    _own("tool-table.length", f"verify p.nc part.apt {ON} --tool-table t.csv", "measure the tool",
+         Edit("t.csv", "1,0", "1,110"), first=(f"convert part.apt {ON} -o p.nc",), t_csv="register,length\n1,0\n2,90\n"),
     convert("tool.called", START + CUT, r"take `(called)` out of \[tools\.N\]", sheet('called = "EM10"\n', ""), setup=NAMED),
     convert("tool.called", "UNITS/MM\n" + nx("A", 1, 5) + nx("B", 2, 6), "give each tool a name of its own",
             sheet("em10", "em20"), setup=NAMED + '[tools.2]\ngauge_length = 80.0\ncalled = "em10"\n',
@@ -92,7 +94,11 @@ _TABLES = [
     edited("gcode.tool_name", CUT, '"EM10"', '"EM99"', r"\[tools\.N\] (called) = ", sheet("EM10", "EM99"),
            setup=NAMED, control="siemens-840d"),
 ]
+TURNING = BALL.replace("FEDRAT", "MULTAX\nFEDRAT").replace("GOTO/0,0,0\nGOTO/9,0,0\n", (
+    "GOTO/0,0,0,0.3,0,0.954\nGOTO/3,0,0,0.25,0.1,0.963\nGOTO/6,0,0,0.1,0.25,0.963\nGOTO/9,0,0,0,0.3,0.954\n"))
 _AXES = [
+    convert("orient.fixed", TURNING, r"(\[orientation\]) (cone) of the set-up", sheet("", "\\1\n\\2 = 5.0\n"),
+            machine="mikron-ucp710", more=" --orient auto"),
     convert("orient.cutter", START + CUT, r"keep the orientation \((--orient keep)\)", option(r"\1", "--orient auto"),
             machine="mikron-ucp710", more=" --orient auto"),
     convert("orient.normals", BALL, r"name the part mesh|\((--max-tilt)\)", sheet("[orientation]\noff_centre = 10.0\n", ""),

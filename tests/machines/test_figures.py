@@ -12,7 +12,7 @@ from tests.machine_page import PAGE, page
 
 FIGURES = ("travel", "velocity", "acceleration", "jerk")
 TIMES = ("tool_change", "clamp", "unclamp")
-DOCUMENTED = 15
+DOCUMENTED = 30
 """machines with travel, speed and range of every axis from a document, that the catalogue holds at least"""
 
 

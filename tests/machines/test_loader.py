@@ -1,6 +1,7 @@
 """Machine files: each fault is a diagnostic with its line, each key is read, internal units come out."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,15 @@ def test_catalogue_loads(name):
 def test_load_raises_with_all_diagnostics():
     with pytest.raises(DiagnosticError, match="did you mean 'mikron-ucp710'"):
         machines.load("mikron-ucp700")
+
+
+@pytest.mark.parametrize(("name", "hint"), [
+    ("mickron.toml", "did you mean 'mikron-ucp710'?"), ("haas-ucm-750.toml", "did you mean 'haas-umc-750'?"),
+    ("okuma", "most alike of [0-9]+ are: okuma-mu-5000v, ")])
+def test_a_misspelt_name_is_answered_with_the_nearest(name, hint):
+    """Not with the list of all; with .toml as little as without."""
+    _, [found] = machines.load_checked(name)
+    assert re.match(hint.replace("?", "[?]"), found.hint) and len(found.hint) < 160
 
 
 def test_a_shop_file_starts_from_a_built_in_one(tmp_path):

@@ -104,6 +104,7 @@ def _setup(case: Case) -> Any:
 def effect_of(job: Any, comparison: Any) -> Effect:
     """What a program that was read back does."""
     from postproc.readback.comparison.checks import block_seconds
+    from postproc.reference.coolant import ANY, coolant_states
 
     motion, moves = comparison.executed[1], job.moves.without_pecks()
     n = len(moves)
@@ -116,7 +117,10 @@ def effect_of(job: Any, comparison: Any) -> Effect:
     timed = np.broadcast_to(motion.inverse, cut.shape)[cut]
     for column, rows in ((0, order[::-1]), (1, order)):
         feeds[owner[cut][rows], column] = np.where(timed, np.nan, motion.feed[cut])[rows]
-    rests = np.bincount(owner, weights=np.broadcast_to(motion.dwell, cut.shape), minlength=n + 1)[:n]
+    standing = ~_moving(motion)  # a rest is of the move that has come there, however often its end is stated
+    arrived = np.maximum.accumulate(np.where(standing, 0, np.arange(len(motion))))
+    rests = np.bincount(owner[arrived], weights=np.broadcast_to(motion.dwell, cut.shape), minlength=n + 1)[:n]
+    any_kind = coolant_states(job.toolpath, job.controller.codes)[moves.row] == ANY
     turns = np.bincount(owner[cut], minlength=n + 1)[:n]
     states = {}
     for name in SAME:
@@ -127,9 +131,18 @@ def effect_of(job: Any, comparison: Any) -> Effect:
         if name == "radius":
             values = np.where(np.broadcast_to(motion.compensation, cut.shape) == 40, -1.0, values)
         column[owner[cut]] = values[cut]
+        if name == "coolant":  # COOLNT/ON: whatever the kind
+            column = np.where(any_kind & (column > 0.0), 1.0, column)
         states[name] = column
     return Effect(spent, feeds, rests, turns, states,
                   (comparison.worst_tip, float(np.degrees(comparison.worst_axis))))
+
+
+def _moving(motion: Any) -> Any:
+    """(E,) blocks that move the tool."""
+    from postproc.readback.execution.poses import begins
+
+    return (motion.end != begins(motion, np.arange(len(motion)))).any(axis=1) | (motion.code == 2)
 
 
 def passed_on(base: Made, got: Made) -> bool:

@@ -55,8 +55,8 @@ class ActualLegs(Actual):
 
     @property
     def _spins(self) -> int:
-        """1 of a platform that turns about z."""
-        return int("c" in self.kinematics.loops.turns)
+        """1 of a platform that turns about z by itself."""
+        return int("c" in self.kinematics.loops.turns and self.kinematics.loops.holds is None)
 
     @cached_property
     def frame(self) -> LegFrame:
@@ -134,6 +134,8 @@ class ActualLegs(Actual):
     def _platform(self, w: Floats) -> tuple[Floats, Floats, Floats]:
         """Nominal (place (N, 3), turn (N, 3, 3)) of the platform seen from the carriers, and joints (N, J)."""
         kin, q, (tip, axis, spin) = self.kinematics, self.joints(w), self._pose(w)
+        if kin.loops.holds is not None:
+            return *kin.standing(tip, axis, kin.gauge - kin.tool_length * UP, spin)[:2], q
         turn = kin.turn_of(axis, spin)
         shift = q[:, kin.carriers_at] @ kin.carriers
         return tip + kin.tool_length * axis - turn @ kin.gauge - shift, turn, q
@@ -142,7 +144,8 @@ class ActualLegs(Actual):
         """See the base class."""
         if not self.any:
             tip, axis, spin = self._pose(w)
-            return tip, axis, tool_x(axis, spin)
+            follows = self.kinematics.loops.holds is not None
+            return tip, axis, self._platform(w)[1][:, :, 0] if follows else tool_x(axis, spin)
         kin, (place, turn, q) = self.kinematics, self._platform(w)
         place, turn = self.frame.solve(q[:, kin.legs_at], place, turn, self.rods)
         own: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, kin.tool_length, self.chain)]
@@ -158,7 +161,7 @@ class ActualLegs(Actual):
     def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
         """See the base class; None where carriers have errors, or more rods hold the platform than it has freedoms."""
         frame, kin = self.frame, self.kinematics
-        if len(frame.leg) != len(frame.freedoms) or self.chain.axes - {SPINDLE}:
+        if kin.loops.rings is not None or not frame.square or self.chain.axes - {SPINDLE}:
             return None
         place, turn, _ = self._platform(self.coordinates(q))
         own, go = q[:, kin.legs_at], reach[:, kin.legs_at]

@@ -28,6 +28,7 @@ from machines.geometric_error.actual.rods import RodErrors, guide_frame, inverte
 from machines.geometric_error.actual.transforms import turns
 from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import blocks
+from machines.kinematics.legs.in_series import LegsInSeries
 from machines.kinematics.legs.loops import FREEDOMS, Loops, turned
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.with_axis import LegsWithAxis
@@ -91,7 +92,13 @@ class LegFrame:
         length = drives.lengths[leg] + errors.length + drives.stretch[leg] * more
         rods = replace(drives, points=feet, directions=along, lengths=length, roots=drives.roots[leg], arms=reach,
                        slide=slide, arm=arm)
-        return Loops(rods, self._joints + errors.platform, self.freedoms, self.machine.loops.kept)
+        return replace(self.machine.loops, drives=rods, joints=self._joints + errors.platform, freedoms=self.freedoms,
+                       rings=self._rings)
+
+    @property
+    def _rings(self) -> Floats | None:
+        rings = self.machine.loops.rings
+        return None if rings is None else rings[self.leg]
 
     @property
     def _joints(self) -> Floats:
@@ -104,12 +111,19 @@ class LegFrame:
         free = ("x", "y", "c") if "z" not in own else FREEDOMS
         place, turn, q = (part[None] for part in self.machine.home)
         drives, leg = self.machine.legs, self.leg
-        loops = Loops(replace(drives, points=drives.points[leg] + self.shift, directions=drives.directions[leg],
-                              lengths=drives.lengths[leg], roots=drives.roots[leg], arms=drives.arms[leg],
-                              slide=drives.slide[leg], arm=drives.arm[leg]), self._joints, free, self.machine.loops.kept)
-        rows = loops.matrix_at(place, turn, q[:, leg])[0][0] / loops.drives.spans(q[:, leg])[0][:, None]
+        rods = replace(drives, points=drives.points[leg] + self.shift, directions=drives.directions[leg],
+                       lengths=drives.lengths[leg], roots=drives.roots[leg], arms=drives.arms[leg],
+                       slide=drives.slide[leg], arm=drives.arm[leg])
+        loops = replace(self.machine.loops, drives=rods, joints=self._joints, freedoms=free, rings=self._rings)
+        rows = loops.matrix_at(place, turn, q[:, leg])[0][0] / loops.sizes(q[:, leg])[0][:, None]
         held = len(rows) >= len(free) and np.linalg.svd(rows, compute_uv=False)[-1] > HELD
         return free if held else own
+
+    @property
+    def square(self) -> bool:
+        """True where rods, and what holds the platform besides, are as many as its freedoms."""
+        holds = self.machine.loops.holds
+        return len(self.leg) + (0 if holds is None else holds.count) == len(self.freedoms)
 
     def solve(self, q: Floats, place: Floats, turn: Floats, errors: RodErrors) -> tuple[Floats, Floats]:
         """The platform (X (N, 3), R (N, 3, 3)) on its rods with their errors, exactly, at joints q (N, K) of the legs.
@@ -119,7 +133,7 @@ class LegFrame:
         loops, place, turn = self.loops(errors), place.copy(), np.array(turn)
         for part in blocks(len(q)):
             rods = q[part][:, self.leg]
-            if len(self.leg) != len(self.freedoms):
+            if not self.square:
                 place[part], turn[part] = shared(loops, rods, place[part], turn[part])
                 continue
             x, r, closed = loops.newton(rods, place[part], turn[part])
@@ -130,8 +144,9 @@ class LegFrame:
         """d(X, turn)/dE (N, 6, P): T^-1 S of E-15, in the order of `RodErrors.names`; of least squares T^+ S."""
         loops = self.loops(self.zero)
         rows, rods = loops.matrix_at(place, turn, q[:, self.leg])
-        span = loops.drives.spans(q[:, self.leg])
-        rows, s = rows / span[:, :, None], self._columns(loops, q, rods, turn) / span[:, :, None]
+        span = loops.sizes(q[:, self.leg])
+        rows, s = rows / span[:, :, None], self._columns(loops, q, rods, turn) / span[:, :len(self.leg), None]
+        s = np.pad(s, ((0, 0), (0, rows.shape[1] - s.shape[1]), (0, 0)))
         if rows.shape[1] == rows.shape[2]:
             return loops.twists(inverted(rows) @ s)
         across = np.swapaxes(rows, 1, 2)
@@ -162,10 +177,12 @@ def shared(loops: Loops, q: Floats, place: Floats, turn: Floats) -> tuple[Floats
     last = np.full(len(q), np.inf)
     for _ in range(STEPS):
         rows, rods = loops.matrix_at(place, turn, q)
-        span = loops.drives.spans(q)
-        rows = rows / span[:, :, None]
+        span, sizes = loops.drives.spans(q), loops.sizes(q)
+        rows = rows / sizes[:, :, None]
         across = np.swapaxes(rows, 1, 2)
         stretch = 0.5 * (dot(rods, rods) / span - span)
+        if loops.holds is not None:
+            stretch = np.hstack([stretch, loops.holds.gaps(place, turn)])
         step = loops.twists(-(inverted(across @ rows) @ (across @ stretch[:, :, None]))[:, :, 0])
         place, turn = place + step[:, :3], turned(step[:, 3:]) @ turn
         last = np.maximum(lengths(step[:, :3]), loops.lever * lengths(step[:, 3:]))
@@ -206,6 +223,10 @@ class _Frames:
     def legs(self, kinematics: OnLegs) -> LegFrame | None:
         """The rods."""
         return leg_frame(kinematics)
+
+    def in_series(self, kinematics: LegsInSeries) -> LegFrame | None:
+        """The rods."""
+        return leg_frame(kinematics.on_legs)
 
 
 def frame_of(kinematics: Kinematics) -> LegFrame | None:

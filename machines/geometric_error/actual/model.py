@@ -12,12 +12,14 @@ from machines.geometric_error.actual.actual_legs import ActualLegs
 from machines.geometric_error.actual.actual_map import ActualByMap
 from machines.geometric_error.actual.actual_rods import ActualDelta, ActualTilting, rods_of
 from machines.geometric_error.actual.actual_serial import ActualSerial
+from machines.geometric_error.actual.actual_series import ActualSeries
 from machines.geometric_error.actual.leg_frame import leg_frame
 from machines.geometric_error.actual.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.tables.curves import least_apart
 from machines.geometric_error.tables.lattice import ErrorMap
 from machines.kinematics.base import Kinematics
+from machines.kinematics.legs.in_series import LegsInSeries
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.rod_platform import RodPlatform
@@ -136,6 +138,10 @@ class Forms:
     def legs(self, kinematics: OnLegs) -> Actual:
         """See `ErrorForms`."""
         return ActualLegs(kinematics, self._legs_of(kinematics), self.axes)
+
+    def in_series(self, kinematics: LegsInSeries) -> Actual:
+        """See `ErrorForms`."""
+        return ActualSeries(kinematics, self._legs_of(kinematics.on_legs), self.axes)
 
     def _legs_of(self, kinematics: OnLegs) -> RodErrors:
         zero = leg_frame(kinematics).zero

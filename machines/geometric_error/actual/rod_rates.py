@@ -95,6 +95,32 @@ def platform_motion(frame: RodFrame, errors: RodErrors, q: Floats, pose: tuple[F
 
 
 @dataclass(frozen=True, eq=False)
+@arrays(reach="N H", travels="H", shift="N K")
+class HoldRates:
+    """Rows of what holds a platform besides its rods (`kinematics/legs/holds.py`), as `HeldLoops` needs them.
+
+    Attributes:
+        weight: mm, of the rows
+        reach: (N, H) mm from X
+        travels: (H,) 1 of planes that go with the platform
+        shift: (N, K) mm of X per mm of each slide
+    """
+
+    weight: float
+    reach: Floats
+    travels: Floats
+    shift: Floats
+
+    def change(self, swing: Floats, drift: Floats, turn: Floats, lever: float) -> tuple[Floats, Floats]:
+        """((N, H) what the rows change by, (N, H, K) of (W' - W) J) while the platform turns by `swing` (N,) and X
+        goes by `drift` (N,) at most; `turn` (N, K) rad per mm."""
+        arm = self.reach * swing[:, None] + self.travels * drift[:, None]
+        aside = self.travels * swing[:, None]
+        wrong = self.weight * (aside[:, :, None] * self.shift[:, None] + arm[:, :, None] * turn[:, None])
+        return self.weight * np.hypot(aside, arm / lever), wrong
+
+
+@dataclass(frozen=True, eq=False)
 @arrays(least="N", rates="N R K", turn="N K", arm="R", length="N R", reach="N K", bend="N R", gain="N R K")
 class HeldLoops:
     """What bounds need of N platforms: least singular value of W (N,), mm that each rod's vector changes by
@@ -110,6 +136,7 @@ class HeldLoops:
     reach: Floats
     bend: Floats
     gain: Floats
+    holds: HoldRates | None = None
 
     def held(self) -> tuple[Floats, Floats]:
         """(by how much columns of J change at most (N, K), turns times the lever; rad that the platform turns
@@ -134,9 +161,14 @@ class HeldLoops:
             away = (self.turn * self.reach).sum(axis=1)[:, None] * self.arm * swing[:, None]
             rod = (self.rates * self.reach[:, None]).sum(axis=2) + drift + away + self.bend
             arm = self.arm * swing[:, None]
-            off = np.linalg.norm(np.hypot(rod, (self.arm * rod + arm * self.length) / self.lever), axis=1)
-            grip = 1.0 / np.where(off < self.least, self.least - off, np.nan)
+            off = np.hypot(rod, (self.arm * rod + arm * self.length) / self.lever)
             wrong = rod[:, :, None] * self.rates + (self.length * arm)[:, :, None] * self.turn[:, None] + self.gain
+            if self.holds is not None:
+                far = ((self.holds.shift + assumed) * self.reach).sum(axis=1)
+                more = self.holds.change(swing, far, self.turn, self.lever)
+                off, wrong = np.hstack([off, more[0]]), np.concatenate([wrong, more[1]], axis=1)
+            off = np.linalg.norm(off, axis=1)
+            grip = 1.0 / np.where(off < self.least, self.least - off, np.nan)
             return grip[:, None] * np.linalg.norm(wrong, axis=1), swing
 
 

@@ -9,10 +9,10 @@ three times:
     r.v' + (b x r).w'  = -r'.r' + l'.l' - r.(w x (w x b)) + r.A''
     r.v'' + (b x r).w'' = -3 r'.r'' - r.(2 w' x (w x b) + w x (w' x b) + w x (w x (w x b))) + r.A'''
 
-linear systems with the matrix Jx at each order. Over the whole move the right sides are bounded by norms; Jx differs from
-its value in the middle by at most what its rows can change in half the move, which bounds its least singular value from
-below (Weyl). The bounds assume a largest |r'| and |w|, and hold if they come out smaller: by continuity no rod can then
-leave them.
+linear systems with the matrix Jx at each order; what holds a platform besides adds its rows (`holds.py`). Over the whole
+move the right sides are bounded by norms; Jx differs from its value in the middle by at most what its rows can change in
+half the move, which bounds its least singular value from below (Weyl). The bounds assume a largest |r'|, |w| and |v|, and
+hold if they come out smaller: by continuity no rod can then leave them.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from functools import cached_property
 
 import numpy as np
 
+from machines.kinematics import columns
+from machines.kinematics.legs.holds import Holds
 from machines.kinematics.legs.loops import Loops
 from machines.kinematics.rod_loops import UNBOUNDED
 from machines.kinematics.sliders import solved
@@ -62,6 +64,18 @@ class PlatformJets:
         """A direction (3,) that turns with the platform."""
         return self._jet(axis, 0.0)
 
+    def carried(self, own: TaylorVector, moves: float) -> TaylorVector:
+        """A point (moves = 1, from the reference point) or a direction (0) that itself moves on the platform."""
+        n, w, bend = len(self.turn), self.first[:, 3:], self.second[:, 3:]
+        b, b1, b2 = ((self.turn @ columns.to_rows(part, n)[:, :, None])[:, :, 0] for part in (
+            own.value, own.first, own.second))
+        first = moves * self.first[:, :3] + cross(w, b) + b1
+        second = moves * self.second[:, :3] + cross(bend, b) + cross(w, cross(w, b)) + 2.0 * cross(w, b1) + b2
+        size = lengths(columns.to_rows(own.value, n)) + 0.5 * own.speed()
+        third = self.third * (moves + size / self.lever) + (3.0 * self.bend * self.spin + self.spin**3) * size
+        third = third + 3.0 * (self.bend + self.spin**2) * own.speed() + 3.0 * self.spin * own.bend() + own.third
+        return TaylorVector(list((moves * self.place + b).T), list(first.T), list(second.T), np.minimum(third, UNBOUNDED))
+
     def tilting(self, tilt: Floats, about: int) -> tuple[TaylorVector, TaylorAngle]:
         """The reference point, and the tilt (N,) of a platform that turns about x, y or z (0, 1, 2) alone."""
         return self._jet(np.zeros(3), 1.0), TaylorAngle(tilt, self.first[:, 3 + about], self.second[:, 3 + about],
@@ -91,13 +105,15 @@ class MovingLoops:
         """See the file."""
         drives, b, r, s = self.loops.drives, self._arms, self._rods, self.step
         moved = drives.moved(self.q) * s[:, :, None]
-        first = self._solved(drives.gains(r, self.q) * s)
+        first = self._solved(self.loops.driven(drives.gains(r, self.q) * s))
         v, w = first[:, None, :3], first[:, None, 3:]
         turns = cross(w, b)
         rod_rates = v + turns - moved
         curved = np.where(drives.arm, s * s, 0.0)[:, :, None] * -self._drive_arms
-        second = self._solved((drives.stretch * s) ** 2 - dot(rod_rates, rod_rates) + dot(r, curved - cross(w, turns)))
-        spin, bend, third = self._bounds(lengths(rod_rates), lengths(first[:, 3:]))
+        held = None if self.loops.holds is None else -self.loops.holds.bent(self.place, self.turn, first)
+        second = self._solved(self.loops.driven(
+            (drives.stretch * s) ** 2 - dot(rod_rates, rod_rates) + dot(r, curved - cross(w, turns)), held))
+        spin, bend, third = self._bounds(lengths(rod_rates), lengths(first[:, 3:]), lengths(first[:, :3]))
         return PlatformJets(self.place, self.turn, first, second, spin, bend, third, self._lever)
 
     @cached_property
@@ -116,7 +132,7 @@ class MovingLoops:
 
     @cached_property
     def _jx(self) -> Floats:
-        return self.loops.matrix(self._rods, self._arms)
+        return self.loops.matrix(self._rods, self._arms, (self.place, self.turn))
 
     def _solved(self, right: Floats) -> Floats:
         x = solved(self._jx, right)
@@ -146,35 +162,85 @@ class MovingLoops:
         arm = np.where(drives.arm, drives.size, 0.0)
         return drives.stretch * s, arm * s**2, arm * s**3
 
-    def _bounds(self, rod_speed: Floats, rate: Floats) -> tuple[Floats, Floats, Floats]:
-        """Bounds (N,) of |w|, |w'| and |(v'', lever w'')| from |r'| (N, K) and |w| (N,) in the middle; UNBOUNDED where
-        none."""
-        lever, speed, spin = self._lever, rod_speed * _GROWTH, rate * _GROWTH
+    def _bounds(self, rod_speed: Floats, rate: Floats, speed_of_place: Floats) -> tuple[Floats, Floats, Floats]:
+        """Bounds (N,) of |w|, |w'| and |(v'', lever w'')| from |r'| (N, K), |w| (N,) and |v| (N,) in the middle; UNBOUNDED
+        where none."""
+        lever, speed, spin, pace = self._lever, rod_speed * _GROWTH, rate * _GROWTH, speed_of_place * _GROWTH
         least = np.linalg.svd(np.nan_to_num(self._jx), compute_uv=False)[:, -1]
         result = np.full((3, len(rate)), UNBOUNDED)
         for _ in range(_ROUNDS):
-            bend, rod_bend, grip = self._second(speed, spin, least)
+            held = None if self.loops.holds is None else HeldBounds(
+                self.loops.holds, self.loops.weight, self.loops.holds.reach(self.place), pace, spin, lever)
+            bend, rod_bend, grip = self._second(speed, spin, least, held)
             new_speed, new_spin = rod_speed + 0.5 * rod_bend, rate + 0.5 * bend / lever
-            third = self._third(speed, spin, bend, rod_bend, grip)
-            held = (new_speed <= speed).all(axis=1) & (new_spin <= spin) & (third < result[2])
-            result[:, held] = np.stack([spin, bend / lever, third])[:, held]
-            speed, spin = new_speed * _GROWTH, new_spin * _GROWTH
+            new_pace = speed_of_place + 0.5 * bend
+            third = self._third(speed, spin, bend, rod_bend, grip, held)
+            good = (new_speed <= speed).all(axis=1) & (new_spin <= spin) & (third < result[2])
+            good &= True if held is None else new_pace <= pace
+            result[:, good] = np.stack([spin, bend / lever, third])[:, good]
+            speed, spin, pace = new_speed * _GROWTH, new_spin * _GROWTH, new_pace * _GROWTH
         return result[0], result[1], result[2]
 
-    def _second(self, speed: Floats, spin: Floats, least: Floats) -> tuple[Floats, Floats, Floats]:
+    def _second(self, speed: Floats, spin: Floats, least: Floats,
+                held: HeldBounds | None) -> tuple[Floats, Floats, Floats]:
         """(|(v', lever w')| (N,), |r''| (N, K), 1 / least singular value of Jx (N,)) at most while |r'| <= speed (N, K) and
         |w| <= spin (N,); NaN where Jx might become singular."""
         reach, longest, lever, t = self._reach, self._longest, self._lever, spin[:, None]
         stretch, curved, _ = self._drive
-        rows = np.hypot(speed, reach * (speed + t * longest) / lever)
-        left = least - 0.5 * np.sqrt((rows**2).sum(axis=1))
+        rows = (np.hypot(speed, reach * (speed + t * longest) / lever) ** 2).sum(axis=1)
+        left = least - 0.5 * np.sqrt(rows if held is None else rows + held.rows())
         grip = 1.0 / np.where(left > 0.0, left, np.nan)
-        right = speed**2 + stretch**2 + longest * (t**2 * reach + curved)
-        bend = grip * np.sqrt((right**2).sum(axis=1))
+        right = ((speed**2 + stretch**2 + longest * (t**2 * reach + curved)) ** 2).sum(axis=1)
+        bend = grip * np.sqrt(right if held is None else right + held.second())
         return bend, bend[:, None] * np.hypot(1.0, reach / lever) + t**2 * reach + curved, grip
 
-    def _third(self, speed: Floats, spin: Floats, bend: Floats, rod_bend: Floats, grip: Floats) -> Floats:
+    def _third(self, speed: Floats, spin: Floats, bend: Floats, rod_bend: Floats, grip: Floats,
+               held: HeldBounds | None) -> Floats:
         """Bound (N,) of |(v'', lever w'')|."""
         turning = (3.0 * spin * bend / self._lever + spin**3)[:, None] * self._reach
-        right = 3.0 * speed * rod_bend + self._longest * (turning + self._drive[2])
-        return np.asarray(grip * np.sqrt((right**2).sum(axis=1)), dtype=np.float64)
+        right = ((3.0 * speed * rod_bend + self._longest * (turning + self._drive[2])) ** 2).sum(axis=1)
+        return np.asarray(grip * np.sqrt(right if held is None else right + held.third(bend)), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+@arrays(reach="N H", pace="N", spin="N")
+class HeldBounds:
+    """What holds add to the sums of squares of the bounds, each over a whole move of which the middle is known.
+
+    Attributes:
+        weight: mm, of their rows
+        reach: (N, H) mm, |a| in the middle
+        pace, spin: (N,) |v| and |w| at most
+        lever: mm per rad
+    """
+
+    holds: Holds
+    weight: float
+    reach: Floats
+    pace: Floats
+    spin: Floats
+    lever: float
+
+    @property
+    def _farthest(self) -> Floats:
+        """(N, H) mm: |a| at most."""
+        return np.asarray(self.reach + 0.5 * self.holds.travels * self.pace[:, None], dtype=np.float64)
+
+    def rows(self) -> Floats:
+        """(N,) square of what the rows of Jx change by in a whole move."""
+        t, v, of = self.spin[:, None], self.pace[:, None], self.holds.travels
+        moments = (self._farthest * t + of * v) / self.lever
+        return np.asarray(self.weight**2 * (moments**2 + of * t**2).sum(axis=1), dtype=np.float64)
+
+    def second(self) -> Floats:
+        """(N,) square of the right sides of second order (`Holds.bent`)."""
+        t, v, of = self.spin[:, None], self.pace[:, None], self.holds.travels
+        return np.asarray(self.weight**2 * ((self._farthest * t**2 + 2.0 * of * v * t) ** 2).sum(axis=1), dtype=np.float64)
+
+    def third(self, bend: Floats) -> Floats:
+        """(N,) square of those of third order: a (3 w w' + w^3), of planes of the platform 3 v' w + 3 v (w' + w^2) more;
+        `bend` (N,) bounds |(v', lever w')|."""
+        t, v, b = self.spin[:, None], self.pace[:, None], bend[:, None]
+        w = b / self.lever
+        right = self._farthest * (3.0 * t * w + t**3) + 3.0 * self.holds.travels * (b * t + v * (w + t**2))
+        return np.asarray(self.weight**2 * (right**2).sum(axis=1), dtype=np.float64)

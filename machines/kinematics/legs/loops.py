@@ -3,7 +3,8 @@
 The platform's reference point is C, its turn R; the joint of leg k is B = C + R b, on a bar that is hinged to the platform
 and keeps its direction C + R b + k. With r = B - A the loops are r.r = l^2, and a platform that moves by (v, omega) moves
 them by r.v + (R b x r).omega: the rows of Jx (II-12 to II-18, V-18, V-23 of Company 2000). Only the freedoms that the
-machine has are solved for, all others are held.
+machine has are solved for, all others are held. Of a platform with `holds` all six are solved for, legs and holds together:
+its drives set `free` of them, the others follow. A leg on a ring ends where the ring, about z of the platform, is nearest.
 """
 
 from __future__ import annotations
@@ -15,28 +16,35 @@ from typing import Literal, cast
 import numpy as np
 
 from machines.kinematics.legs.drives import Drives
+from machines.kinematics.legs.holds import Holds
 from machines.kinematics.sliders import determinant, solved, three_spheres, two_circles, unsolvable
 from toolpaths.arrays import Bools, Floats
-from toolpaths.rotations import cross, dot, lengths
+from toolpaths.rotations import cross, dot, lengths, unit
 from toolpaths.shapes import arrays
 
 STEPS, CLOSED = 30, 1e-13
 """of Newton; closure relative to the square of a rod's length, before its last step"""
 PlatformTurns = Literal["", "a", "b", "c", "abc"]
+PlatformPose = tuple[Floats, Floats]
+"""C (N, 3) mm and R (N, 3, 3)"""
 FREEDOMS = ("x", "y", "z", "a", "b", "c")
 """translations along x, y, z and turns about them"""
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(joints="K 3", kept="K 3")
+@arrays(joints="K 3", kept="K 3", rings="K")
 class Loops:
-    """K legs under a platform of K freedoms.
+    """K legs under a platform of K freedoms, or of 6 with 6 - K holds.
 
     Attributes:
         joints: (K, 3) mm, b: joints of the legs, or hinges of bars that hold them, which turn with the platform
         freedoms: of FREEDOMS, in that order; one turn, or all three
         kept: (K, 3) mm from the hinge of a bar, which keeps its direction, to the joint of its leg (V-10: the sides of the
             symmetric H4's platform), 0 of joints on the platform itself; None without bars
+        holds: what holds the platform besides its legs
+        free: freedoms that the drives set by themselves where others follow; () all
+        rings: (K,) mm, radii about z of the platform, round its joints, on which legs of changing length end; 0 of others;
+            None without any
         bars: the number of the bar that each leg holds, -1 of none; () without bars
     """
 
@@ -44,12 +52,20 @@ class Loops:
     joints: Floats
     freedoms: tuple[str, ...]
     kept: Floats | None = None
+    holds: Holds | None = None
+    free: tuple[str, ...] = ()
+    rings: Floats | None = None
     bars: tuple[int, ...] = ()
 
     @cached_property
     def basis(self) -> Floats:
         """(6, K): the freedoms as columns."""
         return np.eye(6)[:, [FREEDOMS.index(name) for name in self.freedoms]]
+
+    @cached_property
+    def translations(self) -> Floats:
+        """(3, F): the directions x, y, z in which the drives move the platform by themselves."""
+        return np.eye(3)[:, ["xyz".index(name) for name in self.free or self.freedoms if name in "xyz"]]
 
     @property
     def turns(self) -> PlatformTurns:
@@ -69,29 +85,67 @@ class Loops:
 
     def ends(self, place: Floats, turn: Floats) -> Floats:
         """B (N, K, 3) mm."""
-        return self._ends(place, self.arms(turn))
+        return self._ends(place, self._arms(place, turn))
 
     def _ends(self, place: Floats, arms: Floats) -> Floats:
         ends = place[:, None, :] + arms
         return np.asarray(ends if self.kept is None else ends + self.kept, dtype=np.float64)
 
-    def matrix(self, rods: Floats, arms: Floats) -> Floats:
-        """Jx (N, K, K) mm: rows (r, R b x r / lever) of the freedoms."""
+    def _arms(self, place: Floats, turn: Floats) -> Floats:
+        """`arms`, of legs on rings to the point of the ring that is nearest to the foot."""
+        arms = self.arms(turn)
+        if self.rings is None:
+            return arms
+        axis = np.broadcast_to(turn[:, None, :, 2], arms.shape)
+        apart = self.drives.points - place[:, None] - arms
+        aside = apart - dot(apart, axis)[:, :, None] * axis
+        return np.asarray(arms + self.rings[:, None] * unit(aside, 0.0), dtype=np.float64)
+
+    def matrix(self, rods: Floats, arms: Floats, pose: PlatformPose) -> Floats:
+        """Jx (N, K, K) mm: rows (r, R b x r / lever) of the freedoms; (N, 6, 6) with those of the holds times `weight`."""
         rows = np.concatenate([rods, cross(arms, rods) / self.lever], axis=2) if self.turns else rods
+        if self.holds is not None:
+            rows = np.concatenate([rows, self.weight * self.holds.rows(*pose, self.lever)], axis=1)
         return np.asarray(rows[:, :, self._columns], dtype=np.float64)
+
+    @cached_property
+    def weight(self) -> float:
+        """mm, about the length of a rod: rows of holds times it are as large as those of rods."""
+        return max(float(self.drives.lengths.mean()), self.lever)
+
+    def sizes(self, q: Floats) -> Floats:
+        """(N, K or 6) mm: lengths of the rows of Jx, which free it of units."""
+        spans = self.drives.spans(q)
+        return spans if self.holds is None else np.hstack([spans, np.full((len(q), self.holds.count), self.weight)])
+
+    def driven(self, right: Floats, held: Floats | None = None) -> Floats:
+        """(N, K or 6): the right side (N, K) of the legs with that of the holds (N, H) mm, default 0, times `weight`."""
+        if self.holds is None:
+            return right
+        return np.hstack([right, np.zeros((len(right), self.holds.count)) if held is None else self.weight * held])
+
+    def of_drives(self, jx: Floats) -> Floats:
+        """(N, K, K): Jx (N, 6, 6) of the freedoms that the drives set, with what follows as it follows; of others itself."""
+        if self.holds is None:
+            return jx
+        own = [name in self.free for name in self.freedoms]
+        rest = [not name for name in own]
+        k = len(self.joints)
+        follow = np.linalg.solve(jx[:, k:][:, :, rest], jx[:, k:][:, :, own])
+        return np.asarray(jx[:, :k][:, :, own] - jx[:, :k][:, :, rest] @ follow, dtype=np.float64)
 
     @cached_property
     def _columns(self) -> list[int]:
         return [FREEDOMS.index(name) for name in self.freedoms]
 
     def matrix_at(self, place: Floats, turn: Floats, q: Floats) -> tuple[Floats, Floats]:
-        """(Jx (N, K, K), rods (N, K, 3)) mm, of joints q (N, K) of the drives."""
-        arms = self.arms(turn)
+        """(Jx (N, K, K), rods (N, K, 3)) mm, of joints q (N, K) of the drives; see `matrix`."""
+        arms = self._arms(place, turn)
         rods = self._ends(place, arms) - self.drives.feet(q)
-        return self.matrix(rods, arms), np.asarray(rods, dtype=np.float64)
+        return self.matrix(rods, arms, (place, turn)), np.asarray(rods, dtype=np.float64)
 
     def twists(self, x: Floats) -> Floats:
-        """(v, omega) (N, 6, ...) of solutions (N, K, ...) of Jx."""
+        """(v, omega) (N, 6, ...) of solutions (N, K or 6, ...) of Jx."""
         result = np.zeros((len(x), 6, *x.shape[2:]))
         result[:, self._columns] = x
         result[:, 3:] /= self.lever
@@ -101,7 +155,7 @@ class Loops:
         """(v, omega) of the platform per joint rate (N, 6, K), II-17; NaN where Jx is exactly singular."""
         jx, rods = self.matrix_at(place, turn, q)
         bad = unsolvable(jx)
-        inverse = np.linalg.inv(np.where(bad[:, None, None], np.eye(jx.shape[1]), jx))
+        inverse = np.linalg.inv(np.where(bad[:, None, None], np.eye(jx.shape[1]), jx))[:, :, :len(self.joints)]
         x = np.where(bad[:, None, None], np.nan, inverse * self.drives.gains(rods, q)[:, None, :])
         return self.twists(np.asarray(x))
 
@@ -115,6 +169,9 @@ class Loops:
             jx, rods = self.matrix_at(place[live], turn[live], q[live])
             square = self.drives.spans(q[live]) ** 2
             gap = 0.5 * (dot(rods, rods) - square)
+            if self.holds is not None:
+                gap = self.driven(gap, self.holds.gaps(place[live], turn[live]))
+                square = self.sizes(q[live]) ** 2
             step = self.twists(solved(jx, -gap))
             place[live] += step[:, :3]
             if self.turns:

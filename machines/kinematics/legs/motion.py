@@ -32,7 +32,8 @@ def leg_motion(loops: Loops, pose: tuple[Floats, Floats], joints: tuple[Floats, 
     apart, span, span_rate, span_acceleration = (end_rate - foot_rate, drives.spans(q), drives.stretch * rate,
                                                  drives.stretch * acceleration)
     right = dot(rods, foot_acceleration - inward) - dot(apart, apart) + span_rate**2 + span * span_acceleration
-    found = loops.twists(solved(loops.matrix(rods, arms), right))
+    held = None if loops.holds is None else -loops.holds.bent(place, turn, twist)
+    found = loops.twists(solved(loops.matrix(rods, arms, pose), loops.driven(right, held)))
     end_acceleration = found[:, None, :3] + cross(found[:, None, 3:], arms) + inward
     return LegMotion(place, turn, twist, found, rates, np.array(arms), feet, foot_rate, foot_acceleration, end_rate,
                      end_acceleration, np.array(moved), rods, span, span_rate, span_acceleration)

@@ -40,7 +40,7 @@ class OnLegs(RedundantLegs):
     @property
     def transmits(self) -> OverWorkspace:  # type: ignore[override]  # nothing assigns it
         """See the base class."""
-        return OverWorkspace(self.loops, self.workspace)
+        return OverWorkspace(self.loops, self.workspace, self.posed)
 
     @cached_property
     def on_rods(self) -> RodsOnSlides | None:  # type: ignore[override]  # nothing assigns it
@@ -50,8 +50,10 @@ class OnLegs(RedundantLegs):
         return RodsOnSlides(self, self.loops.joints) if whole and not len(self.carriers) else None
 
     @property
-    def leg_geometry(self) -> LegGeometry:
-        """See the base class."""
+    def leg_geometry(self) -> LegGeometry | None:
+        """See the base class; None of platforms that something else holds too, and of joints on rings."""
+        if self.loops.holds is not None or self.loops.rings is not None:
+            return None
         of, names = self.legs, np.array(self.axis_names)
         pairs = np.zeros((len(of.lengths), 3)) if self.clearance is None else pairs_of(
             len(of.lengths), self.clearance.leg, self.clearance.shift)
@@ -104,9 +106,18 @@ class OnLegs(RedundantLegs):
         heading = GOLDEN * np.arange(len(platform), dtype=np.float64)
         axis, spin = attitude(self.loops.turns, platform[:, 3], heading)
         axis = self._within(axis)
+        if self.loops.holds is not None:
+            return self._joints_posed(platform[:, :3], axis, spin)
         gauge = self.turn_of(axis, spin) @ self.gauge
         standing = np.zeros((len(axis), len(self.carriers_at))) if self.carried_twice else None
         return np.asarray(self.joints_with(platform[:, :3] + gauge - self.tool_length * axis, axis, spin, standing)[0])
+
+    def _joints_posed(self, place: Floats, axis: Floats, spin: Floats) -> Floats:
+        """Joints (N, J) with the reference point of a platform with holds, and its carriers, at `place` (N, 3)."""
+        own, turn, carried = self.standing(place, axis, np.zeros(3), spin)
+        q = np.empty((len(place), self.joints))
+        q[:, self.legs_at], q[:, self.carriers_at] = self.legs.solve(self.loops.ends(own, turn), self.legs.roots), carried
+        return np.where(np.isnan(q).any(axis=1, keepdims=True), np.nan, q)
 
     # ---- rates, bounds -------------------------------------------------------------------------------------
 
@@ -150,6 +161,22 @@ class OnLegs(RedundantLegs):
         return (jets.point(self.gauge - self.tool_length * UP) + TaylorVector(shift, moved),
                 jets.direction(UP) if self.tilts else TaylorVector(UP.tolist()))
 
+    def carried_jets(self, q0: Floats, q1: Floats, tip: TaylorVector,
+                     axis: TaylorVector) -> tuple[TaylorVector, TaylorVector]:
+        """(point, direction) in the machine frame of ones that move in directions of the platform, the point from its
+        reference point, along straight moves q0 -> q1 (N, J)."""
+        if self.loops.closed_form:
+            return self.with_tool(0.0)._jets(q0, q1)[0] + (tip - TaylorVector(self.gauge.tolist())), axis
+        middle, step = 0.5 * (q0 + q1), q1 - q0
+        jets = self.moving(*self._platform(middle), middle, step)
+        shift, moved = (list((v[:, self.carriers_at] @ self.carriers).T) for v in (middle, step))
+        return jets.carried(tip, 1.0) + TaylorVector(shift, moved), jets.carried(axis, 0.0)
+
+    def platform_pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
+        """(place (N, 3) with the travel of the carriers, turn (N, 3, 3)) of joints q (N, J); see `pose` for `near`."""
+        place, turn = self._platform(q, near)
+        return place + q[:, self.carriers_at] @ self.carriers, turn
+
     def moving(self, place: Floats, turn: Floats, middle: Floats, step: Floats) -> PlatformJets:
         """The platform along straight moves by `step` (N, J); `place`, `turn` and joints `middle` (N, J) in their middle."""
         return MovingLoops(self.loops, place, turn, middle[:, self.legs_at], step[:, self.legs_at]).jets()
@@ -179,7 +206,7 @@ class OnLegs(RedundantLegs):
     def _unit_free(self, q: Floats) -> tuple[Floats, Floats]:
         own = q[:, self.legs_at]
         jx, rods = self.loops.matrix_at(*self._platform(q), own)
-        return jx / self.legs.spans(own)[:, :, None], self.legs.transmission(rods, own)
+        return jx / self.loops.sizes(own)[:, :, None], self.legs.transmission(rods, own)
 
     def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """Where the parts are at joints q (N, J): seen from the carriers, but for the place that the workspace is about,

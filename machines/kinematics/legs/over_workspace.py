@@ -6,6 +6,7 @@ mm, so that a condition number has a meaning (Company 2000, II-24).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,6 +19,8 @@ from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
 from toolpaths.rotations import cross
 
+Posed = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]
+"""(C (N, 3), R (N, 3, 3)) of a place (N, 3), tool axis (N, 3) and spin (N,)"""
 HEADINGS = 12
 """directions into which a platform that turns in all of them is tilted"""
 
@@ -28,6 +31,8 @@ class OverWorkspace:
 
     loops: Loops
     workspace: Workspace
+    posed: Posed | None = None
+    """place and turn of a platform of which something follows from the rest"""
 
     @cached_property
     def lever(self) -> float:
@@ -44,12 +49,15 @@ class OverWorkspace:
         """See `Transmission`: own roots, spin 0; NaN where a leg does not reach."""
         loops, drives = self.loops, self.loops.drives
         axis, spin = attitude(loops.turns, tilt, np.full(len(tilt), heading))
-        x = tool_x(axis, spin)
-        turn = np.stack([x, cross(axis, x), axis], axis=2)
-        place = place * loops.basis[:3].any(axis=1)
+        if loops.holds is not None and self.posed is not None:
+            place, turn = self.posed(place, axis, spin)
+        else:
+            x = tool_x(axis, spin)
+            turn = np.stack([x, cross(axis, x), axis], axis=2)
+            place = place * loops.basis[:3].any(axis=1)
         q = drives.solve(loops.ends(place, turn), drives.roots)
         jx, rods = loops.matrix_at(place, turn, q)
-        translations = int(loops.basis[:3].any(axis=1).sum())
-        jx = np.array(jx)
+        translations = loops.translations.shape[1]
+        jx = np.array(loops.of_drives(jx))
         jx[:, :, translations:] *= loops.lever / self.lever if self.lever else 1.0
         return jx, drives.gains(rods, q) / drives.size

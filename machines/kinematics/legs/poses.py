@@ -13,14 +13,15 @@ from machines.kinematics.clearance_geometry import ClearanceSizes
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about, tool_x
 from machines.kinematics.legs.attitudes import ROUND_OFF, nearest_directions
+from machines.kinematics.legs.coupled import PosesAsked, across_of, standing
 from machines.kinematics.legs.drives import Drives
-from machines.kinematics.legs.loops import Loops
+from machines.kinematics.legs.loops import Loops, PlatformPose
 from machines.kinematics.legs.modes import found_modes, in_order
 from machines.kinematics.legs.one_turn import OneTurn
 from machines.kinematics.singular_distance import NAMES
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, Ints
-from toolpaths.rotations import angle_between, cross, lengths, unit
+from toolpaths.rotations import angle_between, cross, lengths, unit, wrap
 from toolpaths.shapes import arrays
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -29,11 +30,10 @@ ASIDE = 1e-9
 PARTS = 16
 """of the path from the home joints, where one Newton does not find the home mode"""
 SPINS = np.deg2rad([0.0, -20.0, 20.0, -40.0, 40.0, -60.0, 60.0, -80.0, 80.0])
+FOLLOWS = 1e-9
+"""rad that a spin may differ by from the one that follows"""
 FAR = 40.0
 """mm that a rod misses its length by: the platform may have another spin than was thought"""
-PlatformPose = tuple[Floats, Floats]
-"""C (N, 3) mm and R (N, 3, 3)"""
-
 
 @dataclass(frozen=True, eq=False)
 @arrays(legs_at="K", carriers_at="M", carriers="M 3", gauge="3")
@@ -117,6 +117,11 @@ class PosesOfLegs(Kinematics):
 
     def _ends(self, tip: Floats, axis: Floats, spin: Floats, given: Floats | None) -> tuple[Floats, Floats]:
         """(platform joints (N, K, 3), travel of the carriers (N, M)) of a tip, axis and spin; NaN where there are none."""
+        if self.loops.holds is not None:
+            place, turn, carried = self.standing(tip, axis, self.gauge - self.tool_length * UP, spin)
+            if not self.axis_asked:
+                place = np.where((angle_between(turn[:, :, 2], unit(axis)) <= FOLLOWS)[:, None], place, np.nan)
+            return self.loops.ends(place, turn), carried
         if self.loops.closed_form:
             up = (np.hypot(axis[:, 0], axis[:, 1]) <= ROUND_OFF * axis[:, 2]) & (axis[:, 2] > 0.0) & (spin == 0.0)
             tip = np.where(up[:, None], tip, np.nan)
@@ -127,8 +132,42 @@ class PosesOfLegs(Kinematics):
         place, carried = self._split(tip + self.tool_length * axis - turn @ self.gauge, given)
         return self.loops.ends(place, turn), carried
 
+    def standing(self, target: Floats, axis: Floats, arm: Floats, spin: Floats) -> tuple[Floats, Floats, Floats]:
+        """(C (N, 3), R (N, 3, 3), travel of the carriers (N, M)) that put the point `arm` (3,) of a platform with holds at
+        `target` (N, 3) and its z along `axis` (N, 3); NaN where nothing does, or with another spin (N,) than follows."""
+        axis = unit(axis)
+        near = self._within(axis)
+        asked = PosesAsked(target, arm, near if self.axis_asked else None, across_of(self.carriers))
+        start = np.tile(self.home[1], (len(axis), 1, 1))
+        if self.axis_asked:
+            x = tool_x(near, np.zeros(len(axis)))
+            start = np.stack([x, cross(near, x), near], axis=2)
+        middle = self.home[0][None], self.home[1][None]
+        place, turn, closed = standing(self.loops, asked, (target - start @ arm, start), middle)
+        off = wrap(spin - spin_about(near, turn[:, :, 0]))
+        good = closed & (turn[:, 2, 2] > 0.0) & ((spin == 0.0) | (np.abs(off) <= FOLLOWS))
+        if self.axis_asked:
+            good &= angle_between(near, axis) <= ROUND_OFF
+        place = np.where(good[:, None], place, np.nan)
+        carried = (target - place - turn @ arm) @ np.linalg.pinv(self.carriers) if len(self.carriers) else place[:, :0]
+        return place, np.where(good[:, None, None], turn, np.nan), carried
+
+    @property
+    def axis_asked(self) -> bool:
+        """False of a platform whose turns all follow from its place."""
+        return not self.loops.free or bool(set(self.loops.free) & set("abc"))
+
+    def posed(self, place: Floats, axis: Floats, spin: Floats) -> PlatformPose:
+        """(C (N, 3), R (N, 3, 3)) of a platform whose reference point, with the travel of its carriers, is at `place` (N, 3)
+        with z along `axis` (N, 3): what moves it besides is left out of nothing."""
+        if self.loops.holds is not None:
+            return self.standing(place, axis, np.zeros(3), spin)[:2]
+        return place * self.loops.basis[:3].any(axis=1), self.turn_of(axis, spin)
+
     def turn_of(self, axis: Floats, spin: Floats) -> Floats:
         """R (N, 3, 3) that gives the tool the axis (N, 3) and spin (N,); NaN where the platform has none."""
+        if self.loops.holds is not None:
+            return self.posed(np.tile(self.workspace.middle, (len(axis), 1)), axis, spin)[1]
         near = self._within(axis)
         good = (angle_between(near, axis) <= ROUND_OFF) & ((spin == 0.0) | ("c" in self.loops.turns))
         x = tool_x(near, spin)
@@ -159,13 +198,12 @@ class PosesOfLegs(Kinematics):
     @cached_property
     def carried_twice(self) -> bool:
         """True where carriers move the tool where the platform moves it too: how a path is split between them is free."""
-        return bool(len(self.carriers)) and bool(self.loops.basis[:3].any(axis=1).all())
+        return bool(len(self.carriers)) and self.loops.translations.shape[1] == 3
 
     @cached_property
     def _moves(self) -> Floats:
         """(3, F): translations of the platform, then the carriers."""
-        linear = self.loops.basis[:3]
-        return np.column_stack([linear[:, linear.any(axis=0)], self.carriers.T])
+        return np.column_stack([self.loops.translations, self.carriers.T])
 
     @cached_property
     def plane(self) -> Floats | None:
@@ -178,6 +216,13 @@ class PosesOfLegs(Kinematics):
     @cached_property
     def home(self) -> tuple[Floats, Floats, Floats]:
         """(C (3,), R (3, 3), joints of the legs (K,)) in the middle of the workspace, level or nearest to it."""
+        if self.loops.holds is not None:
+            middle = self.workspace.middle[None]
+            level = self._within(UP[None]) if self.axis_asked else None
+            asked = PosesAsked(middle, np.zeros(3), level, across_of(self.carriers))
+            place, turn, closed = standing(self.loops, asked, (middle, np.eye(3)[None]), (middle, np.eye(3)[None]))
+            q = self.legs.solve(self.loops.ends(place, turn), self.legs.roots)
+            return place[0] if closed[0] else place[0] * np.nan, turn[0], q[0]
         place, _ = self._split(self.workspace.middle[None])
         if np.isnan(place).any():
             place = (self.workspace.middle * (self.loops.basis[:3].any(axis=1)))[None]
@@ -273,7 +318,7 @@ class PosesOfLegs(Kinematics):
         axis = self._within(unit(pose[:, 3:]))
         tip = pose[:, :3] - q[:, self.carriers_at] @ self.carriers
         place, turn = self._spun(tip, axis, np.zeros(len(axis)))
-        if self.loops.turns == "abc":
+        if self.loops.turns == "abc" and self.loops.holds is None:
             own = q[:, self.legs_at]
             far = np.flatnonzero(self._misfit(own, place, turn) > FAR)
             if len(far):
@@ -284,6 +329,8 @@ class PosesOfLegs(Kinematics):
 
     def _spun(self, tip: Floats, axis: Floats, spin: Floats) -> PlatformPose:
         """(C, R) of a tip (N, 3) seen from the carriers, an axis (N, 3) that the platform can take, and a spin (N,)."""
+        if self.loops.holds is not None:
+            return self.standing(tip, axis, self.gauge - self.tool_length * UP, spin)[:2]
         turn = self.turn_of(axis, spin)
         return tip + self.tool_length * axis - turn @ self.gauge, turn
 

@@ -64,4 +64,4 @@ class RedundantLegs(PosesOfLegs):
 
     def with_free_spin(self) -> Self:
         """See the base class: of a platform that turns in every direction."""
-        return replace(self, spin_free=True) if self.loops.turns == "abc" else self
+        return replace(self, spin_free=True) if self.loops.turns == "abc" and self.loops.holds is None else self

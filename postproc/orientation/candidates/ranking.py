@@ -14,6 +14,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_matrix, diags, identity, vstack
 
 from postproc.feedrate.feed import AllowedFeed
+from postproc.feedrate.interior import Multipliers
 from postproc.feedrate.kernels.interior import pentadiagonal
 from postproc.feedrate.limits import JointLimits, MotorLimits, squared_speed, steady_cap
 from postproc.feedrate.paths import Eased
@@ -47,7 +48,7 @@ class Ranking:
     def __init__(self, first: Candidate) -> None:
         knots = sum(len(each) for each in first.knots)
         method = Method().settled()
-        self._grids = [] if knots > LONG else [_Grid(stretch.s, each, AllowedFeed(stretch.feed), first.jerky, method)
+        self._grids = [] if knots > LONG else [StretchKnots(stretch.s, each, AllowedFeed(stretch.feed), first.jerky, method)
                                                for stretch, each in zip(first.one.stretches, first.knots, strict=True)]
 
     def seconds(self, made: Candidate) -> float:
@@ -58,7 +59,7 @@ class Ranking:
                                          zip(self._grids, made.sites, strict=True)))
 
 
-class _Grid:
+class StretchKnots:
     """Knots sigma (K,) of one stretch with sites s (N,)."""
 
     def __init__(self, s: Floats, sigma: Floats, feed: Callable[[Floats], Floats], jerky: bool,
@@ -104,13 +105,20 @@ class _Grid:
 
     def _third_order(self, dq: Floats, d2q: Floats, d3q: Floats, cap: Floats, limits: JointLimits) -> float:
         """With jerk; derivatives (K, J) by sigma, `cap` (K,) of the squared speed."""
+        return self.solved(dq, d2q, d3q, cap, limits)[0]
+
+    def solved(self, dq: Floats, d2q: Floats, d3q: Floats, cap: Floats,
+               limits: JointLimits) -> tuple[float, Floats, Multipliers]:
+        """Least time, x and its two derivatives by sigma (3, K) at the knots, and the multipliers of all limits; arguments
+        as of `SpeedProblem`, derivatives (K, J). It starts from the motion of the call before."""
         basis = rest_basis(self.sigma, self.eased.ease)
         first, second, third = (np.ascontiguousarray(order.T) for order in (dq, d2q, d3q))
         problem = SpeedProblem(basis, first, second, third, limits, cap, np.zeros(len(cap), dtype=np.int64), self.weight,
                                np.ones((2, len(cap))), np.full(len(cap), -1))
         found = solve_problem(problem, self.method.steps, self.near)
         self.near = found.c
-        return float(np.sum(self.weight * basis.values(found.c)[0] ** -0.5))
+        x = basis.values(found.c)
+        return float(np.sum(self.weight * x[0] ** -0.5)), x, found.multipliers
 
 
 def _chained(fitted: BSpline, s: Floats, at: Floats) -> csr_matrix:

@@ -16,10 +16,12 @@ from postproc.orientation.figures.map import axes_map
 from postproc.orientation.figures.overview import angle_panel, gain_panel, plan_panel
 from postproc.orientation.figures.polytopes import box_panel, order_panel
 from postproc.orientation.figures.reach import reach_panel
+from postproc.orientation.figures.turned_axes import panels_of, turned_panels
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.report.figures_of_choice import gain
 from postproc.orientation.report.text import orientation, percent, seconds
+from postproc.orientation.turning.turning_choice import TurningChoice
 from toolpaths.choices import FigureEnding
 from toolpaths.drawing import image, plain
 
@@ -34,12 +36,14 @@ PASS = (0.3, 4.4, 4.4)
 """heights of the headline and the panels of a pass"""
 
 
-def draw(choice: OrientationChoice, plan: Orientation, passes: Sequence[int], ending: FigureEnding) -> bytes:
+def draw(choice: OrientationChoice, plan: Orientation, passes: Sequence[int], ending: FigureEnding,
+         turning: TurningChoice | None = None) -> bytes:
     """An image file of the plans, the passes as `plan` has them, and `passes` (numbers) in full.
 
     Without numbers the pass that can gain most is drawn.
 
     Args:
+        turning: axes that turn along cuts; the cut that gains most is drawn
         ending: ".png" or ".svg"
 
     Raises:
@@ -48,14 +52,17 @@ def draw(choice: OrientationChoice, plan: Orientation, passes: Sequence[int], en
     shown = list(passes) or most_gaining(choice)
     title = f"tool orientations of {Path(choice.work.toolpath.file).name} on {choice.work.machine.name}"
 
-    heights = [*PART, *(PASS * len(shown))]
+    heights = [*PART, *panels_of(turning), *(PASS * len(shown))]
+    first = len(heights) - len(PASS) * len(shown)
 
     def fill(sheet: Figure) -> None:
         grid = sheet.add_gridspec(len(heights), 2, height_ratios=heights)
         _part(sheet, grid, choice, plan)
+        if turning is not None:
+            turned_panels(sheet, grid, len(PART), turning)
         for k, number in enumerate(shown):
             made = choice.plans[plan].picked[number]
-            _pass(sheet, grid, len(PART) + len(PASS) * k, choice.tried[number], made, choice.work)
+            _pass(sheet, grid, first + len(PASS) * k, choice.tried[number], made, choice.work)
 
     return image((WIDTH, sum(heights) + 0.4), title, fill, ending)
 

@@ -117,7 +117,7 @@ class AllowedAxes:
 
         An angle atan2(a . u, a . n) is at most h where a . (u cos h - n sin h) <= 0, for limits within +-90 degrees.
         """
-        at, limits = one.contact, self.limits
+        at, limits = one.contact, self.limits.of(one.operation)
         if not len(at):
             return [(-one.axis[None], -np.cos(self.tilt))]
         result = [(-at.normal, -float(np.cos(self.tilt))), (at.normal, float(np.cos(off_centre(limits, one.radius))))]
@@ -128,7 +128,7 @@ class AllowedAxes:
 
     def _bounds(self, one: Pass, axes: Floats) -> list[_Bound]:
         """What the limits make of unit axes (M, 3)."""
-        at, limits = one.contact, self.limits
+        at, limits = one.contact, self.limits.of(one.operation)
         if not len(at):
             lean = angle_between(axes, one.axis)[:, None]
             return [_Bound("tilt from the CL axis", lean, 0.0, self.tilt), *self._criteria(one, axes)]

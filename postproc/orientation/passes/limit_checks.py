@@ -45,23 +45,27 @@ def _unknown_operations(work: PassContext, limits: OrientationLimits, file: str)
     known = [op.name for op in work.toolpath.operations if op.name]
     return [error("orient.operation", f"fixed_operations names {name!r}, which is not an operation of the CL file",
                   file=file or work.toolpath.file, lines=_line(file, "fixed_operations"), hint=nearest(name, known))
-            for name in limits.fixed_operations if name not in known]
+            for name in limits.fixed_operations if name not in known] + [
+        error("orient.operation", f"[orientation.operations] names {name!r}, which is not an operation of the CL file",
+              file=file or work.toolpath.file, lines=_line(file, "operations"), hint=nearest(name, known))
+        for name in limits.operations if name not in known]
 
 
 def _no_normals(work: PassContext, limits: OrientationLimits, free: list[Pass]) -> list[Diagnostic]:
-    bad = [one for one in free if not len(one.contact)] if limits.need_normals else []
+    bad = [one for one in free if not len(one.contact) and limits.of(one.operation).need_normals]
     if not bad:
         return []
-    asked = ", ".join(key for key in ("lead", "tilt", "off_centre", "contact_radius") if getattr(limits, key) is not None)
+    own = limits.of(bad[0].operation)
+    asked = ", ".join(key for key in ("lead", "tilt", "off_centre", "contact_radius") if getattr(own, key) is not None)
     return [error("orient.normals", f"[orientation] {asked}: no surface normal is known in pass {bad[0].number}",
                   file=work.toolpath.file, lines=[one.line for one in bad][:6], count=len(bad), hint=_NORMALS)]
 
 
 def _too_wide(work: PassContext, limits: OrientationLimits, free: list[Pass], file: str) -> list[Diagnostic]:
-    radius = limits.contact_radius
-    bad = [one for one in free if radius is not None and radius >= one.radius]
+    bad = [one for one in free if (limits.of(one.operation).contact_radius or 0.0) >= one.radius]
     if not bad:
         return []
+    radius = limits.of(bad[0].operation).contact_radius
     return [error("orient.contact_radius", f"contact_radius = {radius:g} mm, the ball of pass {bad[0].number} has a radius "
                   f"of {bad[0].radius:g} mm", file=file or work.toolpath.file, lines=_line(file, "contact_radius"),
                   count=len(bad), hint="a distance below the ball's radius, or off_centre in degrees")]
@@ -70,12 +74,13 @@ def _too_wide(work: PassContext, limits: OrientationLimits, free: list[Pass], fi
 def _too_steep(work: PassContext, limits: OrientationLimits, free: list[Pass], file: str,
                tilt: float) -> list[Diagnostic]:
     """Passes whose least angle to the normal is above the largest."""
-    bad = [one for one in free if len(one.contact) and off_centre(limits, one.radius) > tilt]
+    bad = [one for one in free if len(one.contact) and off_centre(limits.of(one.operation), one.radius) > tilt]
     if not bad:
         return []
-    least = off_centre(limits, bad[0].radius) / DEG
-    key, given = ("off_centre", f"{least:g} degrees is") if limits.contact_radius is None else (
-        "contact_radius", f"{limits.contact_radius:g} mm is an angle of {least:.3f} degrees to the normal,")
+    own = limits.of(bad[0].operation)
+    least = off_centre(own, bad[0].radius) / DEG
+    key, given = ("off_centre", f"{least:g} degrees is") if own.contact_radius is None else (
+        "contact_radius", f"{own.contact_radius:g} mm is an angle of {least:.3f} degrees to the normal,")
     return [error("orient.max_tilt", f"{key} = {given} more than --max-tilt {tilt / DEG:g}: pass {bad[0].number} can take "
                   "no axis", file=file or work.toolpath.file, lines=_line(file, key), count=len(bad),
                   hint=f"--max-tilt {_above(least)} or more, or a smaller {key}")]

@@ -77,6 +77,7 @@ class Pass:
         tool: index into Toolpath.tools
         drilled: what is cut in holes
         cutting_force: N at the tip, as the set-up has it of the tool
+        operation: name of that of its first cut
     """
 
     number: int
@@ -96,6 +97,7 @@ class Pass:
     line: int
     drilled: Drilled
     cutting_force: float = 0.0
+    operation: str = ""
 
     def shift(self, axis: Floats) -> Floats:
         """(3,) by which the tip moves so that the ball stays where it is: tip' = tip + R (axis - axis')."""
@@ -119,7 +121,7 @@ class Pass:
 
 @dataclass(frozen=True)
 class PassContext:
-    """A toolpath on a machine, cut into passes; `moves` in the table frame."""
+    """A toolpath on a machine, cut into passes; `moves` and the part as a mesh, `surface`, in the table frame."""
 
     toolpath: Toolpath
     machine: Machine
@@ -128,6 +130,7 @@ class PassContext:
     moves: Moves
     space: SafeSpace
     passes: tuple[Pass, ...]
+    surface: Surface | None = None
 
 
 def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Options,
@@ -160,7 +163,7 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
               for number, rows in enumerate(pairwise([*_beginnings(toolpath, moves).tolist(), len(moves)]))]
     unknown = _unknown_cutters(toolpath, passes) if turning else []
     work = PassContext(toolpath, machine, setup, placement, moves, safe_space(moves, setup, placement),
-                       tuple(passes))
+                       tuple(passes), surface)
     return (None if unknown else work), [*found, *more, *faults, *unknown]
 
 
@@ -252,7 +255,8 @@ def _pass(number: int, rows: tuple[int, int], of: _Cutting) -> Pass:
     contact = of.contact(cuts, 0.0 if fixed else radius or 0.0)
     return Pass(number, rows, moves.tip[here], moves.axis[here], moves.kind[here] == Kind.RAPID, axis, contact,
                 radius or 0.0, fixed, not stays, not of.homes.isdisjoint(range(*rows)), tool, kin, tuple(inside),
-                int(moves.line[lead]), drilled_of(of.toolpath, moves, rows), length.cutting_force if length else 0.0)
+                int(moves.line[lead]), drilled_of(of.toolpath, moves, rows), length.cutting_force if length else 0.0,
+                of.toolpath.operations[int(of.toolpath.operation[moves.row[lead]])].name)
 
 
 def _kept(of: _Cutting, cuts: Ints) -> str:
@@ -271,7 +275,7 @@ def _fixed(moves: Moves, rows: tuple[int, int], cuts: Ints, axis: Floats) -> str
     if bool((moves.hole[here] >= 0).any()):
         return "drilling: the axis is that of the hole"
     if bool((angle_between(moves.axis[here], axis[None]) > TURNS).any()):
-        return "the tool axis turns within the pass"
+        return TURNING
     if bool((moves.tool[here][cuts] != moves.tool[here][cuts[0]]).any()) or moves.kind[rows[0]] != Kind.RAPID:
         return "no rapid leads to it on which the tool could turn"
     if rows[1] < len(moves) and moves.kind[rows[1]] != Kind.RAPID:
@@ -286,6 +290,7 @@ def _by_cutter(radius: float | None) -> str:
     return "the cutter is not a ball: turned, it would touch elsewhere" if radius == 0.0 else ""
 
 
+TURNING = "the tool axis turns within the pass"
 UNKNOWN = "the form of the cutter is not known"
 
 

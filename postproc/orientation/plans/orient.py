@@ -19,7 +19,7 @@ from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.limit_checks import limit_faults
 from postproc.orientation.passes.parallel_map import PassFault, each_pass
 from postproc.orientation.passes.pass_bodies import pass_bodies
-from postproc.orientation.passes.passes import PassContext, work_of
+from postproc.orientation.passes.passes import TURNING, PassContext, work_of
 from postproc.orientation.passes.reasons import Slower
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.plans import OrientationPlan, plans_of, table_of
@@ -118,11 +118,12 @@ def _tried(work: PassContext, allowed: AllowedAxes, number: int, before: PassSea
 
 
 def _fixed(work: PassContext) -> list[Diagnostic]:
-    """A warning where no pass can be turned or spun."""
-    if not all(one.fixed and not one.spins for one in work.passes):
+    """A warning where no pass can be turned or spun, nor its axis along its cuts."""
+    if work.setup.orientation.turns or not all(one.fixed and not one.spins for one in work.passes):
         return []
     reasons = "; ".join(dict.fromkeys(one.fixed for one in work.passes))
-    return [warning("orient.fixed", f"no pass can be turned: {reasons}", file=work.toolpath.file)]
+    hint = "[orientation] cone of the set-up lets the axis of a ball turn along a cut" if TURNING in reasons else ""
+    return [warning("orient.fixed", f"no pass can be turned: {reasons}", file=work.toolpath.file, hint=hint)]
 
 
 def _unlinked(work: PassContext, auto: OrientationPlan, runs: bool) -> list[Diagnostic]:

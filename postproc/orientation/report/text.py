@@ -46,11 +46,12 @@ def as_text(choice: OrientationChoice, plan: Orientation = "auto", passes: Seque
     return "\n".join([*lines, "", _totals(choice), *_plans(choice), *noted])
 
 
-def header(choice: OrientationChoice, plan: Orientation) -> list[str]:
-    """Lines for the header of a program: the plan, and what tool axes follow one another."""
+def header(choice: OrientationChoice, plan: Orientation, turned: bool = False) -> list[str]:
+    """Lines for the header of a program: the plan, what tool axes follow; `turned`: some turn along cuts."""
     picked = choice.plans[plan].picked
     first = [k for k in range(len(picked)) if k == 0 or turns(picked[k - 1], picked[k])]
-    lines = [_against(choice, plan), f"planned {seconds(choice.plans[plan].seconds)} s, with the axes of the CL file "
+    lines = [_against(choice, plan, turned),
+             f"planned {seconds(choice.plans[plan].seconds)} s, with the axes of the CL file "
              f"{seconds(choice.plans['keep'].seconds)} s"]
     for start, end in list(zip(first, [*first[1:], len(picked)], strict=True))[:RUNS]:
         made, before = (sum(one.seconds for one in some) for some in (
@@ -60,10 +61,10 @@ def header(choice: OrientationChoice, plan: Orientation) -> list[str]:
     return lines + ([f"and {len(first) - RUNS} more turns"] if len(first) > RUNS else [])
 
 
-def _against(choice: OrientationChoice, plan: Orientation) -> str:
+def _against(choice: OrientationChoice, plan: Orientation, turned: bool) -> str:
     """What the program is proved against."""
     pairs = list(zip(choice.tried, choice.plans[plan].picked, strict=True))
-    if any(not one.same(tried.own.axis, one.held) for tried, one in pairs):
+    if turned or any(not one.same(tried.own.axis, one.held) for tried, one in pairs):
         return "proved against the CL file with these axes, its tips moved to keep the ball's contact"
     if any(not one.same(tried.own.axis, tried.own.held) for tried, one in pairs):
         return "proved against the CL file as it is, rotary axes held that the tool axis leaves free"

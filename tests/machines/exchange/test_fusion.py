@@ -95,13 +95,34 @@ def test_what_no_speed_and_no_end_state_is_assumed(tmp_path: Path) -> None:
     assert machine is not None and "axes.Y.travel" in found[-1] and "axes.Y.velocity" in found[-1]
 
 
+def test_newer_files_name_the_configuration_of_the_control_and_state_lines_twice(tmp_path: Path) -> None:
+    """As Autodesk's "5ax table bc head yxz.mch": controller.synced_configuration, offset a place of the line of B."""
+    file, plain = trunnion(), imported(tmp_path, trunnion())[0]
+    file["controller"] = {"synced_configuration": file["controller"]["default"]}
+    turns = file["kinematics"]["default"]["parts"][1]["parts"][0]
+    turns["axis_of_rotation"]["point"], turns["offset"] = [0, -454.0, 650.0], [0, 0, 650.0]
+    machine, found = imported(tmp_path, file)
+    assert machine is not None and plain is not None, found
+    q = np.array([[100.0, 20.0, -50.0, 0.5, 1.0]])
+    np.testing.assert_allclose(machine.kinematics.forward(q), plain.kinematics.forward(q), atol=1e-9)
+    np.testing.assert_array_equal(machine.limits.velocity, plain.limits.velocity)
+
+
+def test_a_place_that_is_stated_counts_where_the_file_is_not_understood(tmp_path: Path) -> None:
+    file = trunnion()
+    file["kinematics"]["default"]["parts"][1]["parts"][0]["offset"] = [7, 0, 650]
+    assert imported(tmp_path, file)[0] is None
+    machine = import_machine(tmp_path / "m.mch", "auto", ("kinematics.axes.B.point=[0,0,-350]",))[1]
+    assert machine is not None and machine.figures["B.point"].startswith("stated at the import")
+
+
 def faults() -> list[tuple[str, Part]]:
     made = []
-    for says in ("offset is not 0", "in cubits", "2 parts of type table", "0 parts of type head", "z of head",
+    for says in ("no place of its line", "in cubits", "2 parts of type table", "0 parts of type head", "z of head",
                  "two axes are", "no coordinate", "no driven axis", "no direction", "kinematics.default.parts.2.direction"):
         made.append((says, trunnion()))
     tree = [file["kinematics"]["default"] for _, file in made]
-    tree[0]["parts"][1]["offset"] = [0, 0, 5]
+    tree[0]["parts"][1]["parts"][0]["offset"] = [5, 0, 650]
     tree[1]["units"]["length"] = "cubits"
     tree[2]["parts"].append(end("table", (0, 0, 0)))
     tree[3]["parts"].pop()

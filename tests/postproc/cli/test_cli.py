@@ -229,7 +229,7 @@ NOT_NEEDED = (
     "postproc.readback.macros.klartext", "postproc.readback.macros.fanuc", "postproc.readback.dialects.siemens",
     "postproc.readback.dialects.klartext", "postproc.readback.dialects.haas", "postproc.writing.siemens",
     "postproc.writing.heidenhain", "postproc.cycle_time.linuxcnc", "postproc.proof.file", "postproc.pipeline.optimised",
-    "postproc.joints.run_roads", "postproc.verification.tool_table")
+    "postproc.joints.run_roads", "postproc.verification.tool_table", "postproc.verification.tool_table_file")
 """modules and packages that a small conversion for a serial machine and one control does without"""
 
 

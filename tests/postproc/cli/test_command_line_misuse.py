@@ -38,6 +38,18 @@ def test_outputs_that_would_replace_something_are_wrong_use(tmp_path: Path) -> N
     assert path.read_bytes() == before and not out.exists() and setup.read_bytes() == TOOLS.read_bytes()
 
 
+@pytest.mark.parametrize(("arguments", "says"), [
+    (["time", POCKET, *MILL, "--what-if", "X.velocity=abc"], "stands behind ="),
+    (["time", POCKET, *MILL, "--what-if", "X.velocity=1.1,tool_change"], "stands behind ="),
+    (["time", POCKET, *MILL, "--what-if", "X.velocity=0"], "stands behind ="),
+    (["machine", "analyse", "uranesx", "--along", "x"], "for --along: this is of a map"),
+    (["machine", "analyse", "uranesx", "--at", "z=-100"], "for --at: this is of a map"),
+    (["machine", "analyse", "uranesx", "--along", "Q"], "for --along: Q")])
+def test_wrong_use_names_the_option_that_is_wrong(arguments: list[str | Path], says: str) -> None:
+    got = run(*arguments)
+    assert got.exit_code == 2 and says in " ".join(got.stderr.split())
+
+
 def test_texts_of_files_command_no_terminal(tmp_path: Path) -> None:
     """Escape sequences and signs that turn writing, in a name that is shown and in a record that is refused."""
     hostile = "\x1b[2J\x07\x9b31m\u202eX"

@@ -33,6 +33,12 @@ def part(tmp_path: Path) -> Path:
     return file
 
 
+def test_the_file_of_a_batch_is_none_of_a_job(part: Path, tmp_path: Path) -> None:
+    (tmp_path / "job" / "postproc.toml").write_text('[[jobs]]\nmachine = "mill-3axis"\n')
+    got = run("convert", part, "-o", tmp_path / "p.nc")
+    assert got.exit_code == 1 and "several are the file of postproc batch" in got.stderr
+
+
 def test_the_command_takes_what_is_left_out_and_names_the_file(part: Path, tmp_path: Path) -> None:
     out = tmp_path / "p.nc"
     got = run("convert", part, "-o", out)

@@ -153,6 +153,9 @@ def test_axes_that_count_park_at_whole_turns_and_unwind_only_where_asked(control
     longer = estimate_of(home).seconds - estimate_of(left).seconds
     assert longer == pytest.approx(none["in_program_s"], abs=1.5)
     assert "turns from home" in as_text(left, "x.nc") and "unwinds whole turns" in as_text(home, "x.nc")
+    assert "none with modulo = true in" in as_text(left, "x.nc")
+    counted = converted(controller, "none")  # modulo = true alone does not help where the control's rule is "none"
+    assert 'none with rollover = "shortest" or "sign" in' in as_text(counted, "x.nc")
     rolled = converted(controller, "")
     assert as_dict(rolled, "x.nc")["unwinding"] == {} and "turns from home" not in as_text(rolled, "x.nc")
     assert estimate_of(rolled).seconds < estimate_of(home).seconds - 6.0

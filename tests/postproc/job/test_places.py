@@ -19,6 +19,7 @@ from postproc.pipeline.result import PostResult
 from postproc.reference.repeated import Repeated, repeated
 from postproc.setup.model import SetupFile, at_places
 from postproc.setup.places import PlaceOrder
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import body, codes, good
 from toolpaths.arrays import Floats, Ints
 
@@ -257,6 +258,22 @@ def test_bodies_stand_at_every_place() -> None:
         result = made("pocket.cls", "mill-3axis", "linuxcnc", places=TWO, bodies={"fixtures": [body_of]})
         said = " ".join(str(d) for d in result.diagnostics if d.code in ("collision.touch", "collision.near"))
         assert not result.ok and all(name in said for name in named)
+        assert ('at the place "right"' in said) and ('at the place "left"' in said) == ("fixture post" not in named)
+
+
+def test_travel_is_said_by_place() -> None:
+    """Where it ends in planning, and where the program of a shorter machine is read."""
+    far = [TWO[0], {**TWO[1], "origin": (900.0, -10.0, 5.0)}]
+    asked = made("pocket.cls", "mill-3axis", "linuxcnc", places=far, clearance={"between": "home"})
+    said = [d.message for d in asked.diagnostics if d.code == "travel.exceeded" and "axis X" in d.message]
+    assert said and all('"right"' in text for text in said)
+    result = good(made("pocket.cls", "mill-3axis", "linuxcnc", places=TWO))
+    assert result.job is not None
+    limits = result.machine.limits
+    shorter = replace(result.machine, limits=replace(limits, upper=np.minimum(limits.upper, [60.0, np.inf, np.inf])))
+    job = replace(result.job, machine=shorter, control=replace(result.job.control, machine=shorter))
+    found = [d.message for d in read_back(result.text, job, "pocket.cls")[1] if d.code == "verify.travel"]
+    assert found and all('at the place "right"' in text for text in found)
 
 
 @pytest.mark.parametrize(("setup", "code"), [

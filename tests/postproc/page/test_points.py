@@ -125,12 +125,34 @@ def test_legs_keep_their_lengths_on_a_table_that_turns() -> None:
     q[:, 4] = [0.3, 1.2, -2.0]
     ends = legs(job, q)
     assert ends is not None
-    length = np.linalg.norm(ends[..., :3] - ends[..., 3:], axis=-1)
+    length = np.linalg.norm(ends[..., :3] - ends[..., 3:6], axis=-1)
     assert np.ptp(length, axis=0).max() < 1e-6 and length.min() > 10.0
     straight = legs(job, np.tile(one.home, (1, 1)))
     assert straight is not None
     c, s = math.cos(0.3), math.sin(0.3)
     assert ends[0, :, 0] == pytest.approx(c * straight[0, :, 0] - s * straight[0, :, 1], abs=1e-6)
+
+
+@pytest.mark.parametrize(("name", "turns"), [("rotary-delta", True), ("triaglide", False), ("hexapod", False)])
+def test_legs_stand_on_their_drives(name: str, turns: bool) -> None:
+    """The end of an arm is as far from its axis wherever it stands; a foot is on its rail, whose ends stay; a leg of
+    changing length stands on its joint alone."""
+    one = machine(name)
+    job = replace(arcs()[0].job, machine=one)
+    q = np.tile(one.home, (2, 1))
+    q[1, :3] += 0.2 if turns else 15.0
+    parts = legs(job, q)
+    assert parts is not None
+    foot, start, end = parts[..., :3], parts[..., 6:9], parts[..., 9:]
+    length = np.linalg.norm(end - start, axis=-1)
+    assert np.ptp(length, axis=0).max() < 1e-6 and np.ptp(start, axis=0).max() < 1e-6
+    if turns:
+        assert length.min() > 50.0 and np.abs(foot - end).max() < 1e-9 and np.abs(foot[1] - foot[0]).max() > 1.0
+    elif name == "hexapod":
+        assert length.max() == 0.0 and np.ptp(foot, axis=0).max() < 1e-6
+    else:
+        assert np.ptp(end, axis=0).max() < 1e-6 and length.min() > 100.0
+        assert np.linalg.norm(foot - start, axis=-1) + np.linalg.norm(end - foot, axis=-1) == pytest.approx(length)
 
 
 def test_what_if_times_are_those_of_a_machine_with_that_limit() -> None:

@@ -10,13 +10,16 @@ from base64 import b64decode
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from postproc.cli.app import app
 from postproc.page import drawings
+from postproc.page.columns import unpacked
+from postproc.page.quantity_drawings import tilt
 from tests.postproc.kit import SAMPLES
-from tests.postproc.page.page_kit import HOSTILE, LINES, refused, reported, small
+from tests.postproc.page.page_kit import CUTS, HOSTILE, LINES, refused, reported, small, turned
 
 SETUP = str(SAMPLES / "tools.setup.toml")
 
@@ -115,14 +118,29 @@ def test_figures_are_drawn_without_a_browser_with_units_on_their_axes(monkeypatc
 
     def filled(size: tuple[float, float], title: str, fill: Callable[[Figure], None], ending: str) -> bytes:
         sheet = Figure(figsize=size)
+        if title in drawn:
+            return ending.encode()  # the same sheet in the other form
         fill(sheet)
         drawn[title] = [place.get_xlabel() + "|" + place.get_ylabel() for place in sheet.axes]
         return ending.encode()
     monkeypatch.setattr(drawings, "image", filled)
-    made = drawings.drawings(small().values)
-    assert set(made) == set(drawings.names(2)) and made["path-2.svg"] == b".svg"
+    made = drawings.drawings(small().values | {"runs": small().values["runs"][1:]})
+    given = [name for name in drawings.names(1) if not name.startswith(("errors", "polytope", "path-correction"))]
+    assert sorted(made) == sorted(given) and made["path-1.svg"] == b".svg"
+    more = drawings.drawings(turned().values)
+    assert {"errors-1.svg", "polytope-1.png", "path-correction-1.png"} <= set(more) <= set(drawings.names(1))
     labels = [label for one in drawn.values() for label in one]
-    assert len(drawn) == 8 and all(re.search(r"\b(mm|deg|s|%)(\b|$|,)|%", label) for label in labels), labels
+    assert len(drawn) > 20 and all(re.search(r"\b(mm|um|deg|s|m/s[²³]?)(\b|$|,)|%", label) for label in labels), labels
+
+
+def test_tilts_are_those_of_the_cl_file() -> None:
+    """Of the cuts, whose axes the CL file has at 0, 0.02, ... rad from z; on a machine of axes they come from its axes."""
+    run = small().values["runs"][0]
+    columns = unpacked(b64decode(run["points"]["data"]), run["points"]["columns"])
+    found, lines = tilt(run, columns), columns["CL line"].astype(int)
+    for k in (1, 5, 11):
+        last = np.flatnonzero(lines == LINES.index(CUTS[k]) + 1)[-1]
+        assert found[last] == pytest.approx(math.degrees(0.02 * k), abs=1e-3)
 
 
 @pytest.mark.parametrize(("arguments", "said"), [

@@ -118,7 +118,7 @@ def test_a_what_if_without_effect_is_named_and_messages_come_once(program: Path)
                   "--json", "-")
     found = json.loads(result.stdout)["diagnostics"]
     assert [(d["code"], d["message"].split()[1]) for d in found] == [("time.no_effect", "X.jerk=0.5")]
-    assert call(program, "-m", "mill-3axis", "--what-if", "").exit_code == 1
+    assert call(program, "-m", "mill-3axis", "--what-if", "").exit_code == 2
 
 
 def test_side_by_side_and_files(program: Path, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from postproc.cli.app import app
 from postproc.controllers.model import load_controller
-from postproc.verification.tool_table import ToolTable, table_of
+from postproc.verification.tool_table_file import ToolTable, table_of
 from tests.postproc.kit import SAMPLES
 from toolpaths.diagnostics import DiagnosticError
 
@@ -84,12 +84,12 @@ REFUSED = [
     ("fanuc-30i", "G10 L10 P1 R1.2.3\n", "number", 1), ("fanuc-30i", "G10 L11 P1 R0.01\n", "wear", 1),
     ("fanuc-30i", "G91\nG10 L10 P1 R1.\n", "increments", 1), ("fanuc-30i", "/G10 L10 P1 R1.\n", "number", 1),
     ("fanuc-30i", "G10 L10 P1 R1. G10 L10 P2 R2.\n", "words", 1), ("fanuc-30i", "G10 L10 P1.5 R1.\n", "register", 1),
-    ("haas-ngc", "G10 L10 P1 R10.\nG10 L10 P1 R11.\n", "twice", 2), ("haas-ngc", "G10 L10 P1 R-90.\n", "length", 1),
+    ("haas-ngc", "G10 L10 P1 R10.\nG10 L10 P1 R11.\n", "twice", 2), ("haas-ngc", "G10 L10 P1 R-90.\n", "length", 0),
     ("heidenhain-tnc640", TABLES["heidenhain-tnc640"].replace("+120.0", "+12O.0"), "number", 4),
     ("heidenhain-tnc640", TABLES["heidenhain-tnc640"].replace("+120.0", "+120,0"), "number", 4),
     ("linuxcnc", "T1 P1 Z120,03\n", "number", 1), ("linuxcnc", "T1 P1 Z1.2e2\n", "number", 1),
-    ("linuxcnc", "T1 P1 Z120\nT1 P2 Z95\n", "twice", 2), ("linuxcnc", "T1 Z120000\n", "length", 1),
-    ("linuxcnc", "T1 Z0\n", "length", 1), ("linuxcnc", "tool,length\n1,120,3\n2,5\n", "cells", 2),
+    ("linuxcnc", "T1 P1 Z120\nT1 P2 Z95\n", "twice", 2), ("linuxcnc", "T1 Z120000\n", "length", 0),
+    ("linuxcnc", "T1 Z0\n", "length", 0), ("linuxcnc", "tool,length\n1,120,3\n2,5\n", "cells", 2),
     ("linuxcnc", "register;length\n1;90,9\n", "number", 2), ("linuxcnc", "register;length\n1;90+0.9\n", "number", 2),
     ("linuxcnc", "register;length;radius\n1;90;3\n", "columns", 1), ("linuxcnc", "register;length\n-1;90\n", "register", 2),
     ("siemens-840d", "$TC_DP3[1,1]=90,9\n", "number", 1), ("siemens-840d", "$TC_DP3[1,1]=1.2.3\n", "number", 1),
@@ -156,3 +156,78 @@ def test_a_length_far_off_and_bodies_that_it_does_not_reach_are_noted(tmp_path: 
     table.write_text("tool,length\n1,101.7\n")
     code, text = run("verify", str(program), str(CL), *given, "--tool-table", str(table))
     assert code == 0 and "tool-table." not in text
+
+
+HEAD, LOAD, CUT = ["UNITS/MM"], ["LOADTL/1", "SPINDL/RPM,2000,CLW"], ["RAPID", "GOTO/0,0,40", "FEDRAT/MMPM,500",
+                                                                      "GOTO/0,0,30", "GOTO/20,8,30", "RAPID", "GOTO/20,8,40"]
+TNC = ("BEGIN TOOL    .T       MM\nT    NAME             L          R          DL      DR      TL RT  DOC\n"
+       "0                     +0,000     +0,000     +0,000  +0,000         0\n"
+       "1    14MM_CRB_4FL_32_ {}   +7,000     +0,031  +0,000         0  K\u00fchlung innen\n"
+       "1.1  14MM_CRB_4FL_32_ +88,000    +7,000     +0,000  +0,000         0\n"
+       "2                     +0,000     +0,000     +0,000  +0,000         0\n"
+       "15   6,0mm_JOBBER     -18,892    +3,000     +0,000  +0,000         0\n[END]\n")
+TOA = ("%_N_TO_TOA\n;$PATH=/_N_INITIAL_DIR\nCHANDATA(1)\n{}$TC_DP1[3470,1]=120\n$TC_DP3[3470,1]={}\n$TC_DP6[3470,1]=12.5\n"
+       "$TC_TP2[3471]=\"OTHER\"\n$TC_DP3[3471,1]=0\nM17\n")
+FS25 = '$TC_TP1[3470]=1\n$TC_TP2[3470]="FS25R2L85"\n'
+
+
+def verified_with(tmp_path: Path, controller: str, table: str, name: str = "") -> tuple[int, str]:
+    cl, setup, program, tools = (tmp_path / n for n in ("p.apt", "s.toml", "p.nc", "tools.txt"))
+    cl.write_text("\n".join([*HEAD, *LOAD, *CUT]) + "\n")
+    setup.write_text("[tools.1]\ngauge_length = 90.0\n" + (f'called = "{name}"\n' if name else ""))
+    tools.write_bytes(table.encode("latin-1"))
+    given = (str(cl), "-m", "mill-3axis", "-c", controller, "--setup", str(setup))
+    code, text = run("convert", *given, "-o", str(program))
+    assert code == 0, text
+    return run("verify", str(program), *given, "--tool-table", str(tools))
+
+
+def test_a_table_with_commas_and_unmeasured_tools(tmp_path: Path) -> None:
+    """TOOL.T as a TNC 310 and a TNC 640 write it: rows of 0, an index, a length from another tool; what is called counts."""
+    code, text = verified_with(tmp_path, "heidenhain-tnc640", TNC.format("+90,500 "))
+    assert code == 0 and "register 1 of the tool table 90.5310 mm (+0.5310" in text
+    for length, said in (("+0,000  ", "0.031 mm"), ("-4,686  ", "-4.655 mm")):
+        code, text = verified_with(tmp_path, "heidenhain-tnc640", TNC.format(length).replace("-18,892", "+18,892"))
+        assert code == 1 and f"number 1 has a length of {said}, and the program calls it" in text
+    code, text = verified_with(tmp_path, "heidenhain-tnc640", TNC.format("+90,500 "), "14mm_crb_4fl_32_")
+    assert code == 0 and "90.5310" in text
+
+
+def test_tools_of_an_archive_are_found_by_name(tmp_path: Path) -> None:
+    """$TC_TP2: the T number of the archive is the control's own; tools of one name stand in for each other."""
+    code, text = verified_with(tmp_path, "siemens-840d", TOA.format(FS25, "90.75"), "fs25r2l85")
+    assert code == 0 and "90.7500 mm (+0.7500" in text
+    code, text = verified_with(tmp_path, "siemens-840d", TOA.format(FS25, "90.75"))
+    assert code == 1 and 'no length of tool "1" (T1)' in text and 'called "FS25R2L85", "OTHER"' in text
+    code, text = verified_with(tmp_path, "siemens-840d", TOA.format(FS25.replace("FS25R2L85", "1"), "90.75"))
+    assert code == 0
+    code, text = verified_with(tmp_path, "siemens-840d", TOA.format(FS25, "90.75"), "OTHER")
+    assert code == 1 and "number 3471 has a length of 0 mm, and the program calls it" in text
+    sister = TOA.format(FS25, "90.75").replace("M17", '$TC_TP2[7]="FS25R2L85"\n$TC_DP3[7,1]=90.5\nM17')
+    code, text = verified_with(tmp_path, "siemens-840d", sister, "FS25R2L85")
+    assert code == 1 and "tools of one name hold different lengths: T1" in text
+
+
+def test_every_register_of_a_punched_table(tmp_path: Path) -> None:
+    """Fanuc writes all registers, those of tools that are not there with 0."""
+    rows = (f"G10G90L10P{n}R{90.25 if n == 1 else 0.0:.3f}\nG10G90L11P{n}R0.000\n" for n in range(1, 9))
+    table = "".join(("%\n", *rows, "%\n"))
+    code, text = verified_with(tmp_path, "fanuc-30i", table)
+    assert code == 0 and "90.2500 mm (+0.2500" in text
+    code, text = verified_with(tmp_path, "fanuc-30i", table.replace("90.250", "0.000"))
+    assert code == 1 and "tool-table.length" in text
+
+
+@pytest.mark.parametrize(("length", "code"), [("0", 0), ("110", 1), ("-3", 1)])
+def test_a_length_is_0_where_the_words_hold_it_and_the_control_adds_its_own(length: str, code: int, tmp_path: Path) -> None:
+    """A machine on legs under a control that keeps the length of its tool table in force: the words have it already."""
+    on = ["-m", "delta-parallel-z", "-c", "heidenhain-tnc640", "--setup", str(tmp_path / "s.toml")]
+    (tmp_path / "s.toml").write_text("[tools.1]\ngauge_length = 110.0\n[part]\norigin = [0.0, 0.0, -60.0]\n")
+    (tmp_path / "a.apt").write_text("UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/MMPM,600\nRAPID\nGOTO/0,0,5\n"
+                                    "GOTO/0,0,0\nGOTO/9,0,0\nRAPID\nGOTO/9,0,5\nFINI\n")
+    (tmp_path / "t.csv").write_text(f"tool,length\n1,{length}\n")
+    made = CliRunner().invoke(app, ["convert", str(tmp_path / "a.apt"), *on, "-o", str(tmp_path / "p.h")])
+    assert made.exit_code == 0 and "tool.length_twice" in made.stderr
+    found = CliRunner().invoke(app, ["verify", str(tmp_path / "p.h"), str(tmp_path / "a.apt"), *on, "--tool-table",
+                                     str(tmp_path / "t.csv")])
+    assert found.exit_code == code and ("error [tool.length_twice]" in found.stderr) == bool(code)

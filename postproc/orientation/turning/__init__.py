@@ -1,0 +1,1 @@
+"""Tool axes that turn along a pass, chosen for the least time."""
