@@ -122,8 +122,10 @@ def read_cl(file: Path, options: Options, progress: Progress | None = None,
         DiagnosticError: where it is a program of a control.
     """
     import toolpaths
+    from postproc.base.memory import reuse
 
     no_program(file, options.dialect)
+    reuse(file.stat().st_size)
     given = {} if tolerance is None else {"tolerance": tolerance}
 
     def shown(at: int, total: int) -> None:
