@@ -16,7 +16,8 @@ _TRIM_THRESHOLD, _MMAP_MAX, _KEPT = -1, -4, 1 << 30
 
 def reuse(size: int) -> None:
     """Large arrays take the place of those that are no longer used: else the system empties every page of each, a fifth of
-    the processor time of a million points. glibc, mallopt(3); `size`: bytes of the file that is worked on."""
+    the processor time of a million points. glibc, mallopt(3); `size`: bytes of the file that is worked on,
+    as far as LARGE."""
     if size < LARGE or sys.platform != "linux":
         return
     import ctypes
