@@ -45,7 +45,8 @@ def main() -> None:
         (SHIPPED / f"{found.figures['key']}.json").write_text(found.text, encoding="utf-8")
         seconds = resource.getrusage(resource.RUSAGE_SELF).ru_utime - before
         values = ", ".join(f"{key} {found.figures[key]}" for key in (
-            "margin", "proved_direct", "proved_inverse", "proved_held", "travel_proved", "parts_apart_mm", "stops_apart_deg") if key in found.figures)
+            "margin", "proved_direct", "proved_inverse", "proved_held", "travel_proved", "parts_apart_mm",
+            "stops_apart_deg") if key in found.figures)
         print(f"{name}: {found.figures['boxes']} boxes, {seconds:.2f} s, {values}")
 
 

@@ -36,7 +36,8 @@ BORDERS = {
     "machines/exchange/draft.py": TABLES, "machines/sheet/file_text.py": TABLES,
     "machines/value_words.py": "what pydantic says of a fault",
     **{f"machines/{name}.py": FIGURES for name in (
-        "analysis/certify", "analysis/certify_chain", "analysis/chain", "analysis/limits_of_box", "analysis/maps", "layouts/design",
+        "analysis/certify", "analysis/certify_chain", "analysis/chain", "analysis/limits_of_box", "analysis/maps",
+        "layouts/design",
         "dynamics/report", "dynamics/rods", "stiffness/report", "tolerances/report")},
     **{f"{name}.py": CERTIFICATES for name in (
         "machines/analysis/certificate_figure", "machines/certificate/certificate_file", "machines/certificate/lookup",
@@ -58,6 +59,7 @@ BORDERS = {
     "postproc/time_study/side_by_side.py": FIGURES,
     "postproc/orientation/figures/polytope_edges.py": FIGURES,
     "postproc/orientation/report/figures_of_choice.py": FIGURES,
+    "postproc/orientation/turning/turning_report.py": FIGURES,
     "postproc/proof/file.py": "the proof file, JSON", "postproc/proof/hashes.py": TABLES,
     "postproc/proof/changes.py": FIGURES,
     "postproc/batch/index.py": FIGURES, "postproc/differences/report.py": FIGURES,

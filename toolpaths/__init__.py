@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from toolpaths.choices import DialectName, LengthUnit
+    from toolpaths.choices import DialectName, LengthUnit, ShopName
     from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
 
@@ -15,7 +15,7 @@ __all__ = ["read", "read_bytes", "write"]
 ReadProgress = Callable[[int, int], None]
 
 
-def read(path: str | Path, *, units: LengthUnit | None = None, dialect: DialectName | None = None,
+def read(path: str | Path, *, units: LengthUnit | None = None, dialect: DialectName | ShopName | None = None,
          allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None,
          tolerance: float = 0.0) -> tuple[Toolpath, list[Diagnostic]]:
     """The toolpath of a CL file, and what reading it showed; see `toolpaths.cl.read.read_bytes` for the options."""
@@ -25,7 +25,8 @@ def read(path: str | Path, *, units: LengthUnit | None = None, dialect: DialectN
     return result.toolpath, result.diagnostics
 
 
-def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = None, dialect: DialectName | None = None,
+def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = None,
+               dialect: DialectName | ShopName | None = None,
                allow_unknown: Iterable[str] = (), tolerance: float = 0.0) -> tuple[Toolpath, list[Diagnostic]]:
     """The same from the text of a CL file; `file` is its name in diagnostics."""
     from toolpaths.cl import read as reader

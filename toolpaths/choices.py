@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NewType
 
 LengthUnit = Literal["mm", "inch"]
 """what the numbers of a file are"""
@@ -12,6 +12,8 @@ DialectName = Literal["generic", "nx", "makino", "creo", "solidworks", "solidwor
                       "camplete", "mfgsuite", "autodesk-iso", "hsmworks", "surfcam", "nci", "freecad", "step-nc"]
 GivenDialect = Literal["", DialectName]
 """asked for; "" as the file is recognised"""
+ShopName = NewType("ShopName", str)
+"""under which an installed package registers a CL dialect or a CL reader"""
 FigureEnding = Literal[".png", ".svg"]
 FieldEnding = Literal[".csv", FigureEnding]
 """of a table, or of a figure"""

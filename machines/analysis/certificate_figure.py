@@ -77,17 +77,19 @@ def _chain_figure(content: Mapping[str, Any], ending: FigureEnding) -> bytes:
         flat = [np.column_stack([end, np.full((len(lines), 2 - len(names)), v)]) for end, v in ((lower, 0.0), (upper, 1.0))]
         for k in range(len(lines)):
             low, high = flat[0][k], flat[1][k]
-            axes.add_patch(Rectangle((low[0], low[1]), high[0] - low[0], high[1] - low[1], linewidth=0.4, edgecolor="#222222",
+            axes.add_patch(Rectangle((low[0], low[1]), high[0] - low[0], high[1] - low[1], linewidth=0.4,
+                                     edgecolor="#222222",
                                      facecolor=shade.to_rgba(left[k])))
         axes.set_xlim(flat[0][:, 0].min(), flat[1][:, 0].max())
         axes.set_ylim(flat[0][:, 1].min(), flat[1][:, 1].max())
-        for name, label in zip(names, (axes.set_xlabel, axes.set_ylabel), strict=False):
-            label(f"{name}, degrees")
+        axes.set_xlabel("".join(f"{name}, degrees" for name in names[:1]))
+        axes.set_ylabel("".join(f"{name}, degrees" for name in names[1:]))
         sheet.colorbar(shade, ax=axes, label="travel left to the slides, mm, at least")
 
     region = content["region"]
     box = ", ".join(f"{name} {region[f'{name}_mm'][0]:g} to {region[f'{name}_mm'][1]:g}" for name in "xyz")
-    return image(_SIZE, f"{content['machine']}: tips {box} mm, tool {region['tool_mm']:g} mm, {len(lines)} boxes", fill, ending)
+    return image(_SIZE, f"{content['machine']}: tips {box} mm, tool {region['tool_mm']:g} mm, {len(lines)} boxes", fill,
+                 ending)
 
 
 def _ends(content: Mapping[str, Any], paths: list[str]) -> tuple[Floats, Floats]:

@@ -58,7 +58,8 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Certified:
-    """A proof of a workspace: what was asked, what was found, and what stands against the travel of a drive, or clearances."""
+    """A proof of a workspace: what was asked, what was found, and what stands against the travel of a drive, or
+    clearances."""
 
     machine: Machine
     region: RegionOfPoses
@@ -122,8 +123,8 @@ def certify(machine: Machine, wanted: Wanted) -> Certified:
 
 
 def _without_travel(asked: AskedProof) -> AskedProof:
-    free = (np.tile([-np.inf, np.inf], (len(one), 1)) for one in (asked.travel, asked.carrier_travel))
-    return replace(asked, **dict(zip(("travel", "carrier_travel"), free, strict=True)))
+    legs, carriers = (np.tile([-np.inf, np.inf], (len(one), 1)) for one in (asked.travel, asked.carrier_travel))
+    return replace(asked, travel=legs, carrier_travel=carriers)
 
 
 def _parts(machine: Machine, legs: LegGeometry, wanted: Wanted) -> PartsOfLegs | None:

@@ -36,7 +36,8 @@ from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 LOOKS, PER_AXIS, SPARE = 20_001, 25, 0.9
-"""positions of the second rotary axis looked at for a margin; positions per rotary axis for the largest box, and the part of it that is asked"""
+"""positions of the second rotary axis looked at for a margin; positions per rotary axis for the largest box, and the part
+of it that is asked"""
 LEAST = 1e-3
 """least sine of the pole's angle that counts as none"""
 NO_BOX = 1.0
@@ -85,7 +86,8 @@ class CertifiedChain:
         boxes = [f"{path or '.'} {' '.join(map(repr, row))}" for path, row in zip(self.proved.paths, bounds.tolist(),
                                                                                  strict=True)]
         region: dict[str, Any] = {"of": "tip", "tool_mm": chain.tool}
-        region |= {f"{name}_mm": [float(lo), float(hi)] for name, lo, hi in zip("xyz", asked.lower, asked.upper, strict=True)}
+        region |= {f"{name}_mm": [float(lo), float(hi)] for name, lo, hi in zip("xyz", asked.lower, asked.upper,
+                                                                                strict=True)}
         region["turns_rad"] = {joint.name: row.tolist() for joint, row in zip(chain.turns, asked.turns, strict=True)}
         travel = dict(zip((joint.name for joint in chain.slides), chain.travel, strict=True))
         return {
@@ -110,7 +112,8 @@ class CertifiedChain:
         """Region, what is proved, number of boxes; where the chain is singular inside."""
         content, asked = self.content, self.asked
         region = {key: value for key, value in content["region"].items() if key != "turns_rad"}
-        region["turns_deg"] = {name: [round(v / DEG, 6) for v in row] for name, row in content["region"]["turns_rad"].items()}
+        turns = content["region"]["turns_rad"]
+        region["turns_deg"] = {name: [round(v / DEG, 6) for v in row] for name, row in turns.items()}
         found = {"machine": self.machine.name, "key": content["key"], "covers": "region", "region": region,
                  "travel_left_mm": content["proved"]["travel"], "slides_span": content["proved"]["slides"]}
         if asked.chain.turns:
@@ -135,7 +138,7 @@ def certify_chain(machine: Machine, wanted: WantedOfChain) -> CertifiedChain:
                                      "kinematics gives no bounds", file=machine.file,
                                      hint="certify machines of the kinds serial, legs, linear-delta and h4-linear")])
     chain = chain_of(machine, wanted.tool)
-    turns = _turns(machine, chain, wanted.turns or {})
+    turns = rotary_ranges(machine, chain, wanted.turns or {})
     (lower, upper), turns = (wanted.box, turns) if wanted.box is not None else _with_box(machine, chain, turns, wanted)
     value, at = _nearest_pole(chain, turns)
     margin = wanted.margin if wanted.margin is not None else (0.0 if value < LEAST else float(np.floor(5e3 * value) / 1e4))
@@ -166,12 +169,13 @@ def _with_box(machine: Machine, chain: ChainOfAxes, turns: Floats,
     if (found := largest_box(chain, turns, wanted.size)) is not None:
         return found, turns
     what = "no cube of tips" if wanted.size is None else f"no box of {' x '.join(f'{v:g}' for v in wanted.size)} mm"
-    raise DiagnosticError([error("certificate.box", f"{what} of {machine.name} is in reach with a tool of {chain.tool:g} mm at "
+    raise DiagnosticError([error("certificate.box", f"{what} of {machine.name} is in reach with a tool of {chain.tool:g} "
+                                                    "mm at "
                                  f"all of {range_words(chain, turns)}", file=machine.file,
                                  hint="narrow the rotary axes with --turn A=-30:30, or ask for a smaller --box")])
 
 
-def _turns(machine: Machine, chain: ChainOfAxes, given: Mapping[str, tuple[float, float]]) -> Floats:
+def rotary_ranges(machine: Machine, chain: ChainOfAxes, given: Mapping[str, tuple[float, float]]) -> Floats:
     """(R, 2) rad; an axis of more than a turn counts from -180 to 180 degrees, or from its lower end."""
     found = []
     for joint in chain.turns:
@@ -182,7 +186,8 @@ def _turns(machine: Machine, chain: ChainOfAxes, given: Mapping[str, tuple[float
         turn = turn if turn[1] <= own[1] and np.ptp(turn) > 0.0 else np.array([own[0], own[0] + 2.0 * np.pi])
         low, high = given.get(joint.name, tuple(turn.tolist()))
         if np.isfinite(machine.limits.lower[j]) and not (own[0] - 1e-9 <= low <= high <= own[1] + 1e-9):
-            raise DiagnosticError([error("certificate.turns", f"{joint.name} from {low / DEG:g} to {high / DEG:g} degrees is "
+            raise DiagnosticError([error("certificate.turns", f"{joint.name} from {low / DEG:g} to {high / DEG:g} degrees "
+                                                              "is "
                                          f"outside its travel of {own[0] / DEG:g} to {own[1] / DEG:g}", file=machine.file,
                                          hint="ask for a range inside the travel with --turn")])
         found.append([low, high])
@@ -199,31 +204,34 @@ def _nearest_pole(chain: ChainOfAxes, turns: Floats) -> tuple[float, Floats]:
     """(least sine between the tool and the rotary axis nearest the part, the position (R,)); it is the second's alone."""
     at = np.tile(np.clip(0.0, *turns.T), (LOOKS, 1))
     if len(turns) > 1:
-        at[:, 1] = np.linspace(*turns[1], LOOKS)
+        at[:, 1] = np.linspace(float(turns[1, 0]), float(turns[1, 1]), LOOKS)
     pole = chain.reached(np.zeros((1, 3)), spanned(at))[1].lo
     k = int(pole.argmin())
     return float(pole[k]), at[k]
 
 
 def largest_box(chain: ChainOfAxes, turns: Floats, size: Floats | None) -> tuple[Floats, Floats] | None:
-    """(lower, upper) of the largest cube of tips, or of a box of that size where it has most room, at a grid of positions."""
+    """(lower, upper) of the largest cube of tips, or of a box of that size where it has most room, at a grid of
+    positions."""
     half = np.ones(3) if size is None else 0.5 * size
     at = spanned(_positions(turns, PER_AXIS))
+    travel = np.asarray(chain.travel, dtype=np.float64)
     q = chain.reached(np.concatenate([np.zeros((1, 3)), np.eye(3)]), at)[0].middle
     first, rates = q[:, :, 0], q[:, :, 1:] - q[:, :, :1]
     across = np.abs(rates) @ half
     rows, due = [], []
     for sign, end in ((1.0, 1), (-1.0, 0)):
-        known = np.isfinite(chain.travel[:, end])
+        known = np.isfinite(travel[:, end])
         rows.append(np.concatenate([sign * rates, across[:, :, None]], axis=2)[:, known].reshape(-1, 4))
-        due.append((sign * (chain.travel[known, end] - first[:, known])).ravel())
+        due.append((sign * (travel[known, end] - first[:, known])).ravel())
     found = linprog([0.0, 0.0, 0.0, -1.0], A_ub=np.concatenate(rows), b_ub=np.concatenate(due),
                     bounds=[(None, None)] * 3 + [(0.0, 1e5)])
-    room = float(found.x[3]) if found.success else 0.0
+    best = np.asarray(found.x if found.success else np.zeros(4), dtype=np.float64)
+    room = float(best[3])
     scale = float(np.floor(SPARE * room)) if size is None else 1.0
     if room < scale or scale < NO_BOX:
         return None
-    middle = np.round(found.x[:3], 1) + 0.0 if size is None else found.x[:3]
+    middle = np.round(best[:3], 1) + 0.0 if size is None else best[:3]
     return np.round(middle - scale * half, 4) + 0.0, np.round(middle + scale * half, 4) + 0.0
 
 
@@ -232,10 +240,12 @@ def _refusal(machine: Machine, asked: AskedOfChain, proved: ProvedChain) -> Diag
     tip = ", ".join(f"{name} {v:.4g}" for name, v in zip("xyz", proved.tip, strict=True))
     where = f"the tip at {tip} mm" + (f" and {turn_words(chain, proved.turned)}" if chain.turns else "")
     if proved.lack == "undecided":
-        return error("certificate.undecided", f"{proved.tried} boxes and no end, the last round {where}: nothing keeps clear "
+        return error("certificate.undecided", f"{proved.tried} boxes and no end, the last round {where}: nothing keeps "
+                                              "clear "
                      "by enough to prove it", file=machine.file, hint="ask for a smaller --box or --margin")
     what = {"travel": f"{proved.slide} is {-proved.value:.4g} mm outside its travel",
-            "pole": f"the tool lies along {chain.turns[0].name if chain.turns else ''} (sine of the angle {proved.value:.4g}, "
+            "pole": f"the tool lies along {chain.turns[0].name if chain.turns else ''} (sine of the angle "
+                    f"{proved.value:.4g}, "
                     f"asked for {asked.margin:g})",
             "slides": f"the slides span no space (|det| {proved.value:.4g})"}[proved.lack]
     return error("certificate.short", f"{what} with {where}", file=machine.file,
@@ -244,7 +254,8 @@ def _refusal(machine: Machine, asked: AskedOfChain, proved: ProvedChain) -> Diag
 
 def turn_words(chain: ChainOfAxes, turned: Floats) -> str:
     """Positions (R,) rad of the rotary axes in words."""
-    return ", ".join(f"{joint.name} {value / DEG:.4g}" for joint, value in zip(chain.turns, turned, strict=True)) + " degrees"
+    names = [joint.name for joint in chain.turns]
+    return ", ".join(f"{name} {value / DEG:.4g}" for name, value in zip(names, turned, strict=True)) + " degrees"
 
 
 def range_words(chain: ChainOfAxes, turns: Floats) -> str:

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from machines.analysis.certify_chain import chain_of, rotary_ranges
+from machines.analysis.chain_extreme import largest_condition
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
@@ -56,7 +58,17 @@ def chain_figures(machine: Machine) -> dict[str, Any]:
         "manipulability_at_home": float(size[0]), "manipulability_range": [float(size.min()), float(size.max())]}}
     if singular.any():
         found["indices"]["singular_at"] = _words(machine, q[int(np.flatnonzero(singular)[0])])
+    if machine.kinematics.chain and not singular.any():
+        found["indices"] |= _proved(machine)
     return found
+
+
+def _proved(machine: Machine) -> dict[str, Any]:
+    """What the condition number exceeds at no position of the rotary axes, slides at home."""
+    chain, at = chain_of(machine, machine.kinematics.tool_length), machine.axis_names.index
+    home = np.array([machine.home[at(joint.name)] for joint in chain.slides])
+    most = largest_condition(chain, home, rotary_ranges(machine, chain, {}), LEVER)
+    return {"condition_number_nowhere_more_than": _finite(most.most), "boxes_of_the_proof": most.boxes}
 
 
 def rotary_positions(machine: Machine) -> Floats:

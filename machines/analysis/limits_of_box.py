@@ -73,6 +73,28 @@ def least_margins(machine: Machine) -> dict[str, dict[str, Any]]:
     return found
 
 
+def extents(machine: Machine) -> dict[str, Any]:
+    """How far along x, y and z the drives' joints come over the workspace, mm, and those of the contracted model, whose
+    platform joints are one point (table III-5, annex C of Company 2000); nothing of a machine without a platform."""
+    kinematics = machine.kinematics
+    over, legs = kinematics.over_workspace, kinematics.leg_geometry
+    if over is None or legs is None:
+        return {}
+    place, tilt = over.workspace.grid(GRID)
+    q = over.joints_at(np.column_stack([place, tilt]), np.zeros((len(place), len(machine.axis_names) - _drives(machine))))
+    feet = kinematics.rig(q[np.isfinite(q).all(axis=1)]).carriages
+    if not len(feet):
+        return {}
+    found = {"extents_mm": _sizes(feet)}
+    if not legs.turns:
+        found["extents_of_the_contracted_model_mm"] = _sizes(feet - legs.joints)
+    return found
+
+
+def _sizes(points: Floats) -> dict[str, float]:
+    return dict(zip("xyz", np.ptp(points.reshape(-1, 3), axis=0).tolist(), strict=True))
+
+
 def _drives(machine: Machine) -> int:
     """Joints that are not rotary axes outside the legs."""
     legs = machine.kinematics.leg_geometry

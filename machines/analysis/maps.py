@@ -86,7 +86,8 @@ def measured(machine: Machine, measure: MapMeasure, along: tuple[MapNumber, ...]
         places[:, i] = side.ravel()
     values = legs.value(measure, places[:, :3], places[:, 3])
     if not np.isfinite(values).any():
-        raise DiagnosticError([error("analysis.reach", f"{machine.name} reaches none of these places, or is singular at all of "
+        raise DiagnosticError([error("analysis.reach", f"{machine.name} reaches none of these places, or is singular at "
+                                                       "all of "
                                      "them", file=machine.file, hint="name places of its workspace with --at")])
     return MeasuredPlaces(machine.name, measure, along, places / np.array([1.0, 1.0, 1.0, DEG]), values)
 

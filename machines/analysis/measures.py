@@ -1,7 +1,7 @@
 """Measures of a platform on legs at places of its workspace: how it transmits, and what its rods carry.
 
-Of the reference point of the platform. Transmission by `transmission.py`; the rods' forces f by T^t f = -w under a unit force
-w (eta_bf), a unit moment (eta_bm), and a unit force of inertia at a centre of mass `offset` above the reference point
+Of the reference point of the platform. Transmission by `transmission.py`; the rods' forces f by T^t f = -w under a unit
+force w (eta_bf), a unit moment (eta_bm), and a unit force of inertia at a centre of mass `offset` above the reference point
 (eta_bfm), each in its worst direction. Source: Company 2000, II-34 to II-38, III-18 to III-22, III.6.2 to III.6.5.
 """
 
@@ -46,7 +46,8 @@ PER_M = 1e3
 @dataclass(frozen=True, eq=False)
 @arrays(leg="R", shift="R 3")
 class StudiedLegs:
-    """The legs that are looked at, the leg of each rod and its place next to the leg's line; height of the centre of mass, mm."""
+    """The legs that are looked at, the leg of each rod and its place next to the leg's line; height of the centre of mass,
+    mm."""
 
     legs: LegGeometry
     leg: Ints
@@ -77,7 +78,8 @@ class StudiedLegs:
                 return np.asarray(OF[measure](self.transmits, place, tilt))
             if measure == "acceleration":
                 return _bent(self, place, tilt)
-            return np.asarray(np.max([_carried(self, measure, place, tilt, float(h)) for h in self.transmits.headings], axis=0))
+            return np.asarray(np.max([_carried(self, measure, place, tilt, float(h)) for h in self.transmits.headings],
+                                     axis=0))
 
 
 def studied(machine: Machine, measure: MapMeasure) -> StudiedLegs:
@@ -98,7 +100,8 @@ def studied(machine: Machine, measure: MapMeasure) -> StudiedLegs:
                                      file=machine.file, hint="name another measure with --map")])
     sizes = parts.clearance
     every = np.arange(len(legs.names))
-    return StudiedLegs(legs, every if sizes is None else sizes.leg, np.zeros((len(every), 3)) if sizes is None else sizes.shift)
+    own = (every, np.zeros((len(every), 3))) if sizes is None else (sizes.leg, sizes.shift)
+    return StudiedLegs(legs, *own)
 
 
 def _bent(of: StudiedLegs, place: Floats, tilt: Floats) -> Floats:
@@ -106,7 +109,7 @@ def _bent(of: StudiedLegs, place: Floats, tilt: Floats) -> Floats:
     jx, along = of.transmits.loops_at(place, tilt, 0.0)
     u = of.legs.directions @ of.transmits.loops.basis[:3]
     outer = u[None, :, :, None] * (jx / along[:, :, None])[:, :, None, :]
-    bad = ~np.isfinite(outer).all(axis=(1, 2, 3))
+    bad = np.asarray(~np.isfinite(outer).all(axis=(1, 2, 3)), dtype=np.bool_)
     size = np.linalg.norm(np.where(bad[:, None, None, None], 0.0, np.eye(u.shape[1]) - outer), ord=2, axis=(2, 3))
     return np.asarray(np.where(bad, np.nan, (size**2 / np.abs(along)).max(axis=1)))
 
@@ -117,7 +120,7 @@ def _carried(of: StudiedLegs, measure: MapMeasure, place: Floats, tilt: Floats, 
     poses = poses_at(legs, np.column_stack([place, tilt, np.full(len(tilt), heading)]))
     rows = force_rows(RodsOfLegs(legs, of.leg, of.shift), poses, np.zeros(3))
     t = np.swapaxes(rows.rods[:, :, rows.columns], 1, 2)
-    bad = ~np.isfinite(t).all(axis=(1, 2))
+    bad = np.asarray(~np.isfinite(t).all(axis=(1, 2)), dtype=np.bool_)
     back = np.zeros((len(t), rows.rods.shape[1], 6))
     back[:, :, rows.columns] = np.linalg.pinv(np.where(bad[:, None, None], 0.0, t))
     load = back[:, :, :3]

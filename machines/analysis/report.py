@@ -11,8 +11,8 @@ import numpy as np
 from machines.analysis.box import Box, reachable_box
 from machines.analysis.chain import chain_figures
 from machines.analysis.directions import tilts
-from machines.analysis.extremes import MEASURES, largest_over
-from machines.analysis.limits_of_box import ends_of_box, least_margins
+from machines.analysis.extremes import MEASURES, largest_over, rates_over, slide_acceleration
+from machines.analysis.limits_of_box import ends_of_box, extents, least_margins
 from machines.analysis.singularity import grid_step_that_proves
 from machines.analysis.transmission import (
     Measure,
@@ -27,6 +27,7 @@ from machines.analysis.transmission import (
     worst,
 )
 from machines.dynamics.report import dynamics_figures
+from machines.kinematics.base import Kinematics
 from machines.kinematics.leg_geometry import LegGeometry
 from machines.kinematics.rod_platform import RodPlatform, Transmission
 from machines.machine import Machine
@@ -34,6 +35,9 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.units import DEG
 
+_WHERE = {True: "the tip of a tool of tool_mm, directions and turns by a lever (lever_mm)",
+          False: "transmission and condition: the platform's reference point, turns by half the largest distance of its "
+                 "joints; reach: the tip of a tool of tool_mm"}
 GRID, COARSE = (11, 11, 11, 7), (5, 5, 5, 3)
 """places and tilts at which a worst value is first looked for; coarse where a tilt has several directions"""
 
@@ -49,7 +53,7 @@ def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, 
         DiagnosticError: where that proof is asked for and the machine is of another kind.
     """
     found: dict[str, Any] = {"machine": machine.name, "structure": machine.structure, "axes": list(machine.axis_names),
-                             "tool_mm": machine.kinematics.tool_length}
+                             "tool_mm": machine.kinematics.tool_length, "of": _WHERE[machine.kinematics.transmits is None]}
     if machine.kinematics.leg_geometry is not None:
         found["workspace_examined"] = "proved" if machine.certificate else "sampled"
     kinematics = machine.kinematics
@@ -59,9 +63,10 @@ def analyse(machine: Machine, singular_above: float | None = None) -> dict[str, 
     if kinematics.transmits is not None:
         found |= _transmission(kinematics.transmits, kinematics.leg_geometry) | _roots(machine)
     if kinematics.on_rods is not None and not kinematics.on_rods.platform_turns:
-        found["acceleration_per_speed_squared_per_mm"] = _largest(speed_acceleration, kinematics.on_rods)
+        found["acceleration_per_speed_squared_per_mm"] = _largest(speed_acceleration, kinematics.on_rods) | _bent(kinematics)
     if kinematics.workspace is not None:
         found["least_margins"] = least_margins(machine)
+        found |= extents(machine)
     if kinematics.transmits is None:
         found |= chain_figures(machine)
     found |= dynamics_figures(machine)
@@ -95,13 +100,26 @@ def _transmission(kinematics: Transmission, legs: LegGeometry | None) -> dict[st
         "force_transmission": _largest(force_transmission, kinematics, several),
         "manipulability": _largest(manipulability, kinematics, several),
         "conditioning_factor": _least(conditioning_factor, kinematics, several)}
+    over = None if legs is None else rates_over(legs, kinematics.lever)
     for key, measure in MEASURES.items():
-        if legs is None:
+        if over is None:
             break
-        extreme = largest_over(legs, kinematics.lever, measure)
+        extreme = largest_over(over, measure)
+        if key == "conditioning_lost":
+            factor = found["conditioning_factor"]
+            factor |= {"nowhere_less_than": min(1.0 / extreme.most, factor["worst"]), "boxes_of_the_proof": extreme.boxes}
+            continue
         most = max(extreme.most, found[key]["worst"]) if np.isfinite(extreme.most) else None
         found[key] |= {"nowhere_more_than": most, "boxes_of_the_proof": extreme.boxes}
     return found | ({"turn_lever_mm": kinematics.lever} if kinematics.lever else {})
+
+
+def _bent(kinematics: Kinematics) -> dict[str, Any]:
+    """What the acceleration per speed squared exceeds nowhere."""
+    legs = kinematics.leg_geometry
+    extreme = None if legs is None else largest_over(rates_over(legs, 0.0), slide_acceleration(legs))
+    known = extreme is not None and np.isfinite(extreme.most)
+    return {"nowhere_more_than": extreme.most, "boxes_of_the_proof": extreme.boxes} if known and extreme is not None else {}
 
 
 def _roots(machine: Machine) -> dict[str, Any]:

@@ -5,9 +5,9 @@ least singular value of rows (l, (T b) x l / s), l unit vectors, changes by at m
 
     M^2 = 6 (2 / l_min)^2 + 6 ((sqrt 2 s / l_min + 1 + 2 alpha / l_min) / s)^2
 
-(D-2, D-30, D-33 as corrected: 1 / s for sqrt 2 / s, sqrt 2 s / l_min for s / l_min). What follows is III.7. For slides along z. The smallest singular values of Jx and Jq change by at most sqrt(3) (2A + 1) |dx| between
-two points of a horizontal slice (III-23 to III-42; III-29 with |sqrt(1+u) - 1| <= |u|, for the printed bound
-fails for u < 0).
+(D-2, D-30, D-33 as corrected: 1 / s for sqrt 2 / s, sqrt 2 s / l_min for s / l_min). What follows is III.7. For slides
+along z. The smallest singular values of Jx and Jq change by at most sqrt(3) (2A + 1) |dx| between two points of a
+horizontal slice (III-23 to III-42; III-29 with |sqrt(1+u) - 1| <= |u|, for the printed bound fails for u < 0).
 """
 
 from __future__ import annotations
@@ -83,7 +83,8 @@ def lipschitz_points(kinematics: Kinematics, margin: float) -> int | None:
 
 
 def lipschitz_halved(kinematics: Kinematics, margin: float, alpha: float = 100.0) -> int | None:
-    """Squares of the same slice when they are halved only where III-42 does not prove them whole; None as `lipschitz_points`."""
+    """Squares of the same slice when they are halved only where III-42 does not prove them whole; None as
+    `lipschitz_points`."""
     if lipschitz_points(kinematics, margin) is None or (rods := kinematics.on_rods) is None:
         return None
     floor, space = margin * float(rods.legs.lengths.max()), rods.workspace
@@ -126,7 +127,8 @@ def annex_d_boxes(legs: LegGeometry, margin: float) -> tuple[float, float] | Non
 
 def growth_of_lengths(size: float, short: float, alpha: float) -> float:
     """M of D-33, per mm: `size` is s, `short` the least length of a leg, mm."""
-    return math.sqrt(6.0 * (2.0 / short) ** 2 + 6.0 * ((math.sqrt(2.0) * size / short + 1.0 + 2.0 * alpha / short) / size) ** 2)
+    return math.sqrt(6.0 * (2.0 / short) ** 2 + 6.0 * ((math.sqrt(2.0) * size / short + 1.0
+                                                        + 2.0 * alpha / short) / size) ** 2)
 
 
 def _step_of(room: float, size: float, short: float) -> float:
@@ -155,6 +157,7 @@ def _least(kinematics: RodPlatform, step: float) -> float:
 def _least_at(kinematics: RodPlatform, place: Floats) -> Floats:
     """The same (N,) at places (N, 2) of the slice."""
     legs = kinematics.legs
-    ends = np.column_stack([place, np.full(len(place), kinematics.workspace.middle[2])])[:, None] + kinematics.platform_joints
+    points = np.column_stack([place, np.full(len(place), kinematics.workspace.middle[2])])
+    ends = points[:, None] + kinematics.platform_joints
     rods = ends - legs.carriages(legs.inverse(ends))
     return np.asarray(np.minimum(smallest_singular_value(rods), np.abs(legs.along(rods)).min(axis=1)))

@@ -1,4 +1,5 @@
-"""Extremes of a measure over the workspace against sizes of the machine: figures III-12 and III-14 to III-20 of Company 2000.
+"""Extremes of a measure over the workspace against sizes of the machine: figures III-12 and III-14 to III-20 of Company
+2000.
 
 For each size the measure is looked at on a grid of the declared workspace, faces included, as III.6 does.
 """
@@ -27,14 +28,15 @@ if TYPE_CHECKING:
 
 CURVE, MAP, GRID = 41, 21, (9, 9, 3, 4)
 """sizes of a curve; per direction of a map; places and tilts of the workspace"""
-SIZE_WORDS: Mapping[SizeNumber, str] = {"rod": "length of the rods, mm", "radius": "distance of the drives from the z axis, mm",
-                                        "offset": "centre of mass above the reference point, mm"}
+SIZE_WORDS: Mapping[SizeNumber, str] = {
+    "rod": "length of the rods, mm", "radius": "distance of the drives from the z axis, mm",
+    "offset": "centre of mass above the reference point, mm"}
 
 
 @dataclass(frozen=True, eq=False)
 @arrays(sizes="N A", least="N", largest="N", place="N 4")
 class SizeStudy:
-    """Sizes (N, A) along `along`, the least and the largest value over the workspace (NaN where it is not in reach), and where
+    """Sizes (N, A) along `along`, the least and the largest value over the workspace (NaN where it is not in reach), where
     the largest is: x, y, z mm, tilt degrees."""
 
     machine: str
@@ -80,8 +82,9 @@ def over_sizes(machine: Machine, measure: MapMeasure, ranges: Mapping[SizeNumber
     least, largest = np.full(len(sizes), np.nan), np.full(len(sizes), np.nan)
     where = np.full((len(sizes), 4), np.nan)
     for k, row in enumerate(sizes.tolist()):
-        value = legs.resized(**dict(zip(ranges, row, strict=True))).value(measure, place, tilt)
-        if not np.isnan(value).any():
+        other = legs.resized(**dict(zip(ranges, row, strict=True)))
+        if all(np.isfinite(other.transmits.loops_at(place, tilt, float(h))[1]).all() for h in other.transmits.headings):
+            value = other.value(measure, place, tilt)
             j = int(value.argmax())
             least[k], largest[k], where[k] = value.min(), value[j], [*place[j], tilt[j] / DEG]
     if not np.isfinite(largest).any():
@@ -104,8 +107,10 @@ def size_figure(found: SizeStudy, ending: FigureEnding) -> bytes:
         else:
             x, y, v = (a.reshape(MAP, MAP) for a in (found.sizes[:, 0], found.sizes[:, 1], largest))
             most = float(np.nanpercentile(largest, 90.0))
-            sheet.colorbar(axes.contourf(x, y, np.minimum(v, most), 20, cmap="viridis"), label=f"largest {WORDS[found.measure]}")
+            sheet.colorbar(axes.contourf(x, y, np.minimum(v, most), 20, cmap="viridis"),
+                           label=f"largest {WORDS[found.measure]}")
             axes.set_ylabel(SIZE_WORDS[found.along[1]])
         axes.set_xlabel(SIZE_WORDS[found.along[0]])
 
-    return image((7.5, 6.0), f"{found.machine}: {WORDS[found.measure]} over the workspace, of the reference point", fill, ending)
+    return image((7.5, 6.0), f"{found.machine}: {WORDS[found.measure]} over the workspace, of the reference point", fill,
+                 ending)

@@ -1,9 +1,9 @@
 """The file of a certificate: geometry, region, margins, and every box with what is proved of it; found by a hash.
 
-JSON. A box is a line "path direct inverse held", with "parts stops" behind it where clearances are proved: its path of halves
-(`search.HALVES`, "." the whole region) and lower bounds, free of units, of parts mm, of stops rad, rounded down. The key is the SHA-256 of what the proof rests on in the machine file: the table
-`[kinematics]` without its clearances. Shipped certificates stand in `shipped`, by their key; a shop's own next to its
-machine file, as NAME.certificate.json.
+JSON. A box is a line "path direct inverse held", with "parts stops" behind it where clearances are proved: its path of
+halves (`search.HALVES`, "." the whole region) and lower bounds, free of units, of parts mm, of stops rad, rounded down.
+The key is the SHA-256 of what the proof rests on in the machine file: the table `[kinematics]` without its clearances.
+Shipped certificates stand in `shipped`, by their key; a shop's own next to its machine file, as NAME.certificate.json.
 """
 
 from __future__ import annotations

@@ -37,7 +37,8 @@ ChainShortfall = Literal["", "travel", "pole", "slides", "undecided"]
 @dataclass(frozen=True, eq=False)
 @arrays(tool_axis="3", travel="3 2")
 class ChainOfAxes:
-    """Three slides and up to two rotary axes from the workpiece to the tool, and the travel of the slides in chain order, mm."""
+    """Three slides and up to two rotary axes from the workpiece to the tool, and the travel of the slides in chain order,
+    mm."""
 
     joints: tuple[Joint, ...]
     tool_axis: Floats
@@ -74,6 +75,31 @@ class ChainOfAxes:
         matrix = joined(carried, 2)
         return _solved(matrix, u - t), self._pole(cos_sin, n), _size(matrix)
 
+    def rates(self, slides: Floats, angles: Span) -> Span:
+        """J (N, 6, J): rates of tip and tool axis in the table frame per joint, in chain order, slides at (3,) mm, boxes of
+        angles (N, R): a rotary axis w moves the tip by w x (tip - point), the axis by w x axis, both turned by what is
+        before it.
+        """
+        n, at = len(angles.lo), dict(zip((joint.name for joint in self.slides), slides.tolist(), strict=True))
+        cos_sin = {joint.name: turned_by(angles[:, k]) for k, joint in enumerate(self.turns)}
+
+        def fixed(v: Floats) -> Span:
+            return spanned(np.broadcast_to(v[:, None], (n, 3, 1)))
+        tip, axis, none = fixed(-self.tool * self.tool_axis), fixed(self.tool_axis), fixed(np.zeros(3))
+        found = list[tuple[Span, Span]]()
+        for joint in reversed(self.joints):
+            w = joint.direction
+            if joint.rotary:
+                c, s = cos_sin[joint.name]
+                tip, axis = _turned(tip - joint.point[:, None], w, c, s), _turned(axis, w, c, s)
+                found = [(_turned(v, w, c, s), _turned(d, w, c, s)) for v, d in found]
+                found.insert(0, (_across(w, tip), _across(w, axis)))
+                tip = tip + joint.point[:, None]
+            else:
+                tip = tip + (at[joint.name] * w)[:, None]
+                found.insert(0, (fixed(w), none))
+        return joined([joined([v, d], 1) for v, d in found], 2)
+
     def _pole(self, cos_sin: dict[str, tuple[Span, Span]], n: int) -> Span:
         """Sine of the angle between the tool and the rotary axis nearest the part; 1 without one."""
         if not self.turns:
@@ -94,6 +120,12 @@ def _turned(v: Span, along: Floats, c: Span, s: Span) -> Span:
     still, aside, flat = rows.by(np.outer(along, along)), rows.by(over), rows.by(-over @ over)
     turned = still + aside * s[:, None, None] + flat * c[:, None, None]
     return Span(np.swapaxes(turned.lo, 1, 2), np.swapaxes(turned.hi, 1, 2))
+
+
+def _across(w: Floats, v: Span) -> Span:
+    """w x v of v (N, 3, 1)."""
+    over = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+    return v[:, :, 0].by(over)[:, :, None]
 
 
 def _solved(matrix: Span, gap: Span) -> Span:
@@ -131,7 +163,8 @@ def _size(matrix: Span) -> Span:
 @dataclass(frozen=True, eq=False)
 @arrays(lower="3", upper="3", turns="R 2")
 class AskedOfChain:
-    """Tips between `lower` and `upper` (3,) mm in the table frame, rotary axes in `turns` (R, 2) rad; least sine of the pole."""
+    """Tips between `lower` and `upper` (3,) mm in the table frame, rotary axes in `turns` (R, 2) rad; least sine of the
+    pole."""
 
     chain: ChainOfAxes
     lower: Floats
@@ -148,7 +181,8 @@ class AskedOfChain:
 @dataclass(frozen=True, eq=False)
 @arrays(bounds="N 3", tip="3", turned="R")
 class ProvedChain:
-    """Boxes of rotary positions by the path of halves to each, with bounds (N, 3) of CHAIN_NAMES; or what is short, and where."""
+    """Boxes of rotary positions by the path of halves to each, with bounds (N, 3) of CHAIN_NAMES; or what is short, and
+    where."""
 
     paths: tuple[str, ...]
     bounds: Floats

@@ -2,10 +2,10 @@
 
 Rods, spindle and slides are round bars, segments X0 X1 and Y0 Y1 with a radius. For any unit vector n two segments are at
 least min n.(X - Y) apart, over the four pairs of their ends; with n from one to the other as they stand in the middle of the
-box that is their distance there, and the ends move by no more than their rates by the numbers of the pose. A joint's swing is
-the angle between rod and its direction in the middle of the workspace, whose cosine is bounded likewise. What is compared is
-what `machines/reach.py` compares. Source: separation of convex sets (Boyd and Vandenberghe, Convex Optimization, 2.5.1);
-Company 2000, II.4.2.
+box that is their distance there, and the ends move by no more than their rates by the numbers of the pose. A joint's swing
+is the angle between rod and its direction in the middle of the workspace, whose cosine is bounded likewise. What is
+compared is what `machines/reach.py` compares. Source: separation of convex sets (Boyd and Vandenberghe, Convex
+Optimization, 2.5.1); Company 2000, II.4.2.
 """
 
 from __future__ import annotations
@@ -79,7 +79,8 @@ class Gaps:
 @dataclass(frozen=True, eq=False)
 @arrays(ends="N 2 3")
 class MovingBar:
-    """A round bar: its ends (N, 2, 3) in the middles of boxes, how they move by the numbers of a pose (N, 5, 2, 3), radius mm."""
+    """A round bar: its ends (N, 2, 3) in the middles of boxes, how they move by the numbers of a pose (N, 5, 2, 3), radius
+    mm."""
 
     name: str
     ends: Floats

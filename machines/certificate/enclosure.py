@@ -82,11 +82,12 @@ def _none(rods: Span) -> Span:
 
 def _about(legs: LegGeometry) -> Floats:
     """(3,): the axis of a platform's one turn."""
-    return np.eye(3)["abc".index(legs.turns)]
+    return np.asarray(np.eye(3)["abc".index(legs.turns)], dtype=np.float64)
 
 
 def _of_bars(legs: LegGeometry, moments: Span, at: Ints | None = None) -> Span:
-    """(..., K, 3 + bars): moments (..., K, 3) on bars less what is about their hinge, which stands in the column of the bar."""
+    """(..., K, 3 + bars): moments (..., K, 3) on bars less what is about their hinge, which stands in the column of the
+    bar."""
     bars = np.asarray(legs.bars)[np.arange(len(legs.bars)) if at is None else at]
     about, own = _about(legs), np.equal.outer(bars, np.arange(bar_count(legs))).astype(np.float64)
     turn = dotted(moments, spanned(about))

@@ -71,7 +71,8 @@ def _is_whole(file: Path, key: str) -> bool:
         least = found["proved"]
         if "chain" in found:
             return bool(min(float(v) for v in least.values()) >= 0.0)
-        return bool(found["covers"] == WHOLE and 0.0 < float(found["margin"]) <= min(float(least[name]) for name in DISTANCES))
+        proved = min(float(least[name]) for name in DISTANCES)
+        return bool(found["covers"] == WHOLE and 0.0 < float(found["margin"]) <= proved)
     except (OSError, ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError):
         return False
 

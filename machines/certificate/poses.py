@@ -2,9 +2,9 @@
 
 A pose is (x, y, z, tilt, heading): mm, rad. The turn is the least one that takes z to the tool axis (spin 0), as the
 machine's inverse takes it; of a platform that turns about z alone `tilt` is that turn. With d from the point asked for to
-the reference point, platform level, that stands at C = p + R d; of a platform that does not turn slides that carry it take the
-part of p that it cannot move by itself, and where they are redundant poses are those seen from the carriers. Joints on a bar,
-which keeps its direction, are at C + R b + k.
+the reference point, platform level, that stands at C = p + R d; of a platform that does not turn slides that carry it take
+the part of p that it cannot move by itself, and where they are redundant poses are those seen from the carriers. Joints on
+a bar, which keeps its direction, are at C + R b + k.
 """
 
 from __future__ import annotations

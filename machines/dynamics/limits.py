@@ -60,6 +60,22 @@ class ForceLimits:
         with np.errstate(invalid="ignore"):
             return np.nan_to_num(np.abs(self.dynamics.forces(q, rate, acceleration, 0.0)) / self.left(q))
 
+    def loads(self, q: Floats, rate: Floats, acceleration: Floats) -> tuple[Floats, Floats]:
+        """Shares (N, J) of the limits in steady motion at joints q with rates (N, J), and with accelerations up to
+        `acceleration` (J,) of all joints in the signs that are worst for each motor; 0 of motors without a limit."""
+        zero = np.zeros_like(q)
+        steady = np.abs(self.dynamics.forces(q, rate, zero))
+        if self.cutting:
+            steady = steady + self.cutting * np.linalg.norm(self.kinematics.jacobian(q)[:, :3], axis=1)
+        most = np.where(np.isfinite(acceleration), acceleration, 0.0)
+        each = (self.dynamics.forces(q, zero, np.broadcast_to(row, q.shape), 0.0) for row in np.diag(most))
+        ramp = steady + np.sum([np.abs(one) for one in each], axis=0)
+        return np.nan_to_num(steady / self.limits), np.nan_to_num(ramp / self.limits)
+
+    def names(self, machine: Machine) -> tuple[str, ...]:
+        """Letters of the motors."""
+        return machine.axis_names
+
     def standing(self, q: Floats) -> Floats:
         """(N, J) of the limits: what gravity and the force at the tool take of each, standing still."""
         zero = np.zeros_like(q)
@@ -96,6 +112,21 @@ class DriveLimits:
     def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
         """See `ForceLimits`."""
         return self.own.use(*drive_motion(self.axes, q, rate, acceleration))
+
+    def loads(self, q: Floats, rate: Floats, acceleration: Floats) -> tuple[Floats, Floats]:
+        """See `ForceLimits`: of axes, each at its own acceleration; the drives follow them."""
+        own, follow, _ = drive_motion(self.axes, q, rate, np.zeros_like(q))
+        steady, _ = self.own.loads(own, follow, np.zeros(own.shape[1]))
+        most = np.where(np.isfinite(acceleration), acceleration, 0.0)
+        still, forces = np.zeros_like(q), np.zeros_like(steady)
+        for row in np.diag(most):
+            at, _, faster = drive_motion(self.axes, q, still, np.broadcast_to(row, q.shape))
+            forces = forces + np.abs(self.own.dynamics.forces(at, np.zeros_like(at), faster, 0.0))
+        return steady, np.nan_to_num(steady + forces / self.own.limits)
+
+    def names(self, machine: Machine) -> tuple[str, ...]:
+        """See `ForceLimits`."""
+        return machine.axis_names if machine.by_drives is None else machine.by_drives.axis_names
 
     def standing(self, q: Floats) -> Floats:
         """See `ForceLimits`."""

@@ -77,7 +77,8 @@ def of_cylinder(diameter: float, height: float) -> CrankSizes:
         DiagnosticError: of a cylinder higher than wide, which none has.
     """
     if not height < diameter:
-        raise DiagnosticError([error("design.cranks", f"a cylinder {diameter:g} mm wide and {height:g} mm high has no arm and "
+        raise DiagnosticError([error("design.cranks", f"a cylinder {diameter:g} mm wide and {height:g} mm high has no arm "
+                                                      "and "
                                      "rod: it has to be wider than high (0.6 times as high at most, for good speeds)",
                                      hint="ask for a lower --box")])
 
@@ -126,7 +127,8 @@ def crank_file(sizes: CrankSizes, platform: float) -> str:
     low, high = np.floor(np.nanmin(q) - SPARE), np.ceil(np.nanmax(q) + SPARE)
     home = np.degrees(_lowered(sizes, 0.0, (0.0, 0.0, 0.0), radius - platform, level))
     lines = [
-        f'description = "rotary Delta for a cylinder of {sizes.diameter:g} x {sizes.height:g} mm, dimensions by machine design"',
+        f'description = "rotary Delta for a cylinder of {sizes.diameter:g} x {sizes.height:g} mm, dimensions by machine '
+        'design"',
         "", "[kinematics]", 'kind = "legs"', 'freedoms = ["x", "y", "z"]', "", "[kinematics.layout]", 'form = "star"',
         'drive = "arm"', 'letters = ["A", "B", "C"]', "angles = [-90, 30, 150]", f"radius = {radius:.6f}",
         f"height = {level:.6f}", f"joint_radius = {platform:.6f}", f"arm = {sizes.arm:.6f}", f"rod = {sizes.rod:.6f}",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from machines.analysis.extremes import MEASURES, largest_over
+from machines.analysis.extremes import MEASURES, largest_over, rates_over
 from machines.kinematics.leg_geometry import LegGeometry
 from machines.kinematics.legs.drives import Drives
 from machines.layouts.choices import Goal
@@ -55,7 +55,7 @@ class Design:
     def figures(self) -> dict[str, Any]:
         """Dimensions, figures over the box, the condition number proved."""
         asked, found = self.asked, self.found
-        proved = largest_over(geometry(asked, found.numbers, found.rod), 0.0, MEASURES["condition_number"])
+        proved = largest_over(rates_over(geometry(asked, found.numbers, found.rod), 0.0), MEASURES["condition_number"])
         slides = slides_of(asked, found.numbers)
         size = extents(slides, contracted(slides, found.rod, box_grid(asked))[1])
         return {

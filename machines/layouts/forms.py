@@ -36,7 +36,8 @@ class PlacedSlides:
 
 @dataclass(frozen=True)
 class LayoutForm:
-    """A family: names of its numbers with their ranges, the slides at numbers (mm), and about which axis it is alike thrice."""
+    """A family: names of its numbers with their ranges, the slides at numbers (mm), and about which axis it is alike
+    thrice."""
 
     numbers: Mapping[str, tuple[float, float]]
     place: Callable[..., PlacedSlides]
@@ -78,6 +79,6 @@ FORMS: Mapping[SlideLayout, LayoutForm] = {
     "star": LayoutForm({"height": (0.3, 4.0)}, _star, 90.0),
     "parallel-x": LayoutForm({"y1": _SIDE, "y2": (-1.5, 1.5), "y3": _SIDE, "z1": _UP, "z2": _UP, "z3": _UP}, _parallel_x),
     "coplanar": LayoutForm({"half": _SIDE, "middle": (-1.0, 1.0), "height": _UP}, _coplanar),
-    "perpendicular": LayoutForm({name: _OFF for name in ("ay", "az", "bx", "bz", "cx", "cy")}, _perpendicular),
+    "perpendicular": LayoutForm(dict.fromkeys(("ay", "az", "bx", "bz", "cx", "cy"), _OFF), _perpendicular),
     "hybrid": LayoutForm({"half": _SIDE, "height": (0.0, 3.0), "behind": (0.5, 3.0)}, _hybrid),
 }

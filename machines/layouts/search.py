@@ -131,8 +131,9 @@ def best(asked: LayoutQuestion, seed: int = 0) -> LayoutFound | None:
     runs = [differential_evolution(cost, bounds, maxiter=ROUNDS, popsize=CROWD, tol=1e-8, seed=seed + k, polish=False)
             for k in range(RESTARTS)]
     top = min(runs, key=lambda run: float(run.fun))
-    polished = minimize(cost, top.x, method="Nelder-Mead", bounds=bounds, options={"maxiter": 200 * len(span), "xatol": 1e-6})
-    numbers, rod = numbers_of(polished.x if polished.fun <= top.fun else top.x)
+    start = np.asarray(top.x, dtype=np.float64)
+    polished = minimize(cost, start, method="Nelder-Mead", bounds=bounds, options={"maxiter": 200 * len(span)})
+    numbers, rod = numbers_of(polished.x if polished.fun <= top.fun else start)
     found = LayoutFound(numbers, rod, figures_of(asked, numbers, rod))
     return found if np.isfinite(found.figures["condition"]) and found.within(asked.limits) else None
 

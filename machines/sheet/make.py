@@ -24,6 +24,8 @@ from machines.user_file import UserFile, ValueSource, read_toml, validate, wrong
 from toolpaths.diagnostics import Diagnostic, Severity, has_errors
 
 ENDLESS = "endless"
+ALSO_ENDLESS = "unlimited", "continuous"
+"""words of machine files and brochures for it, which an answer may hold too"""
 NAME = "sheet"
 """what the document is called in [sources] of the machine file"""
 _ACCELERATION, _TURNING_ACCELERATION = 2000.0, 500.0

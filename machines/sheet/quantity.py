@@ -41,10 +41,14 @@ def read_quantity(text: str, measure: QuantityKind) -> float:
     found = _NUMBER.match(text)
     if found is None:
         example = f"12.5 {next(iter(units))}"
-        raise WrongFigureError(f"{text!r} is not a number with a unit", f"write a {measure} as in {example!r}")
+        raise WrongFigureError(f"{text!r} is not a number with a unit", f"write {_a(measure)} as in {example!r}")
     number, unit = found.groups()
     if not unit:
-        raise WrongFigureError(f"{text!r} has no unit", f"a {measure} is in {known}")
+        raise WrongFigureError(f"{text!r} has no unit", f"{_a(measure)} is in {known}")
     if unit not in units:
-        raise WrongFigureError(f"{unit!r} is no unit of a {measure}", f"known are {known}")
+        raise WrongFigureError(f"{unit!r} is no unit of {_a(measure)}", f"known are {known}")
     return float(number) * units[unit]
+
+
+def _a(measure: QuantityKind) -> str:
+    return f"{'an' if measure[0] in 'aeiou' else 'a'} {measure}"

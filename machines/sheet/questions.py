@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import get_args
 
 from machines.sheet.jog import QUESTIONS
-from machines.sheet.make import ENDLESS
+from machines.sheet.make import ALSO_ENDLESS, ENDLESS
 from machines.sheet.model import PivotForm, ZeroEnd, spelt
 from machines.sheet.pivots import names_of
 from machines.sheet.quantity import QuantityKind, read_quantity
@@ -123,7 +123,7 @@ def _slide(sheet: _Sheet, letter: str) -> Iterator[str]:
 
 def _turn(sheet: _Sheet, letter: str, in_table: bool) -> Iterator[str]:
     def ends(text: str) -> str:
-        if text.lower() == ENDLESS:
+        if text.lower() in (ENDLESS, *ALSO_ENDLESS):
             return json.dumps(ENDLESS)
         both = text.replace(" to ", " ").replace(",", " ").split()
         if len(both) != 2:

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 from postproc.base.given import faults_of
 from postproc.base.header_words import chosen_axes, feed_line, hooks_line, setup_line, smoothing_line
 from postproc.base.length_text import LengthText
-from toolpaths.choices import GivenDialect, GivenUnit
+from toolpaths.choices import GivenDialect, GivenUnit, ShopName
 from toolpaths.diagnostics import DiagnosticError
 
 FeedModeChoice = Literal["auto", "per-minute", "inverse-time"]
@@ -34,7 +34,8 @@ class Options:
     setup: str = ""
     """file of the set-up"""
     units: GivenUnit = ""
-    dialect: GivenDialect = ""
+    dialect: GivenDialect | ShopName = ""
+    """also a name that an installed package registers"""
     allow_unknown: tuple[str, ...] = ()
     output: OutputMode = "auto"
     feed: FeedSource = "programmed"
@@ -66,9 +67,17 @@ class Options:
     """of the program and its subprograms' files; default: that of the CL file"""
 
     def __post_init__(self) -> None:
-        found = faults_of({f.name: (getattr(self, f.name), f.default) for f in fields(self)}, _WORDS)
+        found = faults_of({f.name: (getattr(self, f.name), f.default) for f in fields(self)}, self._words())
         if found:
             raise DiagnosticError(found)
+
+    def _words(self) -> dict[str, tuple[str, ...]]:
+        """The closed lists; installed packages are asked for a dialect that is none of the project's own."""
+        if self.dialect in _WORDS["dialect"]:
+            return _WORDS
+        from toolpaths.cl.systems.shop_forms import shop_names
+
+        return _WORDS | {"dialect": (*_WORDS["dialect"], *shop_names())}
 
     def header(self, said: LengthText) -> list[str]:
         """The options as comment lines of an output file; files by their names, wherever they stand."""

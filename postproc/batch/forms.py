@@ -14,7 +14,7 @@ OUTPUTS = ("output", "json", "report", "csv", "figure", "figures", "check-progra
 """options that name files which the command writes: a batch names them itself"""
 WRITING = ("convert", "place", "report", "calibrate")
 """commands whose -o a batch states; the others leave figures alone"""
-PLAIN = ("help", "max-file-size", "quiet", "verbose")
+PLAIN = ("help", "max-file-size", "quiet", "verbose", "workers", "scheduler")
 """options of all commands that are none of a job"""
 
 

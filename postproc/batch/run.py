@@ -94,7 +94,7 @@ def _on_dask(tasks: Sequence[tuple[Task, str]], runner: Runner, where: Where) ->
 
     ended: Any = as_completed
     with ExitStack() as stack:
-        client = _client(where, stack)
+        client = client_of(where, stack)
         futures = {client.submit(_remote, task, key, runner, key=key, pure=False, retries=0): number
                    for number, (task, key) in enumerate(tasks)}
         stack.callback(client.cancel, list(futures))
@@ -117,7 +117,7 @@ def _why(future: Any) -> str:
     return f"{type(fault).__name__}: {fault}"
 
 
-def _client(where: Where, stack: ExitStack) -> Any:
+def client_of(where: Where, stack: ExitStack) -> Any:
     """The workers, closed at the end.
 
     Raises:

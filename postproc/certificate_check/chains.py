@@ -1,8 +1,8 @@
 """Whether a certificate of a chain of axes proves what it says: rotary positions without a gap, slides inside their travel.
 
 For each box of rotary positions the tip's corners are carried back through the axes before the first slide, the tool forward
-through the rest, and the slides follow by Cramer's rule with rounding. Boxes that do not confirm what the file states are cut.
-The chain is compared with the machine file, read without the project's loader.
+through the rest, and the slides follow by Cramer's rule with rounding. Boxes that do not confirm what the file states are
+cut. The chain is compared with the machine file, read without the project's loader.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ Point = list[Ball]
 
 @dataclass(frozen=True)
 class StatedTurns:
-    """A box of rotary positions of the file, or a part of it: its path, ends (R,), what is stated of it (3,), cuts so far."""
+    """A box of rotary positions of the file, or a part of it: its path, ends (R,), what is stated of it (3,), cuts so
+    far."""
 
     path: str
     lower: FloatArray
@@ -213,10 +214,12 @@ def about_chain(found: dict[str, Any], table: dict[str, Any]) -> None:
         raise Rejected(f"its tool axis is {stated['tool_axis']}, in the machine file {own.tool.tolist()}")
     for axis in stated["axes"]:
         name = axis["letter"]
-        if axis["rotary"] is not (name in "ABC") or not np.allclose(own.direction[name], axis["direction"], rtol=0.0, atol=1e-9):
+        if axis["rotary"] is not (name in "ABC") or not np.allclose(own.direction[name], axis["direction"], rtol=0.0,
+                                                                    atol=1e-9):
             raise Rejected(f"axis {name} turns or moves otherwise in the machine file")
         if axis["rotary"] and not np.allclose(own.point[name], axis["point"], rtol=1e-9, atol=1e-9):
-            raise Rejected(f"the line of {name} goes through {axis['point']}, in the machine file {own.point[name].tolist()}")
+            raise Rejected(f"the line of {name} goes through {axis['point']}, in the machine file "
+                           f"{own.point[name].tolist()}")
         _travel(name, axis, table, found["region"])
 
 

@@ -51,8 +51,10 @@ def legs_in(geometry: dict[str, Any], shift: FloatArray, pose: list[Ball]) -> Bo
         end = [x + v for x, v in zip(end, kept, strict=True)]
         w = [end[i] - float(leg["point"][i]) for i in range(3)]
         under, cosine, q, rod, rod_by = _leg(leg, w, by)
-        for own, value in zip((found.ends, found.ends_by, found.rods, found.rods_by), (end, by, rod, rod_by), strict=True):
-            own.append(value)  # type: ignore[arg-type]  # each list has its own kind of row
+        found.ends.append(end)
+        found.ends_by.append(by)
+        found.rods.append(rod)
+        found.rods_by.append(rod_by)
         found.under.append(under)
         found.cosine.append(cosine)
         found.q.append(q)

@@ -117,9 +117,9 @@ def _of_file(leg: dict[str, Any], axis: dict[str, Any], drive: str, side: tuple[
     bar: dict[str, Any] = {}
     if bars:
         name = leg.get("bar")
-        hinge, own = bars[name]["hinge"] if name else None, list(leg.get("joint", (0, 0, 0)))
+        own = list(leg.get("joint", (0, 0, 0)))
         bar = {"bar": list(bars).index(name) if name else -1, "kept": own if name else [0.0] * 3,
-               "joint": list(hinge) if name else own}
+               "joint": list(bars[name]["hinge"]) if name else own}
     rods: list[Any] = leg.get("rods") or []
     apart = float(leg.get("pair") or 0.0)
     pair = np.subtract(rods[0], rods[1]).tolist() if len(rods) == 2 else [apart * side[0], apart * side[1], 0.0]

@@ -89,7 +89,7 @@ def _spindle(geometry: dict[str, Any], shift: FloatArray, poses: tuple[list[Ball
     parts = geometry["parts"]
     if parts["spindle_radius"] is None:
         return
-    places = [np.array(geometry["gauge"], np.float64) + [0.0, 0.0, float(v)] for v in parts["spindle"]]
+    places = [np.add(geometry["gauge"], (0.0, 0.0, float(v))) for v in parts["spindle"]]
     (low, _), (high, _) = (carried(geometry, shift, poses[0], v) for v in places)
     (_, low_by), (_, high_by) = (carried(geometry, shift, poses[1], v) for v in places)
     yield RoundBar((low, high), (low_by, high_by), float(parts["spindle_radius"]))
@@ -133,8 +133,10 @@ def _normal(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Float
     s, t = np.full(len(a), 0.5), np.full(len(a), 0.5)
     u, v = b - a, d - c
     for _ in range(60):
-        t = np.clip(np.einsum("ij,ij->i", a + s[:, None] * u - c, v) / np.maximum(np.einsum("ij,ij->i", v, v), 1e-30), 0.0, 1.0)
-        s = np.clip(np.einsum("ij,ij->i", c + t[:, None] * v - a, u) / np.maximum(np.einsum("ij,ij->i", u, u), 1e-30), 0.0, 1.0)
+        t = np.clip(np.einsum("ij,ij->i", a + s[:, None] * u - c, v) / np.maximum(np.einsum("ij,ij->i", v, v), 1e-30), 0.0,
+                    1.0)
+        s = np.clip(np.einsum("ij,ij->i", c + t[:, None] * v - a, u) / np.maximum(np.einsum("ij,ij->i", u, u), 1e-30), 0.0,
+                    1.0)
     gap = a + s[:, None] * u - c - t[:, None] * v
     size = np.sqrt((gap**2).sum(axis=1))
     return np.where((size > 1e-9)[:, None], gap / np.maximum(size, 1e-30)[:, None], np.array([1.0, 0.0, 0.0]))

@@ -158,3 +158,27 @@ def errors_schema() -> None:
     from machines.geometric_error.files.loader import error_model_schema
 
     print_json(error_model_schema())
+
+
+@errors_app.command("repeatability", epilog="Example: postproc errors repeatability C-42.csv --figure C-42.svg")
+def repeatability(file: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="column reading [arcsec] or [um]; where "
+                                                       "there are several, position [deg] or [mm], and way (1, -1)")],
+                  figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="the readings drawn, .png or "
+                                                              ".svg")] = None, json: Json = "") -> None:
+    """Repeatability of an axis from repeated readings: interval, standard deviation, reversal (ISO 230-2)."""
+    from postproc.cli.catalogue import analysis_text
+
+    ending = figure_ending(figure)
+    refuse_overwriting({"--figure": str(figure or ""), "--json": json}, {"the readings": str(file)})
+    outputs: dict[Path, str | bytes] = {}
+    with shown_errors(json):
+        from machines.calibration.repeatability import read_repeated, repeated_figure
+
+        found, diagnostics = read_repeated(file)
+        figures = {} if found is None else found.figures
+        if found is not None and figure is not None and ending is not None:
+            outputs[figure] = repeated_figure(found, file.stem, ending)
+    words = {key: value for key, value in figures.items() if key != "positions"} | (
+        {"positions": len(figures["positions"])} if figures else {})
+    report(tuple(diagnostics), json, figures | {"diagnostics": [d.as_dict() for d in diagnostics]}, analysis_text(words),
+           outputs)

@@ -32,12 +32,14 @@ BoxOption = Annotated[str, typer.Option("--box", metavar="BOX", help="of the tip
 BoxTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, max=1e4,
                                           help="length of the tool; of a machine on legs with --box")]
 MarginOption = Annotated[float | None, typer.Option("--margin", metavar="SHARE", min=1e-6, max=1.0, help=(
-    "distance from singular positions, no unit; left out: half of the least that random poses have, of a chain none where it "
+    "distance from singular positions, no unit; left out: half of the least that random poses have, of a chain none where "
+    "it "
     "is singular inside"))]
 ClearanceOption = Annotated[bool | None, typer.Option("--clearance/--no-clearance", help="whether rods, spindle and slides "
                                                       "must clear each other and joints their stops; left out: only where "
                                                       "they do everywhere")]
-TurnOption = Annotated[list[str] | None, typer.Option("--turn", metavar="LETTER=LOW:HIGH", help="of a chain of axes: degrees "
+TurnOption = Annotated[list[str] | None, typer.Option("--turn", metavar="LETTER=LOW:HIGH",
+                                                      help="of a chain of axes: degrees "
                                                       "of a rotary axis; left out: its travel, or the part of it at which a "
                                                       "box is in reach")]
 TravelOption = Annotated[bool | None, typer.Option("--travel/--no-travel", help="whether drives must be inside their "
@@ -61,6 +63,7 @@ def machine_certify(name: Name = "", output: CertificateFile = None, check: Chec
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json):
         machine = machine_of(name)
+        found: CertifiedChain | Certified
         if machine.kinematics.chain:
             found = _chain_certified(machine, box, tool, margin, turn, travel, clearance)
         else:
@@ -96,7 +99,8 @@ def _chain_certified(machine: Machine, box: str, tool: float, margin: float | No
 
     for option, value in (("--travel", travel), ("--clearance", clearance)):
         if value is not None:
-            raise typer.BadParameter(f"of a chain of axes the travel is what is proved, and it states no parts: leave {option} "
+            raise typer.BadParameter(f"of a chain of axes the travel is what is proved, and it states no parts: leave "
+                                     f"{option} "
                                      "out", param_hint=option)
     ends, size = None, None
     if box:
@@ -118,7 +122,8 @@ def _ranges(machine: Machine, given: list[str] | None) -> dict[str, tuple[float,
         except ValueError:
             low, high = 1.0, 0.0
         if name not in letters or name in found or not -1e6 < low <= high < 1e6 or high - low > 360.0:
-            raise typer.BadParameter(f"{text!r}: write {', '.join(letters) or 'no axis: there is no rotary one'}, =, and two "
+            raise typer.BadParameter(f"{text!r}: write {', '.join(letters) or 'no axis: there is no rotary one'}, =, and "
+                                     "two "
                                      "angles with : between them, at most a turn apart, each axis once", param_hint="--turn")
         found[name] = low * DEG, high * DEG
     return found

@@ -20,21 +20,27 @@ if TYPE_CHECKING:
 DESIGNED = "Examples: postproc machine design --layout parallel-z --box 500x500x400 --max bulk=1475 -o delta.toml; " \
            "postproc machine design --layout rotary-delta --arm 260 --rod 480 --box 420x420x100"
 LayoutOption = Annotated[SlideLayout, word_option("--layout", SlideLayout, "how the slides stand")]
-BoxSides = Annotated[str, typer.Option("--box", metavar="XxYxZ", help="sides of the workspace, mm; of cranks the cylinder round "
+BoxSides = Annotated[str, typer.Option("--box", metavar="XxYxZ", help="sides of the workspace, mm; of cranks the cylinder "
+                                       "round "
                                        "z, as wide as it is long")]
 PlatformOption = Annotated[float, typer.Option("--platform", metavar="MM", min=1.0, max=1e5, help="from the middle of the "
                                                  "platform to its joints")]
 GoalOption = Annotated[Goal, word_option("--least", Goal, "what is to be least")]
-MaxOption = Annotated[list[str] | None, typer.Option("--max", metavar="FIGURE=VALUE", help="largest condition, bulk and width "
-                                                     "(mm, larger and smaller extent across z, of the contracted model), speed "
+MaxOption = Annotated[list[str] | None, typer.Option("--max", metavar="FIGURE=VALUE",
+                                                     help="largest condition, bulk and width "
+                                                     "(mm, larger and smaller extent across z, of the contracted model), "
+                                                     "speed "
                                                      "or rod (mm)")]
 MachineFile = Annotated[Path | None, typer.Option("-o", "--output", metavar="MACHINE.toml", help="machine file to write")]
 AgainstOption = Annotated[Goal | None, word_option("--front", Goal, "also the machines of which none is better in both")]
 FrontFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="the front drawn, .png or .svg")]
-ArmOption = Annotated[float | None, typer.Option("--arm", metavar="MM", min=1.0, max=1e5, help="cranks: length of the arms that "
-                                                  "are there; the cylinder's width follows from its height. Left out: arms and "
+ArmOption = Annotated[float | None, typer.Option("--arm", metavar="MM", min=1.0, max=1e5,
+                                                 help="cranks: length of the arms that "
+                                                  "are there; the cylinder's width follows from its height. Left out: "
+                                                  "arms and "
                                                   "rods for the cylinder")]
-CrankRodOption = Annotated[float | None, typer.Option("--rod", metavar="MM", min=1.0, max=1e5, help="cranks: with --arm, length "
+CrankRodOption = Annotated[float | None, typer.Option("--rod", metavar="MM", min=1.0, max=1e5,
+                                                      help="cranks: with --arm, length "
                                                        "of the rods that are there")]
 
 
@@ -62,7 +68,8 @@ def machine_design(layout: LayoutOption = "parallel-z", box: BoxSides = "500x500
     refuse_overwriting({"-o": str(output or ""), "--figure": str(figure or ""), "--json": json}, {})
     if layout == "rotary-delta":
         if given or against is not None or goal != "condition":
-            raise typer.BadParameter("cranks are sized by the angle between rod and arm alone: leave --max, --least and --front "
+            raise typer.BadParameter("cranks are sized by the angle between rod and arm alone: leave --max, --least and "
+                                     "--front "
                                      "out", param_hint="--layout")
         _cranks(sides, platform, arm, rod, output, json)
         return
@@ -89,7 +96,8 @@ def _cranks(sides: Floats, platform: float, arm: float | None, rod: float | None
     with shown_errors(json):
         from machines.layouts.cranks import crank_file, of_bars, of_cylinder
 
-        found = of_cylinder(float(sides[0]), float(sides[2])) if arm is None or rod is None else of_bars(arm, rod, float(sides[2]))
+        found = of_cylinder(float(sides[0]), float(sides[2])) if arm is None or rod is None else of_bars(arm, rod,
+                                                                                                         float(sides[2]))
         text = crank_file(found, platform)
     _say(found.figures, text, output, {}, json)
 

@@ -73,8 +73,7 @@ def _ask(question: SheetQuestion) -> str:
         EOFError: where standard input has ended.
     """
     while True:
-        typer.echo(question.prompt(), nl=False, err=True)
-        line = answer_line()
+        line = answer_line(question.prompt())
         try:
             return question.parsed(line)
         except ValueError as wrong:

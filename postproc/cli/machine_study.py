@@ -5,8 +5,9 @@ Heavy packages are imported inside.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
@@ -16,9 +17,7 @@ from postproc.cli.shared.options import figure_ending, word_option
 
 if TYPE_CHECKING:
     from machines.machine import Machine
-    from toolpaths.arrays import Floats
     from toolpaths.choices import FigureEnding
-    from toolpaths.diagnostics import Diagnostic
 
 ANALYSED = "Examples: postproc machine analyse uranesx --json -; " \
            "postproc machine analyse uranesx --map condition --along x --along y --at z=-100 --figure map.svg --csv map.csv"
@@ -27,9 +26,14 @@ SingularOption = Annotated[float | None, typer.Option("--singular-above", metava
                                                       "slides along z stay above this")]
 MapOption = Annotated[MapMeasure | None, word_option("--map", MapMeasure, "measure of a map or a curve")]
 AlongOption = Annotated[list[str] | None, typer.Option("--along", metavar="x|y|z|tilt|SIZE=LOW:HIGH", help=(
-    "with --map: once a curve, twice a slice; left out: x and y. With a size (rod, radius or offset, mm) the extremes over the "
+    "with --map: once a curve, twice a slice; left out: x and y. With a size (rod, radius or offset, mm) the extremes "
+    "over the "
     "workspace against it"))]
-OffsetOption = Annotated[float, typer.Option("--offset", metavar="MM", min=-1e5, max=1e5, help="with --map rod-inertia: centre "
+AnalysedTool = Annotated[float, typer.Option("--tool", metavar="MM", min=0.0, max=1e4,
+                                             help="length of the tool whose tip is "
+                                              "meant, of reach and of chains of axes")]
+OffsetOption = Annotated[float, typer.Option("--offset", metavar="MM", min=-1e5, max=1e5,
+                                             help="with --map rod-inertia: centre "
                                              "of mass above the platform's reference point")]
 AtOption = Annotated[list[str] | None, typer.Option("--at", metavar="x|y|z|tilt=VALUE", help="with --map: the others, mm or "
                                                     "degrees; left out: the middle of the workspace")]
@@ -40,7 +44,7 @@ MapFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help
 
 def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file")], singular_above: SingularOption = None,
                     measure: MapOption = None, along: AlongOption = None, at: AtOption = None, csv: MapCsv = None,
-                    figure: MapFigure = None, offset: OffsetOption = 0.0, json: Json = "") -> None:
+                    figure: MapFigure = None, offset: OffsetOption = 0.0, tool: AnalysedTool = 0.0, json: Json = "") -> None:
     """Condition number, transmission of speed and force over the workspace, reachable box and what ends it."""
     from postproc.cli.catalogue import analysis_text
 
@@ -56,7 +60,7 @@ def machine_analyse(name: Annotated[str, typer.Argument(help="name or TOML file"
 
         with shown_errors(json):
             machine = machine_of(name)
-            found = analyse(machine, singular_above)
+            found = analyse(replace(machine, kinematics=machine.kinematics.with_tool(tool)), singular_above)
             if figure is not None and ending is not None:
                 outputs[figure] = _condition_figure(machine, ending)
         report((), json, found, analysis_text(found), outputs)
@@ -122,7 +126,8 @@ def _sizes(given: list[str]) -> dict[SizeNumber, tuple[float, float]]:
         key: SizeNumber | None = next((one for one in get_args(SizeNumber) if one == name), None)
         least = -1e6 if key == "offset" else 0.0
         if key is None or key in found or not least <= low < high < 1e6 or len(given) > 2:
-            raise typer.BadParameter(f"{text!r}: write one or two of {', '.join(get_args(SizeNumber))}, = and two lengths in mm "
+            raise typer.BadParameter(f"{text!r}: write one or two of {', '.join(get_args(SizeNumber))}, = and two lengths "
+                                     "in mm "
                                      "with : between them, the smaller first", param_hint="--along")
         found[key] = low, high
     return found

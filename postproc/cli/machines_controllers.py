@@ -11,7 +11,7 @@ import typer
 from postproc.cli.machine_certify import CERTIFIED, machine_certify
 from postproc.cli.machine_design import DESIGNED, machine_design
 from postproc.cli.machine_files import EXPORTED, IMPORTED, machine_export, machine_import
-from postproc.cli.machine_forces import FORCES, machine_forces
+from postproc.cli.machine_forces import FORCES, STARS, machine_forces, machine_star
 from postproc.cli.machine_new import EXAMPLES as NEW
 from postproc.cli.machine_new import machine_new
 from postproc.cli.machine_report import REPORTED, machine_report
@@ -52,6 +52,7 @@ machine_app.command("export", epilog=EXPORTED)(machine_export)
 machine_app.command("analyse", epilog=ANALYSED)(machine_analyse)
 machine_app.command("report", epilog=REPORTED)(machine_report)
 machine_app.command("forces", epilog=FORCES)(machine_forces)
+machine_app.command("star", epilog=STARS)(machine_star)
 machine_app.command("stiffness", epilog=STIFF)(machine_stiffness)
 machine_app.command("design", epilog=DESIGNED)(machine_design)
 machine_app.command("tolerance", epilog=TOLERATED)(machine_tolerance)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,6 +28,8 @@ from postproc.cli.shared.options import (
     MachineName,
     MaxTilt,
     ModelOfControl,
+    SchedulerOption,
+    SearchWorkers,
     ToleranceOption,
     UnitsOption,
     figure_ending,
@@ -70,6 +73,8 @@ def orient(file: ClFile,
            dialect: DialectOption = "",
            allow_unknown: Allow = None,
            model: ModelOfControl = "",
+           workers: SearchWorkers = 0,
+           scheduler: SchedulerOption = "",
            json: Json = "") -> None:
     """Choose the tool orientation of 3+2 passes for the least planned time, and say why."""
     ending = figure_ending(figure)
@@ -85,7 +90,12 @@ def orient(file: ClFile,
     values: dict[str, Any] = {}
     text = ""
     outputs: dict[Path, str | bytes] = {}
-    with shown_errors(json), progress_bar() as progress:
+    with shown_errors(json), progress_bar() as progress, ExitStack() as stack:
+        if workers or scheduler:
+            from postproc.batch.cluster import spread
+            from postproc.batch.run import Where
+
+            stack.enter_context(spread(Where(workers, scheduler)))
         made = _chosen(file, machine_of(machine), controller_of(controller), options, progress, model)
         choice, turning, found = made.choice, made.turning, list(made.diagnostics)
         if choice is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,6 +28,8 @@ from postproc.cli.shared.options import (
     MaxTilt,
     ModelOfControl,
     Orient,
+    SchedulerOption,
+    SearchWorkers,
     ToleranceOption,
     UnitsOption,
     figure_ending,
@@ -69,7 +72,9 @@ def place(file: ClFile,
           allow_unknown: Allow = None,
           figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="map of the places, .png or "
                                                       ".svg")] = None,
-          model: ModelOfControl = "", json: Json = "") -> None:
+          model: ModelOfControl = "", workers: SearchWorkers = 0,
+          scheduler: SchedulerOption = "",
+          json: Json = "") -> None:
     """Place and turn the part on the table for the least planned time, inside the limits of the set-up."""
     ending = figure_ending(figure)
     _check(setup)
@@ -87,7 +92,12 @@ def place(file: ClFile,
     values: dict[str, Any] = {}
     text = ""
     outputs: dict[Path, str | bytes] = {}
-    with shown_errors(json), progress_bar() as progress:
+    with shown_errors(json), progress_bar() as progress, ExitStack() as stack:
+        if workers or scheduler:
+            from postproc.batch.cluster import spread
+            from postproc.batch.run import Where
+
+            stack.enter_context(spread(Where(workers, scheduler)))
         choice, found = _chosen(file, machine_of(machine), controller, options, progress, model)
         if choice is not None:
             if figure is not None and ending is not None:

@@ -26,7 +26,7 @@ from postproc.cli.shared.options import (
     ToleranceOption,
     UnitsOption,
 )
-from postproc.cli.shared.says import answer_line, readable
+from postproc.cli.shared.says import answer_line
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
@@ -127,8 +127,7 @@ class _Asking:
             return ""  # answers that come from a file end with the values; --origin states the place
         one = question if question.default is not None else replace(question, default=self.last.get(question.kind))
         while True:
-            typer.echo(readable(one.prompt()), nl=False, err=True)
-            value, wrong = parsed(one, answer_line())
+            value, wrong = parsed(one, answer_line(one.prompt()))
             if value is not None and not wrong:
                 self.last[question.kind] = value
                 self.done.append((question, value))

@@ -28,8 +28,9 @@ UNKNOWN: dict[str, Any] = {"cycle_time_s": None, "lower_bound_s": None, "band_s"
 """what is reported of a file that is refused"""
 
 
-TimedFiles = Annotated[list[Path], typer.Argument(metavar="FILE...", help="CL file, or G-code file of the controller; "
-                                             "several stand side by side")]
+TimedFiles = Annotated[list[Path] | None, typer.Argument(
+    metavar="FILE...", help="CL file, or G-code file of the controller; several stand side by side; with --plan-calibration "
+    "none asks for a test of every kind of move")]
 Logs = Annotated[list[str] | None, typer.Option(
     "--calibrate", metavar="LOG.csv", help="fit the model to a measured run of FILE: columns nc_line, time_s, or an export "
     "of MTConnect or OPC UA; or the time of the whole run alone, 812.4 or 0:13:32; once for each FILE")]
@@ -53,8 +54,8 @@ TestSeconds = Annotated[float, typer.Option("--plan-seconds", metavar="S", min=5
                                             help="s that the test program may take")]
 
 
-def time(files: TimedFiles,
-         machine: MachineName,
+def time(machine: MachineName,
+         files: TimedFiles = None,
          controller: ControllerName = "linuxcnc",
          model: Annotated[str, typer.Option("--model", metavar="{ideal,lookahead,control,linuxcnc,FILE}",
                                             help="model of the control, or a TOML file; default: the controller's")] = "",
@@ -83,10 +84,11 @@ def time(files: TimedFiles,
          plan_seconds: TestSeconds = 60.0,
          json: Json = "") -> None:
     """Estimate how long programs take, with a band, and where the time goes; several side by side."""
-    logs, ending = calibrate or [], figure_ending(figure)
+    files, logs, test, ending = files or [], calibrate or [], plan_calibration, figure_ending(figure)
+    if not files and test is None:
+        raise typer.BadParameter("name the program or CL file to be timed", param_hint="FILE")
     _check_factors(what_if or [])
     _check(output, logs, len(files))
-    test = plan_calibration
     _check_plan(test, len(files) * (1 + len(with_machine or []) + len(with_setup or []) + len(what_if or [])), bool(logs))
     only_with_errors(beyond, error_model)
     given = {f"the file {k}" if k else "the file": str(file) for k, file in enumerate(files)}
@@ -98,7 +100,7 @@ def time(files: TimedFiles,
                         "the error model": error_model, **own_files(machine, controller),
                         "the model": model if Path(model).suffix else ""})
     from postproc.base.options import Options
-    from postproc.cli.time_variants import Asked, answer
+    from postproc.cli.time_variants import Asked, answer, test_of_the_control
 
     options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model, hooks=hooks,
                       error_beyond=beyond)
@@ -106,7 +108,7 @@ def time(files: TimedFiles,
                   tuple(what_if or ()), tuple(logs), output, override, options, csv, figure, check is not None, ending,
                   test, plan_seconds)
     with shown_errors(json), progress_bar() as progress:
-        values, text, outputs, found = answer(asked, progress)
+        values, text, outputs, found = answer(asked, progress) if files else test_of_the_control(asked)
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 

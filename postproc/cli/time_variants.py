@@ -199,7 +199,7 @@ def _fitted(asked: Asked, all_timed: list[Timed]) -> tuple[CalibratedModel | Non
             runs += [] if run is None else [run]
     if len(runs) < len(asked.logs):
         return None, found
-    fit, more = calibrate(runs, all_timed[0].model.quick(), ", ".join(asked.logs), all_timed[0].machine)
+    fit, more = calibrate(runs, all_timed[0].model, ", ".join(asked.logs), all_timed[0].machine)
     return fit, [*found, *more]
 
 
@@ -248,9 +248,25 @@ def _variants(all_timed: list[Timed], estimates: list[Estimate]) -> list[side_by
     ]
 
 
-def _planned_test(asked: Asked, one: Timed, blocks: MotionBlocks,
+def test_of_the_control(asked: Asked) -> TimeAnswer:
+    """The test program that narrows the band of every kind of move on a machine and control, for no program at hand.
+
+    Raises:
+        DiagnosticError: where machine, controller, set-up or model cannot be read, or no test is found.
+    """
+    from postproc.controllers.model import load_controller
+
+    machine, spec = machine_of(asked.machines[0]), read_value(load_controller(asked.controller))
+    planner = read_value(load_model(asked.model or model_name(asked.controller, spec.writer))).of_machine(machine)
+    one = Timed(Path(), machine, asked.setups[0], AS_IS, None, planner, None, ())
+    assert asked.plan is not None
+    values, text, files = _planned_test(asked, one, None, asked.plan)
+    return values, text, files, []
+
+
+def _planned_test(asked: Asked, one: Timed, blocks: MotionBlocks | None,
                   test: Path) -> tuple[dict[str, Any], str, dict[Path, str | bytes]]:
-    """The test program that narrows the band of one program: figures, text, its files."""
+    """The test program that narrows the band of one program, or of all kinds of moves: figures, text, its files."""
     from postproc.setup.model import load_setup
     from postproc.time_fit.plan_calibration import plan_calibration
     from postproc.time_fit.plan_text import as_dict, as_text

@@ -21,14 +21,14 @@ from toolpaths.compiled import chosen
 from toolpaths.shapes import arrays
 
 SMOOTH_TURN, SMOOTH_SAG = 1.0, 0.25
-"""largest change of direction of neighbouring blocks on one curve, rad, and the sag of its chord, mm: coarser points than any
-that a curve is turned into"""
+"""largest change of direction of neighbouring blocks on one curve, rad, and the sag of its chord, mm: coarser than points of
+a curve"""
 EVEN, SLIGHT, ROUNDED = 1.5, 0.02, 0.003
 """on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad, or what points rounded to
 0.001 mm may turn: ROUNDED mm over the shorter chord"""
 FEW_TURN, FEW_EVEN, FEW_SUM = 1.85, 5.0, 2.6
 """a bend that few points show: what one vertex turns at most (2 sin of half the angle), how many times what both neighbours
-turn the same way, and all three together (those of a square turn by 4.2: corners)"""
+turn to the same side, and all three together (those of a square turn by 4.2: corners)"""
 BY_CHORD = 0.5
 """power of the chord by which splines are parametrised: centripetal (E. T. Y. Lee, Computer-Aided Design 21, 1989)"""
 PIECE_TURN, MOST_PIECES = 0.005, 96
@@ -232,7 +232,7 @@ def _curved(u: Floats, chord: Floats, path: CommandedPath) -> tuple[Bools, Float
 
 
 def _turned_alike(u: Floats, turn: Floats) -> Floats:
-    """(N - 1,) what both neighbours of a vertex turn the same way as it does."""
+    """(N - 1,) what both neighbours of a vertex turn to the same side as it does."""
     cosine = (u[1:] * u[:-1]).sum(axis=1)
     same = (u[2:] * u[:-2]).sum(axis=1) < cosine[1:] * cosine[:-1]
     result = np.zeros(len(turn))

@@ -24,8 +24,6 @@ LEAST_SHARE = 0.001
 ROUND_OFF = 1e-9
 LAST_PECK = 0.02
 """mm: a last peck of less is none of its own: to the read-back its two depths are one"""
-STATES_RETRACT = ("{retract}", "{second}")
-"""one of them stands in cycles that state the level they retract to"""
 
 
 def holes_of(toolpath: Toolpath, moves: Moves, path: JointPath, words: WordRows, control: Control,
@@ -138,7 +136,7 @@ def _states_retract(controller: ControllerFile, key: CycleKey) -> bool:
     """True where the controller's cycle names the level that it retracts to."""
     cycles = controller.cycles
     specs = [table[key] for table in (cycles.table, cycles.with_dwell, cycles.falling) if key in table]
-    return any(name in spec.code for spec in specs for name in STATES_RETRACT)
+    return any(spec.states_retract for spec in specs)
 
 
 def _slack(path: JointPath, controller: ControllerFile, block: int) -> float:

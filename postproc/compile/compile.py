@@ -23,7 +23,7 @@ from postproc.compile.word_rows import WordRows, block_tools, joints_of, with_tu
 from postproc.job.job import Job
 from postproc.path.model import ARC, JointPath
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, shared, taken
 from toolpaths.diagnostics import Diagnostic, info
 
 if TYPE_CHECKING:
@@ -59,9 +59,10 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
     placed, found = with_skips(with_sections(_moved(commands, new), sections, line), skip[keep], line,
                                toolpath.file)
     program = Program(control.machine.axis_names, end[keep], write[keep], path.code[keep], feeds.feed[keep],
-                      feeds.mode[keep], path.plane[keep], path.ccw[keep], contour.center[keep], path.home[keep],
-                      np.isnan(path.u[keep]), moves.row[path.move[keep]], line,
-                      placed, kept_holes, job.grid.places, sections, skip[keep], cubics.numbers()[keep], cubics.curves,
+                      shared(feeds.mode[keep]), taken(path.plane, keep), taken(path.ccw, keep),
+                      shared(taken(contour.center, keep)), path.home[keep], np.isnan(path.u[keep]),
+                      moves.row[path.move[keep]], line, placed, kept_holes, job.grid.places, sections, shared(skip[keep]),
+                      shared(cubics.numbers()[keep]), cubics.curves,
                       control.rolls, control.machine.home * control.unit,
                       tuple(a for a, turns in zip(control.machine.axis_names, control.machine.rotary, strict=True) if turns))
     found += [*refused, *long_turns(program, toolpath.file)]

@@ -24,6 +24,11 @@ class CannedCycle(UserModel):
     dwell: str = ""
     """word of the dwell"""
 
+    @property
+    def states_retract(self) -> bool:
+        """True where it names the level that it retracts to."""
+        return "{retract}" in self.code or "{second}" in self.code
+
 
 class Cycles(UserModel):
     """Canned cycles by the kind of the CL file.

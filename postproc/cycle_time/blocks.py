@@ -12,6 +12,9 @@ from postproc.cycle_time.tip_path import TipPath
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, shared
 from toolpaths.shapes import arrays, rows_of
 
+OFF = -1.0
+"""level of smoothing that is not switched on"""
+
 
 class CornerMode(IntEnum):
     """What a control does where two blocks meet."""
@@ -99,7 +102,7 @@ _SHARED = ("line", "rapid", "arc", "center", "normal", "sweep", "speed", "path",
 @dataclass(frozen=True)
 @arrays(start="E #axes.letters", end="E #axes.letters", line="E", rapid="E", arc="E", center="E 3", normal="E 3",
         sweep="E", speed="E", path="int8: E", tolerance="E", chain="E", operation="E", cl_line="E", move="E", given="E",
-        pieces="E", row="E", tool="E")
+        pieces="E", row="E", tool="E", level="E")
 class MotionBlocks:
     """E blocks that move, in mm, rad and s.
 
@@ -123,6 +126,8 @@ class MotionBlocks:
         row (E,): row of the executed motion that the block is, or is a piece of; None where none is known
         tool (E,): number of the tool in the spindle, -1 where the program states none
         tip: of the motion that `row` counts in; None where none is known
+        level (E,): of the control's smoothing, NaN where the program states none, OFF where it has not switched it on; None
+            where no dialect says
     """
 
     axes: Axes
@@ -148,6 +153,7 @@ class MotionBlocks:
     row: Ints | None = None
     tool: Ints | None = None
     tip: TipPath | None = None
+    level: Floats | None = None
 
     def __post_init__(self) -> None:
         for name in _SHARED:

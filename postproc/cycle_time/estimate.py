@@ -12,6 +12,7 @@ from machines.machine import Machine
 from postproc.cycle_time.blocks import Cause, MotionBlocks
 from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.kinds import own_share
+from postproc.cycle_time.levels import by_level
 from postproc.cycle_time.lookahead import lookahead
 from postproc.cycle_time.model import ASSUMED, PARAMETERS, CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes
@@ -85,7 +86,7 @@ def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
     if model.kind == "control":
         from postproc.cycle_time.control import control  # SciPy, which other models do without
 
-        return control(blocks, model)
+        return by_level(blocks, model, control)
     return lookahead(blocks, model)
 
 

@@ -19,11 +19,12 @@ PARAMETERS = ("corner_tolerance", "block_time", "rapid", "override", "stop_time"
               "spindle_time")
 """what a log can say, in the order of `CalibrationRecord.covariance`"""
 ASSUMED = {"corner_tolerance": 0.7, "block_time": 0.7, "rapid": 0.05, "override": 0.02, "stop_time": 0.7,
-           "spindle_time": 0.7, "velocity": 0.15, "acceleration": 0.3, "jerk": 0.5, "tool_change": 0.3, "clamp": 0.3,
+           "spindle_time": 0.7, "level_share": 0.2,
+           "velocity": 0.15, "acceleration": 0.3, "jerk": 0.5, "tool_change": 0.3, "clamp": 0.3,
            "unclamp": 0.3}
 """standard deviation of the logarithm of a value that no document states"""
 
-AssumedName = Literal["corner_tolerance", "block_time", "rapid", "override", "stop_time", "spindle_time"]
+AssumedName = Literal["corner_tolerance", "block_time", "rapid", "override", "stop_time", "spindle_time", "level_share"]
 """parameters of a model that ASSUMED has a deviation of"""
 
 
@@ -55,6 +56,27 @@ class CalibrationRecord(UserModel):
     """s at which the log was polled; 0: it has every change of the line"""
     not_identifiable: tuple[str, ...] = ()
     """parameters that the run says nothing about; they keep their assumed uncertainty"""
+
+
+class LevelShare(UserModel):
+    """What a level of the control's smoothing takes of the axes' limits; levels between two that are stated lie between."""
+
+    level: float
+    """as the program states it: R of G05.1, P of G187, HSC-MODE of Cycle 32; of CYCLE832 1 roughing, 2 semi-finishing,
+    3 finishing"""
+    acceleration: float = Field(default=1.0, gt=0.0, le=2.0)
+    jerk: float = Field(default=1.0, gt=0.0, le=2.0)
+
+
+class WithoutSmoothing(UserModel):
+    """A control whose smoothing the program has not switched on."""
+
+    block_time: float = Field(default=0.001, ge=0.0, le=1.0)
+    """s that it takes for a block at least"""
+    corner_step: float = Field(default=1e4, gt=0.0, le=1e4)
+    """mm/s by which each axis' velocity may jump at a corner"""
+    smoothing: float = Field(default=0.0, ge=0.0, le=1.0)
+    """s over which the set points of the axes are averaged"""
 
 
 class CycleTimeModel(UserModel):
@@ -98,6 +120,12 @@ class CycleTimeModel(UserModel):
     """mm/s by which each axis' velocity may jump at a corner, instead of a corner rounded off; of kind control"""
     smoothing: float = Field(default=0.0, ge=0.0, le=1.0)
     """s over which the set points of the axes are averaged, of kind control"""
+    levels: tuple[LevelShare, ...] = ()
+    """of its smoothing, of kind control; a program that states none runs without their shares"""
+    level_share: float = Field(default=1.0, gt=0.0, le=10.0)
+    """times the shares of a level that is stated"""
+    off: WithoutSmoothing | None = None
+    """of kind control: where the program has not switched its smoothing on; None: that changes nothing"""
     servo_cycle: float = Field(default=0.001, gt=0.0, le=0.1)
     """s, of LinuxCNC"""
     own_share: float = Field(default=0.03, ge=0.0, le=1.0)
@@ -124,10 +152,12 @@ class CycleTimeModel(UserModel):
         return np.log(np.maximum([getattr(self, name) for name in PARAMETERS], 1e-6))
 
     def with_values(self, logarithms: Floats) -> CycleTimeModel:
-        """The model with other PARAMETERS (8,); the share of stated tolerances goes with the corner tolerance."""
+        """The model with other PARAMETERS (8,); the share of stated tolerances goes with the corner tolerance, and by its
+        square root, as speeds at corners do, the step at corners."""
         new = {name: float(np.exp(v)) for name, v in zip(PARAMETERS, logarithms, strict=True)}
-        share = self.stated_share * new["corner_tolerance"] / self.corner_tolerance
-        return self.model_copy(update={**new, "stated_share": share})
+        factor = new["corner_tolerance"] / self.corner_tolerance
+        step = None if self.corner_step is None else self.corner_step * factor**0.5
+        return self.model_copy(update={**new, "stated_share": self.stated_share * factor, "corner_step": step})
 
 
 def builtin_files() -> dict[str, Path]:
@@ -142,7 +172,7 @@ def load_model(source: str | Path) -> tuple[CycleTimeModel | None, list[Diagnost
 
 
 def model_name(controller: str, writer: str) -> str:
-    """The built-in model of a controller: its own where there is one, that of its dialect, else "lookahead"."""
+    """The built-in model of a controller: its own where there is one, that of its dialect, else "control"."""
     known = builtin_files()
     stem = Path(controller).stem
-    return stem if stem in known else writer if writer in known else "lookahead"
+    return stem if stem in known else writer if writer in known else "control"

@@ -9,11 +9,11 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.control.control import Control
-from postproc.cycle_time.blocks import Axes, Cause, CornerMode, MotionBlocks, Pauses
+from postproc.cycle_time.blocks import OFF, Axes, Cause, CornerMode, MotionBlocks, Pauses
 from postproc.cycle_time.shape import NOTHING, shape
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import arc_sweeps, coordinates, positions
-from postproc.readback.text.canonical import CURVE, LOADED, OFFSET, REGISTER, REST, SMOOTH, Canonical
+from postproc.readback.text.canonical import CURVE, LOADED, OFFSET, REGISTER, REST, SMOOTH, SMOOTH_LEVEL, Canonical
 from postproc.readback.text.clamps import closing, opening
 from postproc.readback.text.modal import columns, fill_values, modal_state
 from postproc.readback.text.words import Words
@@ -76,7 +76,7 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
                           np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names,
                           pauses,
                            origin.cl_line, origin.move, _feed_lengths(motion, control), pieces, np.arange(len(motion)),
-                           tool=np.asarray(motion.tool[:len(motion)]))
+                           tool=np.asarray(motion.tool[:len(motion)]), level=_levels(words)[block])
     turned = np.where(np.isnan(motion.pitch), override, 1.0)
     linear = _linear(motion, control)
     blocks = replace(blocks, speed=_clamped(_speeds(motion, blocks, linear, by_radius) * turned, blocks, linear, machine))
@@ -179,6 +179,13 @@ def _path_modes(words: Words, blends_unstated: bool, under_61: CornerMode) -> tu
     return (np.where(exact, CornerMode.STOP, held).astype(np.int8),
             np.where(rounded & (smooth > 0.0), smooth, np.where(np.isnan(own), stated, own)),
             np.nan_to_num(_carried(at, chain, words.lines)))
+
+
+def _levels(words: Words) -> Floats:
+    """(B + 1,) level of the control's smoothing in force at each block."""
+    allowed = fill_values(*words.pick(SMOOTH), words.lines)
+    level = fill_values(*words.pick(SMOOTH_LEVEL), words.lines)
+    return np.where(np.isnan(allowed) | (allowed == 0.0), OFF, level)
 
 
 def _exact_stops(words: Words) -> tuple[Bools, Bools]:

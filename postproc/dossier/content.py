@@ -62,5 +62,6 @@ def certificate(machine: Machine) -> dict[str, Any] | None:
         return None
     content = json.loads(Path(machine.certificate).read_text("utf-8"))
     return {"file": Path(machine.certificate).name, "boxes": len(content["boxes"]), "region": content["region"],
-            "margin": content["margin"], "proved": content["proved"], "travel_proved": "chain" in content or content["travel_proved"],
+            "margin": content["margin"], "proved": content["proved"], "travel_proved": "chain" in content
+            or content["travel_proved"],
             "checked_with_this_version": comes_with_package(machine.certificate)}

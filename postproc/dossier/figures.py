@@ -13,7 +13,8 @@ from machines.analysis.chain_map import chain_map_figure
 from machines.analysis.choices import MapMeasure, MapNumber
 from machines.analysis.lever_map import lever_figure, moved_by_slides
 from machines.analysis.machine_figure import machine_figure
-from machines.analysis.maps import WORDS, map_figure, measured
+from machines.analysis.maps import map_figure, measured
+from machines.analysis.measures import WORDS
 from machines.geometric_error.exchange.figures import model_figure
 from machines.machine import Machine
 from machines.sheet.drawing import drawing

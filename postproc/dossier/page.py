@@ -160,7 +160,7 @@ def _region(region: Mapping[str, Any]) -> str:
     """What was proved of which part and tool, ranges in mm and degrees."""
     ranges = []
     turns = {f"{letter}_rad": ends for letter, ends in region.get("turns_rad", {}).items()}
-    for key, ends in (region | turns).items():
+    for key, ends in {**region, **turns}.items():
         name, _, unit = key.rpartition("_")
         if isinstance(ends, list):
             low, high = (value / DEG if unit == "rad" else value for value in ends)

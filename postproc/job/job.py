@@ -268,7 +268,7 @@ def prepare(toolpath: Toolpath, machine: Machine, controller: ControllerFile, se
     toolpath, repeats = at_all(toolpath, places, setup.order)
     setup, placement = places[0].setup, places[0].placement
     axis_tolerance = options.axis_tolerance * DEG
-    moves, found = build_moves(toolpath, setup, axis_tolerance, repeats)
+    moves, found = build_moves(toolpath, setup, axis_tolerance, repeats, controller.cycles)
     found = [d for d in found if not (errors and d.code == "feed.no_speed")]  # follows from the speed that is missing
     diagnostics += [*found, *_default_feed(toolpath, setup)]
     moves, found = limited_feeds(moves, toolpath, machine.largest_feed)

@@ -66,6 +66,8 @@ def smoothing_plan(controller: ControllerFile, setup: SetupFile, options: Option
             found.append(error("setup.smoothing", f"[output.smoothing] {name!r} = {asked!r}: {why[0]}", file=options.setup,
                                hint=why[1]))
         named[name] = one
+    stated = _stated(controller, options, default, named)
+    named |= {} if stated == default else dict.fromkeys(sorted(names - named.keys()), stated)
     used = tuple(named.get(op.name, default) for op in toolpath.operations)
     return SmoothingPlan(default, named, used), found
 
@@ -75,6 +77,18 @@ def _usual(controller: ControllerFile, options: Options) -> float:
     if fixed is None and options.smoothing and any("{tolerance}" in block for block in controller.program.path_tolerance):
         return min(options.smoothing, MOST * options.tolerance)
     return controller.kinematics.smoothing_share * options.tolerance if fixed is None else fixed
+
+
+def _stated(controller: ControllerFile, options: Options, default: Smoothing, named: dict[str, Smoothing]) -> Smoothing:
+    """The smoothing of operations that state none in a program where others state a level.
+
+    No page at hand says that a word without a level (G05.1 Q1) does away with the level of the block before, so the level
+    is stated that takes no more than is allowed for that word; where there is none, the word.
+    """
+    if controller.kinematics.smoothing_fixed is None or all(one.blocks == default.blocks for one in named.values()):
+        return default
+    one, why = _asked(controller, default.mm, options, default)
+    return default if why is not None else one
 
 
 def _asked(controller: ControllerFile, asked: str | float, options: Options,

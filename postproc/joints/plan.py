@@ -152,10 +152,11 @@ def _stages(runs: list[PoseRun], limits: Limits, start: Floats, may_rewind: bool
     after it; where neither is inside travel, at a quarter turn. One that holds it has no choice.
     """
     result: list[_Stage] = []
+    begins = _begins(runs, start)
     for k, run in enumerate(runs):
         near = [result[-1].lattice.values[b, -1] for b in range(len(result[-1].lattice.values))] if result else [start]
         if k + 1 < len(runs):
-            near += list(runs[k + 1].kin.inverse(runs[k + 1].tip[:1], runs[k + 1].axis[:1], near=start)[:, 0])
+            near += begins[k + 1]
         rotary = np.array(run.kin.rotary)
         near = _distinct(near, start, rotary)
         stage = _stage(lattice_of(run, limits, np.stack(near) if run.held is None else run.held[None]), may_rewind)
@@ -165,6 +166,18 @@ def _stages(runs: list[PoseRun], limits: Limits, start: Floats, may_rewind: bool
         result.append(stage)
         if progress:
             progress(k + 1)
+    return result
+
+
+def _begins(runs: list[PoseRun], start: Floats) -> list[list[Floats]]:
+    """Joints (J,) of every branch at the first pose of each run; those of one machine at once."""
+    result, alike = [list[Floats]() for _ in runs], dict[int, list[int]]()
+    for k, run in enumerate(runs):
+        alike.setdefault(id(run.kin), []).append(k)
+    for some in alike.values():
+        tip, axis = (np.stack([getattr(runs[k], name)[0] for k in some]) for name in ("tip", "axis"))
+        for k, branches in zip(some, runs[some[0]].kin.inverse(tip, axis, near=start).swapaxes(0, 1), strict=True):
+            result[k] = list(branches)
     return result
 
 

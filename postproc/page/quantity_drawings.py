@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.units import DEG
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def fills(run: dict[str, Any], columns: dict[str, Floats]) -> dict[str, Fill]:
     return made
 
 
-def _pieces(columns: dict[str, Floats]) -> tuple[Floats, Floats]:
+def _pieces(columns: dict[str, Floats]) -> tuple[Floats, Ints]:
     """Both ends (N, 2, 2) mm on the sheet of every piece that cuts, and the point (N,) where each ends; at most MOST."""
     flat = np.stack([columns[f"part {name}"] for name in "xyz"], axis=1) @ VIEW.T
     ends = np.flatnonzero(columns["kind"] > 0)
@@ -75,9 +75,9 @@ def _valued(sheet: Figure, run: dict[str, Any], columns: dict[str, Floats], name
     (pieces, at), (column, unit) = _pieces(columns), QUANTITIES[name]
     values = tilt(run, columns)[at] if name == "tilt" else columns[column][at]
     place, known = _place(sheet, pieces), np.isfinite(values)
-    place.add_collection(LineCollection(pieces[~known], colors="#9a9a9a", linewidths=0.8))
+    place.add_collection(LineCollection(list(pieces[~known]), colors="#9a9a9a", linewidths=0.8))
     if known.any():
-        drawn = LineCollection(pieces[known], array=values[known], cmap="viridis", linewidths=0.9)
+        drawn = LineCollection(list(pieces[known]), array=values[known], cmap="viridis", linewidths=0.9)
         place.add_collection(drawn)
         sheet.colorbar(drawn, ax=place, label=f"{column}, {unit}")
 
@@ -91,7 +91,7 @@ def _named(sheet: Figure, run: dict[str, Any], columns: dict[str, Floats], name:
     for k, value in enumerate(np.unique(values).tolist()):
         text = run["causes"][value].replace("_", " ") if name == "cause" else _limit(run, value)
         colour = COLOURS[k % len(COLOURS)]
-        place.add_collection(LineCollection(pieces[values == value], colors=colour, linewidths=0.9, label=text))
+        place.add_collection(LineCollection(list(pieces[values == value]), colors=colour, linewidths=0.9, label=text))
     place.legend(loc="upper right", fontsize="small")
 
 
@@ -145,7 +145,7 @@ def _errors(sheet: Figure, found: dict[str, Any]) -> None:
     for key, colour, text in (("vector_um", COLOURS[1], "before"), ("vector_after_um", COLOURS[0], "after")):
         vector = scale * np.array([one[key] for one in found["places"]]) @ VIEW.T
         place.quiver(*tip.T, *vector.T, angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.0025, label=text)
-    place.scatter(*tip.T, s=3.0, color="#50575f")
+    place.plot(*tip.T, linestyle="", marker=".", markersize=2.0, color="#50575f")
     known = found["uncertainty_k2_um"]
     place.set_aspect("equal")
     place.margins(0.15)

@@ -20,8 +20,8 @@ EVEN = 1e-3
 """rad: triangles that meet flatter than this are one face"""
 MOST = 20_000
 """edges of a solid at most: the sharpest"""
-LEAST = 600
-"""edges of a solid that are drawn however flat they are, so that a round one is seen too"""
+FEW, LEAST = 6, 600
+"""sharp edges below which a solid is a round one, and how many edges of that are drawn, so that it is seen too"""
 
 
 def solids(result: PostResult) -> list[dict[str, Any]]:
@@ -59,6 +59,8 @@ def _edges(folder: Path, file: str | None, units: LengthUnit) -> Floats:
         return np.zeros((0, 6))
     angle = np.asarray(mesh.face_adjacency_angles)
     order = np.argsort(-angle, kind="stable")[:MOST]
-    drawn = (angle[order] > FLAT) | ((np.arange(len(order)) < LEAST) & (angle[order] > EVEN))
+    drawn = angle[order] > FLAT
+    if np.count_nonzero(drawn) < FEW:
+        drawn = (np.arange(len(order)) < LEAST) & (angle[order] > EVEN)
     pairs = np.asarray(mesh.face_adjacency_edges)[order[drawn]]
     return np.asarray(np.asarray(mesh.vertices)[pairs].reshape(-1, 6), dtype=np.float64)

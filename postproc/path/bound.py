@@ -18,7 +18,8 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import blocks as in_blocks
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from postproc.control.control import Control
-from toolpaths.arrays import Bools, Floats, without_nan
+from postproc.path.coarse_bound import coarse_bounds, highest
+from toolpaths.arrays import Bools, Floats, Ints, without_nan
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -26,6 +27,8 @@ from toolpaths.shapes import arrays
 SHORT = 0.1
 """mm: on shorter curves the axis is compared where the curve's own parameter stands, not at the nearest tip"""
 _MOST_SKEW = 0.25
+MANY = 1000
+"""blocks from which on a cheap bound is looked for first"""
 
 
 @dataclass(frozen=True)
@@ -44,10 +47,34 @@ class CurveBlocks:
     def __len__(self) -> int:
         return len(self.u0)
 
-    def take(self, rows: slice | Bools) -> CurveBlocks:
+    def take(self, rows: slice | Bools | Ints) -> CurveBlocks:
         """Some of the blocks."""
         return CurveBlocks(self.curves.take(rows), self.u0[rows], self.u1[rows], self.q0[rows], self.q1[rows],
                            (self.start[0][rows], self.start[1][rows]), (self.end[0][rows], self.end[1][rows]))
+
+
+def settled_bounds(control: Control, kin: Kinematics, stretch: CurveBlocks, allowed: tuple[float, float], ends: Bools,
+                   worst: Floats) -> tuple[Floats, Floats]:
+    """As `bounds` within the tolerances `allowed`, of blocks that are taken wherever that is kept, where `ends` (N,).
+
+    The largest of those, and of `worst` (2,), is what `bounds` finds; where a cheap bound shows that a block keeps the
+    tolerances and is not the worst, that bound stands for it.
+    """
+    coarse = None if control.tip_law or len(stretch) < MANY else coarse_bounds(
+        kin, stretch.curves, (stretch.q0, stretch.q1), stretch.start, stretch.end, SHORT)
+    if coarse is None:
+        return bounds(control, kin, stretch, *allowed)
+    kept = ends & (coarse[0] <= allowed[0]) & (coarse[1] <= allowed[1])
+    known = ~kept
+    known[highest(np.where(kept, coarse, 0.0))] = True
+    first = np.flatnonzero(known)
+    coarse[:, first] = bounds(control, kin, stretch.take(first), *allowed)
+    good = ends[first] & (coarse[0, first] <= allowed[0]) & (coarse[1, first] <= allowed[1])
+    worst = np.maximum(worst, coarse[:, first[good]].max(axis=1, initial=0.0))
+    rest = np.flatnonzero(~known & ((coarse[0] > worst[0]) | (coarse[1] > worst[1])))
+    if len(rest):
+        coarse[:, rest] = bounds(control, kin, stretch.take(rest), *allowed)
+    return coarse[0], coarse[1]
 
 
 def bounds(control: Control, kin: Kinematics, stretch: CurveBlocks, tolerance: float,

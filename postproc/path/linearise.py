@@ -13,7 +13,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from postproc.control.control import Control
 from postproc.joints.joint_path import branch_of, nearest_solution
-from postproc.path.bound import CurveBlocks, bounds
+from postproc.path.bound import CurveBlocks, settled_bounds
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between, wrap
 from toolpaths.shape import Curves
@@ -56,10 +56,12 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
 
     `keep` (N,) marks curves whose block follows them by itself (kept arcs).
     """
-    parts = []
+    parts, worst = list[CurvePieces](), np.zeros(2)
     for first in range(0, max(len(curves), 1), _TOGETHER):
         part = slice(first, first + _TOGETHER)
-        found = _linearised(control, kin, curves.take(part), q0[part], q1[part], keep[part], tolerance, axis_tolerance)
+        found = _linearised(control, kin, curves.take(part), q0[part], q1[part], keep[part], tolerance, axis_tolerance,
+                            worst)
+        worst = np.maximum(worst, [found.worst_tip, found.worst_axis])
         parts.append(found if not first else replace(found, curve=found.curve + first, broken=found.broken + first))
     if len(parts) == 1:
         return parts[0]
@@ -68,13 +70,14 @@ def linearise(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1:
 
 
 def _linearised(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats, keep: Bools,
-                tolerance: float, axis_tolerance: float) -> CurvePieces:
-    """The same of curves that are looked at together."""
+                tolerance: float, axis_tolerance: float, worst: Floats) -> CurvePieces:
+    """The same of curves that are looked at together; `worst` (2,): bounds that are known of others."""
     exact = keep | _straight_already(control, kin, curves, q0, q1)
     if exact.all():
         return CurvePieces(np.arange(len(exact)), np.ones(len(exact)), q1,
                            np.zeros(0, dtype=np.int64), 0.0, 0.0)
     front = _Front(control, kin, curves, q0, q1, np.flatnonzero(~exact), tolerance, axis_tolerance)
+    front.worst = worst
     while len(front.index):
         front.advance()
     curve = np.concatenate([np.flatnonzero(exact), *front.curve])
@@ -127,7 +130,8 @@ class _Front:
         """Try the steps, take those that are long enough, forget finished and broken curves."""
         u1, q1, pose = self._tried()
         stretch = CurveBlocks(self.curves.take(self.index), self.at, u1, self.joints, q1, self.pose, pose)
-        tip, axis = bounds(self.control, self.kin, stretch, self.tolerance, self.axis_tolerance)
+        ends = (u1 == self.until) & ~stretch.curves.is_arc
+        tip, axis = settled_bounds(self.control, self.kin, stretch, (self.tolerance, self.axis_tolerance), ends, self.worst)
         ratio = np.maximum(tip / self.tolerance, axis / self.axis_tolerance)
         good = ratio <= 1.0
         full = (u1 == self.until) | (self.step >= self.longest)

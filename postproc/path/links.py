@@ -34,6 +34,8 @@ SAMPLES = 17
 _TURN = 2.0 * np.pi
 LEG_TOLERANCE = 0.01
 """mm off the straight line for retract and approach"""
+_STANDS = 1e-12
+"""rad: what the inverse rounds at the end of a leg; a turn below it moves no tip by as much as is measured here"""
 
 
 @dataclass(frozen=True)
@@ -268,6 +270,10 @@ def _leg(control: Control, kin: Kinematics, start: Pose, end: Pose) -> Floats:
     """Joints from one pose to another on the same tool axis, tip on the straight line between; none where equal."""
     if bool((start.q == end.q).all()):
         return np.zeros((0, len(end.q)))
+    if control.tip_law or kin.straight_slides:
+        turned = np.abs(end.q - start.q)[np.array(kin.rotary) | np.array(kin.turns_tool)]
+        if not len(turned) or turned.max() < _STANDS:
+            return end.q[None]
     line = Curves(start.tip[None], end.tip[None], start.axis[None], end.axis[None], np.zeros(1, dtype=bool),
                   np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1))
     return linearise(control, kin, line, start.q[None], end.q[None], np.zeros(1, dtype=bool), LEG_TOLERANCE, 1e-3).q

@@ -153,8 +153,8 @@ def _text(job: Job, check: _Check, readings: list[str]) -> str:
     system = np.concatenate([origin, *rotation.T[:2]])
     lines = ["UNITS/MM", "TOOL PATH/CHECK OF PIVOTS,TOOL,CHECK", f"MSYS/{_numbers(system)}", f"LOAD/TOOL,{check.tool}"]
     axes, point = local(check.axes, True), local(check.point[None], False)[0]
-    said = job.controller.lengths
-    place = " ".join(f"{letter}{said.plain(v + 0.0)}" for letter, v in zip("XYZ", point.round(4).tolist(), strict=True))
+    said, words = job.controller.lengths, (check.point - job.control.origin).round(4)  # its axes are the machine's
+    place = " ".join(f"{letter}{said.plain(v + 0.0)}" for letter, v in zip("XYZ", words.tolist(), strict=True))
     lines += ["PPRINT/BALL OR PROBE, ITS LENGTH TO THE CENTRE, SPINDLE STANDING, RAPIDS SLOWED DOWN BY HAND",
               f"PPRINT/INDICATOR ON THE TABLE AT {place} OF THE WORK OFFSET"]
     for axis, reading in zip(axes, readings, strict=True):

@@ -9,6 +9,7 @@ from pathlib import Path
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile
+from toolpaths.choices import ShopName
 from toolpaths.cl.curves import SPLINE_SHARE
 from toolpaths.cl.read import read_bytes
 from toolpaths.diagnostics import Diagnostic, Severity, warning
@@ -48,7 +49,7 @@ def with_cubics(path: Toolpath, options: Options) -> Toolpath:
     source = path.source
     if source is None or not path.spline_slack:
         return path
-    asked = source.dialect or None if source.plug_in is None else None
+    asked = source.dialect or None if source.plug_in is None else ShopName(source.plug_in.name)
     read = read_bytes(source.data, file=path.file, units=source.units or None, dialect=asked,
                       allow_unknown=options.allow_unknown, tolerance=path.spline_slack / SPLINE_SHARE, cubics=True)
     return read.toolpath if len(read.toolpath.faults) == len(path.faults) else path

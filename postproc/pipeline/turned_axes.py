@@ -46,7 +46,10 @@ def turned_by_clock(choice: TurningChoice, keep: PostResult, write: Write,
     last = {one: measured(clock, known[one].made) for one in {own.picked, *order[:LAST]}}
     best = known[min(last, key=lambda one: (last[one].seconds, one != own.picked))]
     times: dict[Programs, ProgramTime] = {"keep": last[own.picked], "turned": last[best.choice.picked]}
-    return replace(best.choice, programs=times, passed=tuple(dict.fromkeys(passed))), best.made
+    spent = zip(*(_seconds_of_runs(replace(known[one], time=last[one])).tolist()
+                  for one in (own.picked, best.choice.picked)), strict=True)
+    runs = tuple(replace(one, on_control=pair) for one, pair in zip(best.choice.runs, spent, strict=True))
+    return replace(best.choice, runs=runs, programs=times, passed=tuple(dict.fromkeys(passed))), best.made
 
 
 def turned_by_plan(choice: TurningChoice, keep: PostResult, write: Write) -> tuple[TurningChoice, PostResult]:

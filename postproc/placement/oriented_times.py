@@ -36,6 +36,12 @@ class OrientedTimer(Timer):
         self.most = min(_MOST, max(_LEAST, _CHOICES // len(work.passes)))
 
     def _tried(self, place: Floats, best: float) -> TimedPlace:
+        made = super()._tried(place, best)
+        self.planned += 0 if made.refused else len(self.work.passes)
+        return made
+
+    def seen(self, place: Floats) -> TimedPlace:
+        """See the base class: a whole choice, without a bound."""
         why = self.stands(place)
         if why is not None:
             return self._refused(place, why)
@@ -54,7 +60,6 @@ class OrientedTimer(Timer):
         singular, why = self._singular(plan.picked)
         if why is not None:
             return self._refused(place, why, low, high, singular)
-        self.planned += len(plan.picked)
         cutting, limiting = float(plan.cuts.sum()), dict[str, float]()
         for made, spent in zip(plan.picked, plan.cuts.tolist(), strict=True):
             name = " ".join(made.limiting).strip()

@@ -19,7 +19,7 @@ from postproc.orientation.candidates.ranking import load_compiler
 from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.path.links import safe_space
 from postproc.pipeline.feeds_by_clock import ProgramClock, measured
-from postproc.placement.bodies import adjacent
+from postproc.placement.bodies import StationaryBodies, adjacent
 from postproc.placement.oriented_times import OrientedTimer
 from postproc.placement.place_times import TimedPlace, Timer
 from postproc.placement.search import FoundPlaces, PlaceSearch
@@ -98,14 +98,8 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
     found += more
     if has_errors(found):
         return None, found
-    timer: Timer = Timer(work, space, setup.joints.singular_distance, bodies)
     try:
-        search = PlaceSearch(timer, space, progress)
-        result = search.run()
-        if options.orient != "keep":
-            timer = OrientedTimer(work, space, setup, options, bodies)
-            result = replace(PlaceSearch(timer, space, progress).among(_likely(search)), lacks=result.lacks,
-                             attitudes=result.attitudes, screened=result.screened)
+        timer, result = _searched(work, space, setup, options, bodies, progress)
     except (ValueError, ArithmeticError) as fault:
         return None, [*found, error("place.plan", f"no motion could be planned: {fault}", file=toolpath.file)]
     if timer.unsolved:
@@ -131,6 +125,23 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
     more += _lifted(space, best, options.setup)
     return PlacementChoice(work, space, result, best, timer.planned, timer.looked, timer.pruned, timer.refused,
                            tuple(timer.known()), program, times), [*found, *more]
+
+
+def _searched(work: PassContext, space: Space, setup: SetupFile, options: Options, bodies: StationaryBodies | None,
+              progress: Progress | None) -> tuple[Timer, FoundPlaces]:
+    """The places that were found, and what has timed them; with `options.orient` axes are chosen at the likely ones."""
+    timers: list[Timer] = [Timer(work, space, setup.joints.singular_distance, bodies)]
+    try:
+        search = PlaceSearch(timers[0], space, progress)
+        result = search.run()
+        if options.orient != "keep":
+            timers.append(OrientedTimer(work, space, setup, options, bodies))
+            result = replace(PlaceSearch(timers[1], space, progress).among(_likely(search)), lacks=result.lacks,
+                             attitudes=result.attitudes, screened=result.screened)
+    finally:
+        for timer in timers:
+            timer.close()
+    return timers[-1], result
 
 
 def _lifted(space: Space, best: TimedPlace, file: str) -> list[Diagnostic]:

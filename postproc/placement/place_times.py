@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import dataclass, field, replace
+from functools import partial
 from hashlib import blake2b
 
 import numpy as np
 
 from machines.machine import Machine
+from postproc.base.team import Crew, Processes, team_at_hand, working
 from postproc.orientation.candidates.candidate_times import Candidate, turned
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.index_time import PassEnds, ends, links_between
@@ -67,6 +70,31 @@ class TimedPlace:
 
 
 @dataclass(frozen=True)
+class PlacedCut:
+    """A cut at a place: of which pass and line, how the joints go (see `_link`), the least seconds that it can take, and
+    what plans it: its seconds, what limits them, and whether the plan was solved."""
+
+    number: int
+    line: int
+    link: bytes
+    bound: float
+    plan: Callable[[], tuple[float, str, bool]] | None
+
+
+@dataclass(frozen=True)
+@arrays(place="6", low="J", high="J")
+class SeenPlace:
+    """A place as it is before its cuts are planned; see `TimedPlace`."""
+
+    place: Floats
+    cuts: tuple[PlacedCut, ...]
+    linking: float
+    low: Floats
+    high: Floats
+    singular: float
+
+
+@dataclass(frozen=True)
 class _Cut:
     """What is known of a pass whose joints go this way, wherever they begin."""
 
@@ -100,6 +128,8 @@ class Timer:
         self.unsolved: set[int] = set()
         self._cuts: dict[tuple[int, bytes], _Cut] = {}
         self._known: dict[bytes, TimedPlace] = {}
+        self.ahead: dict[bytes, SeenPlace | TimedPlace] = {}
+        self.crew: Crew[tuple[Floats, float], SeenPlace | TimedPlace] | None = None
         sites = sum(len(each.s) for one in work.passes for each in one.stretches)
         self.most = min(_MOST, max(_LEAST, _SITES // max(1, sites)))
 
@@ -113,7 +143,7 @@ class Timer:
 
     def tried(self, place: Floats, best: float = np.inf) -> TimedPlace:
         """A place (6,); its seconds are inf where they are proved not to be below `best`."""
-        key = (np.round(place, 9) + 0.0).tobytes()
+        key = _key(place)
         found = self._known.get(key)
         if found is not None and (np.isfinite(found.seconds) or found.refused or found.bound >= best * (1.0 - _WORTH)):
             return found
@@ -124,6 +154,22 @@ class Timer:
         return made
 
     def _tried(self, place: Floats, best: float) -> TimedPlace:
+        seen = self.ahead.pop(_key(place), None) or self.seen(place)
+        if isinstance(seen, TimedPlace):
+            return seen
+        cuts, bound, lost = self._cutting(seen, best - seen.linking)
+        if lost:
+            self.pruned += 1
+            return TimedPlace(place, np.inf, np.inf, seen.linking, bound + seen.linking, seen.low, seen.high, seen.singular)
+        cutting = float(sum(each[0] for each in cuts))
+        limiting: dict[str, float] = {}
+        for spent, name in cuts:
+            limiting[name] = limiting.get(name, 0.0) + spent
+        return TimedPlace(place, cutting + seen.linking, cutting, seen.linking, bound + seen.linking, seen.low, seen.high,
+                          seen.singular, None, limiting)
+
+    def seen(self, place: Floats) -> SeenPlace | TimedPlace:
+        """A place (6,) with its cuts to be planned; refused, or timed without a bound, where that is known already."""
         why = self.stands(place)
         if why is not None:
             return self._refused(place, why)
@@ -138,17 +184,52 @@ class Timer:
         why = near or _no_height(edge, made) or (None if self.bodies is None else self.bodies.tool(work))
         if why is not None:
             return self._refused(place, why, low, high, singular)
-        linking = _linking(work, edge)
-        cuts, bound, lost = self._cutting(made, best - linking)
-        if lost:
-            self.pruned += 1
-            return TimedPlace(place, np.inf, np.inf, linking, bound + linking, low, high, singular)
-        cutting = float(sum(each[0] for each in cuts))
-        limiting: dict[str, float] = {}
-        for spent, name in cuts:
-            limiting[name] = limiting.get(name, 0.0) + spent
-        return TimedPlace(place, cutting + linking, cutting, linking, bound + linking, low, high, singular,
-                          None, limiting)
+        cuts = tuple(PlacedCut(one.one.number, one.one.line, _link(one), one.bound, partial(_planned, one))
+                     for one in made)
+        return SeenPlace(place, cuts, _linking(work, edge), low, high, singular)
+
+    def planned_ahead(self, place: Floats, best: float) -> SeenPlace | TimedPlace:
+        """In a worker: `seen`, its cuts planned as long as the place can take less than `best`."""
+        found = self.seen(place)
+        if isinstance(found, TimedPlace):
+            return found
+        total, made = found.linking + sum(cut.bound for cut in found.cuts), [replace(cut, plan=None) for cut in found.cuts]
+        for k in np.argsort([-cut.bound for cut in found.cuts], kind="stable").tolist():
+            plan = found.cuts[k].plan
+            if plan is None or total >= best * (1.0 - _WORTH):
+                break
+            known = plan()
+            made[k] = replace(made[k], plan=partial(_known, known))
+            total += known[0] - made[k].bound
+        return replace(found, cuts=tuple(made))
+
+    def look_ahead(self, places: Sequence[Floats], best: float) -> None:
+        """Have the workers, where there are some, look at places that will be asked for next; nothing else changes by it."""
+        team = team_at_hand()
+        fresh = [place for place in places if _key(place) not in self._known and _key(place) not in self.ahead]
+        if team is None or team.size < 2 or len(fresh) < 2:
+            return
+        if self.crew is None:
+            self.crew = team.crew(_ahead, self._alone())
+        made = self.crew.results([(place, best) for place in fresh])
+        self.ahead |= {_key(place): seen for place, seen in zip(fresh, made, strict=True)}
+
+    def _here(self, seen: SeenPlace) -> SeenPlace:
+        """The same place, all of its cuts to be planned here."""
+        made = self.seen(seen.place)
+        return seen if isinstance(made, TimedPlace) else made
+
+    def _alone(self) -> Timer:
+        """Itself as workers get it: without what it has found."""
+        other = copy(self)
+        other._known, other._cuts, other.ahead, other.crew = {}, {}, {}, None
+        return other
+
+    def close(self) -> None:
+        """The workers are free."""
+        if self.crew is not None:
+            self.crew.close()
+        self.crew = None
 
     def stands(self, place: Floats) -> Obstacle | None:
         """What the part would stand in or hang over, None where it stands free."""
@@ -172,12 +253,12 @@ class Timer:
         value = float(found[row, which])
         return value, NearSingular(kin.singular_names[int(which)], value, self.least) if value < self.least else None
 
-    def _cutting(self, made: Sequence[Candidate], best: float) -> tuple[list[tuple[float, str]], float, bool]:
+    def _cutting(self, seen: SeenPlace, best: float) -> tuple[list[tuple[float, str]], float, bool]:
         """(seconds and what limits of each pass, bound, True where all together are proved not to be below `best`)."""
-        keys = [(one.one.number, _link(one)) for one in made]
-        for one, key in zip(made, keys, strict=True):
+        keys = [(cut.number, cut.link) for cut in seen.cuts]
+        for cut, key in zip(seen.cuts, keys, strict=True):
             if key not in self._cuts:
-                self._cuts[key] = _Cut(one.bound)
+                self._cuts[key] = _Cut(cut.bound)
         bounds = [self._cuts[key].bound for key in keys]
         total = bound = float(sum(bounds))
         for k in np.argsort(-np.array(bounds), kind="stable").tolist():
@@ -186,12 +267,35 @@ class Timer:
                 if total >= best * (1.0 - _WORTH):
                     return [], total, True
                 self.planned += 1
-                planned = made[k].seconds, " ".join(made[k].limiting).strip()
+                plan = seen.cuts[k].plan
+                if plan is None:  # a worker stopped before it, by the bound of a cut that goes the same way elsewhere
+                    seen = self._here(seen)
+                    plan = seen.cuts[k].plan
+                spent, name, solved = plan() if plan is not None else (np.inf, "", False)
+                planned = spent, name
                 self._cuts[keys[k]] = _Cut(self._cuts[keys[k]].bound, planned)
-                self.unsolved |= set() if made[k].solved else {made[k].one.line}
+                self.unsolved |= set() if solved else {seen.cuts[k].line}
             total += planned[0] - bounds[k]
         done = [self._cuts[key].planned for key in keys]
         return [one for one in done if one is not None], bound, False
+
+
+def _key(place: Floats) -> bytes:
+    return bytes((np.round(place, 9) + 0.0).tobytes())
+
+
+def _planned(made: Candidate) -> tuple[float, str, bool]:
+    return made.seconds, " ".join(made.limiting).strip(), made.solved
+
+
+def _known(plan: tuple[float, str, bool]) -> tuple[float, str, bool]:
+    return plan
+
+
+def _ahead(timer: Timer, asked: tuple[Floats, float]) -> SeenPlace | TimedPlace:
+    """In a worker: it asks nobody else."""
+    with working(Processes(1)):
+        return timer.planned_ahead(*asked)
 
 
 def _linking(work: PassContext, edge: list[PassEnds]) -> float:

@@ -31,6 +31,8 @@ _FINEST = (1.0, 0.25 * DEG)
 """mm, rad: the last compass steps"""
 _POLISH = 60
 _SLACK = 1e-6
+_AT_ONCE = 8
+"""places that workers look at together, before the best of them bounds the next"""
 
 
 @dataclass
@@ -68,13 +70,11 @@ class PlaceSearch:
         attitudes = self.space.attitudes()
         self.found.attitudes = len(attitudes)
         seeds = [seeds for k, angles in enumerate(attitudes) if (seeds := self._seeds(angles, k, len(attitudes)))]
-        for place in self._by_bound([place for group in seeds for place in group[:_FIRST]]):
-            self._look(place)
+        self._look_at(self._by_bound([place for group in seeds for place in group[:_FIRST]]))
         likely = [one.place[ANGLES:] for one in self._starts(_LIKELY, 0.0)]
         more = [place for group in seeds for place in group[_FIRST:]
                 if any(np.abs(place[ANGLES:] - angles).max() < 1e-9 for angles in likely)]
-        for place in self._by_bound(more):
-            self._look(place)
+        self._look_at(self._by_bound(more))
         for start in self._starts(_STARTS, _DISTINCT):
             self._compass(self.timer.tried(start.place))
         if self.found.best is not None:
@@ -83,6 +83,7 @@ class PlaceSearch:
 
     def among(self, likely: list[TimedPlace]) -> FoundPlaces:
         """The best of places that another search found likely, and compass steps from it; few, where each costs much."""
+        self.timer.look_ahead([one.place for one in likely[:max(self.timer.most // 2 - self.timer.looked, 0)]], np.inf)
         for one in likely:
             if self.timer.looked < self.timer.most // 2:
                 self._look(one.place)
@@ -90,6 +91,13 @@ class PlaceSearch:
             self._compass(self.found.best)
             self.found.best = self._roomiest(self.found.best, 0)
         return self.found
+
+    def _look_at(self, places: list[Floats]) -> None:
+        """Time places one after the other; workers are some ahead."""
+        for k, place in enumerate(places):
+            if k % _AT_ONCE == 0 and not self.spent:
+                self.timer.look_ahead(places[k:k + _AT_ONCE], np.inf if self.found.best is None else self.found.best.seconds)
+            self._look(place)
 
     def _look(self, place: Floats) -> TimedPlace | None:
         """Time a place; it becomes the best where it is."""
@@ -149,6 +157,7 @@ class PlaceSearch:
         """The places by the least time that the file can take there."""
         if self.found.best is None or len(places) < 2:
             return places
+        self.timer.look_ahead(places[:self.timer.most], 0.0)
         bounds = [self.timer.tried(place, 0.0).bound for place in places if not self.spent]
         return [places[k] for k in np.argsort(bounds, kind="stable").tolist()]
 
@@ -175,7 +184,9 @@ class PlaceSearch:
         at = start
         while not self.spent and self._coarse(steps):
             before = at
-            for place in list(self.space.neighbours(at.place, steps)):
+            around = list(self.space.neighbours(at.place, steps))
+            self.timer.look_ahead(around, at.seconds)
+            for place in around:
                 made = self._nearer(place, at)
                 at = made if made is not None else at
             if at is before:
@@ -211,7 +222,9 @@ class PlaceSearch:
         steps = self._first_steps()
         while left > 0 and self._coarse(steps):
             before = at
-            for place in list(self.space.neighbours(at.place, steps)):
+            around = list(self.space.neighbours(at.place, steps))
+            self.timer.look_ahead(around, most / (1.0 - 2e-4))
+            for place in around:
                 left -= 1
                 made = self.timer.tried(place, most / (1.0 - 2e-4))
                 if made.seconds <= most and made.shares(machine) > at.shares(machine):

@@ -74,7 +74,8 @@ def limits_not_kept(job: Job) -> list[Diagnostic]:
     planned."""
     found = []
     if job.machine.dynamics is not None and job.machine.dynamics.limited:
-        found.append(warning("plan.motors", f"what the motors of {job.machine.name} can give ([dynamics]) is not looked at: "
+        found.append(warning("plan.motors", f"what the motors of {job.machine.name} can give ([dynamics]) is reported, "
+                                            "not kept: "
                              "the feeds are those of the CL file", file=job.machine.file,
                              hint="convert with --feed planned"))
     numbers = sorted({job.number_of(k) for k in _limited(job)})

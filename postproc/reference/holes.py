@@ -6,6 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from postproc.controllers.cycles import Cycles
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.toolpath import Cycle, Kind, Toolpath
 
@@ -28,8 +29,19 @@ class Phase(IntEnum):
 HoleLeg = tuple[Floats, Phase, Kind]
 
 
-def hole_legs(toolpath: Toolpath, link: Bools, holes: Ints) -> list[list[HoleLeg]]:
-    """The legs of each hole. The level is the height along the tool axis the tool comes from."""
+def stops_at_its_level(cycle: Cycle, cycles: Cycles | None) -> bool:
+    """True where the tool stops on its path down to a hole at the retract level that the cycle names: of taps, and of cycles
+    that go back to the level they begin from, and so are equal to what the CL file asks for from that level alone."""
+    if cycle.retract is None or cycle.kind == "TAP" or cycles is None:
+        return cycle.retract is not None and cycle.kind == "TAP"
+    alike = cycles.with_dwell if cycle.dwell > 0.0 else cycles.table
+    spec = (alike if len(set(cycle.steps)) <= 1 else cycles.falling).get(cycle.kind)
+    return cycles.enabled and spec is not None and not spec.states_retract
+
+
+def hole_legs(toolpath: Toolpath, link: Bools, holes: Ints, cycles: Cycles | None = None) -> list[list[HoleLeg]]:
+    """The legs of each hole, for the canned cycles of a control. The level is the height along the tool axis the tool
+    comes from."""
     result: list[list[HoleLeg]] = []
     before: Floats | None = None
     initial = 0.0
@@ -40,17 +52,18 @@ def hole_legs(toolpath: Toolpath, link: Bools, holes: Ints) -> list[list[HoleLeg
         axis = toolpath.axis[row]
         if not chained and before is not None:
             initial = float(axis @ before)
-        legs = _legs(toolpath.tip[row], axis, toolpath.cycles[toolpath.cycle[row]], before, initial)
+        cycle = toolpath.cycles[toolpath.cycle[row]]
+        legs = _legs(toolpath.tip[row], axis, cycle, before, initial, stops_at_its_level(cycle, cycles))
         before = legs[-1][0]
         result.append(legs)
     return result
 
 
-def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initial: float) -> list[HoleLeg]:
+def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initial: float, stops: bool) -> list[HoleLeg]:
     """Above the hole at the level the tool is at (never below the clearance plane), down, drill, out.
 
     Without a known level (`before` None: a linking move leads here) the tool comes straight to the clearance plane
-    and AUTO retracts to it. A tap stops on its path down at the retract level that it names: controls come
+    and AUTO retracts to it. What `stops` does so on its path down at the retract level that it names: controls come
     back to the level that a cycle begins from.
     """
     height = float(axis @ top)
@@ -62,7 +75,7 @@ def _legs(top: Floats, axis: Floats, cycle: Cycle, before: Floats | None, initia
         if float(axis @ before) < plane - 1e-9:
             legs.append((before + (plane - float(axis @ before)) * axis, Phase.POSITION, Kind.RAPID))
     legs.append((top + (level - height) * axis, Phase.POSITION, Kind.RAPID))
-    own = cycle.retract if cycle.kind == "TAP" and cycle.retract is not None else np.inf
+    own = cycle.retract if stops and cycle.retract is not None else np.inf
     if cycle.clearance + 1e-9 < own < level - height - 1e-9:
         legs.append((top + own * axis, Phase.POSITION, Kind.RAPID))
     if level > plane + 1e-9:

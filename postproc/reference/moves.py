@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from machines.kinematics.frames import spin_about, tool_x
+from postproc.controllers.cycles import Cycles
 from postproc.reference.events import tool_changes
 from postproc.reference.holes import HoleLeg, hole_legs
 from postproc.reference.holes import Phase as Phase
@@ -93,7 +94,7 @@ class Moves:
 
     def curves(self, rows: Ints | slice = slice(None)) -> Curves:
         """The reference motion of every row, or of some; linked rows stand still at their end."""
-        ends = np.arange(len(self))[rows]
+        ends = np.arange(len(self))[rows] if isinstance(rows, slice) else rows
         first = np.where(self.link[rows], ends, np.maximum(ends - 1, 0))
         return Curves(self.tip[first], self.tip[rows], taken(self.axis, first), taken(self.axis, rows),
                       *self._arcs_of(rows))
@@ -201,14 +202,15 @@ def _begins(toolpath: Toolpath, link: Bools, places: Repeated | None) -> Ints:
 
 
 def build_moves(toolpath: Toolpath, setup: SetupFile, axis_tolerance: float,
-                places: Repeated | None = None) -> tuple[Moves, list[Diagnostic]]:
-    """The reference moves of a Toolpath, in the part frame; `places` where it is repeated at several."""
+                places: Repeated | None = None, cycles: Cycles | None = None) -> tuple[Moves, list[Diagnostic]]:
+    """The reference moves of a Toolpath, in the part frame; `places` where it is repeated at several, `cycles` the canned
+    cycles of the control that they are written for."""
     link = link_rows(toolpath, setup, axis_tolerance, places)
     feed, seconds, diagnostics = feeds_of(toolpath, setup.output.feed)
     begin = _begins(toolpath, link, places)
     counts = np.where(toolpath.role == Role.START, 0, 1 + (begin >= 0))
     holes = np.flatnonzero(toolpath.role == Role.HOLE)
-    legs = hole_legs(toolpath, link, holes)
+    legs = hole_legs(toolpath, link, holes, cycles)
     counts[holes] = [len(leg) for leg in legs]
     row = np.repeat(np.arange(len(toolpath)), counts)
     first = np.zeros(len(row), dtype=bool)

@@ -1,4 +1,5 @@
-"""How far the tool yields along a program under the cutting force that the set-up gives it, and where that is worst."""
+"""How far the tool yields along a program under the cutting force that the set-up gives it, what its motors have to give at
+the program's feeds, and where both are worst."""
 
 from __future__ import annotations
 
@@ -10,8 +11,8 @@ from postproc.path.model import FEED
 from postproc.pipeline.result import PostResult
 from postproc.planning.planned_source import cutting_forces
 
-AT_ONCE = 65536
-"""poses at a time"""
+AT_ONCE, LOOKS = 65536, 2000
+"""poses at a time; blocks at which the forces of the motors are looked at, spread over each tool's cuts"""
 
 
 def deflection(result: PostResult) -> dict[str, Any] | None:
@@ -46,3 +47,43 @@ def deflection_lines(found: dict[str, Any] | None) -> list[str]:
     place = ", ".join(f"{v:.3f}" for v in found["tip_mm"])
     return [f"deflection of the tip: at most {found['worst_um']:.1f} um under {found['force_n']:g} N in the worst direction,"
             f" T{found['tool']} at ({place}), line {found['line']}; rods, joints and drives alone, ends of cuts"]
+
+
+def motor_load(result: PostResult) -> dict[str, Any] | None:
+    """Largest share of its limit that a motor gives in the cuts at the words' feeds: in steady motion (rates, gravity, the
+    tool's cutting force in its worst direction), and on top of that while the control starts and stops all axes with their
+    full accelerations, in the signs that are worst. None where the machine file limits no motor."""
+    job, path, moves = result.job, result.path, result.moves
+    if job is None or path is None or moves is None:
+        return None
+    from machines.dynamics.limits import force_limits
+
+    forces, worst = cutting_forces(job), dict[str, Any]()
+    for tool in np.unique(moves.tool).tolist():
+        limits = force_limits(result.machine, job.kinematics(tool), forces.get(tool, 0.0))
+        if limits is None:
+            return None
+        rows = np.flatnonzero((path.code == FEED) & (moves.tool[path.move] == tool) & (path.seconds > 0.0))
+        rows = rows[rows > 0]
+        rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(LOOKS, len(rows))).astype(np.int64))] if len(rows) else rows
+        if not len(rows):
+            continue
+        before, after = path.q[rows - 1], path.q[rows]
+        rate = (after - before) / path.seconds[rows][:, None]
+        steady, ramp = limits.loads(0.5 * (before + after), rate, result.machine.limits.acceleration)
+        for key, share in (("steady", steady), ("starting_and_stopping", ramp)):
+            k, j = np.unravel_index(int(share.argmax()), share.shape)
+            if share[k, j] > worst.get(key, {"share": -1.0})["share"]:
+                worst[key] = {"share": float(share[k, j]), "motor": limits.names(result.machine)[int(j)],
+                              "tool": job.number_of(tool), "line": int(moves.line[path.move[rows[k]]])}
+    return worst or None
+
+
+def motor_load_lines(found: dict[str, Any] | None) -> list[str]:
+    """The same for people."""
+    if found is None:
+        return []
+    steady, ramp = found["steady"], found["starting_and_stopping"]
+    return [f"motors: {steady['motor']} gives at most {steady['share']:.0%} of its limit in steady cuts (T{steady['tool']}, "
+            f"line {steady['line']}); {ramp['motor']} {ramp['share']:.0%} if all axes start or stop at their full "
+            f"acceleration there (line {ramp['line']})"]

@@ -12,7 +12,7 @@ from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.readback.comparison.compare import Comparison
 from postproc.readback.comparison.length_margins import margin_lines
 from postproc.reference.events import cutting, spindle_states
-from postproc.report.loads import deflection, deflection_lines
+from postproc.report.loads import deflection, deflection_lines, motor_load, motor_load_lines
 from postproc.report.places import place_lines, places
 from postproc.report.unwinding import unwinding, unwinding_lines
 from postproc.verification.proof_text import statement
@@ -51,6 +51,7 @@ def as_dict(result: PostResult, output: str, estimate: Estimate | None = None) -
         "linearising_bound": _bound(result),
         "feed_reduced_blocks": int(result.feeds.slowed.sum()) if result.feeds is not None else 0,
         "deflection": deflection(result),
+        "motor_load": motor_load(result),
         "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
         "optimised": result.optimised.as_dict() if result.optimised else None,
         "feed_times": result.feed_times.as_dict() if result.feed_times else None,
@@ -272,7 +273,7 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None,
         lines += result.compensation.lines() + ([] if proof is None else [proof.line()])
     if d["feed_reduced_blocks"]:
         lines.append(f"feed reduced for an axis limit in {d['feed_reduced_blocks']} blocks")
-    lines += deflection_lines(d["deflection"])
+    lines += deflection_lines(d["deflection"]) + motor_load_lines(d["motor_load"])
     if d["singular_events"]:
         lines.append(f"singular directions passed: {d['singular_events']}")
     if d["rewinds"]:

@@ -85,13 +85,11 @@ def new_setup(toolpath: Toolpath, machine: Machine, controller: str | Path, opti
 
 
 def _stated(fit: Fit, at: Callable[[tuple[float, float, float]], Fit],
-            ask: Callable[[Question], float | str] | None, progress: Progress | None) -> Fit:
+            ask: Callable[[Question], float | str] | None) -> Fit:
     """The part where somebody says that it stands, where travel or the table's origin has chosen its place; `at` fits it
     there."""
     if ask is None or fit.place is None or not fit.result.ok or not (below_origin(fit) or looked_for(fit)):
         return fit
-    if progress is not None:
-        progress("", 0, 0)
     said = three_numbers(str(ask(origin_question(fit.setup.part.origin))))
     if said is None:
         return fit
@@ -151,7 +149,7 @@ def _made(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
     if any(d.code == "rapid.off_line" for d in first.result.diagnostics):
         setup = setup.model_copy(update={"output": setup.output.model_copy(update={"rapids_as_feed": True})})
         first = at(given.origin)
-    fit = _stated(first, at, ask, progress)
+    fit = _stated(first, at, ask)
     if below_origin(fit) or (assume and looked_for(fit)):
         fit = replace(fit, setup=fit.setup.model_copy(update={"assumed": [*fit.setup.assumed, ORIGIN]}))
     made = SetupSheet("", tuple(known), facts, tuple(questions), tuple(answers.items()), fit)

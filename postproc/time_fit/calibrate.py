@@ -22,6 +22,7 @@ from postproc.cycle_time.blocks import Cause
 from postproc.cycle_time.estimate import timed
 from postproc.cycle_time.kinds import KINDS
 from postproc.cycle_time.model import ASSUMED, PARAMETERS, CalibrationRecord, CycleTimeModel
+from postproc.time_fit.executed_fit import own_slopes, refined
 from postproc.time_fit.left_out import structure
 from postproc.time_fit.runs import CLOCK, OTHERS, MeasuredRun
 from toolpaths.arrays import Floats
@@ -36,7 +37,7 @@ PRIOR = {"corner_tolerance": 1.2, "block_time": 1.5, "rapid": 0.4, "override": 0
 """standard deviation of each logarithm before a run is looked at"""
 STATED = 0.05
 """the same of the share of accelerations and jerks that the machine file states"""
-FREE = {"lookahead": PARAMETERS,
+FREE = {"lookahead": PARAMETERS, "control": PARAMETERS,
         "ideal": tuple(name for name in PARAMETERS if name != "block_time"),
         "linuxcnc": ("rapid", "override", "acceleration_share", "spindle_time")}
 CREDIBLE = 1.5
@@ -114,11 +115,12 @@ def calibrate(runs: Sequence[MeasuredRun], model: CycleTimeModel, file: str = ""
               machine: Machine | None = None) -> tuple[CalibratedModel | None, list[Diagnostic]]:
     """The model fitted to runs; None and why where it fits them worse than the model before.
 
-    A model with jerk is also tried without, and left so where that is clearly better.
+    Of kind "lookahead" a model with jerk is also tried without, and left so where that is clearly better. Of kind "control"
+    the fit of the formulas is refined on the executed control.
     """
     data = Runs.of(runs)
     before = data.modelled(model)
-    both = model.jerk and model.kind != "linuxcnc" and len(data.measured) >= ENOUGH
+    both = model.jerk and model.kind in ("lookahead", "ideal") and len(data.measured) >= ENOUGH
     kinds = [True, False] if both else [model.jerk]
     fits = [_fitted(data, before, model.model_copy(update={"jerk": jerk}), file, machine) for jerk in kinds]
     off = [float(np.abs(fit.modelled - fit.measured).sum()) for fit in fits]
@@ -158,10 +160,13 @@ def _fitted(data: Runs, before: Floats, model: CycleTimeModel, file: str, machin
     free, prior = free_parameters(data, model), prior_of(machine)
     start, measured = begin.values(), data.measured
 
-    def modelled(x: Floats) -> Floats:
+    def moved(x: Floats) -> CycleTimeModel:
         values = start.copy()
         values[free] += x * prior[free]
-        return data.modelled(begin.with_values(values))
+        return begin.with_values(values)
+
+    def modelled(x: Floats) -> Floats:
+        return data.modelled(moved(x).quick())
     x = _start(modelled, measured, free)
     scale = _scatter(modelled(x), measured, len(free))
     for _ in range(3):
@@ -173,10 +178,17 @@ def _fitted(data: Runs, before: Floats, model: CycleTimeModel, file: str, machin
                                max_nfev=60, f_scale=3.0, bounds=(-MOST, MOST))
         x = result.x
         scale = _scatter(modelled(x), measured, len(free))
-    values = start.copy()
-    values[free] += x * prior[free]
+    if model.kind == "control":
+        def executed(x: Floats) -> Floats:
+            return data.modelled(moved(x))
+        x = refined([x, np.zeros(len(x))], executed, lambda x: slopes(modelled, x), measured, data.uncertainty(scale), MOST)
+        own, scale = own_slopes(executed, x), _scatter(executed(x), measured, len(free))
+        x = refined([x], executed, lambda _: own, measured, data.uncertainty(scale), MOST)
+        scale = _scatter(executed(x), measured, len(free))
+        own = own / data.uncertainty(scale)[:, None]
+        return _record(data, model, moved(x), own, free, prior, before, scale, file, machine)
     weighted = slopes(modelled, x) / data.uncertainty(scale)[:, None]
-    return _record(data, model, begin.with_values(values), weighted, free, prior, before, scale, file, machine)
+    return _record(data, model, moved(x), weighted, free, prior, before, scale, file, machine)
 
 
 def free_parameters(data: Runs, model: CycleTimeModel) -> list[int]:

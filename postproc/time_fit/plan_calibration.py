@@ -115,12 +115,13 @@ def chosen_moves(known: Knowledge, budget: float) -> list[int]:
         here = known.variance(result)
 
 
-def plan_calibration(blocks: MotionBlocks, machine: Machine, controller: str, model: CycleTimeModel, setup: SetupFile,
+def plan_calibration(blocks: MotionBlocks | None, machine: Machine, controller: str, model: CycleTimeModel, setup: SetupFile,
                      budget: float, name: str) -> CalibrationPlan:
     """The test for a program at hand.
 
     Args:
-        blocks: of the program; setup: of it, for tools and the form of the output; budget: s that the test may take
+        blocks: of the program; None: every kind of move that a test may hold, for what it shows of the control
+        setup: of it, for tools and the form of the output; budget: s that the test may take
         name: of the test program's file
 
     Raises:
@@ -128,6 +129,7 @@ def plan_calibration(blocks: MotionBlocks, machine: Machine, controller: str, mo
     """
     model = model.quick().of_machine(machine)
     all_moves, box = _box(machine, controller, setup, model)
+    blocks, anyhow = (from_conversion(box), True) if blocks is None else (blocks, False)
     known = knowledge(blocks, box, machine, model, len(all_moves))
     left, low, high = budget, *_extents(box)
     notes = _notes(low, high, machine, controller, name)
@@ -138,7 +140,7 @@ def plan_calibration(blocks: MotionBlocks, machine: Machine, controller: str, mo
         test = read_value(from_gcode(made.text.encode(), machine, made.controller, box.setup))
         if (taken := total(test, timed(test, model))) <= budget:
             plan = _expected(blocks, machine, model, made, test, taken, low, high)
-            if plan.after.band[1] - plan.after.band[0] < plan.now.band[1] - plan.now.band[0]:
+            if anyhow or plan.after.band[1] - plan.after.band[0] < plan.now.band[1] - plan.now.band[0]:
                 return plan
             raise DiagnosticError([error("time.test", "the band of this program is as narrow as a test would leave it",
                                          hint="log a run of the program itself, and give it with --calibrate")])

@@ -17,6 +17,7 @@ import numpy as np
 from machines import reach
 from postproc.job.job import Job
 from postproc.joints.tracks import TRAVEL_SLACK
+from postproc.path.model import ARC
 from postproc.readback.comparison.checks import CHUNK, off_line
 from postproc.readback.comparison.compare import Comparison, bound_of_blocks, off_level, place_on_moves
 from postproc.readback.comparison.length_margins import MUCH, LengthMargin, length_matters
@@ -112,6 +113,7 @@ def length_margins(trial: LengthTrial, motion: Motion, executed: BlockPoses, c: 
     look.bounds_of_reach()
     if matters:
         _prove(_Proof(trial, motion, executed, c), ends)
+    executed.forget()
     return tuple(_margin(job, ends, t) for t in range(len(numbers)))
 
 
@@ -249,23 +251,39 @@ class _Look:
             self.ends.leave(self._tool(rows[part]), lengths(places.d_tip), left, "tolerance")
 
     def travel(self) -> None:
-        """Travel of all axes, at the places of `check_travel`."""
-        limits, names = self.job.machine.limits, self.job.machine.axis_names
+        """Travel of all axes, at the places of `check_travel`; within blocks only where that is not between their ends."""
         for first in range(0, len(self.motion), CHUNK):
             rows = np.arange(first, min(first + CHUNK, len(self.motion)))
             rows = rows[~self._keeps_joints(rows)]
-            times = self._times(rows, False) if len(rows) else []
-            if not times:
+            if not len(rows):
                 continue
-            q = np.concatenate([self.executed.joints(self.motion, rows, t) for t in times])
-            slope = (np.concatenate([self.longer.joints(self.again, rows, t) for t in times]) - q) / STEP
-            tool, goes_on = np.tile(self._tool(rows), len(times)), np.abs(slope) > LEAST
-            for j in np.flatnonzero(goes_on.any(axis=0)).tolist():
-                k = np.flatnonzero(goes_on[:, j])
-                up, down = limits.upper[j] - q[k, j] + TRAVEL_SLACK, q[k, j] - limits.lower[j] + TRAVEL_SLACK
-                for sign, direction in enumerate(SIGNS):
-                    goes = direction * slope[k, j]
-                    self.ends.add(tool[k], sign, np.where(goes > 0.0, up, down) / np.abs(goes), f"travel {names[j]}")
+            slope = self._travel_at(rows, [1.0])
+            inner = rows[self._within(rows, slope)]
+            if len(inner):
+                self._travel_at(inner, self._times(inner, False))
+
+    def _within(self, rows: Ints, slope: Floats) -> Bools:
+        """(K,) blocks whose joints may be farther within than at the end of the block before and their own, or that go
+        otherwise with the length there; `slope` (K, J) at their ends."""
+        inner = np.append(True, (np.diff(rows) != 1) | (np.diff(self.motion.tool[rows]) != 0))
+        inner[1:] |= (np.abs(np.diff(slope, axis=0)) > LEAST).any(axis=1)
+        if self.job.control.base == "tcp" or not (self.motion.table.plain and self.again.table.plain):
+            inner[:] = True
+        return np.asarray(inner | (self.motion.code[rows] == ARC))
+
+    def _travel_at(self, rows: Ints, times: Sequence[float | Floats]) -> Floats:
+        """Looks at travel at fractions of blocks; joints per mm of length (K T, J) there."""
+        limits, names = self.job.machine.limits, self.job.machine.axis_names
+        q = np.concatenate([self.executed.joints(self.motion, rows, t) for t in times])
+        slope: Floats = (np.concatenate([self.longer.joints(self.again, rows, t) for t in times]) - q) / STEP
+        tool, goes_on = np.tile(self._tool(rows), len(times)), np.abs(slope) > LEAST
+        for j in np.flatnonzero(goes_on.any(axis=0)).tolist():
+            k = np.flatnonzero(goes_on[:, j])
+            up, down = limits.upper[j] - q[k, j] + TRAVEL_SLACK, q[k, j] - limits.lower[j] + TRAVEL_SLACK
+            for sign, direction in enumerate(SIGNS):
+                goes = direction * slope[k, j]
+                self.ends.add(tool[k], sign, np.where(goes > 0.0, up, down) / np.abs(goes), f"travel {names[j]}")
+        return slope
 
     def bounds_of_reach(self) -> None:
         """Bounds of a parallel machine's workspace and joints, where those go with the length."""

@@ -37,6 +37,7 @@ _WORDS = {
     "nx": ("TOOL PATH", "END-OF-PATH", "TLDATA", "MSYS", "PAINT"), "ncl": ("INDIRP",),
     "catia": ("CATIA0", "TLON,GOFWD", "INDIRV", "AUTOPS", "PSIS", "TOOLNO"), "creo": ("CAMERA", "PPWORD"),
 }
+_OTHERS = ("HYPERMILL", "POWERMILL", "CIMATRON", "TOPSOLID", "SOLIDCAM", "ESPRIT", "GIBBSCAM", "RHINOCAM", "BOBCAD")
 _SCALE = {"MM": 1.0, "MILLIMETER": 1.0, "MILLIMETERS": 1.0, "METRIC": 1.0, "INCH": INCH, "INCHES": INCH, "IN": INCH,
           "ENGLISH": INCH}
 
@@ -55,7 +56,7 @@ def dialect_of(records: list[Record], data: bytes) -> WitnessDialect:
     if any(r.major == "CIRCLE" and r.has("CLOCKWISE", "COUNTERCLOCKWISE") for r in records):
         return ALL["solidworks-clt"]
     for name, words in _WORDS.items():
-        if majors.intersection(words):
+        if majors.intersection(words) and not (name == "catia" and "CATIA" not in head and any(o in head for o in _OTHERS)):
             return ALL[name]
     if any(m.startswith("$$->") for m in majors):
         return ALL["creo"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -99,8 +100,18 @@ def rotations(along: Array, angle: Array) -> Array:
 
 def turned(along: Array, angle: Array, v: Array) -> Array:
     """Vectors (N, 3) or (1, 3) turned about a unit vector by angles (N,): `rotations` without their matrices."""
-    angle, first = angle[:1] if len(angle) and (angle == angle[0]).all() else angle, np.cross(along, v)
-    return np.asarray(v + np.sin(angle)[:, None] * first + (1.0 - np.cos(angle))[:, None] * np.cross(along, first))
+    angle = angle[:1] if len(angle) and (angle == angle[0]).all() else angle
+    sine, rest, result = np.sin(angle), 1.0 - np.cos(angle), np.empty((max(len(angle), len(v)), 3))
+    columns = np.ascontiguousarray(v.T)
+    first = across(along, columns)
+    for k, (value, once, twice) in enumerate(zip(columns, first, across(along, first), strict=True)):
+        result[:, k] = value + sine * once + rest * twice
+    return result
+
+
+def across(along: Array, v: Sequence[Array] | Array) -> list[Array]:
+    """The vector product of one vector with others, these and that by columns."""
+    return [along[j] * v[k] - along[k] * v[j] for j, k in ((1, 2), (2, 0), (0, 1))]
 
 
 def apply(turns: Array, v: Array) -> Array:

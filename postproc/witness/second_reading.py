@@ -62,7 +62,7 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
 
 def _reoriented(c: Commanded, axes: Array) -> Commanded:
     """With other tool axes: balls, and arcs, stay where they are; a tool that is turned and no ball is not known. A straight
-    cut whose tip goes a longer or shorter way for it takes the time that it had."""
+    cut whose tip goes farther or less far for it takes the time that it had."""
     turned = np.abs(axes - c.axis).max(axis=1) > 1e-12
     move = np.where(turned[:, None], c.ball[:, None] * (c.axis - axes), 0.0)
     centre, arcs = c.centre.copy(), np.flatnonzero(c.arc >= 0)
@@ -72,7 +72,7 @@ def _reoriented(c: Commanded, axes: Array) -> Commanded:
 
 
 def _longer(c: Commanded, turned: Array, move: Array) -> Array:
-    """(N,) the new length of the tip's way over the old one in straight cuts between poses that are turned, else 1."""
+    """(N,) how far the tip goes over how far it went in straight cuts between poses that are turned, else 1."""
     ratio, now = np.ones(len(c)), c.tip + move
     old, new = (np.sqrt((np.diff(tip, axis=0) ** 2).sum(axis=1)) for tip in (c.tip, now))
     cuts = (c.kind[1:] == LINE) & (turned[1:] | turned[:-1]) & ~c.inverse[1:] & (np.minimum(old, new) > 1e-6)

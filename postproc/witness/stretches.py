@@ -93,7 +93,8 @@ def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Arr
 def matched(targets: Targets, tip: Array, axis: Array, turns: Array, tolerance: float,
             axis_tolerance: float) -> tuple[Array, Array]:
     """(block (M,) that ends at each target, -1; target (E,) that each block serves, M behind the last)."""
-    around = np.concatenate([targets.centre, targets.normal], axis=1)
+    sides = [targets.centre, targets.normal]
+    around = np.concatenate(sides, axis=1) if targets.sweep.any() else np.broadcast_to(np.zeros(6), (len(targets), 6))
     least = np.zeros(len(targets))
     half = np.array([0.5 * length_of(points) for points in targets.splines.values()])
     least[list(targets.splines)] = np.where(half > tolerance, half, 0.0)  # on a shorter one the tool may stand

@@ -101,15 +101,12 @@ def read(data: bytes) -> ClText:
     spans = [m.span() for m in _OTHER.finditer(text)]
     raw = np.frombuffer(text, np.uint8)
     ends = np.flatnonzero((raw == 10) | (raw == JOIN[0]))
-    kept, at = [], 0
-    for first, last in spans:
-        kept.append(text[at:first])
-        at = last + 1
-    kept.append(text[at:])
-    lengths = [part.count(b"\n") + (1 if k == len(kept) - 1 and part.strip() and not part.endswith(b"\n") else 0)
-               for k, part in enumerate(kept)]
+    kept = list(zip([0, *(last + 1 for _, last in spans)], [*(first for first, _ in spans), len(text)], strict=True))
+    lengths = [text.count(b"\n", *part) for part in kept]
+    rest = text[kept[-1][0]:]
+    lengths[-1] += bool(rest.strip()) and not rest.endswith(b"\n")
     before = np.cumsum(lengths)
-    rows = _numbers(b"".join(kept))
+    rows = _numbers(b"".join(memoryview(text)[first:last] for first, last in kept))
     starts = np.searchsorted(ends, [first for first, _ in spans]) if spans else np.zeros(0, np.int64)
     found = [_record(text[first:last]) for first, last in spans]
     used = [k for k, r in enumerate(found) if r.major or r.body]

@@ -1,10 +1,10 @@
 """How often the band of a model fitted to one run holds the time of other programs on controls of other kinds.
 
-python tests/benchmarks/bench_bands.py [CONTROLS]: for each of some controls (LinuxCNC's planner, look-ahead with hidden
-parameters and
-accelerations, with and without jerk, with the corners of another rule) a look-ahead model is fitted to one program, and its
-band
-asked for programs of six kinds. Printed: coverage and width of the bands of 95 % by kind, seen by the fit and not.
+python tests/benchmarks/bench_bands.py [CONTROLS]: for each of some controls with hidden parameters and accelerations
+(LinuxCNC's planner, the formulas of look-ahead with and without jerk and slower in short lines, the executed control with
+corners by their difference of feeds and with other shares of bends) the executed control, and for controls that are executed
+the formulas, are fitted to one to three programs, and the band asked for programs of six kinds. Printed: coverage and width
+of the bands of 95 % by kind, seen by the fit and not.
 """
 
 from __future__ import annotations
@@ -69,9 +69,13 @@ def control(rng: np.random.Generator, kind: int) -> tuple[CycleTimeModel, float]
         "acceleration_share": np.exp(rng.normal(0, 0.3)),
         "jerk_share": np.exp(rng.normal(0, 0.5)),
     }
-    name = "linuxcnc" if kind == 0 else "lookahead"
+    if kind == 4:
+        values |= {"corner_step": 8.0 * np.exp(rng.normal(0, 0.5)), "smoothing": 0.002 * rng.integers(0, 12)}
+    if kind == 5:
+        values |= {"bend_acceleration": rng.uniform(0.4, 0.95), "bend_jerk": rng.uniform(0.4, 0.95)}
+    name = "linuxcnc" if kind == 0 else "control" if kind > 3 else "lookahead"
     chosen = model(name).model_copy(update={k: float(v) for k, v in values.items()} | {"jerk": kind != 1})
-    return chosen, (0.0, 0.0, 0.0, 0.5)[kind]
+    return chosen, 0.5 if kind == 3 else 0.0
 
 
 def under(b: MotionBlocks, truth: CycleTimeModel, bend: float) -> tuple[float, np.ndarray]:
@@ -94,7 +98,8 @@ def fitted(seen: tuple[str, ...], truth: CycleTimeModel, bend: float, rng: np.ra
         run, found = run_of_log(b, RunLog(line, stamps, np.full((len(line), 5), np.nan), line))
         assert run is not None, found
         runs.append(run)
-    fit, _ = calibrate(runs, model("lookahead"), "log.csv", machine(MACHINE))
+    begin = model("lookahead" if truth.kind == "control" else "control")
+    fit, _ = calibrate(runs, begin, "log.csv", machine(MACHINE))
     return fit.model if fit is not None else None
 
 
@@ -104,7 +109,7 @@ def main(controls: int) -> None:
     rows: list[tuple[str, bool, bool, float, float]] = []
     refused = 0
     for number in range(controls):
-        truth, bend = control(rng, number % 4)
+        truth, bend = control(rng, number % 6)
         for seen in (("zigzag",), ("waves", "rapids"), ("arcs", "zigzag", "rapids"), ("turning", "waves")):
             made = fitted(seen, truth, bend, rng)
             if made is None:

@@ -13,6 +13,7 @@ slides stand to them, is read as A and C of a turning and tilting table in this 
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
@@ -35,6 +36,7 @@ from toolpaths.arrays import Floats
 KNOTS = np.array([0, 0, 0, 0, 0.25, 0.5, 0.75, 1, 1, 1, 1])
 POLES = np.array([[10, 0], [20, 27], [12, 8], [10, 20], [8, 8], [0, 27], [10, 0]], dtype=np.float64)
 MEASURED, FEED = 2.4, 50.0
+CHORDS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 LIMITS = ControlSettings(np.array([500.0, 500.0]), np.array([2500.0, 3000.0]), np.array([5000.0, 5000.0]))
 """mm/s, mm/s2, mm/s3 of X and Y, as the paper's table has them"""
 
@@ -107,9 +109,15 @@ def main() -> None:
         ours, bound = pocket_times(tilting, turning)
         print(f"pocket, A {tilting} and C {turning} rad/s: printed {PRINTED} s, planner {ours:.3f} s, "
               f"bound by duality {bound:.3f} s")
-    for chord in (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0):
-        t = float(execute(commanded(points(chord)), LIMITS).seconds)
-        print(f"chord {chord:4} mm: measured {MEASURED} s, control {t:.3f} s ({100 * (t / MEASURED - 1):+.1f} %)")
+    by_step, times = replace(LIMITS, corner_step=np.full(2, 8.333)), []
+    for chord in CHORDS:
+        t, steps = (float(execute(commanded(points(chord)), one).seconds) for one in (LIMITS, by_step))
+        times.append(t)
+        print(f"chord {chord:4} mm: measured {MEASURED} s, control {t:.3f} s ({100 * (t / MEASURED - 1):+.1f} %), "
+              f"corners by step {steps:.3f} s ({100 * (steps / MEASURED - 1):+.1f} %)")
+    every = np.array([float(execute(commanded(points(chord)), LIMITS).seconds) for chord in np.linspace(0.05, 1.0, 39)])
+    print(f"most over least: these chords {100 * (max(times) / min(times) - 1):.1f} %, 39 chords "
+          f"{100 * (every.max() / every.min() - 1):.1f} %, {every.min():.3f} to {every.max():.3f} s")
     print(f"optimum of the planner {optimum():.3f} s, bound without jerk {lower_bound():.3f} s")
 
 

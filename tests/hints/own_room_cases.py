@@ -94,7 +94,11 @@ _TABLES = [
     edited("gcode.tool_name", CUT, '"EM10"', '"EM99"', r"\[tools\.N\] (called) = ", sheet("EM10", "EM99"),
            setup=NAMED, control="siemens-840d"),
 ]
+TURNING = BALL.replace("FEDRAT", "MULTAX\nFEDRAT").replace("GOTO/0,0,0\nGOTO/9,0,0\n", (
+    "GOTO/0,0,0,0.3,0,0.954\nGOTO/3,0,0,0.25,0.1,0.963\nGOTO/6,0,0,0.1,0.25,0.963\nGOTO/9,0,0,0,0.3,0.954\n"))
 _AXES = [
+    convert("orient.fixed", TURNING, r"(\[orientation\]) (cone) of the set-up", sheet("", "\\1\n\\2 = 5.0\n"),
+            machine="mikron-ucp710", more=" --orient auto"),
     convert("orient.cutter", START + CUT, r"keep the orientation \((--orient keep)\)", option(r"\1", "--orient auto"),
             machine="mikron-ucp710", more=" --orient auto"),
     convert("orient.normals", BALL, r"name the part mesh|\((--max-tilt)\)", sheet("[orientation]\noff_centre = 10.0\n", ""),

@@ -23,6 +23,7 @@ from postproc.page.document import document
 from postproc.page.tabs import ReportTab, TabTable, with_tabs
 from postproc.setup.model import load_setup
 from tests.postproc.kit import machine
+from toolpaths.choices import ShopName
 from toolpaths.diagnostics import Severity
 from toolpaths.plug_ins import PlugInFault, plug_in, registered
 
@@ -110,6 +111,31 @@ def test_code_that_has_changed_since_is_named(shop: Path, tmp_path: Path, monkey
 def test_a_dialect_that_is_asked_for_stands_before_plug_ins(shop: Path) -> None:
     _, found = toolpaths.read(FOLDER / "part.shop", dialect="generic")
     assert any("MOVETO" in d.message for d in found if d.severity is Severity.ERROR)
+
+
+@pytest.mark.parametrize(("file", "name"), [("part.points", "probe-points"), ("part.shop", "shop-apt")])
+def test_a_dialect_of_a_package_is_asked_for_by_its_name(shop: Path, tmp_path: Path, file: str, name: str) -> None:
+    """Without its mark a file of the shop is read by nobody, but where the name is said: the same path."""
+    known, bare = FOLDER / file, tmp_path / "bare.cls"
+    bare.write_text("\n".join(line for line in known.read_text().split("\n") if "SHOP" not in line.upper() or "/" in line))
+    path, found = toolpaths.read(bare, dialect=ShopName(name))
+    assert not [d for d in found if d.severity is Severity.ERROR] and path.source is not None
+    assert path.source.plug_in is not None and path.source.plug_in.name == name
+    np.testing.assert_array_equal(path.tip, toolpaths.read(known)[0].tip)
+    said = run("convert", bare, "-m", "mill-3axis", *ON, "--dialect", name, "-o", tmp_path / "p.ngc")
+    assert f"as read by {name} of shop-plugins 1.0" in said
+    wrong = run("inspect", bare, "--dialect", "nobodys", code=2)
+    assert "nobodys" in wrong and name in wrong and "generic" in wrong
+
+
+def test_a_broken_dialect_that_is_asked_for_is_an_error(site: Path, tmp_path: Path) -> None:
+    install(site, "broken-post", {"postproc.cl_dialects": {"broken": "broken_post:NOTHING"}}, broken_post="x = 1\n")
+    part = tmp_path / "p.cls"
+    part.write_text("GOTO/0,0,0\nFINI\n")
+    assert "error [cl.plug-in]" in run("inspect", part, "--dialect", "broken", code=1)
+    assert "cl.plug-in" not in run("inspect", part, "--dialect", "generic")
+    with pytest.raises(ValueError, match="no dialect 'brokn'; did you mean 'broken'"):
+        toolpaths.read(part, dialect=ShopName("brokn"))
 
 
 def test_both_readings_are_given_the_lines_of_the_file(shop: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from toolpaths.choices import DialectName, LengthUnit
+from toolpaths.choices import DialectName, LengthUnit, ShopName
 from toolpaths.cl.assemble import assemble
 from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.curves import SPLINE_CHORD, SPLINE_SHARE
@@ -18,7 +18,7 @@ from toolpaths.cl.rapid_heights import low_rapids
 from toolpaths.cl.records import counted
 from toolpaths.cl.structure import open_paths
 from toolpaths.cl.systems.recognise import Form, read_form, recognised, shop_form
-from toolpaths.cl.systems.shop_forms import ShopText, shop_text
+from toolpaths.cl.systems.shop_forms import ShopText, shop_names, shop_text, shop_text_as
 from toolpaths.cl.text.dialects import DIALECTS, Dialect, detect, units_said
 from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.other_formats import APT, other_format
@@ -29,6 +29,7 @@ from toolpaths.diagnostics import Diagnostic, Severity, has_errors
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import ClSource, RecordCounts, Toolpath
 
+AskedDialect = DialectName | ShopName
 _OWN_HEAD = b"$$-> TOOLPATH /"
 _TAIL = 400
 """bytes that hold the last two lines"""
@@ -56,7 +57,7 @@ class ReadResult:
     lines: int = 0
 
 
-def read_file(path: str | Path, *, units: LengthUnit | None = None, dialect: DialectName | None = None,
+def read_file(path: str | Path, *, units: LengthUnit | None = None, dialect: AskedDialect | None = None,
               allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None,
               tolerance: float = 0.0) -> ReadResult:
     """Read the file at `path` (- for standard input); see `read_bytes`. A file that cannot be opened is a diagnostic too."""
@@ -69,7 +70,7 @@ def read_file(path: str | Path, *, units: LengthUnit | None = None, dialect: Dia
                       progress=progress, tolerance=tolerance)
 
 
-def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = None, dialect: DialectName | None = None,
+def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = None, dialect: AskedDialect | None = None,
                allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None,
                tolerance: float = 0.0, cubics: bool = False) -> ReadResult:
     """Read the text of a CL file.
@@ -77,7 +78,8 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     Args:
         data: the file, in any encoding if bytes
         units: "mm" or "inch", used instead of what the file says
-        dialect: one of `DIALECTS`, used instead of the recognised one
+        dialect: one of `DIALECTS`, or the name of one that an installed package registers; used instead of the recognised
+            one
         allow_unknown: words that may be left out although they look like motion
         progress: called with (bytes read, bytes in all)
         tolerance: mm of the program; a share of it may go to arcs and chords in the place of splines
@@ -92,10 +94,14 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     log = DiagnosticLog(file)
     raw = data.encode("utf-8", "replace") if isinstance(data, str) else bytes(data)
     other = None if recognised(raw) else other_format(raw)
-    shop = _read_by_package(raw, dialect, other is not None, log)
+    built_in = _built_in(dialect)
+    shop = _read_by_package(raw, built_in, other is not None, log) if dialect in (None, built_in) else shop_text_as(
+        ShopName(str(dialect)), raw, log)
+    if dialect not in (None, built_in) and shop is None:
+        return ReadResult(_with_faults(_empty(file), log.diagnostics()), log.diagnostics())
     if other and shop is None:
         return _refused(file, f"this is {other[0]}", other[1])
-    said, apt = _said(raw, dialect, shop, log, progress)
+    said, apt = _said(raw, built_in, shop, log, progress)
     program, found = said.program, DIALECTS[said.name]
     b = ToolpathBuilder(program, said.points, found, _units(program, units, log), log, allow_unknown,
                         SPLINE_SHARE * tolerance or SPLINE_CHORD, cubics, frozenset() if shop is None else shop.passive)
@@ -120,7 +126,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         log.info("cl.turning", f"{whole}: milling alone is converted")
     diagnostics = log.diagnostics()
     read = replace(_with_faults(toolpath, diagnostics), records=records)
-    source = ClSource(raw, units or "", dialect or "") if shop is None else shop.source(raw, units)
+    source = ClSource(raw, units or "", built_in or "") if shop is None else shop.source(raw, units)
     object.__setattr__(read, "source", source)
     return ReadResult(read, diagnostics, counts, found.name, said.evidence,
                       b.arc_records, b.cycle_records, said.lines)
@@ -184,13 +190,18 @@ def _cut_off(data: bytes, lines: int, log: DiagnosticLog) -> None:
                     "be cut off", lines, "compare the last line with the CAM system, or write the file again")
 
 
-def _check_options(units: LengthUnit | None, dialect: DialectName | None) -> None:
+def _built_in(dialect: AskedDialect | None) -> DialectName | None:
+    """A dialect that was asked for as one of the project's own."""
+    return next((name for name in DIALECTS if name == dialect), None)
+
+
+def _check_options(units: LengthUnit | None, dialect: AskedDialect | None) -> None:
     if units not in (None, "mm", "inch"):
         raise ValueError(f"units are mm or inch, not {units!r}")
-    if dialect is not None and dialect not in DIALECTS:
-        near = get_close_matches(dialect, DIALECTS, 1)
+    if dialect is not None and dialect not in DIALECTS and dialect not in (packages := shop_names()):
+        near = get_close_matches(dialect, [*DIALECTS, *packages], 1)
         raise ValueError(f"no dialect {dialect!r}; {f'did you mean {near[0]!r}? ' if near else ''}known: "
-                         + ", ".join(DIALECTS))
+                         + ", ".join([*DIALECTS, *packages]))
 
 
 def _units(program: StatementList, given: LengthUnit | None, log: DiagnosticLog) -> LengthUnit:

@@ -164,16 +164,15 @@ def progress_bar() -> Iterator[Progress]:
     task = bar.add_task("")
 
     def shown(stage: str, at: int, total: int) -> None:
-        if not stage:
-            bar.stop()
-            return
         bar.start()  # not before: a bar that stands already wipes out what is asked on its line
         bar.update(task, description=stage, completed=at, total=total)
 
+    SAYS.still = bar.stop
     try:
         yield shown
     finally:
         bar.stop()
+        SAYS.still = lambda: None
 
 
 def _say(stage: str, said: list[str]) -> None:

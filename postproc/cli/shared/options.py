@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
@@ -14,17 +15,27 @@ _LONGEST = 72
 """characters of an option with its choices that stand on one line of 80 columns"""
 
 
-def word_option(option: str, words: Any, said: str, *others: str) -> Any:
+def _of_packages() -> tuple[str, ...]:
+    """Dialects of installed packages."""
+    from toolpaths.cl.systems.shop_forms import shop_names
+
+    return shop_names()
+
+
+def word_option(option: str, words: Any, said: str, *others: str, more: Callable[[], Iterable[str]] = tuple) -> Any:
     """An option that takes one of the values of a Literal; another is wrong use, and help shows the values: as choices,
-    or in its text where a narrow terminal would break them; `others` are further names of it."""
+    or in its text where a narrow terminal would break them. `others` are further names of it; `more` gives further values,
+    asked for where it is none of these."""
     known = {str(word): word for word in get_args(words)}
     shown = [word for word in known if word]
 
     def taken(value: object) -> Any:
-        if str(value) not in known:
-            raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join(shown)}",
-                                     param_hint=option)
-        return known[str(value)]
+        if str(value) in known:
+            return known[str(value)]
+        if str(value) in (further := tuple(more())):
+            return str(value)
+        raise typer.BadParameter(f"{value!r} is not available; choose from {', '.join([*shown, *further])}",
+                                 param_hint=option)
 
     choices = f"{{{','.join(shown)}}}"
     if len(option) + len(choices) > _LONGEST:
@@ -73,7 +84,8 @@ AxisToleranceOption = Annotated[float, typer.Option("--axis-tolerance", metavar=
 UnitsOption = Annotated[GivenUnit, word_option("--units", GivenUnit, "units of a CL file that states none")]
 DialectOption = Annotated[GivenDialect, word_option(
     "--dialect", GivenDialect, "read the CL file as this dialect instead of the recognised one (--axis-from tlaxis: "
-    "a .clt that lacks the ROTABL which turn its frame back)", "--axis-from")]
+    "a .clt that lacks the ROTABL which turn its frame back); also one of an installed package", "--axis-from",
+    more=_of_packages)]
 HooksFile = Annotated[str, typer.Option("--hooks", metavar="FILE", help="TOML file whose [hooks] are blocks of the shop; "
                                         "those of the set-up go before them")]
 ControllerName = Annotated[str, typer.Option("-c", "--controller", metavar="CONTROLLER", autocompletion=_controllers,
@@ -120,6 +132,10 @@ def ending_of(file: Path, endings: Any, option: str, wrong: str) -> Any:
         need("matplotlib", "drawings need")
     return ending
 
+SearchWorkers = Annotated[int, typer.Option("-j", "--workers", metavar="N", min=0, max=1024, help="processes that search; "
+                                            "default: as many as there are cores")]
+SchedulerOption = Annotated[str, typer.Option("--scheduler", metavar="ADDRESS", help="search on the cluster of this Dask "
+                                              "scheduler (tcp://HOST:8786)")]
 ModelOfControl = Annotated[str, typer.Option("--model", metavar="MODEL", help="cycle-time model of the control that choices "
                                              "and times go by: a name, or a file of time --calibrate; default: the "
                                              "controller's")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from unicodedata import category
 
@@ -17,6 +18,7 @@ class Says:
         strict: warnings are errors
         job_line: what --quiet holds back until there is a warning or an error: the values that a job file gives
         interrupted: what is said where the command is interrupted, "" where nothing was written
+        still: stops what moves on the terminal, as a progress bar does, while something is asked
         job_units: the job file whose units the command takes, "" where it has its own or none
     """
 
@@ -26,6 +28,7 @@ class Says:
     job_units: str = ""
     job_line: str = ""
     interrupted: str = ""
+    still: Callable[[], None] = lambda: None
 
 
 SAYS = Says()
@@ -40,12 +43,15 @@ def readable(text: str) -> str:
     return "".join("\N{REPLACEMENT CHARACTER}" if c != "\n" and category(c) in ("Cc", "Cf") else c for c in text)
 
 
-def answer_line() -> str:
-    """One line of standard input, where a question was asked.
+def answer_line(question: str) -> str:
+    """One line of standard input to a question, which is asked on standard error: nothing moves there until it is answered.
 
     Raises:
         EOFError: where it has ended, is closed, or cannot be read.
     """
+    SAYS.still()
+    sys.stderr.write(readable(question))
+    sys.stderr.flush()
     try:
         line = sys.stdin.readline() if sys.stdin is not None else ""
     except OSError:

@@ -56,6 +56,8 @@ def _speeds(place: Axes, one: RunChoice, own: ReachAlong, now: ReachAlong) -> No
 def _jerks(place: Axes, own: ReachAlong, now: ReachAlong) -> None:
     for reach, colour in ((own, OWN), (now, TURNED)):
         place.semilogy(reach.s, np.maximum(reach.jerk, 1.0), color=colour, linewidth=0.8)
+    place.yaxis.set_major_formatter("{x:.0f}")
+    place.yaxis.set_minor_formatter("")
     place.set_ylabel("mm/s3", fontsize="small")
     place.set_title("jerk along the path that the joints leave, at the planned speed and acceleration", fontsize="small")
 

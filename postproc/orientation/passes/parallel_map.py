@@ -1,23 +1,17 @@
-"""The same done for every pass, on all cores where there are many; the results do not depend on how many cores there are.
+"""The same done for every pass, by workers where there are some; the results do not depend on how many there are.
 
-Workers are forked, so that they have passes, machine and bodies without copying; only results travel back, in
-which these are named instead of written (`_Packer`). Where a system cannot fork, one process does it all.
+Only results travel back; passes, machine and what is allowed are named in them instead of written (`_Packer`).
 """
 
 from __future__ import annotations
 
 import io
-import os
 import pickle
-import signal
-import sys
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from itertools import repeat
-from multiprocessing import get_context
 from typing import Any, TypeVar
 
 from postproc.base.progress import Progress
+from postproc.base.team import Processes, Team, forked, team_at_hand
 from postproc.orientation.passes.allowed import AllowedAxes
 from postproc.orientation.passes.passes import PassContext
 
@@ -25,9 +19,8 @@ T = TypeVar("T")
 CHUNK = 8
 """passes that are done one after the other"""
 _FEWEST = 4 * CHUNK
-"""passes from which processes pay"""
-_shared: list[tuple[Callable[[int, Any], Any], PassContext, AllowedAxes]] = []
-"""what the workers are to do; theirs by inheritance"""
+"""passes from which workers pay"""
+_Work = tuple[Callable[[int, Any], Any], PassContext, AllowedAxes]
 
 
 class PassFault(Exception):
@@ -47,7 +40,8 @@ def each_pass(function: Callable[[int, T | None], T], work: PassContext, allowed
 
     Args:
         function: of the number and of what it gave for the pass before, None for the first of each CHUNK
-        workers: processes, None for as many as there are cores; 1 for this one alone
+        workers: processes, None for those of `postproc.base.team.working`, else as many as there are cores; 1 for this one
+            alone
 
     Raises:
         PassFault: where no motion can be planned.
@@ -61,37 +55,31 @@ def each_pass(function: Callable[[int, T | None], T], work: PassContext, allowed
         if progress is not None:
             progress(name, len(result) - 1, count)
 
-    workers = min(_cores() if workers is None else workers, len(chunks))
-    if workers < 2 or count < _FEWEST:
+    team = _team(workers)
+    if team is None or min(team.size, len(chunks)) < 2 or count < _FEWEST:
         for chunk in chunks:
             for found in _in_turn(function, chunk, work):
                 take([found])
         return result
-    _shared.append((function, work, allowed))
-    pool = ProcessPoolExecutor(workers, get_context("fork"), _ignore_interrupt)
+    crew = team.crew(_chunk, (function, work, allowed))
     try:
-        for packed in pool.map(_chunk, chunks, repeat(len(_shared) - 1)):
+        for packed in crew.results(chunks):
             take(_unpacked(packed, work, allowed))
-        pool.shutdown()
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-        _shared.pop()
+        crew.close()
     return result
 
 
-def _cores() -> int:
-    """Cores that this process may use; 1 where it should not fork."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else 1
+def _team(workers: int | None) -> Team | None:
+    """Who does it; None for this process."""
+    if workers is None:
+        return team_at_hand() or forked()
+    return Processes(workers) if workers > 1 else None
 
 
-def _ignore_interrupt() -> None:
-    """Ctrl-C is the parent's business."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _chunk(passes: range, which: int) -> bytes:
+def _chunk(shared: _Work, passes: range) -> bytes:
     """In a worker: results of some passes, packed."""
-    function, work, allowed = _shared[which]
+    function, work, allowed = shared
     out = io.BytesIO()
     _Packer(out, work, allowed).dump(list(_in_turn(function, passes, work)))
     return out.getvalue()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from postproc.orientation.passes.parallel_map import each_pass
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.index_time import PassEnds, all_ends, links_between, unwinding
 from postproc.orientation.plans.shortest_sequence import groupwise, shortest
-from postproc.orientation.plans.states import CLUSTER, groups_of, index, pools_of, ranked, states_of
+from postproc.orientation.plans.states import CLUSTER, Axis, groups_of, index, pools_of, ranked, states_of
 from toolpaths.arrays import Bools, Floats
 from toolpaths.shapes import arrays
 
@@ -147,13 +148,7 @@ def _least(plans: list[OrientationPlan]) -> OrientationPlan:
 def table_of(work: PassContext, results: list[PassSearch], allowed: AllowedAxes, progress: Progress | None = None,
              workers: int | None = None) -> StateTable:
     """All states with their seconds."""
-    pools = pools_of(results)
-
-    def row(k: int, before: _Row | None) -> _Row:
-        states = states_of(results[k], allowed, pools[k])
-        return states, ranked(states), all_ends(states, work)
-
-    rows = each_pass(row, work, allowed, "comparing", progress, workers)
+    rows = each_pass(partial(_row, work, allowed, results, pools_of(results)), work, allowed, "comparing", progress, workers)
     states, edges = [states for states, _, _ in rows], [edge for _, _, edge in rows]
     rapids = [np.array([each.rapids for each in edge]) for edge in edges]
     links = links_between(work, edges)
@@ -161,6 +156,13 @@ def table_of(work: PassContext, results: list[PassSearch], allowed: AllowedAxes,
              zip(states, results, strict=True)]
     return StateTable(work, edges, states, [cuts for _, cuts, _ in rows], rapids, links,
                       [np.zeros(link.shape, dtype=np.bool_) for link in links], paper)
+
+
+def _row(work: PassContext, allowed: AllowedAxes, results: list[PassSearch], pools: list[list[Axis]], k: int,
+         before: _Row | None) -> _Row:
+    """States of a pass, ranked, with their ends."""
+    states = states_of(results[k], allowed, pools[k])
+    return states, ranked(states), all_ends(states, work)
 
 
 def _wholes(table: StateTable, keep: list[int], cost: list[Floats], links: list[Floats]) -> list[list[int]]:

@@ -20,12 +20,12 @@ STILL = 1e-5
 
 def block_time(q: Floats, limits: JointLimits, fed: Floats) -> tuple[float, Floats]:
     """Seconds of the blocks between joints (N, J), `fed` (N - 1,) s at the programmed feed, and the slope by the joints."""
-    way = np.diff(q, axis=0)
-    distance = np.sqrt(way**2 + STILL**2)
+    travel = np.diff(q, axis=0)
+    distance = np.sqrt(travel**2 + STILL**2)
     v, a = limits.velocity, limits.acceleration
     short = distance < v**2 / a
     seconds = np.where(short, 2.0 * np.sqrt(distance / a), distance / v + v / a)
-    rate = np.where(short, 1.0 / np.sqrt(distance * a), 1.0 / v) * way / distance
+    rate = np.where(short, 1.0 / np.sqrt(distance * a), 1.0 / v) * travel / distance
     every = np.column_stack((seconds, fed))
     longest = np.maximum(every.max(axis=1), 1e-12)
     mean = longest * ((every / longest[:, None]) ** POWER).sum(axis=1) ** (1.0 / POWER)

@@ -1,15 +1,17 @@
-"""Cuts between rapids whose tool axis may be turned along the way, or why it may not."""
+"""Cuts between rapids whose tool axis may be turned along it, or why it may not."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
 from postproc.feedrate.feed import StepFeed
+from postproc.orientation.passes.contact import Contact
 from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.orientation.passes.poses import poses
+from postproc.orientation.turning.run_contact import contact_along
 from postproc.planning.geometry_sites import sites
 from postproc.planning.pass_geometry import stops_of
 from postproc.reference.events import compensation_states
@@ -22,6 +24,7 @@ from toolpaths.toolpath import Kind, Role
 
 TURNS = 1e-6
 """rad: axes that differ by less are one"""
+UNKNOWN_SURFACE = "lead, tilt and distance from the centre need surface normals, and none is known"
 PLAIN = 40
 """G40: no compensation of the radius"""
 
@@ -54,6 +57,7 @@ class CuttingRun:
         cone: rad by which an axis may be turned
         limits: of the operation
         fixed: why its axes stay, "" where they may be turned
+        contact: where the surface is known, `line` the number of the pose; looked at where the axes may turn
         stretches: between stops; none where `fixed`
     """
 
@@ -67,6 +71,7 @@ class CuttingRun:
     cone: float
     limits: OrientationLimits
     fixed: str
+    contact: Contact = field(default_factory=Contact.none)
     stretches: tuple[TurningStretch, ...] = ()
 
     @property
@@ -92,9 +97,16 @@ def runs_of(work: PassContext, tolerance: Tolerance, most: float) -> list[Cuttin
         cone = min(np.radians(limits.cone or 0.0), most)
         run = CuttingRun(number, (low, high), np.zeros(high - low + 1), work.moves.tip[low - 1:high],
                          work.moves.axis[low - 1:high], work.moves.line[low - 1:high], whole, cone, limits, "")
-        why = _fixed(work, run)
+        if not (why := _fixed(work, run)):
+            run = replace(run, contact=_contact(work, run))
+            why = UNKNOWN_SURFACE if limits.need_normals and not len(run.contact) else ""
         result.append(replace(run, fixed=why) if why else _with_stretches(work, run, stops, tolerance))
     return result
+
+
+def _contact(work: PassContext, run: CuttingRun) -> Contact:
+    radius, rows = run.whole.radius, work.moves.row[run.rows[0] - 1:run.rows[1]]
+    return contact_along(work, rows, run.tip + radius * run.axis, radius)
 
 
 def _rows(work: PassContext) -> list[tuple[int, int]]:
@@ -132,8 +144,6 @@ def _fixed(work: PassContext, run: CuttingRun) -> str:
         return "the tool is held about its axis"
     if bool((compensation_states(work.toolpath)[rows] != PLAIN).any()):
         return "the control compensates the radius of the cutter there"
-    if run.limits.need_normals and not len(run.whole.contact):
-        return "lead, tilt and distance from the centre need surface normals, and none is known"
     return "packages limit its axis (criteria)" if run.limits.criteria else ""
 
 

@@ -5,7 +5,7 @@ time): where rotary joints turn, the polytope of a machine is moved by the last 
 and axis must keep leaves one freedom, s(t). Along it the same is said by the joints themselves: q' = dq/ds s', and
     |q_s s'| <= V,   |q_s s'' + q_ss s'^2| <= A,   |q_s s''' + 3 q_ss s' s'' + q_sss s'^3| <= J,
 so that the reach at a place is the end of the interval of s', s'' or s''' that all joints leave. Each is given at the ball's
-centre, which goes the same way whatever the axes are.
+centre, whose path is the same whatever the axes are.
 """
 
 from __future__ import annotations

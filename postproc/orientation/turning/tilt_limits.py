@@ -12,13 +12,10 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.orientation.passes.allowed import off_centre
-from postproc.orientation.passes.contact import Contact, contact_of
-from postproc.orientation.passes.passes import PassContext
-from postproc.orientation.passes.surface import mesh_normals
+from postproc.orientation.passes.contact import Contact
 from postproc.orientation.turning.cutting_runs import CuttingRun
 from postproc.orientation.turning.tilted_axes import sagitta
 from toolpaths.arrays import Floats, Ints
-from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -90,34 +87,15 @@ class TiltLimits:
                 np.asarray(2.0 * WEIGHT / len(q) * (high - low) * self.scale))
 
 
-def limits_of(work: PassContext, run: CuttingRun, machine: Machine, tolerance: float, most: float) -> TiltLimits:
+def limits_of(run: CuttingRun, machine: Machine, tolerance: float, most: float) -> TiltLimits:
     """The limits of a run; `most`: rad from the surface normal, `tolerance`: mm."""
-    row, side, bound = _half_spaces(run, contact_along(work, run), most)
+    row, side, bound = _half_spaces(run, run.contact, most)
     inside = np.einsum("ki,ki->k", run.axis[row], side)
     q = np.concatenate([one.q for one in run.stretches])
     limits = machine.limits
     return TiltLimits(row, side, np.maximum(bound, inside), np.minimum(limits.lower, q.min(axis=0)),
                       np.maximum(limits.upper, q.max(axis=0)), np.where(machine.rotary, 1.0, 0.1), sagitta(run.axis),
                       run.whole.radius, SHARE * tolerance)
-
-
-def contact_along(work: PassContext, run: CuttingRun) -> Contact:
-    """Where the surface is known at the poses of a run, `line` the number of the pose; the feed is that of its centre."""
-    centre = run.tip + run.whole.radius * run.axis
-    rows = work.moves.row[run.rows[0] - 1:run.rows[1]]
-    normal = np.full((len(centre), 3), np.nan)
-    if work.toolpath.normal is not None:
-        normal = work.placement.directions(work.toolpath.normal[rows])
-    elif work.surface is not None:
-        part = work.surface
-        found = mesh_normals(part.mesh, part.placement.inverse().points(centre), run.whole.radius, part.slack)
-        normal = part.placement.directions(found)
-    number = np.arange(len(centre))
-    flat = np.zeros((len(centre) - 1, 3))
-    chords = Curves(centre[:-1], centre[1:], run.axis[:-1], run.axis[1:], np.zeros(len(flat), dtype=np.bool_), flat, flat,
-                    np.zeros(len(flat)))
-    ends = np.stack((number[:-1], number[1:]), axis=1)
-    return contact_of(chords, normal[ends], ends)
 
 
 def _half_spaces(run: CuttingRun, at: Contact, most: float) -> tuple[Ints, Floats, Floats]:

@@ -29,7 +29,7 @@ from toolpaths.shapes import arrays
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-Measure = Literal["planned", "blocks"]
+TimeMeasure = Literal["planned", "blocks"]
 """what is made small: the planned time, or that of blocks that each begin and end nearly at rest"""
 STEPS = 40
 """of the quasi-Newton method at most"""
@@ -44,8 +44,8 @@ DRAWN = 12
 _OUT = 10.0
 
 
-class Poses(NamedTuple):
-    """Poses (N, 3), (N, 3) of the own axes, their joints (N, J), and the basis of the field there (N, C)."""
+class CutPoses(NamedTuple):
+    """CutPoses (N, 3), (N, 3) of the own axes, their joints (N, J), and the basis of the field there (N, C)."""
 
     tip: Floats
     axis: Floats
@@ -53,7 +53,7 @@ class Poses(NamedTuple):
     basis: csr_matrix
 
 
-class Posed(NamedTuple):
+class TurnedPoses(NamedTuple):
     """Turned axes (N, 3) and their joints (N, J)."""
 
     axis: Floats
@@ -84,11 +84,6 @@ class TiltField:
             return axis
         return self.run.whole.kin.nearest_axis(turned_axes(axis, field))
 
-    @property
-    def tips(self) -> Floats:
-        """(N, 3) tips at the poses of the run."""
-        return kept_ball(self.run.tip, self.run.axis, self.axes, self.run.whole.radius)
-
 
 class TiltSearch:
     """Of one run."""
@@ -98,16 +93,16 @@ class TiltSearch:
         self.basis = TiltBasis.over(run.length, float(np.clip(run.length / PARTS, FINEST, COARSEST)))
         self._kin: Kinematics = run.whole.kin
         at = [self.basis.at(one.s) for one in run.stretches]
-        self._sites = [Poses(one.tip, one.axis, one.q, b) for one, b in zip(run.stretches, at, strict=True)]
+        self._sites = [CutPoses(one.tip, one.axis, one.q, b) for one, b in zip(run.stretches, at, strict=True)]
 
     @cached_property
-    def _rows(self) -> Poses:
+    def _rows(self) -> CutPoses:
         """The poses of the run."""
         run = self.run
         s, q = (np.concatenate([getattr(one, name) for one in run.stretches]) for name in ("s", "q"))
         near = np.stack([np.interp(run.s, s, column) for column in q.T], axis=1)
         axis = self._kin.nearest_axis(run.axis)
-        return Poses(run.tip, axis, nearest_solution(self._kin, run.tip, axis, near), self.basis.at(run.s))
+        return CutPoses(run.tip, axis, nearest_solution(self._kin, run.tip, axis, near), self.basis.at(run.s))
 
     @cached_property
     def _fed(self) -> Floats:
@@ -127,7 +122,7 @@ class TiltSearch:
         """The own axes."""
         return TiltField(self.run, self.basis, np.zeros((self.basis.count, 3)))
 
-    def seconds(self, measure: Measure, made: TiltField) -> float:
+    def seconds(self, measure: TimeMeasure, made: TiltField) -> float:
         """The time of a field; inf where the machine has no joints for it."""
         posed = [self._posed(at, made.field) for at in self._measured(measure)]
         if not all(np.isfinite(one.q).all() for one in posed):
@@ -138,7 +133,7 @@ class TiltSearch:
         """(M, J) joints at all sites."""
         return np.concatenate([self._posed(at, made.field).q for at in self._sites])
 
-    def found(self, measure: Measure, steps: int = STEPS) -> TiltField:
+    def found(self, measure: TimeMeasure, steps: int = STEPS) -> TiltField:
         """The field of least time that the search comes to, inside all limits; the own axes where none is faster."""
         from scipy.optimize import minimize
 
@@ -150,7 +145,7 @@ class TiltSearch:
         made = self._inside(self._field(answer.x)[0])
         return made if self.seconds(measure, made) < before else self.kept()
 
-    def _merit(self, measure: Measure, before: float) -> Callable[[Floats], tuple[float, Floats]]:
+    def _merit(self, measure: TimeMeasure, before: float) -> Callable[[Floats], tuple[float, Floats]]:
         """The time over `before` with all penalties, and its slope, by v (3 C,)."""
         def merit(v: Floats) -> tuple[float, Floats]:
             field, back = self._field(v)
@@ -180,10 +175,10 @@ class TiltSearch:
             slope[:, k] = self._rows.basis.T @ (np.einsum("ni,ni->n", by_axis, moved) / NUDGE)
         return penalty, slope
 
-    def _measured(self, measure: Measure) -> list[Poses]:
+    def _measured(self, measure: TimeMeasure) -> list[CutPoses]:
         return self._sites if measure == "planned" else [self._rows]
 
-    def _timed(self, measure: Measure, posed: list[Posed]) -> tuple[float, list[Floats]]:
+    def _timed(self, measure: TimeMeasure, posed: list[TurnedPoses]) -> tuple[float, list[Floats]]:
         """Seconds, and their slopes by the joints."""
         if measure == "blocks":
             seconds, slope = block_time(posed[0].q, self.most, self._fed)
@@ -201,14 +196,15 @@ class TiltSearch:
             return np.asarray(self.run.cone * (slope / size - inward)).ravel()
         return np.asarray(self.run.cone * rows / size), back
 
-    def _posed_axes(self, at: Poses, field: Floats) -> Floats:
+    def _posed_axes(self, at: CutPoses, field: Floats) -> Floats:
         return self._kin.nearest_axis(turned_axes(at.axis, np.asarray(at.basis @ field)))
 
-    def _posed(self, at: Poses, field: Floats) -> Posed:
+    def _posed(self, at: CutPoses, field: Floats) -> TurnedPoses:
         axis = self._posed_axes(at, field)
-        return Posed(axis, nearest_solution(self._kin, kept_ball(at.tip, at.axis, axis, self.run.whole.radius), axis, at.q))
+        tip = kept_ball(at.tip, at.axis, axis, self.run.whole.radius)
+        return TurnedPoses(axis, nearest_solution(self._kin, tip, axis, at.q))
 
-    def _by_field(self, at: Poses, field: Floats, here: Posed, slope: Floats) -> Floats:
+    def _by_field(self, at: CutPoses, field: Floats, here: TurnedPoses, slope: Floats) -> Floats:
         """(C, 3) slope by the coefficients of what has the slope (N, J) by the joints."""
         result = np.empty_like(field)
         for k, nudge in enumerate(NUDGE * np.eye(3)):

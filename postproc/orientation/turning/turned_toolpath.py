@@ -60,7 +60,7 @@ def _stands(work: PassContext, free: Bools, row: int, axis: Floats) -> bool:
 
 
 def _in_their_time(path: Toolpath, tip: Floats, axis: Floats) -> Floats:
-    """Feeds (N,) by which every straight cut takes the time that it had: those of the tip, which goes another way now."""
+    """Feeds (N,) by which every straight cut takes the time that it had: the path of the tip is another now."""
     cuts = np.zeros(len(path), dtype=np.bool_)
     moved = (np.abs(axis - path.axis).max(axis=1) > 0.0)
     cuts[1:] = moved[1:] | moved[:-1]

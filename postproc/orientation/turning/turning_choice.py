@@ -15,7 +15,7 @@ from postproc.orientation.candidates.ranking import load_compiler
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.turning.cutting_runs import CuttingRun, runs_of
 from postproc.orientation.turning.tilt_limits import TiltLimits, limits_of
-from postproc.orientation.turning.tilt_search import Measure, TiltField, TiltSearch
+from postproc.orientation.turning.tilt_search import TiltField, TiltSearch, TimeMeasure
 from postproc.orientation.turning.turned_toolpath import turned_toolpath
 from postproc.planning.planned import limits_at_feed
 from toolpaths.smoothing.smooth import Tolerance
@@ -33,6 +33,7 @@ class RunChoice:
         limits: None where the run is fixed
         seconds: planned, of each field; of machines that state no jerk, by blocks
         taken: number of the field; 0: the own axes
+        on_control: s that the control takes for its cuts with the own axes and with those taken; None without a clock
     """
 
     run: CuttingRun
@@ -40,6 +41,7 @@ class RunChoice:
     fields: tuple[TiltField, ...] = ()
     seconds: tuple[float, ...] = ()
     taken: int = 0
+    on_control: tuple[float, float] | None = None
 
     @property
     def turned(self) -> bool:
@@ -108,10 +110,10 @@ def turning_choice(work: PassContext, options: Options, progress: Progress | Non
 def _tried(work: PassContext, run: CuttingRun, options: Options) -> RunChoice:
     if run.fixed:
         return RunChoice(run, None)
-    limits = limits_of(work, run, work.machine, options.tolerance, options.max_tilt * DEG)
+    limits = limits_of(run, work.machine, options.tolerance, options.max_tilt * DEG)
     most = limits_at_feed(work.machine, run.whole.kin, cutting_force=run.whole.cutting_force)
     jerky = bool(np.isfinite(most.jerk).all())
-    measures: tuple[Measure, ...] = ("planned", "blocks") if jerky else ("blocks",)
+    measures: tuple[TimeMeasure, ...] = ("planned", "blocks") if jerky else ("blocks",)
     search = TiltSearch(run, limits, most)
     fields = [search.kept()]
     for measure in measures:

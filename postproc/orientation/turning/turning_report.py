@@ -9,7 +9,6 @@ import numpy as np
 from postproc.base.program_time import ProgramTime
 from postproc.orientation.passes.contact import Contact
 from postproc.orientation.turning.reach_along import ReachAlong, reach_along
-from postproc.orientation.turning.tilt_limits import contact_along
 from postproc.orientation.turning.turning_choice import RunChoice, TurningChoice
 from postproc.planning.planned import limits_at_feed
 from toolpaths.arrays import Floats, finite
@@ -21,8 +20,8 @@ from toolpaths.units import DEG
 SHOWN = 20
 """cuts in the table; where there are more, those that gain most"""
 _LINES = 6
-_HEADS = ("cut", "lines", "turned by deg", "of deg", "lead deg", "tilt deg", "ball off path mm", "planned s", "own axes s",
-          "gain %")
+_HEADS = ("cut", "lines", "turned by deg", "of deg", "lead deg", "tilt deg", "ball off path mm", "on control s",
+          "own axes s", "gain %", "planned s", "own axes s")
 
 
 def noted(choice: TurningChoice) -> list[Diagnostic]:
@@ -35,6 +34,13 @@ def noted(choice: TurningChoice) -> list[Diagnostic]:
     for why, some in reasons.items():
         found.append(info("orient.cut_kept", f"{len(some)} of {len(choice.runs)} cuts keep their axes: {why}",
                           file=file, lines=[int(one.run.line[1]) for one in some][:_LINES], count=len(some)))
+    some = [one for one in choice.runs if one.turned and one.run.limits.need_normals and one.run.contact.unknown]
+    if some:
+        unknown = sum(one.run.contact.unknown for one in some)
+        places = unknown + sum(len(one.run.contact) for one in some)
+        found.append(info("orient.no_normal", f"at {unknown} of {places} places along cuts whose axes turn no normal "
+                          "is known: no lead or tilt is looked at there", file=file,
+                          lines=[int(one.run.line[1]) for one in some][:_LINES], count=len(some)))
     if choice.passed:
         found.append(info("orient.turn_refused", "cuts whose program is refused with axes that turn along them keep theirs: "
                           f"{choice.passed[0]}", file=file, count=len(choice.passed)))
@@ -44,15 +50,15 @@ def noted(choice: TurningChoice) -> list[Diagnostic]:
 def as_dict(choice: TurningChoice) -> dict[str, Any]:
     """The key `turning` of `orient --json` and `convert --json`."""
     return {"turned": sum(one.turned for one in choice.runs), "refused": list(choice.passed),
-            "on_the_control": _programs(choice), "cuts": [_cut(choice, one) for one in choice.runs]}
+            "on_the_control": _programs(choice), "cuts": [_cut(one) for one in choice.runs]}
 
 
 def as_text(choice: TurningChoice) -> str:
     """Table of the cuts whose axes turn, why others keep theirs, and the times on the control."""
     turned, best = sorted((one for one in choice.runs if one.turned), key=_saved, reverse=True), most_gaining(choice)
     lines = [f"axes turned along {len(turned)} of {len(choice.runs)} cuts, the ball's centre kept"]
-    rows = [_row(choice, one) for one in sorted(turned[:SHOWN], key=lambda one: one.run.number)]
-    lines += table_text(rows, _HEADS, "rlrrllrrrr") if rows else []
+    rows = [_row(one) for one in sorted(turned[:SHOWN], key=lambda one: one.run.number)]
+    lines += table_text(rows, _HEADS, "rlrrllrrrrrr") if rows else []
     if len(turned) > SHOWN:
         lines.append(f"      and {len(turned) - SHOWN} cuts that gain less; all are in --json")
     lines += _reach_lines(choice, best) if best is not None else []
@@ -98,7 +104,9 @@ def most_gaining(choice: TurningChoice) -> RunChoice | None:
 
 
 def _saved(one: RunChoice) -> float:
-    return one.seconds[0] - one.seconds[one.taken]
+    """s, on the control where they are known."""
+    own, taken = one.on_control or (one.seconds[0], one.seconds[one.taken])
+    return own - taken
 
 
 def _turned(one: RunChoice) -> Floats:
@@ -110,9 +118,9 @@ def _off_path(one: RunChoice) -> float:
     return 0.0 if one.limits is None else one.limits.off_path(one.fields[one.taken].axes)
 
 
-def _ranges(choice: TurningChoice, one: RunChoice) -> dict[str, tuple[float, float]]:
+def _ranges(one: RunChoice) -> dict[str, tuple[float, float]]:
     """Least and greatest lead and tilt of the axes taken, degrees, where the surface is known."""
-    at = contact_along(choice.work, one.run)
+    at = one.run.contact
     if not len(at):
         return {}
     axes = one.fields[one.taken].axes[at.line]
@@ -128,12 +136,20 @@ def _range(angles: Floats) -> tuple[float, float]:
     return (float(angles.min()) / DEG, float(angles.max()) / DEG) if len(angles) else (np.nan, np.nan)
 
 
-def _row(choice: TurningChoice, one: RunChoice) -> tuple[object, ...]:
+def _row(one: RunChoice) -> tuple[object, ...]:
     run, (own, taken) = one.run, (one.seconds[0], one.seconds[one.taken])
-    found = _ranges(choice, one)
+    found = _ranges(one)
     spans = (f"{found[name][0]:.1f} to {found[name][1]:.1f}" if name in found else "-" for name in ("lead", "tilt"))
     return (run.number, f"{run.line[1]} to {run.line[-1]}", f"{_turned(one).max() / DEG:.2f}", f"{run.cone / DEG:.2f}",
-            *spans, f"{_off_path(one):.5f}", f"{taken:.3f}", f"{own:.3f}", f"{100.0 * (1.0 - taken / own):.2f}")
+            *spans, f"{_off_path(one):.5f}", *_on_control(one), f"{taken:.3f}", f"{own:.3f}")
+
+
+def _on_control(one: RunChoice) -> tuple[str, str, str]:
+    """Seconds of the cuts on the control, turned and with the own axes, and percent saved; "-" where they are not known."""
+    if one.on_control is None or one.on_control[0] <= 0.0:
+        return "-", "-", "-"
+    own, taken = one.on_control
+    return f"{taken:.3f}", f"{own:.3f}", f"{100.0 * (1.0 - taken / own):.2f}"
 
 
 def _reach_lines(choice: TurningChoice, one: RunChoice) -> list[str]:
@@ -154,17 +170,19 @@ def _middle(values: Floats) -> float:
     return float(np.median(known)) if len(known) else np.inf
 
 
-def _cut(choice: TurningChoice, one: RunChoice) -> dict[str, Any]:
+def _cut(one: RunChoice) -> dict[str, Any]:
     run = one.run
     values: dict[str, Any] = {"cut": run.number, "first_line": int(run.line[1]), "last_line": int(run.line[-1]),
                               "fixed": run.fixed, "turned": one.turned}
     if run.fixed:
         return values
-    found = _ranges(choice, one)
+    found = _ranges(one)
     return values | {"turned_deg": float(_turned(one).max()) / DEG, "cone_deg": run.cone / DEG,
                      "lead_deg": list(found["lead"]) if found else None, "tilt_deg": list(found["tilt"]) if found else None,
                      "ball_off_path_mm": _off_path(one), "time_s": finite(one.seconds[one.taken]),
-                     "reference_time_s": finite(one.seconds[0])}
+                     "reference_time_s": finite(one.seconds[0]),
+                     "control_s": None if one.on_control is None else one.on_control[1],
+                     "reference_control_s": None if one.on_control is None else one.on_control[0]}
 
 
 def _programs(choice: TurningChoice) -> dict[str, Any] | None:

@@ -10,6 +10,7 @@ from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.job.job import Job
 from postproc.path.links import SafeSpace
+from postproc.path.model import ARC
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion
@@ -158,15 +159,26 @@ def _beyond_travel(motion: Motion, executed: BlockPoses, slack: Floats) -> tuple
     limits, names = executed.control.machine.limits, executed.control.machine.axis_names
     found, excess = [np.zeros(0, dtype=np.int64)], [np.zeros((0, len(names)))]
     for first in range(0, len(motion), CHUNK):
-        rows = np.arange(first, min(first + CHUNK, len(motion)))
+        rows = _near_limits(motion, executed, np.arange(first, min(first + CHUNK, len(motion))), slack)
         worst = np.full((len(rows), len(names)), -np.inf)
-        for t in executed.times(motion, rows):
+        for t in executed.times(motion, rows) if len(rows) else ():
             q = executed.joints(motion, rows, t)
             worst = np.fmax(worst, np.maximum(limits.lower - q, q - limits.upper))
         bad = (worst > slack).any(axis=1)
         found.append(rows[bad])
         excess.append(worst[bad])
     return np.concatenate(found), np.concatenate(excess)
+
+
+def _near_limits(motion: Motion, executed: BlockPoses, rows: Ints, slack: Floats) -> Ints:
+    """Those of successive blocks that may leave travel: where every axis goes one way from end to end, those that begin or
+    end within half a slack (J,) of where it is left."""
+    if not motion.table.plain or executed.control.base == "tcp":
+        return rows
+    limits, q = executed.control.machine.limits, executed.joints(motion, rows, 1.0)
+    near = np.asarray(~((q >= limits.lower - 0.5 * slack) & (q <= limits.upper + 0.5 * slack)).all(axis=1))
+    near |= np.append(True, near[:-1]) | (motion.code[rows] == ARC)
+    return rows[near]
 
 
 def check_smoothing(motion: Motion, job: Job, moves: Moves, owner: Ints, faults: Faults) -> list[Diagnostic]:

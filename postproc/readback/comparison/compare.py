@@ -106,7 +106,7 @@ def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gco
     match, owner = aligned(ends, moves, moves.link, tolerance, axis_tolerance, grain)
     lost = unreached(match)
     diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
-    bound = bound_of_blocks(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects)
+    bound = bound_of_blocks(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects, ends=(tip, axis))
     (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match, owner, tolerance,
                                                                None if job.corrects else bound.whole)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
@@ -251,17 +251,20 @@ def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: F
 
 
 def bound_of_blocks(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allowed: tuple[float, float],
-                    corrects: bool, judge: bool = False) -> DeviationBound:
-    """Bounds of every block of the moves that are no links. From hole to hole dog-legs are looked at in
-    height alone; so are all paths where geometric errors are corrected: a control that drills the holes takes
-    up lost motion on its path."""
+                    corrects: bool, judge: bool = False, ends: tuple[Floats, Floats] | None = None) -> DeviationBound:
+    """Bounds of every block of the moves that are no links.
+
+    From hole to hole dog-legs are looked at in height alone; so are all paths where geometric errors are corrected: a
+    control that drills the holes takes up lost motion on its path. `ends`: tips and axes (E, 3) at the ends of all blocks,
+    where they are known.
+    """
     rows = np.flatnonzero(moves.run_by(owner))
     begin, share = place_on_moves(motion, executed, rows, owner, moves)
     free = executed.bent(motion, rows) | corrects
     level = (moves.phase[owner[rows]] == Phase.POSITION) & (motion.code[rows] == 0) & free
     some = as_slice(np.flatnonzero(~level))
     found = deviation_bound(motion, executed, moves, rows[some], owner[rows[some]], begin[some],
-                            share[some], allowed, judge)
+                            share[some], allowed, judge, ends)
     if level.any():
         whole = np.full((2, len(rows)), np.inf)
         whole[:, ~level] = found.whole

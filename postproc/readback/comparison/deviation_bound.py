@@ -19,14 +19,15 @@ from machines.kinematics.columns import Columns
 from machines.kinematics.taylor import TaylorAngle, TaylorVector, straight
 from postproc.base.group_rows import groups
 from postproc.control.word_arcs import PLANE_AXIS, PLANE_COLUMNS
-from postproc.path.bound import SHORT, axis_reference, curve_parameter, tip_reference
+from postproc.path.bound import MANY, SHORT, axis_reference, curve_parameter, tip_reference
+from postproc.path.coarse_bound import coarse_bounds, highest
 from postproc.path.model import ARC
 from postproc.readback.comparison.actual_deviation_bound import CIRCLE, JOINTS, LINE, TIP, strays
 from postproc.readback.comparison.bound_search import BoundSearch, DeviationBound, PieceBounds, Pieces
 from postproc.readback.execution.execute import Motion
-from postproc.readback.execution.poses import BlockPoses, coordinates, signed_sweep
+from postproc.readback.execution.poses import BlockPoses, alike, coordinates, signed_sweep
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints, without_nan
+from toolpaths.arrays import Bools, Floats, Ints, taken, without_nan
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -57,20 +58,31 @@ class _Ends:
 
 
 def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, owner: Ints, begin: Floats,
-                    share: Floats, allowed: tuple[float, float], judge: bool = False) -> DeviationBound:
+                    share: Floats, allowed: tuple[float, float], judge: bool = False,
+                    poses: tuple[Floats, Floats] | None = None) -> DeviationBound:
     """Bounds of the blocks `rows` (K,) from the curves of their moves `owner` (K,).
 
     `begin`, `share` (K,): where on its curve each begins and what part of it it is, by count; `allowed`: tolerances of tip
-    (mm) and axis (rad); `judge`: see `BoundSearch`. Rapids that are dog-legs are bounded piece by piece between corners.
+    (mm) and axis (rad); `judge`: see `BoundSearch`; `poses`: tips and axes (E, 3) at the ends of all blocks, where they are
+    known: then closer bounds are found only of blocks whose cheap ones leave it open. Rapids that are dog-legs are bounded
+    piece by piece between corners.
     """
     ends = _Ends(rows, owner, begin, share)
-    worst, whole = BoundSearch(allowed, judge), np.zeros((2, len(rows)))
-    for at in range(0, len(rows), CHUNK):
-        for pieces in _whole(motion, executed, ends, np.arange(at, min(at + CHUNK, len(rows)))):
-            values = _values(motion, executed, moves, ends, pieces, allowed)
-            worst.add(pieces, values)
-            for most, bound in zip(whole, (values.tip, values.axis), strict=True):
-                np.maximum.at(most, pieces.k, bound)
+    worst, whole = BoundSearch(allowed, judge), _coarse(motion, executed, moves, ends, poses)
+    known = np.asarray(~np.isfinite(whole).all(axis=0))
+    if len(rows) and not known.all():
+        known[highest(np.where(known, 0.0, whole))] = True
+    for rest in (False, True):
+        # Blocks whose cheap bound is below the worst that was seen are not the worst, nor would closer bounds say so.
+        above = ~known & (whole > worst.seen[:, None]).any(axis=0) if rest else known
+        looked = np.flatnonzero(above)
+        whole[:, looked] = 0.0
+        for at in range(0, len(looked), CHUNK):
+            for pieces in _whole(motion, executed, ends, looked[at:at + CHUNK]):
+                values = _values(motion, executed, moves, ends, pieces, allowed)
+                worst.add(pieces, values)
+                for most, bound in zip(whole, (values.tip, values.axis), strict=True):
+                    np.maximum.at(most, pieces.k, bound)
     for divided in range(HALVINGS):
         if divided >= _PATIENCE:
             worst.give_up()
@@ -84,6 +96,29 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
             part = pieces.take(slice(at, at + CHUNK))
             worst.add(part, _values(motion, executed, moves, ends, part, allowed))
     return replace(worst.result(rows), whole=whole)
+
+
+def _coarse(motion: Motion, executed: BlockPoses, moves: Moves, ends: _Ends,
+            poses: tuple[Floats, Floats] | None) -> Floats:
+    """(2, K) cheap bounds of tip (mm) and axis (rad) of blocks straight in joints, or with standing axes, on the machine of
+    their law (`postproc.path.coarse_bound`); infinite of others, and where it saves nothing."""
+    result = np.full((2, len(ends.rows)), np.inf)
+    if poses is None or len(ends.rows) < MANY or not motion.table.plain:
+        return result
+    for at in range(0, len(ends.rows), CHUNK):
+        rows = ends.rows[at:at + CHUNK]
+        law, before = _kinds(motion, executed, rows), np.maximum(rows - 1, 0)
+        fits = ((law == JOINTS) | (law == LINE)) & ~executed.bent(motion, rows) & ~executed.off_law(motion, rows)
+        fits &= (rows > 0) & (motion.tool[rows] == motion.tool[before]) & (motion.register[rows] == motion.register[before])
+        for k, (tool,) in alike(motion.tool[rows]):
+            k = np.arange(len(rows))[k][fits[k]]
+            joints = executed.joints(motion, before[k], 1.0), executed.joints(motion, rows[k], 1.0)
+            begin, end = ((poses[0][some], taken(poses[1], some)) for some in (before[k], rows[k]))
+            curves = moves.curves(ends.owner[at + k])
+            found = coarse_bounds(executed.kinematics(tool), curves, joints, begin, end, SHORT)
+            if found is not None:
+                result[:, at + k] = found
+    return result
 
 
 def _whole(motion: Motion, executed: BlockPoses, ends: _Ends, k: Ints) -> list[Pieces]:

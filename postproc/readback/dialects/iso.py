@@ -31,7 +31,7 @@ from toolpaths.units import MM_PER_INCH
 New = list[tuple[int, str, float]]
 """words to add: block, letter, value"""
 _OWN_LEVELS = 1000
-"""from here on levels that the controller file knows by their words, beyond the R and P of controls"""
+"""from here on levels that the controller file knows by their words without an R, beyond the R and P of controls"""
 
 
 class IsoReader(Reader):
@@ -77,12 +77,13 @@ class IsoReader(Reader):
         new, drop = list[tuple[int, str, float]](), np.zeros(len(words.letter), dtype=bool)
         for number, (text, mm) in enumerate(known.items(), _OWN_LEVELS):
             stated = [(ord(part[0]), float(part[1:])) for part in text.split(" ")]
+            level = next((value for letter, value in stated if letter == ord("R")), float(number))
             for k in np.flatnonzero((words.letter == stated[0][0]) & (words.value == stated[0][1])).tolist():
                 rows = slice(k, k + len(stated))
                 here = list(zip(words.letter[rows].tolist(), words.value[rows].tolist(), strict=True))
                 if here == stated and words.line[k] == words.line[k + len(stated) - 1]:
                     drop[rows] = True
-                    new += [(int(words.line[k]), SMOOTH, mm), (int(words.line[k]), SMOOTH_LEVEL, float(number))]
+                    new += [(int(words.line[k]), SMOOTH, mm), (int(words.line[k]), SMOOTH_LEVEL, level)]
         return words.take(~drop) if new else words, new
 
     def check(self, words: Words, file: str) -> list[Diagnostic]:

@@ -49,6 +49,11 @@ class BlockPoses:
             self._asked[:] = [(motion, rows, BlockMotions.of(motion, self.control, rows))]
         return self._asked[0][2]
 
+    def forget(self) -> None:
+        """Nothing is kept of the blocks that were asked for last."""
+        self._asked.clear()
+        self._ahead.clear()
+
     def poses(self, motion: Motion, rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         """(tip, axis) (K, 3) of the blocks `rows` at fraction t."""
         for ahead, k in self._known(motion, rows, t):
@@ -237,7 +242,8 @@ def poses_before(motion: Motion, control: Control) -> Floats | None:
 
 def begins(motion: Motion, rows: Ints) -> Floats:
     """Machine coordinates (K, J) where blocks begin."""
-    result: Floats = np.where((rows == 0)[:, None], motion.start, motion.end[np.maximum(rows - 1, 0)])
+    result: Floats = motion.end[rows - 1]
+    result[rows == 0] = motion.start
     return result
 
 

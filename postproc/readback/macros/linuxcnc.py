@@ -238,7 +238,14 @@ class LinuxCncMacros:
         level.at = self._end_of(level, label) + 1
 
     def _continue(self, level: OLevel, label: str, c: Cursor) -> None:
-        level.at = self._end_of(level, label)
+        """LinuxCNC looks for the end of a do from here on by the label alone, and carries out a break that it meets;
+        the next repeat then runs twice as often (2.9, compared with rs274)."""
+        end = self._end_of(level, label)
+        of_a_do = _word(level.source.rows[end])[0] == "WHILE"
+        if of_a_do and self._begins(level.source, label, ("BREAK",), end) >= level.at:
+            raise MacroFault("gcode.jump", f"o{label} continue in a do, with a break of o{label} behind it: LinuxCNC leaves "
+                             "the loop there", "put the break before the continue, or use while")
+        level.at = end
 
     def _call(self, level: OLevel, label: str, c: Cursor) -> None:
         given = list[float]()

@@ -138,7 +138,7 @@ class SiemensNames(Names):
             skip(c)
             name = c.match(NAME)
             if not name:
-                raise c.fault("DEF without a name")
+                raise c.fault("DEF without a name of two letters at least")
             sizes = tuple(int(number(v)) for v in listed(c, self, "]")) if take(c, "[") else ()
             if math.prod(sizes) > 1_000_000:
                 raise c.fault("DEF of an array that is too large")

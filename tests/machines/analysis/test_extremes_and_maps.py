@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import machines
 from machines.analysis.box import Box
 from machines.analysis.chain import chain_figures, indices, scaled_jacobian
-from machines.analysis.extremes import MEASURES, largest_over
+from machines.analysis.extremes import MEASURES, largest_over, rates_over, slide_acceleration
 from machines.analysis.limits_of_box import ends_of_box, least_margins
 from machines.analysis.transmission import (
     condition_number,
@@ -23,6 +23,7 @@ from machines.analysis.transmission import (
     force_transmission,
     manipulability,
     rates,
+    speed_acceleration,
     speed_transmission,
     worst,
 )
@@ -30,7 +31,8 @@ from postproc.cli.app import app
 from toolpaths.drawing import level
 
 SAME = {"condition_number": condition_number,
-        "speed_transmission": speed_transmission, "force_transmission": force_transmission}
+        "speed_transmission": speed_transmission, "force_transmission": force_transmission, "manipulability": manipulability,
+        "conditioning_lost": lambda transmits, place, tilt: 1.0 / conditioning_factor(transmits, place, tilt)}
 
 
 @pytest.mark.covering
@@ -39,18 +41,18 @@ SAME = {"condition_number": condition_number,
 def test_nothing_found_by_other_code_is_above_what_is_proved(name: str, key: str) -> None:
     """Grid with refinement and random places, by the kinematics of the machine."""
     kin = machines.load(name).kinematics
-    found = largest_over(kin.leg_geometry, kin.transmits.lever, MEASURES[key])
+    found = largest_over(rates_over(kin.leg_geometry, kin.transmits.lever), MEASURES[key])
     grid = worst(partial(SAME[key], kin.transmits), kin.workspace, (5, 5, 5, 3))
     place, tilt = kin.workspace.random(np.random.default_rng(0), 500)
     assert grid.value <= found.most * (1.0 + 1e-9) and SAME[key](kin.transmits, place, tilt).max() <= found.most
-    if kin.leg_geometry.turns != "abc":
+    if kin.leg_geometry.turns != "abc" and key != "conditioning_lost":
         assert found.value == pytest.approx(grid.value, rel=0.01) and found.most <= 1.0101 * found.value
 
 
 def test_speed_of_uranesx_is_that_of_its_flattest_rod() -> None:
     """A Delta on parallel slides: largest row norm of J^-1 = L / sqrt(L^2 - d^2), d to the farthest foot (row 4)."""
     kin = machines.load("uranesx").kinematics
-    found = largest_over(kin.leg_geometry, 0.0, MEASURES["speed_transmission"])
+    found = largest_over(rates_over(kin.leg_geometry, 0.0), MEASURES["speed_transmission"])
     feet = kin.legs.points[:, :2] - kin.loops.joints[:, :2]
     corners = np.array([[x, y] for x in (-250.0, 250.0) for y in (-250.0, 250.0)])
     d = np.linalg.norm(corners[:, None] - feet, axis=2).max()
@@ -58,10 +60,21 @@ def test_speed_of_uranesx_is_that_of_its_flattest_rod() -> None:
     assert 2.0 * found.value == pytest.approx(2.761, rel=1e-3)
 
 
+@pytest.mark.parametrize("name", ["uranesx", "delta-hybrid", "delta-star"])
+def test_the_acceleration_of_slides_per_speed_squared_is_proved(name: str) -> None:
+    """III.6.5, against the measure of the machine's own code on a grid."""
+    kin = machines.load(name).kinematics
+    found = largest_over(rates_over(kin.leg_geometry, 0.0), slide_acceleration(kin.leg_geometry))
+    grid = worst(partial(speed_acceleration, kin.on_rods), kin.workspace, (7, 7, 5, 2))
+    assert grid.value <= found.most * (1.0 + 1e-9) and found.value == pytest.approx(grid.value, rel=0.01)
+    assert found.most <= 1.0101 * found.value
+
+
 def test_the_condition_number_of_the_h4a_is_below_six_everywhere() -> None:
     """V.7, over the declared workspace and 45 degrees to both sides: proved, not seen."""
     kin = machines.load("h4a-c-table").kinematics
-    assert largest_over(kin.leg_geometry, kin.transmits.lever, MEASURES["condition_number"], close=0.03).most < 6.0
+    assert largest_over(rates_over(kin.leg_geometry, kin.transmits.lever), MEASURES["condition_number"],
+                        close=0.03).most < 6.0
 
 
 def test_manipulability_says_nothing_of_a_lost_direction() -> None:

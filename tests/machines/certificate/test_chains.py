@@ -1,4 +1,5 @@
-"""What is proved of a chain of axes holds at every rotary position and tip; what is refused is refused with one that shows it."""
+"""What is proved of a chain of axes holds at every rotary position and tip; what is refused is refused with one that shows
+it."""
 
 from __future__ import annotations
 

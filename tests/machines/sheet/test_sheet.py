@@ -142,7 +142,7 @@ UPSIDE_DOWN = '[0, 0, -250.1], "I2" = [0.02, 0, -30], "I1" = [-0.02, 0, 280.1]'
     (NUTATED, '"I2"', '"I4"', "sheet.figure", "I2 missing", "points"),
     (TRUNNION, '"22.9 m/min"', '"22900 mm/s"', ODD, "22900 mm/s", "rapid"),
     (TRUNNION, '"22.9 m/min"', '"22900"', "sheet.figure", "no unit", "rapid"),
-    (TRUNNION, '"0.3 g"', '"0.3 m/min"', "sheet.figure", "no unit of a acceleration", "acceleration"),
+    (TRUNNION, '"0.3 g"', '"0.3 m/min"', "sheet.figure", "no unit of an acceleration", "acceleration"),
     (TRUNNION, 'jog = "right up"', 'jog = "clockwise"', "sheet.figure", "is no answer for B", "jog"),
     (TRUNNION, '["-35 deg", "120 deg"]', '"155 deg"', "sheet.figure", "one figure", None),
     (TRUNNION, 'form = "haas"', 'form = "siemens"', "sheet.figure", "MRZP is not a name of siemens", "points"),

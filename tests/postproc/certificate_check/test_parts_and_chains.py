@@ -1,4 +1,5 @@
-"""Certificates with parts held apart, of bars, and of chains of axes: confirmed as they are, rejected when anything is changed."""
+"""Certificates with parts held apart, of bars, and of chains of axes: confirmed as they are, rejected when anything is
+changed."""
 
 from __future__ import annotations
 
@@ -136,13 +137,14 @@ def test_other_changes_of_a_chain_are_rejected(edit: Callable[[Content], object]
 
 @pytest.mark.parametrize("edit", [
     lambda t: t["axes"]["X"].update(travel=[-10, 10]), lambda t: t["kinematics"]["axes"]["A"].update(point=[0, 0, 9]),
-    lambda t: t["kinematics"]["axes"]["C"].update(positive=-1), lambda t: t["axes"]["A"].update(travel=[-1, 1])], ids=range(4))
+    lambda t: t["kinematics"]["axes"]["C"].update(positive=-1), lambda t: t["axes"]["A"].update(travel=[-1, 1])],
+    ids=range(4))
 def test_a_chain_of_a_changed_machine_is_rejected(edit: Callable[[Content], object]) -> None:
     table = table_of("mikron-ucp710")
     edit(table)
     with pytest.raises(Rejected, match="key"):
         about(deepcopy(MIKRON), table)
-    with pytest.raises(Rejected, match="machine file|outside its travel"):
+    with pytest.raises(Rejected, match=r"machine file|outside its travel"):
         about(deepcopy(MIKRON) | {"key": hash_of(table)}, table)
 
 
@@ -157,7 +159,8 @@ def test_shipped_certificates_of_chains_are_confirmed(name: str) -> None:
 
 def test_a_chain_is_certified_and_checked_from_the_command_line(tmp_path: Path) -> None:
     run, file = CliRunner(), tmp_path / "m.json"
-    done = run.invoke(app, ["machine", "certify", "mikron-ucp710", "--tool", "100", "--box", "100x80x60", "--turn", "A=-10:40",
+    done = run.invoke(app, ["machine", "certify", "mikron-ucp710", "--tool", "100", "--box", "100x80x60", "--turn",
+                            "A=-10:40",
                             "-o", str(file), "--figure", str(tmp_path / "m.png"), "--json", "-"])
     assert done.exit_code == 0, done.output
     figures = json.loads(done.stdout)

@@ -182,3 +182,23 @@ def test_what_cannot_be_executed_is_said(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(control, "MOST_BLOCKS", 1)
     beyond = timed(b, m)
     assert [d.code for d in beyond.found] == ["time.control"] and (beyond.seconds == quick).all()
+
+
+@pytest.mark.parametrize(("control", "most"), [(LIMITS, 1.02), (replace(LIMITS, corner_step=np.full(2, 8.333)), 1.04)])
+def test_how_far_points_of_the_measured_curve_stand_apart_changes_its_time_little(control: ControlSettings,
+                                                                                  most: float) -> None:
+    """0.05 to 1 mm (`published.py` has more): bends of 0.04 mm radius, which few points or none show."""
+    times = [execute(commanded(points(chord)), control).seconds for chord in (0.05, 0.3, 1.0)]
+    assert max(times) <= most * min(times)
+    assert times == pytest.approx([MEASURED] * 3, rel=0.05)
+
+
+@pytest.mark.parametrize("step", [None, np.full(3, 8.333)])
+def test_no_program_takes_longer_than_with_a_rest_at_each_corner(step: Floats | None) -> None:
+    """Lines of 5 to 15 mm that turn by up to a radian, as fixtures and plates have them."""
+    rng = np.random.default_rng(3)
+    q = np.cumsum(rng.normal(size=(30, 3)) * 6.0 + [6.0, 0.0, 0.0], axis=0)
+    settings = ControlSettings(np.full(3, 500.0), np.full(3, 3000.0), np.full(3, 30_000.0), corner_step=step)
+    free = commanded(q, 0.01)
+    rests = execute(replace(free, stop=np.ones(30, dtype=bool)), settings).seconds
+    assert 0.6 * rests < execute(free, settings).seconds <= 1.03 * rests

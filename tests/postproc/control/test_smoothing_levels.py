@@ -51,6 +51,18 @@ def test_levels_stand_where_operations_begin(controller: str) -> None:
     assert not off or re.search(rf"(?m)(^|N\d+ ){re.escape(off)}$", made.text[cuts[2]:])
 
 
+def test_no_word_without_a_level_stands_behind_one() -> None:
+    """No page says that G05.1 Q1 does away with R1: REST, which states nothing, is cut with the level that takes no more."""
+    asked = setup(ROUGH="roughing")
+    made = good(convert(part(), MACHINE, "fanuc-30i", asked))
+    assert re.findall(r"(?m)^G05\.1 Q1.*$", made.text) == ["G05.1 Q1 R1", "G05.1 Q1 R10"]
+    assert made.job is not None
+    found = read_back(made.text.replace("G05.1 Q1 R10", "G05.1 Q1").encode(), made.job, "part.cls")[1]
+    assert "verify.smoothing" in {d.code for d in found if d.severity is Severity.ERROR}
+    plain = good(convert(part(), MACHINE, "fanuc-30i", setup()))
+    assert "G05.1 Q1\n" in plain.text and "R10" not in plain.text
+
+
 @pytest.mark.parametrize("controller", LEVELS)
 def test_a_level_that_takes_more_is_found_in_the_operation_that_must_not(controller: str, tmp_path: Path) -> None:
     """The finishing blocks replaced by the roughing ones: what is allowed counts by operation, not by program."""

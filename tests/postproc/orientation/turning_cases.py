@@ -62,5 +62,5 @@ def only_run(path: Toolpath, setup: SetupFile) -> tuple[PassContext, CuttingRun]
 
 def searched(path: Toolpath, setup: SetupFile) -> TiltSearch:
     work, run = only_run(path, setup)
-    limits = limits_of(work, run, work.machine, OPTIONS.tolerance, 60.0 * DEG)
+    limits = limits_of(run, work.machine, OPTIONS.tolerance, 60.0 * DEG)
     return TiltSearch(run, limits, limits_at_feed(work.machine, run.whole.kin))

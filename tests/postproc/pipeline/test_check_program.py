@@ -55,6 +55,8 @@ def test_all_poses_are_of_one_point(name: str, controller: str, setup: str) -> N
         tip, axis = pose_of(name, there, 90.0)
         assert np.abs(tip - tip[0]).max() < 2e-3
         assert len(np.unique(axis.round(3), axis=0)) == POSES
+        said = re.search(r"(?i)INDICATOR ON THE TABLE AT X(\S+) Y(\S+) Z(\S+) OF THE WORK OFFSET", flat(result.text))
+        assert said and np.abs(np.array([float(v) for v in said.groups()]) - (tip[0] - [31.0, -12.0, 5.0])).max() < 2e-3
     assert not re.search(r"\bM[34]\b", re.sub(r"\(.*?\)|;.*", "", result.text))
     assert len(re.findall(r"(?m)\bM0\b$", result.text)) == POSES
 

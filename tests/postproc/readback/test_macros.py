@@ -89,6 +89,15 @@ def test_faults_stand_at_the_line_that_was_written() -> None:
     assert [(d.code, d.file, d.lines) for d in found] == [("gcode.variable", "O9000.nc", (3,))]
 
 
+def test_a_continue_of_a_do_before_a_break_is_refused_as_linuxcnc_leaves_the_loop_there() -> None:
+    """rs274 of LinuxCNC 2.9 goes on behind the do, and runs the next repeat twice as often."""
+    inside = ["#1=[#1+1]", "O2 IF [#1 EQ 2]", "O1 CONTINUE", "O2 ENDIF", "O3 IF [#1 GE 5]", "O1 BREAK", "O3 ENDIF", "G0 X#1"]
+    text = "\n".join(["#1=0", "O1 DO", *inside, "O1 WHILE [#1 LT 10]"]) + "\n"
+    assert list(faults(LINUXCNC, HEAD + text + "M2\n")) == ["gcode.jump"]
+    first = "\n".join(["#1=0", "O1 DO", *inside[:1], *inside[4:7], *inside[1:4], *inside[7:], "O1 WHILE [#1 LT 10]"]) + "\n"
+    assert [x for x, _, _ in track(LINUXCNC, first)] == [1, 3, 4]
+
+
 @pytest.mark.parametrize("name", ["Q2", "PLATE-Q17", "QL3"])
 def test_names_of_klartext_hold_no_parameters(name: str) -> None:
     """The name of a program is that of its file, which a user chooses."""

@@ -57,9 +57,9 @@ def test_taps_of_both_hands_and_none_without_a_turning_spindle() -> None:
 def test_dwell_in_revolutions_is_written_in_seconds() -> None:
     """600 rev/min: 15 revolutions take 1.5 s; as a canned cycle and as single moves."""
     assert "G82 X10 Y0 Z-5 R3 P1.5 F100" in good(holes("DRILL,DEPTH,5,MMPM,100,CLEAR,3,DWELL,15,REV")).text
-    single = body(good(holes("DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,20,DWELL,15,REV")).text)
+    single = body(good(holes("DRILL,DEPTH,5,MMPM,100,RAPTO,3,RTRCTO,60,DWELL,15,REV")).text)
     at = single.index("G1 Z-5 F100")
-    assert single[at + 1:at + 3] == ["G4 P1.5", "G0 Z20"]
+    assert single[at + 1:at + 3] == ["G4 P1.5", "G0 Z60"]
     found = holes("DRILL,DEPTH,5,MMPM,100,CLEAR,3,DWELL,15,REV", "SPINDL/OFF").diagnostics
     assert [d.lines[0] for d in found if d.code == "cycle.dwell"] == [8]
 

@@ -412,15 +412,13 @@ def test_who_knows_where_the_part_stands_says_so(tmp_path: Path) -> None:
 def test_a_place_that_was_offered_is_accepted_or_another_stated(tmp_path: Path) -> None:
     path, found = toolpaths.read(bare(tmp_path))
     given = GivenAnswers(spindle={0: 3000.0}, feed=300.0, coolant="off", tool_number={"EM10": 1})
-    drawn: list[str] = []
 
     def made(answer: str) -> SetupSheet:
         def ask(question: Question) -> float | str:
-            assert question.kind == "origin" and drawn[-1] == "", "nothing is drawn while somebody is asked"
+            assert question.kind == "origin"
             return parsed(question, answer)[0] or ""
 
-        return new_setup(path, machine("haas-umc-750"), "haas-ngc", Options(), given, ask, False, found, "G54",
-                         lambda stage, at, total: drawn.append(stage))
+        return new_setup(path, machine("haas-umc-750"), "haas-ngc", Options(), given, ask, False, found, "G54")
 
     offered, other = made(""), made("-380 -250 -300")
     assert offered.fit is not None and other.fit is not None and not offered.fit.setup.assumed
@@ -451,14 +449,14 @@ def test_wrong_registers_and_a_closed_standard_input_are_no_faults_of_ours(tmp_p
     (file := tmp_path / "part.cls").write_text(practice_file(nx, CASES["no spindle"]))
     words = ["setup", "new", file, "-m", "mill-3axis", "-o", tmp_path / "s.toml"]
     assert "no register" in run(*words, "--yes", "--work-offset-code", 'G54"', code=2).output
-    monkeypatch.setattr("postproc.cli.setup_new.answer_line", lambda: setup_new_line(monkeypatch))
+    monkeypatch.setattr("postproc.cli.setup_new.answer_line", lambda question: setup_new_line(monkeypatch, question))
     assert "setup.unanswered" in run(*words, code=1).output
 
 
-def setup_new_line(monkeypatch: pytest.MonkeyPatch) -> str:
+def setup_new_line(monkeypatch: pytest.MonkeyPatch, question: str) -> str:
     with monkeypatch.context() as closed:
         closed.setattr(sys, "stdin", None)  # as `<&-` leaves it
-        return LINE()
+        return LINE(question)
 
 
 @pytest.mark.parametrize("record", ["SPINDL/CCLW", "SPINDL/ON,CCLW", "SPINDL/RPM,0,CCLW"])

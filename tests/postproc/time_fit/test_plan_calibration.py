@@ -99,3 +99,10 @@ def test_moves_that_show_what_the_program_asks_are_taken_first() -> None:
     assert chosen_moves(known, 100.0)[0] == 1 and 0 not in chosen_moves(known, 100.0)
     assert 3 not in chosen_moves(known, 100.0) and chosen_moves(known, 0.5) == []
     assert known.variance([1]) == pytest.approx(25.0 / 51.0)
+
+
+@pytest.mark.slow
+def test_without_a_program_the_test_shows_what_every_kind_of_move_depends_on() -> None:
+    made = plan_calibration(None, machine(timing=True), "generic-iso", model("lookahead"), SetupFile(), BUDGET, "t.nc")
+    assert made.seconds <= BUDGET and len(made.moves) > 3
+    assert all(after < before for name, (before, after) in made.shown.items() if name != "block_time")

@@ -50,12 +50,27 @@ def test_generic_iso_cycle() -> None:
 
 
 def test_retract_that_no_code_makes_is_written_as_single_moves() -> None:
-    """20 mm above the top is neither the plane nor the level the tool came from; it is that to the next hole."""
-    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100", "GOTO/10,0,0",
+    """60 mm above the top is neither the plane nor the level the tool came from; it is that to the next hole."""
+    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,12,RAPTO,3,RTRCTO,60,MANUAL,MMPM,100", "GOTO/10,0,0",
                     "GOTO/20,0,0")
     blocks = body(good(convert(path, "mill-3axis")).text)
     at = blocks.index("X10")
-    assert blocks[at:at + 5] == ["X10", "Z3", "G1 Z-12 F100", "G0 Z20", "G98 G81 X20 Y0 Z-12 R3 F100"]
+    assert blocks[at:at + 5] == ["X10", "Z3", "G1 Z-12 F100", "G0 Z60", "G98 G81 X20 Y0 Z-12 R3 F100"]
+
+
+@pytest.mark.parametrize(("controller", "rows"), [
+    ("linuxcnc", ["X10", "Z20", "G98 G81 X10 Y0 Z-12 R3 F100", "X20 Y0"]),
+    ("siemens-840d", ["MCALL CYCLE81(20,0,3,-12)", "X10 Y0", "X20 Y0"])])
+def test_a_retract_below_the_level_the_tool_came_from_is_the_cycles_own(controller: str, rows: list[str]) -> None:
+    """Where the control goes back to the level that a cycle begins from, the tool stops there on its path down; where the
+    cycle names the level it needs not."""
+    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DRILL,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100", "GOTO/10,0,0",
+                    "GOTO/20,0,0")
+    result = good(convert(path, "mill-3axis", controller))
+    blocks = [re.sub(r"^(N\d+ )?(G0 )?", "", line) for line in result.text.splitlines()]
+    at = blocks.index(rows[0])
+    assert blocks[at:at + len(rows)] == rows and "Z20" not in blocks[:at]
+    assert "cycle.as_moves" not in codes(result.diagnostics)
 
 
 def test_pecks_that_grow_smaller_are_written_as_single_moves() -> None:

@@ -9,14 +9,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, get_args, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, get_args, runtime_checkable
 
-from toolpaths.choices import DialectName, LengthUnit
+from toolpaths.choices import DialectName, LengthUnit, ShopName
 from toolpaths.cl.systems.as_statements import UP, AsStatements
 from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.source import normalise, text_of
 from toolpaths.plug_ins import PlugIn, PlugInFault, plug_in, registered, said
 from toolpaths.toolpath import ClSource
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 APT_TEXT = tuple(name for name in get_args(DialectName) if name not in ("nci", "freecad", "step-nc"))
 """dialects whose records are text"""
@@ -131,6 +134,25 @@ def shop_text(data: bytes, other: bool, log: DiagnosticLog) -> ShopText | None:
     return (_by_reader(data, log) if other else None) or _by_dialect(data, log)
 
 
+def shop_names() -> tuple[str, ...]:
+    """Names that may be asked for: dialects and readers of installed packages, none of them imported."""
+    return tuple(sorted({*registered("postproc.cl_dialects"), *registered("postproc.cl_readers")}))
+
+
+def shop_text_as(name: ShopName, data: bytes, log: DiagnosticLog) -> ShopText | None:
+    """A file as the package reads it that registers the name, whatever the file looks like; None, with an error in `log`,
+    where that plug-in cannot be used."""
+    dialects, readers = registered("postproc.cl_dialects"), registered("postproc.cl_readers")
+    try:
+        if name in dialects:
+            return _in_dialect(*_dialect(name, dialects[name]), "asked for,", data, log)
+        given, reader = plug_in("postproc.cl_readers", name, readers[name])
+        return _read(given, _made(given, reader), data, log)
+    except PlugInFault as fault:
+        log.error("cl.plug-in", str(fault), hint=fault.hint)
+    return None
+
+
 def _by_reader(data: bytes, log: DiagnosticLog) -> ShopText | None:
     for name, points in registered("postproc.cl_readers").items():
         try:
@@ -184,19 +206,33 @@ def _by_dialect(data: bytes, log: DiagnosticLog) -> ShopText | None:
     head = data[:HEAD].replace(b"\x00", b"").upper()
     for name, points in registered("postproc.cl_dialects").items():
         try:
-            given, found = plug_in("postproc.cl_dialects", name, points)
-            if not isinstance(found, ShopDialect) or found.fault():
-                why = found.fault() if isinstance(found, ShopDialect) else "is no ShopDialect"
-                raise PlugInFault(f"the CL dialect {given}: {why}", _correct(given))
+            given, found = _dialect(name, points)
         except PlugInFault as fault:
             log.warning("cl.plug-in", f"{fault}; it is not used", hint=fault.hint)
             continue
         mark = next((mark for mark in found.marks if mark.upper().encode() in head), "")
         if mark:
-            text = found.in_words_of_like(normalise(data, log))
-            return ShopText(given, found.like, f'"{mark}", recognised by {given}', text, None,
-                            frozenset(word.upper() for word in found.passive), found.without_passive(text))
+            return _in_dialect(given, found, f'"{mark}", recognised by', data, log)
     return None
+
+
+def _dialect(name: str, points: list[EntryPoint]) -> tuple[PlugIn, ShopDialect]:
+    """A dialect of a package.
+
+    Raises:
+        PlugInFault: where it cannot be imported, or is none.
+    """
+    given, found = plug_in("postproc.cl_dialects", name, points)
+    if not isinstance(found, ShopDialect) or found.fault():
+        why = found.fault() if isinstance(found, ShopDialect) else "is no ShopDialect"
+        raise PlugInFault(f"the CL dialect {given}: {why}", _correct(given))
+    return given, found
+
+
+def _in_dialect(given: PlugIn, found: ShopDialect, evidence: str, data: bytes, log: DiagnosticLog) -> ShopText:
+    text = found.in_words_of_like(normalise(data, log))
+    return ShopText(given, found.like, f"{evidence} {given}", text, None, frozenset(word.upper() for word in found.passive),
+                    found.without_passive(text))
 
 
 def _correct(given: PlugIn) -> str:

@@ -111,6 +111,10 @@ _TEXTS: tuple[tuple[DialectName, str], ...] = (("makino", "MAKINO-FF"), ("surfca
           ("ncl", "NCL"), ("ncl", "NCLCAM"), ("creo", "PRO/NC"), ("creo", "PRO/CLFILE"), ("creo", "CREO"))
 _NAMED = ("makino", "surfcam")
 """systems that write words of others, and their own name in each file"""
+_OTHERS = ("HYPERMILL", "POWERMILL", "CIMATRON", "TOPSOLID", "SOLIDCAM", "ESPRIT", "GIBBSCAM", "RHINOCAM", "BOBCAD")
+"""systems whose APT text is that of a shop's post, with words of ISO 4343"""
+_STANDARD = ("TLON,GOFWD", "INDIRV", "AUTOPS", "PSIS", "TOOLNO")
+"""words of ISO 4343 that say CATIA where no other system is named"""
 OWN = DATA_COMMENT + "TOOLPATH"
 """Mark of the text that `write` makes."""
 
@@ -127,12 +131,13 @@ def detect(program: StatementList) -> tuple[Dialect, str]:
     text = _by_text(program)
     if text is not None and text[0] in _NAMED:
         return DIALECTS[text[0]], text[1]
+    other = None if text is not None else _by_text(program, tuple(("generic", name) for name in _OTHERS))
     sense_word = _clockwise_word(program)
     if sense_word:
         return DIALECTS["solidworks-clt"], f"CIRCLE with a sense word in line {sense_word}"
     for name, words in _MAJORS:
         for word in words:
-            if word in majors:
+            if word in majors and (other is None or word not in _STANDARD):
                 return DIALECTS[name], f"{word} in line {majors[word]}"
     for major, line in majors.items():
         if major.startswith(DATA_COMMENT):
@@ -140,8 +145,9 @@ def detect(program: StatementList) -> tuple[Dialect, str]:
     autodesk = _autodesk(program)
     if autodesk is not None:
         return autodesk
-    if text is not None:
-        return DIALECTS[text[0]], text[1]
+    if text is not None or other is not None:
+        name, where = text or other or ("generic", "")
+        return DIALECTS[name], where
     return DIALECTS["generic"], "no word that only one system writes"
 
 
@@ -169,16 +175,17 @@ def _autodesk(program: StatementList) -> tuple[Dialect, str] | None:
     return None
 
 
-def _by_text(program: StatementList) -> tuple[DialectName, str] | None:
-    """A system named in a comment, PARTNO, MACHIN or PPRINT; the first of `_TEXTS` that is there."""
+def _by_text(program: StatementList,
+             texts: tuple[tuple[DialectName, str], ...] = _TEXTS) -> tuple[DialectName, str] | None:
+    """A system named in a comment, PARTNO, MACHIN or PPRINT; the first of `texts` that is there."""
     found: dict[str, tuple[DialectName, str]] = {}
     for statement, line in program.first.items():
         if statement.major in (COMMENT, "PARTNO", "MACHIN", "PPRINT", "REMARK"):
             body = statement.body.upper()
-            for name, text in _TEXTS:
+            for name, text in texts:
                 if text in body and text not in found and _whole(body, text):
                     found[text] = (name, f'"{text}" in line {line}')
-    for _, text in _TEXTS:
+    for _, text in texts:
         if text in found:
             return found[text]
     return None
