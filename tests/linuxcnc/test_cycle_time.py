@@ -94,7 +94,7 @@ def test_a_generic_model_learns_linuxcnc_from_its_log(recorded, tmp_path: Path) 
     """A look-ahead model fitted to one run foretells another within its band."""
     on = machine("mill-3axis")
     texts = [f"{HEAD} G64 P0.01\nG0 Z300\nF{feed}\n{random_lines(count)}G0 X0 Y0 Z300\nG0 X200\n{END}"
-             for feed, count in ((4000, 120), (2500, 80))]
+             for feed, count in ((4000, 60), (2500, 40))]
     runs = [run(recorded, text, on, tmp_path) for text in texts]
     taught = runs[0]
     rows = np.concatenate([[0], np.flatnonzero(np.diff(taught.line) != 0) + 1])
