@@ -39,7 +39,7 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import error, read_value
 from toolpaths.rotations import angle_between
 from toolpaths.smoothing.smooth import Tolerance
-from toolpaths.toolpath import Kind, Toolpath
+from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
 
 RADIUS = 3.0
