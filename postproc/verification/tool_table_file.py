@@ -167,8 +167,8 @@ def _linuxcnc(lines: list[str], rows: _Rows) -> None:
         words = _words(line.split(";")[0], n, rows)
         if any(letter == "Z" for letter, _ in words) and (values := _single(words, "TZ", n, rows)):
             rows.add(values["T"], "geometry", values["Z"], n)
-            if words := [f"{letter} {value:g}" for letter, value in words if letter in "XYABCUVW" and value != 0.0]:
-                rows.aside.setdefault(int(values["T"]), []).extend(words)
+            if aside := [f"{letter} {value:g}" for letter, value in words if letter in "XYABCUVW" and value != 0.0]:
+                rows.aside.setdefault(int(values["T"]), []).extend(aside)
 
 
 def _offsets(lines: list[str], rows: _Rows) -> None:
