@@ -171,7 +171,7 @@ def _beyond_travel(motion: Motion, executed: BlockPoses, slack: Floats) -> tuple
 
 
 def _near_limits(motion: Motion, executed: BlockPoses, rows: Ints, slack: Floats) -> Ints:
-    """Those of successive blocks that may leave travel: where every axis goes one way from end to end, those that begin or
+    """Those of successive blocks that may leave travel: where no axis turns back within, those that begin or
     end within half a slack (J,) of where it is left."""
     if not motion.table.plain or executed.control.base == "tcp":
         return rows
@@ -204,7 +204,8 @@ def check_smoothing_levels(code: Canonical, motion: Motion, job: Job, moves: Mov
     """The level of the control's own smoothing while cutting is that of the blocks asked for, as the same reader reads them:
     an error in an operation of [output.smoothing], a warning in others, whose level no one stated."""
     plan, reader = job.smoothing, reader_for(job.controller, job.machine.axis_names)
-    wanted = np.array([reader.smoothing_level(one.blocks) for one in plan.used] or [np.nan])
+    levels = {blocks: reader.smoothing_level(blocks) for blocks in {one.blocks for one in plan.used}}
+    wanted = np.array([levels[one.blocks] for one in plan.used] or [np.nan])
     if np.isnan(wanted).all():
         return []
     named = np.array([op.name in plan.named for op in job.toolpath.operations] or [False])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import error, read_value
 from toolpaths.rotations import angle_between
 from toolpaths.smoothing.smooth import Tolerance
-from toolpaths.toolpath import Kind, Toolpath
+from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
 
 RADIUS = 3.0
@@ -231,12 +232,12 @@ FLAT = ["UNITS/MM", "CUTTER/6,1", *BALL[2:]]
 
 
 @pytest.mark.parametrize(("path", "keys", "why"), [
-    (swing(head=FLAT), {}, "no ball|not a ball"), (swing(), {"cone": None}, "states no cone"),
-    (swing("COOLNT/OFF"), {}, ""),
-    (swing(), {"lead": [0.0, 30.0]}, "none is known"), (swing("CUTCOM/LEFT,3"), {}, "compensates the radius")],
+    ({"head": FLAT}, {}, "no ball|not a ball"), ({}, {"cone": None}, "states no cone"),
+    ({"middle": "COOLNT/OFF"}, {}, ""),
+    ({}, {"lead": [0.0, 30.0]}, "none is known"), ({"middle": "CUTCOM/LEFT,3"}, {}, "compensates the radius")],
     ids=["flat", "no cone", "stop", "normals", "cutcom"])
-def test_what_keeps_its_axes_says_why(path: Toolpath, keys: dict[str, object], why: str) -> None:
-    _, run = only_run(path, with_cone(**keys))
+def test_what_keeps_its_axes_says_why(path: dict[str, Any], keys: dict[str, object], why: str) -> None:
+    _, run = only_run(swing(**path), with_cone(**keys))
     assert bool(run.fixed) == bool(why)
     assert any(part in run.fixed for part in why.split("|"))
 
@@ -261,6 +262,8 @@ def test_the_program_is_proved_faster_and_says_so(controller: str) -> None:
     assert made.ok, [str(d) for d in made.diagnostics]
     assert made.turning is not None
     assert made.turning.programs["turned"].seconds < 0.97 * made.turning.programs["keep"].seconds
+    assert made.choice is not None
+    assert made.choice.toolpath("auto").equals(made.toolpath), "what Python takes from the choice"
     assert made.witness is not None
     assert not made.witness.findings
     assert {one.what for one in made.witness.compared} >= {"positions", "feeds"}
