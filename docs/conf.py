@@ -8,6 +8,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
+from live_reports import write_reports  # noqa: E402  # of this tree
 from reference_pages import write_pages  # noqa: E402  # of this tree
 
 from postproc.base.version import VERSION  # noqa: E402  # of this tree
@@ -33,3 +34,5 @@ html_theme_options = {"navigation_with_keys": True}
 nitpicky = False
 suppress_warnings = ["myst.xref_missing"]  # links to files of the source tree, which the site does not hold
 write_pages(HERE / "reference" / "generated")
+write_reports(HERE / "reference" / "generated" / "pages" / "reports")
+html_extra_path = ["reference/generated/pages"]  # its folder `reports` stands at the top of the site

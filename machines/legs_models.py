@@ -167,8 +167,9 @@ class LegsModel(KinematicsModel):
     def build(self) -> Kinematics:
         """The kinematics at the gauge point."""
         if self.in_series:
-            return LegsInSeries(self._on_legs(), *(tuple(one.joint(name) for name, one in axes.items())
-                                                   for axes in (self.table_axes, self.spindle_axes)))
+            tables, head = (tuple(one.joint(name) for name, one in axes.items())
+                            for axes in (self.table_axes, self.spindle_axes))
+            return LegsInSeries(self._on_legs(), tables, head)
         return self._on_legs() if self.rotary is None else self.rotary.on(self._on_legs(), np.array(self.gauge))
 
     def _on_legs(self) -> OnLegs:

@@ -91,8 +91,8 @@ def arrangements() -> list[str]:
     lines = ["", "## Arrangements of the symmetric H4", "",
              "Best and worst condition number in the cylinder of table V-33, motors at angles phi of V-21 (one of those "
              "that a mirror makes the same). The document prints 12 of 15, by letters whose figure V-32 is a drawing; rows "
-             "that have a letter here are those whose numbers it prints.", "", "| row | phi, degrees | best | worst | ratio |",
-             "|---|---|---|---|---|"]
+             "that have a letter here are those whose numbers it prints.", "",
+             "| row | phi, degrees | best | worst | ratio |", "|---|---|---|---|---|"]
     own = {min(mirrored(tuple(phi))) for phi in product(*H4_PLACES)}
     for phi in sorted(one for one in own if abs(v4_in_the_middle(with_motors_at(one))) > 1e-6):
         numbers = condition_number(with_motors_at(phi).transmits, *cylinder())

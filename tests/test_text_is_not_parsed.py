@@ -21,6 +21,7 @@ FILES = {
     "toolpaths.interrupted_runs": "names of temporary files", "toolpaths.shapes": "tables of shapes",
     "machines.toml_lines": "lines of TOML files", "machines.value_words": "values in TOML files",
     "postproc.certificate_check.check": "boxes of certificates",
+    "postproc.certificate_check.chains": "boxes of certificates",
     "postproc.time_fit.log_exports": "logs that others export",
     "machines.sheet.pivot_text": "pivot numbers as controls put them out",
     "machines.sheet.quantity": "figures of data sheets with their units",

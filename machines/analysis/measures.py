@@ -59,7 +59,7 @@ class StudiedLegs:
         """How they transmit."""
         of = self.legs
         drives = Drives(of.points, of.directions, of.lengths, of.roots, of.arms, of.slide, of.arm)
-        return OverWorkspace(Loops(drives, of.joints, of.freedoms, of.kept, of.bars), of.workspace)
+        return OverWorkspace(Loops(drives, of.joints, of.freedoms, of.kept, bars=of.bars), of.workspace)
 
     def resized(self, rod: float | None = None, radius: float | None = None, offset: float | None = None) -> StudiedLegs:
         """The same with all rods of one length, all drives at one distance from the z axis, another centre of mass, mm."""

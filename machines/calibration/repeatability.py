@@ -30,14 +30,14 @@ MICRO, ARCSEC = 1e-3, ANGLES["arcsec"]
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(reading="N", position="N", way="N")
+@arrays(reading="N", position="N", approach="N")
 class RepeatedReadings:
     """Readings, where they were taken (one number where no column says) and from which side (1, -1, 0 not known); mm,
     rad."""
 
     reading: Floats
     position: Floats
-    way: Floats
+    approach: Floats
     angle: bool
 
     @property
@@ -49,8 +49,8 @@ class RepeatedReadings:
     def figures(self) -> dict[str, Any]:
         """All of it; units in the keys."""
         size, unit = self.unit
-        rows = [self._row(place, way) for place in np.unique(self.position) for way in np.unique(self.way)
-                if ((self.position == place) & (self.way == way)).any()]
+        rows = [self._row(place, approach) for place in np.unique(self.position) for approach in np.unique(self.approach)
+                if ((self.position == place) & (self.approach == approach)).any()]
         whole = self.reading / size
         found: dict[str, Any] = {
             "readings": len(self.reading), f"interval_{unit}": float(np.ptp(whole)), f"mean_{unit}": float(whole.mean()),
@@ -58,17 +58,18 @@ class RepeatedReadings:
             f"unidirectional_repeatability_{unit}": max(row[f"repeatability_{unit}"] for row in rows)}
         return found | self._both(rows, unit)
 
-    def _row(self, place: float, way: float) -> dict[str, Any]:
+    def _row(self, place: float, approach: float) -> dict[str, Any]:
         size, unit = self.unit
-        own = self.reading[(self.position == place) & (self.way == way)] / size
+        own = self.reading[(self.position == place) & (self.approach == approach)] / size
         s = float(own.std(ddof=1)) if len(own) >= LEAST else float("nan")
-        return {"position": float(place / (ANGLES["deg"] if self.angle else 1.0)), "way": int(way), "readings": len(own),
+        return {"position": float(place / (ANGLES["deg"] if self.angle else 1.0)), "approach": int(approach),
+                "readings": len(own),
                 f"mean_{unit}": float(own.mean()), f"standard_deviation_{unit}": s, f"interval_{unit}": float(np.ptp(own)),
                 f"repeatability_{unit}": 4.0 * s}
 
     def _both(self, rows: Sequence[dict[str, Any]], unit: str) -> dict[str, Any]:
         """Reversal and bi-directional repeatability where positions were approached from both sides."""
-        sides = {way: {row["position"]: row for row in rows if row["way"] == way} for way in (1, -1)}
+        sides = {approach: {row["position"]: row for row in rows if row["approach"] == approach} for approach in (1, -1)}
         places = sorted(set(sides[1]) & set(sides[-1]))
         if not places:
             return {}
@@ -82,7 +83,7 @@ class RepeatedReadings:
 
 
 def read_repeated(file: Path) -> tuple[RepeatedReadings | None, list[Diagnostic]]:
-    """The readings of a table with a column `reading` [um, arcsec, ...], and where there are, `position` and `way`."""
+    """The readings of a table with a column `reading` [um, arcsec, ...], and where there are, `position` and `approach`."""
     table, found = read_csv(file)
     return (None, found) if table is None else _checked(table, found)
 
@@ -90,20 +91,21 @@ def read_repeated(file: Path) -> tuple[RepeatedReadings | None, list[Diagnostic]
 def _checked(table: CsvTable, found: list[Diagnostic]) -> tuple[RepeatedReadings | None, list[Diagnostic]]:
     reading = table.columns.get("reading")
     if reading is None or not table.unit["reading"]:
-        return None, [*found, error("repeatability.column", f"{Path(table.file).name} has no column `reading` with a unit",
-                                    file=table.file, lines=[table.head],
-                                    hint="write reading [arcsec] or reading [um]; position [deg] and way (1, -1) beside it")]
+        return None, [*found, error(
+            "repeatability.column", f"{Path(table.file).name} has no column `reading` with a unit", file=table.file,
+            lines=[table.head], hint="write reading [arcsec] or reading [um]; next to it position [deg], approach (1, -1)")]
     angle = table.unit["reading"] in ANGLES
-    way = table.columns.get("way", np.zeros(len(reading)))
+    approach = table.columns.get("approach", np.zeros(len(reading)))
     position = table.columns.get("position", np.zeros(len(reading)))
-    bad = ~np.isin(way, (-1.0, 0.0, 1.0))
+    bad = ~np.isin(approach, (-1.0, 0.0, 1.0))
     if bad.any():
         row = int(np.argmax(bad))
-        return None, [*found, error("repeatability.way", f"way is {way[row]:g}", file=table.file, lines=[table.lines[row]],
-                                    hint="write 1 where the axis came from lesser values, -1 from greater ones")]
-    made = RepeatedReadings(reading, position, way, angle)
-    groups = [(place, side) for place in np.unique(position) for side in np.unique(way[position == place])]
-    few = [place for place, side in groups if ((position == place) & (way == side)).sum() < LEAST]
+        return None, [*found, error(
+            "repeatability.approach", f"approach is {approach[row]:g}", file=table.file, lines=[table.lines[row]],
+            hint="write 1 where the axis came from lesser values, -1 from greater ones")]
+    made = RepeatedReadings(reading, position, approach, angle)
+    groups = [(place, side) for place in np.unique(position) for side in np.unique(approach[position == place])]
+    few = [place for place, side in groups if ((position == place) & (approach == side)).sum() < LEAST]
     if few:
         rows = [table.lines[k] for k in np.flatnonzero(np.isin(position, few))]
         return None, [*found, error("repeatability.few", f"{len(few)} positions have one reading from a side: they say "

@@ -14,8 +14,8 @@ NEXT_TO_IT = ".certificate.json"
 """what the name of a certificate next to a machine file ends in"""
 APART = ("clearance", "assumed", "source", "family")
 """keys of `[kinematics]` that the proof does not rest on"""
-CHAIN = "serial"
-"""a kind of machine of which a box of tips inside its travel is proved: its travel counts too"""
+CHAIN = "structure"
+"""key of a chain of axes, of which a box of tips inside its travel is proved: its travel counts too"""
 DISTANCES = ("direct", "inverse", "held")
 """bounds that the margin is of"""
 WHOLE = "workspace"
@@ -26,7 +26,7 @@ def key_of(values: Mapping[str, Any]) -> str:
     """The hash of a machine file's merged values."""
     kinematics = values.get("kinematics", {})
     table = {"kind": kinematics.get("family")} | {k: v for k, v in kinematics.items() if k not in APART}
-    if table["kind"] == CHAIN:
+    if CHAIN in table:
         table["travel"] = {letter: axis.get("travel", "") for letter, axis in values.get("axes", {}).items()}
     text = json.dumps(_plain(table), sort_keys=True, separators=(",", ":"))
     return sha256(text.encode()).hexdigest()

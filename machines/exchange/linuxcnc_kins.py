@@ -18,7 +18,7 @@ COORDINATES = {"trivkins": "XYZABCUVW", "xyzac-trt-kins": "XYZAC", "xyzbc-trt-ki
 UNREAD_PINS = ("conventional-directions", "J0off", "J1off", "J2off")
 """pins that change the geometry where they are not 0"""
 _ROBOTS = "it moves arms, struts or belts, no machine of three linear and up to two rotary axes in a chain"
-ON_LEGS = ("genhexkins", "rotarydeltakins")
+ON_LEGS = ("genhexkins", "pentakins", "rotarydeltakins")
 """modules of struts and arms that a machine file of kind `legs` describes"""
 NOT_OURS = {
     "maxkins": "up to LinuxCNC 2.9 it adds the offset of the swivelled head without turning it with the table, so that the "

@@ -6,12 +6,16 @@ Source of the law of one leg: Company 2000, II-7, II-8 (slides); the same closur
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, cast
 
 import numpy as np
 
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shapes import arrays
+
+TurnLetters = Literal["", "a", "b", "c", "abc"]
+"""turns about x, y and z that legs leave a platform"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +64,9 @@ class LegGeometry:
     bars: tuple[int, ...] = ()
 
     @property
-    def turns(self) -> str:
+    def turns(self) -> TurnLetters:
         """The turns among the freedoms."""
-        return "".join(name for name in self.freedoms if name in "abc")
+        return cast(TurnLetters, "".join(name for name in self.freedoms if name in "abc"))
 
     @property
     def tilts_everywhere(self) -> bool:

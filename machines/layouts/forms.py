@@ -2,7 +2,7 @@
 
 All of the contracted model, platform joints in one point E: slides through points P along unit vectors u, and which of the
 two solutions of each rod is built (the text's families along x need the other one in the middle). Numbers are parts of the
-largest side of the box. A slide along z beside two along x stands outside the box.
+largest side of the box. A slide along z next to two along x stands outside the box.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from postproc.witness.machine import chain
 LOWER, UPPER, DEEPEST, AT_ONCE = "ab", "AB", 16, 1_000
 STATED = ("pole", "slides", "travel")
 _LINE = re.compile(r"(\.|[abAB]{1,64}) (\S+) (\S+) (\S+)")
-Point = list[Ball]
+BallPoint = list[Ball]
 
 
 @dataclass(frozen=True)
@@ -139,16 +139,16 @@ def _bounds(found: dict[str, Any], angles: list[Ball], n: int) -> FloatArray:
     turning = dict(zip([k for k, axis in enumerate(axes) if axis["rotary"]], [cos_sin(angle) for angle in angles],
                        strict=True))
     first = min(k for k, axis in enumerate(axes) if not axis["rotary"])
-    end, ways = [_known(-tool * v, n) for v in direction], dict[int, Point]()
+    end, directions = [_known(-tool * v, n) for v in direction], dict[int, BallPoint]()
     for k in range(len(axes) - 1, first - 1, -1):
         axis = axes[k]
         if axis["rotary"]:
             end = _about(axis, turning[k], end)
-            ways = {i: _turned(axis["direction"], turning[k], way) for i, way in ways.items()}
+            directions = {i: _turned(axis["direction"], turning[k], along) for i, along in directions.items()}
         else:
-            ways[k] = [_known(v, n) for v in axis["direction"]]
-    slides = sorted(ways)
-    a, b, c = (ways[k] for k in slides)
+            directions[k] = [_known(v, n) for v in axis["direction"]]
+    slides = sorted(directions)
+    a, b, c = (directions[k] for k in slides)
     sides = (vector(b, c), vector(c, a), vector(a, b))
     volume = scalar(a, sides[0])
     left = np.full(n, np.inf)
@@ -173,12 +173,12 @@ def _pole(axes: list[dict[str, Any]], turning: dict[int, tuple[Ball, Ball]], too
     if not turning:
         return np.ones(n)
     first, *others = sorted(turning)
-    way = [_known(v, n) for v in tool]
+    along = [_known(v, n) for v in tool]
     for k in reversed(others):
-        way = _turned(axes[k]["direction"], turning[k], way)
-    across = vector([_known(v, n) for v in axes[first]["direction"]], way)
+        along = _turned(axes[k]["direction"], turning[k], along)
+    across = vector([_known(v, n) for v in axes[first]["direction"]], along)
     square = scalar(across, across).least()
-    by_cosine = 1.0 - (np.abs((c := scalar([_known(v, n) for v in axes[first]["direction"]], way)).m) + c.r) ** 2 - 1e-12
+    by_cosine = 1.0 - (np.abs((c := scalar([_known(v, n) for v in axes[first]["direction"]], along)).m) + c.r) ** 2 - 1e-12
     return np.sqrt(np.maximum(np.where(np.isfinite(square), np.maximum(square, by_cosine), 0.0), 0.0)) * (1.0 - 1e-12)
 
 
@@ -186,7 +186,7 @@ def _known(value: float, n: int) -> Ball:
     return ball(np.full(n, float(value)))
 
 
-def _turned(along: Any, angle: tuple[Ball, Ball], v: Point) -> Point:
+def _turned(along: Any, angle: tuple[Ball, Ball], v: BallPoint) -> BallPoint:
     """About a unit vector: v + sin (u x v) + (1 - cos) u x (u x v)."""
     u = [_known(float(x), len(v[0].m)) for x in along]
     once = vector(u, v)
@@ -194,7 +194,7 @@ def _turned(along: Any, angle: tuple[Ball, Ball], v: Point) -> Point:
     return [x + angle[1] * y + left * z for x, y, z in zip(v, once, twice, strict=True)]
 
 
-def _about(axis: dict[str, Any], angle: tuple[Ball, Ball], v: Point) -> Point:
+def _about(axis: dict[str, Any], angle: tuple[Ball, Ball], v: BallPoint) -> BallPoint:
     """A point turned about the line of an axis."""
     place = [float(x) for x in axis["point"]]
     moved = _turned(axis["direction"], angle, [x - p for x, p in zip(v, place, strict=True)])

@@ -26,6 +26,8 @@ SPANS = ("x_mm", "y_mm", "z_mm", "tilt_rad", "heading_rad")
 BOUNDS, GAPS = ("direct", "inverse", "held"), ("parts", "stops")
 FORM, COVERS = 2, ("workspace", "region")
 """of the file that this check reads; what a certificate may be of"""
+NONE_THERE = 9e5
+"""a distance that is stated of parts, or stops, that a machine has not"""
 _LINE = re.compile(r"(\.|[xyztnXYZTN]{1,64})((?: \S+)+)")
 
 
@@ -73,7 +75,7 @@ def confirmed(found: dict[str, Any]) -> dict[str, Any]:
             raise
         raise Rejected(f"it is no certificate of this form: {type(fault).__name__}: {fault}") from fault
     return {"region": region} | {"boxes": len(boxes), "looked_at": looked, "margin": margin} | {
-        f"{name}_at_least": float(v) for name, v in zip(_names(found), least, strict=True)}
+        f"{name}_at_least": float(v) for name, v in zip(_names(found), least, strict=True) if v < NONE_THERE}
 
 
 def _names(found: dict[str, Any]) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ def hash_of(table: dict[str, Any]) -> str:
     """The hash of a machine file's merged values, as certificates have it."""
     kinematics = dict(table.get("kinematics", {}))
     kept = {"kind": kinematics.get("family"), **{k: v for k, v in kinematics.items() if k not in LEFT_OUT}}
-    if kept["kind"] == "serial":  # what is proved of a chain is a box inside its travel
+    if "structure" in kept:  # a chain of axes: what is proved of a chain is a box inside its travel
         kept["travel"] = {letter: axis.get("travel", "") for letter, axis in table.get("axes", {}).items()}
     return sha256(json.dumps(_numbers(kept), sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 

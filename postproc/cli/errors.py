@@ -100,7 +100,7 @@ def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step 
 @errors_app.command("to-linuxcnc", epilog="Example: postproc errors to-linuxcnc e.toml -m mill-3axis -o comp --rest r.toml")
 def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Rest = None, step: Step = None,
                 loss: Loss = 0.1, angle_loss: AngleLoss = 0.1, tool_length: ToolLength = 100.0, json: Json = "") -> None:
-    """Write positioning errors as LinuxCNC's screw compensation, one file per joint, and report what remains."""
+    """Write positioning errors as LinuxCNC's screw compensation, one file per joint; report what is left."""
     refuse_overwriting({"--rest": str(rest or ""), "--json": json},
                        {"the error model": str(file), **own_files(machine)})
     from machines.geometric_error.exchange import exports
@@ -162,7 +162,7 @@ def errors_schema() -> None:
 
 @errors_app.command("repeatability", epilog="Example: postproc errors repeatability C-42.csv --figure C-42.svg")
 def repeatability(file: Annotated[Path, typer.Argument(metavar="READINGS.csv", help="column reading [arcsec] or [um]; where "
-                                                       "there are several, position [deg] or [mm], and way (1, -1)")],
+                                                       "there are several, position [deg] or [mm], and approach (1, -1)")],
                   figure: Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="the readings drawn, .png or "
                                                               ".svg")] = None, json: Json = "") -> None:
     """Repeatability of an axis from repeated readings: interval, standard deviation, reversal (ISO 230-2)."""

@@ -25,6 +25,7 @@ from postproc.joints.states import (
     staying,
 )
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.rotations import TWO_PI
 from toolpaths.shapes import arrays
 
 
@@ -93,11 +94,24 @@ def _rewinding(lattice: Lattice, segment: Segment, wrong: Floats) -> tuple[Float
     """(cost (S, S, 5) of going through a segment with a rewind from one state to another, pose (S, S) of the rewind)."""
     count = len(segment)
     costs, places = np.tile(NEVER, (count, count, 1)), np.full((count, count), -1)
-    for s in range(count):
-        for t in range(count):
-            if s != t:
-                costs[s, t], places[s, t] = _rewind(lattice, segment, s, t, wrong)
+    alike: dict[tuple[int, int, bool, bool, tuple[int, ...]], tuple[Floats, int]] = {}
+    for s, t in np.argwhere(_worth_a_rewind(lattice, segment)).tolist():
+        (b, turns), (c, others) = segment.states[s], segment.states[t]
+        kind = (b, c, bool(segment.bad[s]), bool(segment.bad[t]), tuple(k - n for k, n in zip(others, turns, strict=True)))
+        if kind not in alike:  # of windings their difference alone counts
+            alike[kind] = _rewind(lattice, segment, s, t, wrong)
+        costs[s, t], places[s, t] = alike[kind]
     return costs, places
+
+
+def _worth_a_rewind(lattice: Lattice, segment: Segment) -> Bools:
+    """(S, S) False from a state to itself and to windings farther off than the whole run turns: nearer ones serve as well,
+    and an axis of very wide travel has hundreds."""
+    turns = np.array([turns for _, turns in segment.states], dtype=np.float64).reshape(len(segment), -1)
+    values = lattice.values[:, :, lattice.wound]
+    least, most = (end(np.where(np.isfinite(values), values, 0.0), axis=(0, 1)) for end in (np.min, np.max))
+    near = np.abs(turns[:, None] - turns[None]) * TWO_PI <= most - least + 2.0 * TWO_PI
+    return np.asarray(near.all(axis=2) & ~np.eye(len(segment), dtype=np.bool_))
 
 
 def _rewind(lattice: Lattice, segment: Segment, s: int, t: int, wrong: Floats) -> tuple[Floats, int]:

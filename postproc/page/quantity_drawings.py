@@ -4,7 +4,8 @@ geometric errors, the polytope of a pass; drawn from the report alone."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -14,11 +15,13 @@ from toolpaths.units import DEG
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-QUANTITIES = {"feed": ("feed reached", "mm/min"), "deviation": ("deviation", "um"), "correction": ("correction", "um"),
-              "tilt": ("tilt", "deg")}
+Quantity = Literal["feed", "deviation", "correction", "tilt"]
+PathReason = Literal["limit", "cause"]
+QUANTITIES: dict[Quantity, tuple[str, str]] = {
+    "feed": ("feed reached", "mm/min"), "deviation": ("deviation", "um"), "correction": ("correction", "um"),
+    "tilt": ("tilt", "deg")}
 """by name: column of the points (that of the tilt is made here), unit"""
-NAMED = ("limit", "cause")
-KINDS = (*(f"path-{name}" for name in (*QUANTITIES, *NAMED)), "feed", "what-if", "errors", "polytope")
+KINDS = (*(f"path-{name}" for name in (*QUANTITIES, "limit", "cause")), "feed", "what-if", "errors", "polytope")
 MOST = 20_000
 """points of a curve"""
 VIEW = np.array([[0.765, 0.644, 0.0], [-0.375, 0.445, 0.813]])
@@ -32,10 +35,10 @@ Fill = Callable[["Figure"], None]
 
 def fills(run: dict[str, Any], columns: dict[str, Floats]) -> dict[str, Fill]:
     """What fills each sheet of which the run has figures, by its name in `KINDS`."""
-    made: dict[str, Fill] = {f"path-{name}": lambda sheet, n=name: _valued(sheet, run, columns, n)  # type: ignore[misc]  # bound
-                             for name in QUANTITIES if name != "correction" or "correction" in columns}
-    made |= {"path-limit": lambda sheet: _named(sheet, run, columns, "limit"),
-             "path-cause": lambda sheet: _named(sheet, run, columns, "cause"), "feed": lambda sheet: _feed(sheet, columns)}
+    made: dict[str, Fill] = {f"path-{name}": partial(_valued, run, columns, name) for name in QUANTITIES
+                             if name != "correction" or "correction" in columns}
+    made |= {"path-limit": partial(_named, run, columns, "limit"), "path-cause": partial(_named, run, columns, "cause"),
+             "feed": lambda sheet: _feed(sheet, columns)}
     what_if, chosen = run["what_if"], run["orientation"]
     if what_if and what_if["counted"] and what_if["limits"]:
         made["what-if"] = lambda sheet: _what_if(sheet, what_if)
@@ -68,7 +71,7 @@ def _place(sheet: Figure, pieces: Floats) -> Any:
     return place
 
 
-def _valued(sheet: Figure, run: dict[str, Any], columns: dict[str, Floats], name: str) -> None:
+def _valued(run: dict[str, Any], columns: dict[str, Floats], name: Quantity, sheet: Figure) -> None:
     """The cuts in the colours of a scale; grey where there is no figure."""
     from matplotlib.collections import LineCollection
 
@@ -82,7 +85,7 @@ def _valued(sheet: Figure, run: dict[str, Any], columns: dict[str, Floats], name
         sheet.colorbar(drawn, ax=place, label=f"{column}, {unit}")
 
 
-def _named(sheet: Figure, run: dict[str, Any], columns: dict[str, Floats], name: str) -> None:
+def _named(run: dict[str, Any], columns: dict[str, Floats], name: PathReason, sheet: Figure) -> None:
     """The cuts by what limits them, or by where their time goes."""
     from matplotlib.collections import LineCollection
 

@@ -94,7 +94,7 @@ def rapid_codes(control: Control, kin: Kinematics, q0: Floats, q1: Floats, toler
     """(K,) TRAVERSE where a rapid from q0 to q1 (K, J) stays on its straight line, else FEED (at the axes' limits).
 
     A dog-leg is piecewise straight in the joints; its corners are where an axis arrives. Rapids of `level` (K,) lead from
-    hole to hole: there only the height along the tool axis counts, as in the controls' own cycles.
+    hole to hole: where they keep the height along the tool axis it alone counts, as in the controls' own cycles.
     """
     own = np.abs(q1 - q0) / control.machine.limits.velocity
     total = own.max(axis=1, initial=0.0)
@@ -108,7 +108,8 @@ def rapid_codes(control: Control, kin: Kinematics, q0: Floats, q1: Floats, toler
             straight = kin.forward(q0[rows] + t[:, None] * (q1 - q0)[rows])[1]
             off = _off(tip, begin, end)
             if level is not None:
-                off = np.where(level[rows], np.abs(((tip - begin) * straight).sum(axis=1)), off)
+                flat = level[rows] & (np.abs(((end - begin) * straight).sum(axis=1)) <= tolerance)
+                off = np.where(flat, np.abs(((tip - begin) * straight).sum(axis=1)), off)
             leaves[rows] |= (off > tolerance) | (angle_between(axis, straight) > axis_tolerance)
     return np.where(leaves, FEED, TRAVERSE).astype(np.int8)
 

@@ -65,7 +65,9 @@ def _turned(begun: PostResult, keep: PostResult, write: Callable[[TurningChoice]
         return begun.with_found(found), keep
     tried = turning_choice(work, begun.options, progress)
     turning, made = turned_by_plan(tried, keep, write) if clock is None else turned_by_clock(tried, keep, write, clock)
-    begun = replace(begun.with_found(noted(turning)), toolpath=turning.toolpath, turning=turning)
+    turned = turning.toolpath if any(turning.picked) else None
+    choice = None if begun.choice is None else replace(begun.choice, turned=turned)
+    begun = replace(begun.with_found(noted(turning)), toolpath=turning.toolpath, choice=choice, turning=turning)
     return begun, replace(made, turning=turning)
 
 

@@ -268,7 +268,7 @@ class Timer:
                     return [], total, True
                 self.planned += 1
                 plan = seen.cuts[k].plan
-                if plan is None:  # a worker stopped before it, by the bound of a cut that goes the same way elsewhere
+                if plan is None:  # a worker stopped before it: by another bound of a cut with the same joints
                     seen = self._here(seen)
                     plan = seen.cuts[k].plan
                 spent, name, solved = plan() if plan is not None else (np.inf, "", False)

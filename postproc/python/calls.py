@@ -75,7 +75,8 @@ def time(source: Toolpath | FileName, machine: Machine | FileName, controller: F
 
 def orient(path: Toolpath, machine: Machine | FileName, controller: FileName = "linuxcnc",
            options: Options | None = None) -> OrientationChoice:
-    """The tool axes of 3+2 passes for the least planned time; `options.orient` is the plan that is proved.
+    """The tool axes of 3+2 passes for the least planned time, and along cuts where the set-up has a cone; `options.orient`
+    is the plan that is proved.
 
     `choice.toolpath("auto")` is the path with the axes of a plan, `choice.plans` are the plans with their times.
 

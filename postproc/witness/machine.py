@@ -345,12 +345,13 @@ def rods(table: dict[str, Any]) -> Rods:
     tables = legs_of(kinematics)
     besides, rings = held(kinematics, tables), {name: float(leg["ring"]) for name, leg in tables.items() if leg.get("ring")}
     freedoms = "xyzabc" if besides.any or rings else freedoms
+    under, wrist = ({name: np.array([unit(np.array(one["direction"], np.float64)), one.get("point", (0.0, 0.0, 0.0))])
+                           for name, one in kinematics.get(key, {}).items()} for key in ("table_axes", "spindle_axes"))
     return Rods(legs, "".join(sorted(set(freedoms) & set("abc"))), pivot, reach, rotary.get("letter", ""),
                 rotary.get("carries", ""), float(rotary.get("positive", 1)),
                 {name: unit(rows(one, "direction")[0]) for name, one in carriers.items()},
                 np.array([float(letter not in freedoms) for letter in "xyz"]), besides, rings,
-                *({name: np.array([unit(np.array(one["direction"], np.float64)), one.get("point", (0.0, 0.0, 0.0))])
-                   for name, one in kinematics.get(key, {}).items()} for key in ("table_axes", "spindle_axes")))
+                under, wrist)
 
 
 def _on_bar(leg: dict[str, Any], bars: dict[str, dict[str, Any]]) -> dict[str, Any]:

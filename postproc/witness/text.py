@@ -144,10 +144,14 @@ def _plain(data: bytes) -> bytes:
 
 
 def without_carriage_returns(data: bytes) -> bytes:
-    """UTF-8 or single bytes with LF, without NULs."""
-    for bom, encoding in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
+    """UTF-8 or single bytes with LF, without NULs; UTF-16 without its mark has a NUL for every other byte."""
+    for bom, encoding in ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
+                          (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16")):
         if data.startswith(bom):
             data = data.decode(encoding, "replace").encode("utf-8")
+    for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if len(data) >= 8 and data[first:400:2].count(0) > 0.8 * len(data[first:400:2]):
+            data = data.decode(encoding, "replace").encode("utf-8", "replace")
     for old, new in ((b"\r\n", b"\n"), (b"\r", b"\n"), (b"\x00", b" "), (b"\x1a", b" ")):
         if old in data:
             data = data.replace(old, new)

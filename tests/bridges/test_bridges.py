@@ -14,10 +14,12 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import postproc
 import toolpaths
-from tests.postproc.kit import good, machine, tool_setup
+from postproc.cli.app import app
+from tests.postproc.kit import SAMPLES, good, machine, tool_setup
 from toolpaths.diagnostics import Severity
 
 ROOT = Path(__file__).parents[2]
@@ -88,6 +90,16 @@ def test_holes_of_freecad_are_spelt_out(freecad: ModuleType) -> None:
     assert [event.values for event in path.events if event.word == "DELAY"] == [(0.5,)]
 
 
+def verified(part: Path, name: str, folder: Path, change: tuple[str, str] | None = None) -> int:
+    """Exit code of `postproc verify` of the program that `postproc convert` writes of a file, its first text changed."""
+    program, given = folder / "p.ngc", ["-m", name, "-c", "linuxcnc", "--setup", str(SAMPLES / "tools.setup.toml"), "-q"]
+    done = CliRunner().invoke(app, ["convert", str(part), *given, "-o", str(program)])
+    assert done.exit_code == 0, done.output
+    if change is not None:
+        program.write_text(program.read_text("utf-8").replace(*change, 1), encoding="utf-8")
+    return CliRunner().invoke(app, ["verify", str(program), str(part), *given]).exit_code
+
+
 def test_a_job_of_freecad_converts_and_is_proved(freecad: ModuleType, tmp_path: Path) -> None:
     place = tmp_path / "a part.apt"
     freecad.export([operation(*PLATE, ToolController=CONTROLLER), operation("G1 X999", Active=False)], str(place))
@@ -95,6 +107,8 @@ def test_a_job_of_freecad_converts_and_is_proved(freecad: ModuleType, tmp_path: 
     assert not [d for d in found if d.severity is not Severity.INFO]
     result = good(postproc.convert(path, machine("mill-3axis"), controller="linuxcnc", setup=tool_setup()))
     assert result.comparison is not None and result.comparison.unbounded == 0
+    assert verified(place, "mill-3axis", tmp_path) == 0
+    assert verified(place, "mill-3axis", tmp_path, ("G1 ", "G1 X1.5 ")) == 1, "a changed program is not that of the job"
 
 
 @pytest.mark.parametrize(("commands", "words"), [
@@ -135,9 +149,12 @@ def test_the_post_of_fusion_writes_the_path_in_the_work_coordinate_system() -> N
     np.testing.assert_allclose(path.arcs.sweep, [np.pi / 2, np.pi / 2, np.pi / 2], atol=1e-6)
 
 
-def test_a_program_from_fusion_is_proved() -> None:
+def test_a_program_from_fusion_is_proved(tmp_path: Path) -> None:
     result = good(postproc.convert(read(fusion()), machine("mikron-ucp710"), controller="linuxcnc", setup=tool_setup()))
     assert result.comparison is not None and result.comparison.unbounded == 0
+    part = tmp_path / "from fusion.apt"
+    part.write_text(fusion(), encoding="utf-8")
+    assert verified(part, "mikron-ucp710", tmp_path) == 0
 
 
 def test_inches_of_fusion_stay_inches() -> None:

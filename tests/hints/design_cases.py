@@ -6,8 +6,20 @@ from tests.hints.case import COMMAND, Edit, HintCase
 
 _ANOTHER = '{"certificate": 1, "machine": "uranesx"}'
 DESIGN = [
-    HintCase("certificate.legs", "machine certify mill-3axis", {}, "certify machines (on legs)",
-             (Edit(COMMAND, "mill-3axis", "uranesx"),)),
+    HintCase("certificate.turns", "machine certify mikron-ucp710 --turn A=-90:0", {},
+             "a range inside the travel with (--turn)", (Edit(COMMAND, "-90:0", "-20:0"),)),
+    HintCase("certificate.box", "machine certify mikron-ucp710 --box 700x700x700", {}, "ask for a smaller (--box)",
+             (Edit(COMMAND, "700x700x700", "100x100x100"),)),
+    HintCase("design.cranks", "machine design --layout rotary-delta --box 1x1x100 --arm 50 --rod 480", {},
+             "take an (arm) longer than the height", (Edit(COMMAND, "--arm 50", r"--\1 260"),)),
+    HintCase("analysis.reach", "machine analyse uranesx --map speed --along rod=100:200", {},
+             "sizes with (--along rod)=LOW:HIGH", (Edit(COMMAND, "--along rod=100:200", r"\1=1200:1400"),)),
+    HintCase("repeatability.column", "errors repeatability r.csv", {"r.csv": "reading\n1\n2\n"},
+             r"write (reading \[arcsec\])", (Edit("r.csv", "reading", r"\1"),)),
+    HintCase("repeatability.approach", "errors repeatability r.csv", {"r.csv": "reading [um],approach\n1,2\n3,1\n2,1\n"},
+             "write (1) where the axis came from lesser values", (Edit("r.csv", "1,2", r"1,\1"),)),
+    HintCase("repeatability.few", "errors repeatability r.csv", {"r.csv": "reading [um],position [mm]\n1,0\n3,0\n2,5\n"},
+             "or leave it out", (Edit("r.csv", "2,5\n", ""),)),
     HintCase("certificate.head", "machine certify h4a-spindle-axis --box=-5:5,-5:5,-650:-640", {},
              "leave (--box) out", (Edit(COMMAND, " --box=-5:5,-5:5,-650:-640", ""),)),
     HintCase("certificate.short", "machine certify uranesx --box=-250:900,-250:250,-250:250 --margin 0.3", {},

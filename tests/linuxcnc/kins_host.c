@@ -25,6 +25,14 @@ static int pin(void **address, const char *format, va_list rest) {
         return kind##_plain(address, "%s", name); }
 PIN(float) PIN(bit) PIN(s32) PIN(u32)
 
+/* parameters, whose memory is the module's own */
+#define PARAM(kind) \
+    int hal_param_##kind##_newf(int way, void *address, int owner, const char *format, ...) { \
+        if (count >= MOST) return -1; \
+        va_list rest; va_start(rest, format); vsnprintf(names[count], sizeof names[count], format, rest); va_end(rest); \
+        values[count++] = address; return 0; }
+PARAM(float) PARAM(bit) PARAM(s32) PARAM(u32)
+
 int hal_init(const char *name) { return 1; }
 int hal_ready(int owner) { return 0; }
 int hal_exit(int owner) { return 0; }

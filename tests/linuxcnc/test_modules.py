@@ -1,8 +1,8 @@
 """LinuxCNC's own kinematics modules, loaded as they are installed, and our inverse: the same joints within 1e-6 mm.
 
 A module asks its host for memory and pins alone (`kins_host.c`), so that no simulator runs. Its pose is the controlled point
-and a, b, c in degrees, turns about x, then y, then z; its joints are in mm and degrees. pentakins has no machine here: its
-five struts end on rings that turn about the tool, which no fixed joint of a platform does.
+and a, b, c in degrees, turns about x, then y, then z; its joints are in mm and degrees. pentakins has its own file,
+linuxcnc-pentapod: struts that end on rings about the tool.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import pytest
 
 import machines
 import postproc
+from machines.kinematics.legs.attitudes import direction_of
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.loader import load_checked
 from tests.linuxcnc import outputs
@@ -86,6 +87,21 @@ def test_genhexkins_gives_the_lengths_of_the_hexapod() -> None:
     assert np.abs(theirs - (kin.legs.lengths + q)).max() < SAME
 
 
+def test_pentakins_gives_the_lengths_of_struts_on_rings() -> None:
+    machine = machines.load("linuxcnc-pentapod")
+    kin, control = machine.kinematics, machine.control_kinematics
+    assert isinstance(kin, OnLegs) and kin.workspace is not None and control is not None
+    rng = np.random.default_rng(0)
+    axis = direction_of("abc", rng.uniform(0.0, kin.workspace.tilt[1], 200), rng.uniform(0.0, 2.0 * np.pi, 200))
+    tip = rng.uniform(kin.workspace.lower, kin.workspace.upper, (200, 3))
+    q = kin.inverse(tip, axis)[0]
+    turn = kin._platform(q)[1]
+    ab = np.degrees(np.column_stack([np.arctan2(turn[:, 2, 1], turn[:, 2, 2]), -np.arcsin(turn[:, 2, 0])]))
+    pins = {key.split(".", 1)[1]: value for key, value in control.pins.items()} | {"tool-offset": 0.0}
+    assert np.abs(inverse("pentakins", pins, np.column_stack([tip, ab, 0.0 * ab[:, 0]]), 5) - q).max() < SAME
+    assert np.abs(np.hstack(kin.forward(q)) - np.hstack([tip, axis])).max() < 1e-9
+
+
 def test_rotarydeltakins_gives_the_angles_of_a_rotary_delta(tmp_path: Path) -> None:
     """Its joint 0 stands at -y, 1 at 30 and 2 at 150 degrees, as the letters C and B of the file."""
     (tmp_path / "arms.toml").write_text(ARMS)
@@ -114,7 +130,12 @@ UPRIGHT = ("RAPID", "GOTO/-40,-20,30", "FEDRAT/MMPM,1200", "GOTO/-40,-20,0", "GO
            "GOTO/40,20,30")
 
 
-@pytest.mark.parametrize(("text", "module", "cuts"), [(HEXAPOD, "genhexkins", TILTED), (CRANKS, "rotarydeltakins", UPRIGHT)])
+PENTAPOD = 'base = "linuxcnc-pentapod"\n'
+HIGH = "[part]\norigin = [0, 140, 420]\n[tools.1]\ngauge_length = 80\n[clearance]\nmargin = 15\n"
+
+
+@pytest.mark.parametrize(("text", "module", "cuts"), [(HEXAPOD, "genhexkins", TILTED), (CRANKS, "rotarydeltakins", UPRIGHT),
+                                                      (PENTAPOD, "pentakins", TILTED)])
 def test_the_module_moves_the_drives_of_a_tip_program_as_ours(text: str, module: str, cuts: tuple[str, ...],
                                                               tmp_path: Path) -> None:
     """Every block of a program, between its ends too, with the pins, zeros and order of joints that the files have."""
@@ -122,7 +143,7 @@ def test_the_module_moves_the_drives_of_a_tip_program_as_ours(text: str, module:
     machine = machines.load(tmp_path / "own.toml")
     control = machine.control_kinematics
     assert control is not None and control.legs is not None
-    result = good(postproc.convert(toolpath(*cuts), machine, "linuxcnc", setup_of(LOW)))
+    result = good(postproc.convert(toolpath(*cuts), machine, "linuxcnc", setup_of(HIGH if module == "pentakins" else LOW)))
     assert "(words: tool-centre-point control)" in result.text
     motion, poses = outputs.read(result)[1], result.comparison.poses
     pins = {key.split(".", 1)[1]: value for key, value in control.pins.items()}

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from machines.kinematics.legs.in_series import LegsInSeries
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.with_axis import LegsWithAxis
 from toolpaths.arrays import Floats
 
 
-def random_slides(kinematics: LegsWithAxis | OnLegs, rng: np.random.Generator, n: int) -> Floats:
+def random_slides(kinematics: LegsWithAxis | LegsInSeries | OnLegs, rng: np.random.Generator, n: int) -> Floats:
     """Slides (n, 3 or 4) of random places and tilts of the workspace; of a machine on legs all joints."""
     if isinstance(kinematics, OnLegs):
         return kinematics.inverse(*poses_over_workspace(kinematics, rng, n))[0]
     place, tilt = kinematics.workspace.random(rng, n)
+    if isinstance(kinematics, LegsInSeries):
+        return kinematics.legs_at_place(place)[0]
     return kinematics.platform.inverse(np.column_stack([place, tilt]))
 
 

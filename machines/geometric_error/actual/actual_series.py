@@ -32,16 +32,15 @@ Placed = tuple[Line, Floats, Floats, Floats, Floats]
 
 @dataclass(frozen=True, eq=False)
 class ActualSeries(Actual):
-    """Errors of rods, of rotary axes and of the spindle."""
+    """Errors of rods, of rotary axes and of the spindle; its turns are the rotary axes."""
 
     kinematics: LegsInSeries
     rods: RodErrors
     chain: SerialErrors = field(default_factory=SerialErrors)
+    turns: int = field(init=False)
 
-    @property
-    def turns(self) -> int:  # type: ignore[override]  # nothing assigns it
-        """The rotary axes."""
-        return len(self.kinematics.turning)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "turns", len(self.kinematics.turning))
 
     @cached_property
     def frame(self) -> LegFrame:
@@ -61,7 +60,7 @@ class ActualSeries(Actual):
 
     def coordinates(self, q: Floats, near: Floats | None = None) -> Floats:
         """See the base class."""
-        return np.column_stack([self.kinematics.platform(q, near)[0], q[:, self.kinematics.legs_joints:]])
+        return np.column_stack([self.kinematics.platform_pose(q, near)[0], q[:, self.kinematics.legs_joints:]])
 
     def joints(self, w: Floats) -> Floats:
         """See the base class."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,12 +20,13 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class LegsInSeries(PosesInSeries):
-    """Attributes as of `PosesInSeries`."""
+    """Attributes as of `PosesInSeries`; `clearance_parts` is itself."""
 
-    @property
-    def clearance_parts(self) -> LegsInSeries:  # type: ignore[override]  # nothing assigns it
-        """Itself."""
-        return self
+    clearance_parts: LegsInSeries = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "clearance_parts", self)
 
     @property
     def over_workspace(self) -> LegsInSeries:
@@ -46,7 +47,7 @@ class LegsInSeries(PosesInSeries):
     def _rates(self, q: Floats, near: Floats | None) -> tuple[Floats, Floats]:
         """(twist (N, 6, J), tool axis (N, 3)) in the table frame."""
         q = as_points(q, self.joints, "q")
-        (place, turn), k = self.platform(q, near), self.legs_joints
+        (place, turn), k = self.platform_pose(q, near), self.legs_joints
         turns, n = q[:, k:], len(q)
         reach, axis, _ = self.tool(turns)
         tip, axis = place + np.einsum("nij,nj->ni", turn, reach), np.einsum("nij,nj->ni", turn, axis)
@@ -121,7 +122,7 @@ class LegsInSeries(PosesInSeries):
 
     def rig(self, q: Floats, near: Floats | None = None) -> ClearanceGeometry:
         """Where the parts are at joints q (N, J), in the machine frame."""
-        place, turn = self.platform(q, near)
+        place, turn = self.platform_pose(q, near)
         k = self.legs_joints
         gauge = place + turn @ self.on_legs.gauge
         found = self.on_legs.rig(q[:, :k], np.column_stack([gauge, turn[:, :, 2]]))

@@ -1,10 +1,10 @@
 """Platforms on legs that modules of LinuxCNC describe: their pins, joints and zero, or why they are none of theirs.
 
-Sources: genhexkins.c, rotarydeltakins-common.h of LinuxCNC 2.9 (src/emc/kinematics), kins(9). genhexkins has six struts
-whose joints are their lengths, any base and platform. rotarydeltakins has three cranks at -90, 30 and 150 degrees about z,
-arms outwards at 0 and downwards with growing angles, parallel rods to a platform whose point is in the plane of its joints;
-its zero is in the plane of the cranks' axes. pentakins has struts that end on rings about the tool, which no joint of a
-platform does.
+Sources: genhexkins.c, pentakins.c, rotarydeltakins-common.h of LinuxCNC 2.9 (src/emc/kinematics), kins(9). genhexkins has
+six struts whose joints are their lengths, any base and platform. rotarydeltakins has three cranks at -90, 30 and 150 degrees
+about z, arms outwards at 0 and downwards with growing angles, parallel rods to a platform whose point is in the plane of its
+joints; its zero is in the plane of the cranks' axes. pentakins has five struts whose joints are their lengths and which end
+on rings about the tool; its turn about z is 0.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from toolpaths.units import DEG
 
 SAME = 1e-9
 """mm, or parts of a direction, that dimensions may differ by"""
+STRUTS = 5
+"""of pentakins"""
 CRANKS = np.array([-90.0, 30.0, 150.0]) * DEG
 
 
@@ -52,12 +54,30 @@ def genhexkins(loops: Loops, gauge: Floats) -> ModulePins:
         ValueError: where the legs are others; the message says what the module needs.
     """
     drives = loops.drives
-    if loops.turns != "abc" or not drives.stretch.all() or loops.kept is not None:
+    if loops.turns != "abc" or loops.holds is not None or not drives.stretch.all() or loops.kept is not None:
         raise ValueError("genhexkins needs six legs with drive = \"length\" and a platform free in x y z a b c")
     ends = {"base": drives.points, "platform": loops.joints - gauge}
     pins = {f"genhexkins.{what}.{k}.{letter}": value for what, points in ends.items() for k, point in enumerate(points)
             for letter, value in zip("xyz", point.tolist(), strict=True)}
     return ModulePins(pins, "genhexkins.tool-offset", tuple(range(len(drives.lengths))), drives.lengths)
+
+
+def pentakins(loops: Loops, gauge: Floats) -> ModulePins:
+    """Base of five struts, rings seen from the gauge point.
+
+    Raises:
+        ValueError: where the legs are others; the message says what the module needs.
+    """
+    drives, ends = loops.drives, loops.joints - gauge
+    if loops.rings is None or len(ends) != STRUTS:
+        raise ValueError("pentakins needs five legs with drive = \"length\" and ring, and a platform free in x y z a b")
+    if np.abs(ends[:, :2]).max() > SAME:
+        raise ValueError("pentakins needs rings round the line of the tool: joint and gauge with the same x and y")
+    pins = {f"pentakins.base.{k}.{letter}": value for k, point in enumerate(drives.points)
+            for letter, value in zip("xyz", point.tolist(), strict=True)}
+    for k, (ring, height) in enumerate(zip(loops.rings.tolist(), ends[:, 2].tolist(), strict=True)):
+        pins |= {f"pentakins.effector.{k}.r": ring, f"pentakins.effector.{k}.z": height}
+    return ModulePins(pins, "pentakins.tool-offset", tuple(range(STRUTS)), drives.lengths)
 
 
 def rotarydeltakins(loops: Loops, gauge: Floats) -> ModulePins:
@@ -91,5 +111,5 @@ def rotarydeltakins(loops: Loops, gauge: Floats) -> ModulePins:
                       (hips[0, 2] - feet[0, 2]) * up)
 
 
-MODULES = {"genhexkins": genhexkins, "rotarydeltakins": rotarydeltakins}
+MODULES = {"genhexkins": genhexkins, "pentakins": pentakins, "rotarydeltakins": rotarydeltakins}
 """by their names"""

@@ -49,6 +49,12 @@ class OnLegs(RedundantLegs):
             and self.loops.kept is None
         return RodsOnSlides(self, self.loops.joints) if whole and not len(self.carriers) else None
 
+    jets_proved = True
+
+    def __post_init__(self) -> None:
+        if self.loops.rings is not None:  # their nearest points move on the platform
+            object.__setattr__(self, "jets_proved", False)
+
     @property
     def leg_geometry(self) -> LegGeometry | None:
         """See the base class; None of platforms that something else holds too, and of joints on rings."""
@@ -146,7 +152,7 @@ class OnLegs(RedundantLegs):
 
     def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """See the base class."""
-        return by_parts(self._jets, q0, q1)
+        return by_parts(self._jets, q0, q1) if self.jets_proved else super().jets(q0, q1)
 
     def _jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         middle, step = 0.5 * (q0 + q1), q1 - q0
@@ -182,8 +188,10 @@ class OnLegs(RedundantLegs):
         return MovingLoops(self.loops, place, turn, middle[:, self.legs_at], step[:, self.legs_at]).jets()
 
     @property
-    def leg_parts(self) -> LegParts:
-        """See the base class."""
+    def leg_parts(self) -> LegParts | None:
+        """See the base class; None of legs on rings."""
+        if self.loops.rings is not None:
+            return None
         of = self.legs
         return LegParts(self.legs_at, of.points, of.directions, of.lengths, of.arm, of.stretch > 0.0, self.carriers_at,
                         self.carriers)

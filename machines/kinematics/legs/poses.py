@@ -61,7 +61,6 @@ class PosesOfLegs(Kinematics):
     clearance: ClearanceSizes | None = None
     tool_length: float = 0.0
     all_roots: bool = False
-    jets_proved = True
     singular_names = NAMES
 
     @property
@@ -158,8 +157,7 @@ class PosesOfLegs(Kinematics):
         return not self.loops.free or bool(set(self.loops.free) & set("abc"))
 
     def posed(self, place: Floats, axis: Floats, spin: Floats) -> PlatformPose:
-        """(C (N, 3), R (N, 3, 3)) of a platform whose reference point, with the travel of its carriers, is at `place` (N, 3)
-        with z along `axis` (N, 3): what moves it besides is left out of nothing."""
+        """(C (N, 3), R (N, 3, 3)) with the reference point, carried, at `place` (N, 3) and z along `axis` (N, 3)."""
         if self.loops.holds is not None:
             return self.standing(place, axis, np.zeros(3), spin)[:2]
         return place * self.loops.basis[:3].any(axis=1), self.turn_of(axis, spin)
@@ -167,7 +165,7 @@ class PosesOfLegs(Kinematics):
     def turn_of(self, axis: Floats, spin: Floats) -> Floats:
         """R (N, 3, 3) that gives the tool the axis (N, 3) and spin (N,); NaN where the platform has none."""
         if self.loops.holds is not None:
-            return self.posed(np.tile(self.workspace.middle, (len(axis), 1)), axis, spin)[1]
+            return self.posed(self.workspace.middle + 0.0 * axis, axis, spin)[1]
         near = self._within(axis)
         good = (angle_between(near, axis) <= ROUND_OFF) & ((spin == 0.0) | ("c" in self.loops.turns))
         x = tool_x(near, spin)
@@ -233,8 +231,7 @@ class PosesOfLegs(Kinematics):
     @property
     def _level(self) -> Floats:
         """(1, 3, 3): the turn nearest to none."""
-        axis = self._within(UP[None])
-        return self.turn_of(axis, np.zeros(1))
+        return self.turn_of(self._within(UP[None]), np.zeros(1))
 
     @cached_property
     def _side(self) -> float:

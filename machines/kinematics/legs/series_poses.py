@@ -10,7 +10,7 @@ whatever they do, which gives C and R, and the axes take the tool from R to wher
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
 
@@ -45,6 +45,8 @@ class PosesInSeries(Kinematics):
         on_legs: the legs and their platform, which moves in x, y and z
         tables: from the part to the bed, points in the machine frame
         head: from the platform to the spindle, points from the reference point of the level platform
+        axis_names, rotary, branches: of the legs, then of the rotary axes; branches of these, times the choices of roots
+        workspace, transmits: of the legs; C in the machine frame
     """
 
     on_legs: OnLegs
@@ -52,8 +54,21 @@ class PosesInSeries(Kinematics):
     head: tuple[Joint, ...]
     tool_length: float = 0.0
     all_roots: bool = False
+    axis_names: tuple[str, ...] = field(init=False)
+    rotary: tuple[bool, ...] = field(init=False)
+    branches: int = field(init=False)
+    workspace: Workspace = field(init=False)
+    transmits: OverWorkspace = field(init=False)
     jets_proved = True
     singular_names = NAMES
+
+    def __post_init__(self) -> None:
+        own, turning = self.on_legs, self.turning
+        made = {"axis_names": (*own.axis_names, *(joint.name for joint in turning)),
+                "rotary": (*own.rotary, *(True for _ in turning)), "workspace": own.workspace, "transmits": own.transmits,
+                "branches": self.axes.branches * (len(self.legs.root_choices()) if self.all_roots else 1)}
+        for name, value in made.items():
+            object.__setattr__(self, name, value)
 
     @cached_property
     def turning(self) -> tuple[Joint, ...]:
@@ -71,19 +86,9 @@ class PosesInSeries(Kinematics):
         return self.on_legs.loops.holds is not None
 
     @property
-    def axis_names(self) -> tuple[str, ...]:  # type: ignore[override]  # nothing assigns it
-        """Of the legs, then of the rotary axes"""
-        return (*self.on_legs.axis_names, *(joint.name for joint in self.turning))
-
-    @property
-    def rotary(self) -> tuple[bool, ...]:  # type: ignore[override]  # nothing assigns it
-        """True for joints in rad"""
-        return (*self.on_legs.rotary, *(True for _ in self.turning))
-
-    @property
     def drives_tip(self) -> tuple[bool, ...]:
-        """The legs, arms too."""
-        return (*self.on_legs.drives_tip, *(False for _ in self.turning))
+        """The legs, arms too, and a wrist that holds the tool axis as the platform turns."""
+        return (*self.on_legs.drives_tip, *(self.follows for _ in self.turning))
 
     @property
     def turns_tool(self) -> tuple[bool, ...]:
@@ -99,16 +104,6 @@ class PosesInSeries(Kinematics):
         return Serial((*self.tables, *PLACE, *head), names, tool_length=self.tool_length)
 
     @property
-    def branches(self) -> int:  # type: ignore[override]  # nothing assigns it
-        """Of the rotary axes, times the choices of roots with `all_roots`"""
-        return self.axes.branches * (len(self.legs.root_choices()) if self.all_roots else 1)
-
-    @property
-    def workspace(self) -> Workspace:  # type: ignore[override]  # nothing assigns it
-        """of C, in the machine frame"""
-        return self.on_legs.workspace
-
-    @property
     def legs(self) -> Drives:
         """See `ClearanceParts`."""
         return self.on_legs.legs
@@ -122,11 +117,6 @@ class PosesInSeries(Kinematics):
     def clearance(self) -> ClearanceSizes | None:
         """See `ClearanceParts`."""
         return self.on_legs.clearance
-
-    @property
-    def transmits(self) -> OverWorkspace:  # type: ignore[override]  # nothing assigns it
-        """Of the legs."""
-        return self.on_legs.transmits
 
     @property
     def leg_geometry(self) -> LegGeometry | None:
@@ -201,7 +191,7 @@ class PosesInSeries(Kinematics):
 
     # ---- forward -------------------------------------------------------------------------------------------
 
-    def platform(self, q: Floats, near: Floats | None = None) -> PlatformFrame:
+    def platform_pose(self, q: Floats, near: Floats | None = None) -> PlatformFrame:
         """(C (N, 3), R (N, 3, 3)) with the travel of carriers in C, of joints q (N, J); see `pose` for `near`."""
         q = as_points(q, self.joints, "q")
         own, turns = q[:, : self.legs_joints], q[:, self.legs_joints:]
@@ -227,7 +217,8 @@ class PosesInSeries(Kinematics):
         n = len(turns)
         point = np.tile(self.on_legs.gauge - self.tool_length * UP, (n, 1))
         axis, side = np.tile(UP, (n, 1)), np.tile(np.eye(3)[0], (n, 1))
-        return self._through(self.head, turns[:, len(self.tables):], point, axis, side)
+        found = self._through(self.head, turns[:, len(self.tables):], point, axis, side)
+        return found[0], found[1], found[2]
 
     def to_part(self, turns: Floats, point: Floats, *vectors: Floats) -> tuple[Floats, ...]:
         """A point and vectors (N, 3) of the machine frame in the table frame."""
@@ -249,12 +240,12 @@ class PosesInSeries(Kinematics):
 
     def pose(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """(tip (N, 3), axis (N, 3), spin (N,)) of joints q (N, J), see the base class."""
-        tip, axis, side = self.placed(*self.platform(q, near), q[:, self.legs_joints:])
+        tip, axis, side = self.placed(*self.platform_pose(q, near), q[:, self.legs_joints:])
         return tip, axis, spin_about(axis, side)
 
     def forward(self, q: Floats, near: Floats | None = None) -> tuple[Floats, Floats]:
         """(tip (N, 3), axis (N, 3)) of joints q (N, J)."""
-        return self.placed(*self.platform(q, near), q[:, self.legs_joints:])[:2]
+        return self.placed(*self.platform_pose(q, near), q[:, self.legs_joints:])[:2]
 
     def placed(self, place: Floats, turn: Floats, turns: Floats) -> tuple[Floats, Floats, Floats]:
         """(tip, axis, x of the tool), each (N, 3) in the table frame, of platforms and rotary axes (N, H)."""

@@ -54,7 +54,7 @@ class TipAxes(Serial):
     @classmethod
     def of(cls, legs: OnLegs) -> Self:
         """The axes of a platform that only translates, or turns in every direction; travel without ends."""
-        turns = "CBA" if legs.loops.turns == "abc" else ""
+        turns = "" if not legs.loops.turns else "BA" if legs.loops.rings is not None else "CBA"
         directions = dict(zip("XYZABC", np.tile(np.eye(3), (2, 1)), strict=True))
         chain = tuple(Joint(name, name in "ABC", directions[name]) for name in "XYZ" + turns)
         return cls(chain=chain, axis_names=tuple("XYZ" + turns[::-1]), legs=legs,
@@ -66,7 +66,8 @@ class TipAxes(Serial):
         """See the base class: joints (N, K) of the legs, NaN where they do not reach; with any tool."""
         gauge = as_points(q, self.joints, "q")
         tip, axis, spin = (self if self.tool_length == 0.0 else self.with_tool(0.0)).pose(gauge)
-        return np.asarray(self.legs.inverse(tip, axis, spin if "c" in self.legs.loops.turns else 0.0)[0])
+        asked = "c" in self.legs.loops.turns and self.legs.loops.holds is None
+        return np.asarray(self.legs.inverse(tip, axis, spin if asked else 0.0)[0])
 
     def axes_at(self, drives: Floats) -> Floats:
         """Axes (N, J) of joints (N, K) of the legs."""
@@ -100,8 +101,9 @@ class TipAxes(Serial):
         if not self._turns:
             return np.empty((len(axis), 0))
         turn = self.legs.turn_of(axis, spin)
-        return np.column_stack([np.arctan2(turn[:, 2, 1], turn[:, 2, 2]), np.arcsin(np.clip(-turn[:, 2, 0], -1.0, 1.0)),
-                                np.arctan2(turn[:, 1, 0], turn[:, 0, 0])])
+        found = [np.arctan2(turn[:, 2, 1], turn[:, 2, 2]), np.arcsin(np.clip(-turn[:, 2, 0], -1.0, 1.0)),
+                 np.arctan2(turn[:, 1, 0], turn[:, 0, 0])]
+        return np.column_stack(found[: len(self._turns)])
 
     # ---- kinematics ----------------------------------------------------------------------------------------
 

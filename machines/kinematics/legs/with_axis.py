@@ -253,7 +253,9 @@ class LegsWithAxis(Kinematics):
     @property
     def leg_parts(self) -> LegParts:
         """See the base class."""
-        return replace(self.on_legs.leg_parts, axis=FifthAxis(self.letter, *self.axis.line(), self.axis.at_spindle))
+        parts = self.on_legs.leg_parts
+        assert parts is not None
+        return replace(parts, axis=FifthAxis(self.letter, *self.axis.line(), self.axis.at_spindle))
 
     def leg_motion(self, q: Floats, rate: Floats, acceleration: Floats) -> LegMotion:
         """See the base class: of the legs."""

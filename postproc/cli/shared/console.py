@@ -122,8 +122,11 @@ def read_cl(file: Path, options: Options, progress: Progress | None = None,
         DiagnosticError: where it is a program of a control.
     """
     import toolpaths
+    from postproc.base.memory import LARGE, reuse
+    from toolpaths.input_files import first_bytes
 
     no_program(file, options.dialect)
+    reuse(len(first_bytes(file, LARGE)))
     given = {} if tolerance is None else {"tolerance": tolerance}
 
     def shown(at: int, total: int) -> None:

@@ -33,6 +33,7 @@ class OrientationChoice:
         paper: the paper's choice in each pass (a vertex along the mean direction, smallest angles), elsewhere the own axis
         programs: times on the control of the programs of "keep" and "auto", where a clock was given
         proof: what became of the program of the plan that was asked for; None where none was made
+        turned: the path of "auto" with axes that turn along its cuts; None where none do
     """
 
     work: PassContext
@@ -42,6 +43,7 @@ class OrientationChoice:
     paper: OrientationPlan
     proof: PlanProof | None = None
     programs: Mapping[Orientation, ProgramTime] = field(default_factory=dict)
+    turned: Toolpath | None = None
 
     @property
     def gain(self) -> float | None:
@@ -51,4 +53,6 @@ class OrientationChoice:
 
     def toolpath(self, name: Orientation) -> Toolpath:
         """The CL path with the axes of a plan."""
+        if name == "auto" and self.turned is not None:
+            return self.turned
         return reoriented(self.work, self.plans[name].picked)

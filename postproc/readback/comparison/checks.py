@@ -171,7 +171,7 @@ def _beyond_travel(motion: Motion, executed: BlockPoses, slack: Floats) -> tuple
 
 
 def _near_limits(motion: Motion, executed: BlockPoses, rows: Ints, slack: Floats) -> Ints:
-    """Those of successive blocks that may leave travel: where every axis goes one way from end to end, those that begin or
+    """Those of successive blocks that may leave travel: where no axis turns back within, those that begin or
     end within half a slack (J,) of where it is left."""
     if not motion.table.plain or executed.control.base == "tcp":
         return rows

@@ -68,7 +68,7 @@ def test_forces_in_the_rods_balance_force_and_moment() -> None:
 def test_measures_that_a_machine_has_not_are_refused() -> None:
     for name, measure in (("mikron-ucp710", "condition"), ("hexapod", "acceleration"), ("h4-rotary", "rod-force")):
         with pytest.raises(DiagnosticError, match=r"analysis\.map"):
-            studied(machines.load(name), measure)  # type: ignore[arg-type]  # words of the list
+            studied(machines.load(name), measure)
 
 
 def test_a_star_of_a_delta_in_closed_form() -> None:
@@ -88,7 +88,7 @@ def test_a_star_of_a_delta_in_closed_form() -> None:
 
 def machines_force(transmits: object, place: np.ndarray, tilt: np.ndarray) -> np.ndarray:
     """Largest force of a drive per force on the platform (III.6.3)."""
-    jx, along = transmits.loops_at(place, tilt, 0.0)  # type: ignore[attr-defined]  # of any platform
+    jx, along = transmits.loops_at(place, tilt, 0.0)
     return np.asarray(np.linalg.norm(np.linalg.inv(jx / along[:, :, None]), axis=1).max(axis=1))
 
 

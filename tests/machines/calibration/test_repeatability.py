@@ -34,8 +34,8 @@ def test_42_readings_of_one_position(tmp_path: Path) -> None:
 def test_both_sides_of_two_positions(tmp_path: Path) -> None:
     """s of (a, b) is |a - b| / sqrt 2; reversal 5 um at 100 mm, bi-directional 2 s + 2 s + 5."""
     file = tmp_path / "x.csv"
-    file.write_text("position [mm],way,reading [um]\n0,1,1\n0,1,2\n0,-1,1\n0,-1,2\n100,1,6\n100,1,8\n100,-1,1\n100,-1,3\n",
-                    encoding="utf-8")
+    file.write_text("position [mm],approach,reading [um]\n0,1,1\n0,1,2\n0,-1,1\n0,-1,2\n100,1,6\n100,1,8\n"
+                    "100,-1,1\n100,-1,3\n", encoding="utf-8")
     found, diagnostics = read_repeated(file)
     assert found is not None and not diagnostics
     figures, s = found.figures, np.sqrt(2.0)
@@ -46,7 +46,7 @@ def test_both_sides_of_two_positions(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("text", "code"), [
     ("value [um]\n1\n2\n", "repeatability.column"), ("reading\n1\n2\n", "repeatability.column"),
-    ("reading [um],way\n1,3\n2,1\n", "repeatability.way"),
+    ("reading [um],approach\n1,3\n2,1\n", "repeatability.approach"),
     ("reading [um],position [mm]\n1,0\n2,0\n3,5\n", "repeatability.few"), ("reading [um]\n", "error-table.empty")])
 def test_what_is_no_run_is_refused(text: str, code: str, tmp_path: Path) -> None:
     file = tmp_path / "bad.csv"

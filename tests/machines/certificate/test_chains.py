@@ -23,7 +23,7 @@ KINDS = ["mikron-ucp710", "fork-head-ab", "nutating-head", "head-table", "mill-4
 
 def proved(name: str, **wanted: object) -> tuple[Machine, CertifiedChain]:
     m = machines.load(name)
-    return m, certify_chain(m, WantedOfChain(**wanted))  # type: ignore[arg-type]  # keys of one dataclass
+    return m, certify_chain(m, WantedOfChain(**wanted))
 
 
 def slides(m: Machine, tip: np.ndarray, turned: np.ndarray, tool: float) -> np.ndarray:
@@ -76,7 +76,7 @@ def test_a_box_beyond_the_travel_is_refused_with_a_place_that_shows_it() -> None
     with pytest.raises(DiagnosticError) as refused:
         certify_chain(m, WantedOfChain((-wide, wide), None, 50.0))
     words = refused.value.diagnostics[0].message
-    slide, by, *numbers = re.search(  # type: ignore[union-attr]  # it is there
+    slide, by, *numbers = re.search(
         r"(\w) is (\S+) mm outside.* x (\S+), y (\S+), z (\S+) mm and C (\S+), A (\S+) degrees", words).groups()
     x, y, z, c, a = map(float, numbers)
     q = slides(m, np.array([[x, y, z]]), np.array([[c, a]]) * DEG, 50.0)[0]

@@ -129,3 +129,27 @@ def test_motor_that_cannot_hold_its_axis_is_refused(tmp_path: Path) -> None:
     run = CliRunner().invoke(app, ["convert", "samples/pocket.cls", "-m", str(file), "-c", "linuxcnc", "--feed", "planned",
                                    "-o", str(tmp_path / "o.ngc")])
     assert run.exit_code == 1 and "plan.force" in run.output and "motor of Z" in run.output
+
+
+def test_shares_of_motors_in_steady_motion_and_while_all_axes_start(tmp_path: Path) -> None:
+    """Of every choice of signs of the accelerations the largest is what is said; the summary of `convert` has both."""
+    file = tmp_path / "u.toml"
+    file.write_text('base = "uranesx"\n' + MASSES, encoding="utf-8")
+    m = machines.load(file)
+    kinematics = m.kinematics.with_tool(80.0)
+    limits = force_limits(m, kinematics, 500.0)
+    assert limits is not None and limits.names(m) == ("X", "Y", "Z")
+    q = kinematics.inverse(np.array([[60.0, -40.0, -120.0]]), UP[None])[0]
+    rate, most = np.array([[200.0, -100.0, 50.0]]), np.array([3000.0, 5000.0, 7000.0])
+    steady, ramp = limits.loads(q, rate, most)
+    force = needed(m).forces
+    own = np.abs(force(q, rate, np.zeros_like(q)))[0] + 500e3 * np.linalg.norm(kinematics.jacobian(q)[0, :3], axis=0)
+    np.testing.assert_allclose(steady[0], own / limits.limits)
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+    seen = np.max([np.abs(force(q, np.zeros_like(q), (s * most)[None], 0.0))[0] for s in signs], axis=0)
+    np.testing.assert_allclose(ramp[0], (own + seen) / limits.limits)
+    samples = Path(__file__).parents[3] / "samples"
+    done = CliRunner().invoke(app, ["convert", str(samples / "pocket.cls"), "-m", str(file), "-c", "linuxcnc", "--setup",
+                                    str(samples / "delta.setup.toml"), "-o", str(tmp_path / "p.ngc"), "--json", "-"])
+    found = json.loads(done.stdout)["motor_load"]
+    assert 0.0 < found["steady"]["share"] < found["starting_and_stopping"]["share"] and found["steady"]["motor"] in "XYZ"

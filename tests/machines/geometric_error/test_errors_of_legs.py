@@ -69,7 +69,7 @@ def test_the_sensitivity_is_the_derivative_of_the_exact_closure(name: str) -> No
         up, down = (found.with_values(sign * step * np.eye(len(found.names))[k]).on(kin).aim(w) for sign in (1.0, -1.0))
         size, turns = np.abs(rates[:, :, k]).max(), np.cross(rates[:, 3:, k], axis)
         assert (up[0] - down[0]) / (2.0 * step) == pytest.approx(rates[:, :3, k], abs=1e-5 * size + 1e-9), label
-        assert (up[1] - down[1]) / (2.0 * step) == pytest.approx(turns, abs=1e-5 * size + 1e-15), label
+        assert (up[1] - down[1]) / (2.0 * step) == pytest.approx(turns, abs=1e-5 * size + 1e-12), label
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -19,12 +19,12 @@ from toolpaths.arrays import Floats
 
 HEAD = (ROOT / "machines/data/tripod-head.toml").read_text()
 OTHERS = {
-    "lengths": (("drive = \"slide\"", "drive = \"length\""), ("radius = 350", "radius = 350\nheight = 500"),
-                ("rod = 700", "rod = 660"), ("travel = [100, 1100]", "travel = [-400, 400]"), ("home = 542.82", "home = 0")),
-    "cranks": (("drive = \"slide\"", "drive = \"arm\"\nheight = 400\narm = 300\nroot = -1"), ("rod = 700", "rod = 600"),
-               ("z = [-300, 0]", "z = [-250, -100]"), ("tilt = [0, 40]", "tilt = [0, 25]"),
+    "lengths": (("drive = \"slide\"", "drive = \"length\""), ("radius = 350", "radius = 350\nheight = 680"),
+                ("rod = 700", "rod = 660"), ("travel = [280, 1280]", "travel = [-400, 400]"), ("home = 810.82", "home = 0")),
+    "cranks": (("drive = \"slide\"", "drive = \"arm\"\nheight = 580\narm = 300\nroot = -1"), ("rod = 700", "rod = 600"),
+               ("z = [-120, 180]", "z = [-70, 80]"), ("tilt = [0, 40]", "tilt = [0, 25]"),
                ("[\"Z\", \"V\", \"W\"]", "[\"A\", \"B\", \"C\"]"), ("axes.Z]", "axes.A]"), ("axes.V]", "axes.B]"),
-               ("axes.W]", "axes.C]"), ("travel = [100, 1100]", "travel = [-120, 120]"), ("home = 542.82", "home = 30"))}
+               ("axes.W]", "axes.C]"), ("travel = [280, 1280]", "travel = [-120, 120]"), ("home = 810.82", "home = 30"))}
 """the head's platform on other drives: 3-RPS and 3-RRS"""
 
 
@@ -83,7 +83,7 @@ def test_the_bound_of_the_third_derivative_holds_along_moves(name: str) -> None:
     h = 0.02
     for jet, which in ((tip, 0), (axis, 1)):
         at = [np.stack([kin.forward(q0 + (t + k * h) * step)[which] for k in (-2, -1, 1, 2)]) for t in
-              np.linspace(0.05, 0.95, 25)]
+              np.linspace(0.05, 0.95, 8)]
         third = np.max([np.linalg.norm(0.5 * p[3] - p[2] + p[1] - 0.5 * p[0], axis=1) / h**3 for p in at], axis=0)
         assert (third <= jet.third * (1.0 + 1e-3) + 1e-6).all() and (jet.third < 1e4 * np.maximum(third, 1e-3)).all()
 

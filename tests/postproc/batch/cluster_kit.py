@@ -6,6 +6,7 @@ import os
 import signal
 from pathlib import Path
 
+from postproc.base.team import forked
 from postproc.orientation.passes.passes import PassContext
 
 
@@ -29,6 +30,11 @@ def line_of(work: PassContext, mark: str, number: int, before: int | None) -> in
     if number == 9:
         killed_once(Path(mark))
     return work.passes[number].line
+
+
+def without_processes(shared: int, item: int) -> bool:
+    """True where this worker begins no processes of its own: those of a cluster may not."""
+    return forked() is None
 
 
 def refuses(shared: int, item: int) -> int:

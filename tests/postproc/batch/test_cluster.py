@@ -24,7 +24,7 @@ from postproc.orientation.passes.parallel_map import each_pass
 from postproc.orientation.passes.passes import PassContext, work_of
 from postproc.placement.place import place
 from postproc.setup.model import SetupFile, load_setup
-from tests.postproc.batch.cluster_kit import line_of, refuses, squared
+from tests.postproc.batch.cluster_kit import line_of, refuses, squared, without_processes
 from tests.postproc.kit import SAMPLES, machine, toolpath
 from toolpaths import read
 
@@ -82,6 +82,8 @@ def test_a_worker_of_a_cluster_killed_in_the_middle_of_a_pass_is_replaced(tmp_pa
     monkeypatch.setattr(parallel_map, "_FEWEST", 2)
     here, mark = twelve_passes(), tmp_path / "killed"
     with two_workers():
+        team = team_at_hand()
+        assert team is not None and list(team.crew(without_processes, 0).results([1])) == [True], "of a batch's worker"
         lines = each_pass(partial(line_of, here, str(mark)), here, AllowedAxes(1.0), "trying")
     assert lines == [one.line for one in here.passes] and int(mark.read_text("utf-8")) != os.getpid()
 

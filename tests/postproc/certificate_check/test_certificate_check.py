@@ -132,7 +132,8 @@ def test_shipped_certificates_are_confirmed_and_about_their_machine(name: str) -
 
 def test_no_certificate_is_shipped_for_nothing() -> None:
     assert set(shipped()) == {hash_of(values_of_machine(machines.load(name))) for name in (*on_legs(), *of_chains())}
-    assert len(builtin()) == len(on_legs()) + len(of_chains())
+    held = {"linuxcnc-pentapod", "tricept", "tripod-head"}  # by more than legs: what is proved of legs does not hold there
+    assert set(builtin()) - held == {*on_legs(), *of_chains()}
 
 
 def test_a_certificate_of_another_machine_is_rejected(tmp_path: Path) -> None:

@@ -31,22 +31,22 @@ Content = dict[str, Any]
 
 
 def table_of(name: str) -> Content:
-    return json.loads(json.dumps(values_of_machine(machines.load(name))))  # type: ignore[no-any-return]  # JSON
+    return json.loads(json.dumps(values_of_machine(machines.load(name))))
 
 
 def some_boxes(name: str, lower: list[float], upper: list[float]) -> Content:
-    return json.loads(certify(machines.load(name), Wanted((np.array(lower), np.array(upper)), 0.0)).text)  # type: ignore[no-any-return]  # JSON
+    return json.loads(certify(machines.load(name), Wanted((np.array(lower), np.array(upper)), 0.0)).text)
 
 
 @cache
 def made(which: str) -> Content:
     """A certificate, which nobody changes."""
     if which == "uranesx":
-        return json.loads(certify(machines.load("uranesx"), Wanted()).text)  # type: ignore[no-any-return]  # JSON
+        return json.loads(certify(machines.load("uranesx"), Wanted()).text)
     if which == "bars":
         return some_boxes("h4-rotary", [-20.0, -20.0, -90.0], [20.0, 20.0, -60.0])
     wanted = WantedOfChain(tool=100.0) if which == "mikron" else WantedOfChain(turns={"A": (0.2, 0.9)})
-    return json.loads(certify_chain(machines.load("mikron-ucp710"), wanted).text)  # type: ignore[no-any-return]  # JSON
+    return json.loads(certify_chain(machines.load("mikron-ucp710"), wanted).text)
 
 
 def test_parts_bars_and_chains_are_confirmed_and_about_their_machines() -> None:

@@ -53,11 +53,12 @@ def test_a_trunnion_s_page_says_limits_pivots_and_levers(tmp_path: Path) -> None
         assert float(limits[letter][3]) == pytest.approx(m.limits.velocity[j] * unit)
         assert limits[letter][1].endswith("*")  # travel is assumed there
     assert set(values["pivots"]) == {"haas-ngc", "siemens-840d"} == {row[0] for row in cells(page, "pivots") if row}
-    assert values["certificate"] is None and values["errors"] is None
+    assert values["certificate"]["boxes"] > 100 and values["certificate"]["checked_with_this_version"]
+    assert values["errors"] is None and any("A -30 to 120 degrees" in row[1] for row in cells(page, "certificate"))
     assert "X.travel" in values["assumed"] and values["ok"]
     assert {row[0]: row[1] for row in cells(page, "condition") if len(row) == 3} == {
         letter: f"{row['mm']:.4g}" for letter, row in values["levers"].items()}
-    assert page.count("<img") == 3
+    assert page.count("<img") == 4
 
 
 def test_a_machine_on_legs_shows_maps_and_its_certificate(tmp_path: Path) -> None:

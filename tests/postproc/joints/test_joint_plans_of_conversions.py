@@ -11,6 +11,7 @@ import pytest
 import machines
 import postproc
 from machines.machine import Machine
+from postproc.joints import search
 from postproc.pipeline.result import PostResult
 from postproc.setup.joints import Joints
 from postproc.setup.model import SetupFile
@@ -96,6 +97,25 @@ def test_rewinds_with_the_feeds_of_a_plan() -> None:
     """A planned pass ends where the tool is drawn back; the program is read back as ever."""
     result = run(cone(2.5, 5.0), limited("mikron-ucp710", "C", -400, 400), feed="planned")
     assert len(result.path.rewinds) == 1
+
+
+def test_an_axis_of_very_wide_travel_is_no_harder_than_one_of_few_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its windings are alike: what a rewind costs is looked at once for each difference. The cut leaves the travel of Z."""
+    looked, rewind = list[tuple[int, int]](), search._rewind
+    monkeypatch.setattr(search, "_rewind", lambda *given: looked.append(given[2:4]) or rewind(*given))
+    t = np.linspace(0.0, 2.0 * np.pi, 9)
+    sway = np.stack([0.12 * np.sin(t), 0.0 * t, np.sqrt(1.0 - (0.12 * np.sin(t)) ** 2)], axis=1)
+    lines = goto(np.stack([15.0 * np.cos(t), 15.0 * np.sin(t), 0.0 * t], axis=1), sway)
+    counts = []
+    for degrees in (1200.0, 9000.0):
+        m = machine("dmg-dmu-80-monoblock")
+        wide = [np.where(np.arange(5) == m.axis_names.index("C"), sign * degrees * DEG, own)
+                for sign, own in ((-1.0, m.limits.lower), (1.0, m.limits.upper))]
+        m = replace(m, limits=replace(m.limits, lower=wide[0], upper=wide[1]))
+        postproc.convert(toolpath("RAPID", lines[0], "FEDRAT/MMPM,900", *lines[1:]), m, setup=tool_setup())
+        counts.append(len(looked))
+        looked.clear()
+    assert 0 < counts[1] == counts[0] < 400
 
 
 def test_choices_are_reported() -> None:

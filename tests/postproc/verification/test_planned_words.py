@@ -88,6 +88,6 @@ def test_no_sample_is_refused_for_its_plan(file: str, name: str, controller: str
 
 
 def test_corrected_programs_carry_their_plan() -> None:
-    path = few_sides("five_faces.cls", (1, 2))
-    result = convert(path, "mikron-ucp710", "siemens-840d", feed="planned", error_model=ERRORS)
+    result = convert(few_sides("five_faces.cls", (1, 2)), "mikron-ucp710", "siemens-840d", feed="planned",
+                     error_model=ERRORS)
     assert refused(result) == set() and result.text
