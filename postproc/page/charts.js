@@ -129,7 +129,7 @@ class Lanes {
 function whatIf(k) {
   const found = report.runs[k].what_if, made = make("div", {}, make("h3", {}, "What if one limit were another?"));
   if (!found) return made;
-  if (!found.counted) return make("p", {class: "note"}, `Not counted for programs of more than ${found.largest_program_blocks} blocks.`);
+  if (!found.counted) { made.append(make("p", {class: "note"}, `Not counted for programs of more than ${found.largest_program_blocks} blocks.`)); return made; }
   if (!found.limits.length) { made.append(make("p", {}, "No limit of an axis holds this program for long: other limits would not change its time.")); return made; }
   const rows = found.limits.map((one, n) => {
     const out = make("output", {}), slider = make("input", {type: "range", min: 0, max: found.factors.length - 1, step: "any", value: found.factors.indexOf(1),

@@ -39,13 +39,13 @@ function bandCell(k) {
 
 function compareTable(pick) {
   if (report.runs.length < 2) return null;
-  const rows = report.runs.map((run, k) => [make("button", {type: "button", onclick: () => pick(k)}, lineOf(run)),
+  const rows = report.runs.map((run, k) => [make("button", {type: "button", class: "name", onclick: () => pick(k)}, lineOf(run)),
     !run.converted ? "not converted" : run.proved ? "proved" : "checked", figure(`runs.${k}.conversion.worst_tip_deviation_mm`, 5, "mm"), timeCell(k), bandCell(k),
     run.conversion.cycle_time_s === null ? "-" : figure(`runs.${k}.conversion.lower_bound_s`, 2, "s"), figure(`runs.${k}.conversion.blocks_out`, 0, ""),
     make("span", {}, ...run.axes.flatMap((axis, j) => (axis.used_percent === null ? [] : [axis.letter + " ", figure(`runs.${k}.axes.${j}.used_percent`, 0, "%  ")]))),
-    String(run.conversion.diagnostics.filter((d) => d.severity === "warning").length)]);
+    ["error", "warning"].map((severity) => run.conversion.diagnostics.filter((d) => d.severity === severity).length).join(", ")]);
   return make("div", {}, make("h3", {}, "Machines and controls side by side"),
-    table(["Machine, control", "State", "Bound", "Time", "95 % of runs", "Lower bound", "Blocks", "Travel used", "Warnings"], rows, [2, 3, 4, 5, 6, 8]));
+    table(["Machine, control", "State", "Bound", "Time", "95 % of runs", "Lower bound", "Blocks", "Travel used", "Errors, warnings"], rows, [2, 3, 4, 5, 6, 8]));
 }
 
 function collisionText(found) {
@@ -121,15 +121,34 @@ function grouped(rejected) {
 const PLAN_TEXT = {keep: "keep: the axes of the CL file", per_pass: "per pass: each pass under its own fastest axis", whole_part: "whole part: one axis for all passes",
   auto: "auto: the least of all, turning between passes counted", paper_per_pass: "vertex-aligned: each pass with a corner of its polytope (above) turned into the cut, for comparison"};
 
+// Cuts along which the axis turns, or may: how far, within which limits, and the times of the control's model.
+function turningParts(k) {
+  const chosen = report.runs[k].conversion.orientation, base = `runs.${k}.conversion.orientation.turning`, found = chosen && chosen.turning;
+  if (!found || !found.cuts.length) return [];
+  const range = (ends) => (ends ? `${number(ends[0], 2)} to ${number(ends[1], 2)}` : "-"), now = found.on_the_control, time = report.runs[k].conversion.time;
+  const shown = found.cuts.map((c, n) => [c, n]).filter(([c]) => c.turned).slice(0, 40), kept = new Map();
+  for (const c of found.cuts) if (!c.turned) kept.set(c.fixed || "no other axes are faster", (kept.get(c.fixed || "no other axes are faster") || 0) + 1);
+  const rows = shown.map(([c, n]) => [`${c.first_line} to ${c.last_line}`, figure(`${base}.cuts.${n}.turned_deg`, 2, "deg"), c.cone_deg === null ? "-" : figure(`${base}.cuts.${n}.cone_deg`, 2, "deg"),
+    range(c.lead_deg), range(c.tilt_deg), figure(`${base}.cuts.${n}.ball_off_path_mm`, 5, "mm"), ...(c.control_s === null ? ["time_s", "reference_time_s"] : ["control_s", "reference_control_s"]).map((key) => figure(`${base}.cuts.${n}.${key}`, 3, "s"))]);
+  return [make("h3", {}, "Axes that turn along the cuts"),
+    make("p", {}, `The tool axis is turned along ${found.turned} of ${found.cuts.length} cuts; the centre of the ball stays on its path.` + (shown.length < found.turned ? ` The first ${shown.length} are shown.` : "")),
+    rows.length ? table(["CL lines", "Turned by at most", "Allowed", "Lead, deg", "Tilt, deg", "Ball off its path", "Time", "With the CL file's axes"], rows, [1, 2, 3, 4, 5, 6, 7]) : null,
+    found.turned && now && now.keep && now.turned ? make("p", {}, `Whole program by the model by which they were chosen (${now.model}${time && time.model !== now.model ? `; the time in the summary is by another, ${time.model}` : ""}): `, figure(`${base}.on_the_control.turned.time_s`, 2, "s"), " turned, ",
+      figure(`${base}.on_the_control.keep.time_s`, 2, "s"), " with the axes of the CL file, ", figure(`${base}.on_the_control.gain_percent`, 1, "%"), " less.") : null,
+    kept.size ? make("ul", {}, ...[...kept].map(([why, n]) => make("li", {}, `${n} ${n === 1 ? "cut keeps its" : "cuts keep their"} axes: ${why}`))) : null].filter(Boolean);
+}
+
 function orientationParts(k) {
   const found = report.runs[k].orientation, base = `runs.${k}.orientation`;
   if (!found) return [make("p", {}, "The tool axes are those of the CL file (--orient keep): none were chosen.")];
-  const angles = (values) => Object.entries(values || {}).map(([a, v]) => `${a} ${number(v, 2)}`).join("  ");
-  return [make("p", {}, "Each pass is machined with a fixed tool axis (3+2). The table gives the chosen rotary positions, the time with them and with the axes of the CL file, and why other directions lost."),
-    table(["Pass", "Rotary position, deg", "Time", "With the CL file's axes", "Held by", "Rejected candidates"], found.passes.map((p, n) => [String(p.pass), angles(p.orientation_deg),
+  const angles = (values) => Object.entries(values || {}).map(([a, v]) => `${a} ${number(v, 2)}`).join("  "), free = found.passes.some((p) => !p.fixed), turning = turningParts(k);
+  return [...turning, turning.length ? make("h3", {}, "Passes with one axis") : null, make("p", {}, free ? "A pass with one tool axis (3+2) may be given another. The table gives the chosen rotary positions, the time with them and with the axes of the CL file, and why other directions lost."
+    : "No pass could be given another fixed axis (3+2); the last column says why."),
+    table(["Pass", "Rotary position, deg", "Time", "With the CL file's axes", "Held by", "Rejected candidates"], found.passes.map((p, n) => [String(p.pass), p.fixed ? "as in the CL file" : angles(p.orientation_deg),
       figure(`${base}.passes.${n}.time_s`, 3, "s"), figure(`${base}.passes.${n}.reference_time_s`, 3, "s"), p.limiting_axis || "-",
-      p.rejected && p.rejected.length ? make("div", {}, ...grouped(p.rejected)) : "-"]), [2, 3]), ...polytopeParts(found),
-    table(["Plan", "Time"], Object.keys(found.plans).filter((name) => found.plans[name]).map((name) => [PLAN_TEXT[name] || name.replaceAll("_", " "), figure(`${base}.plans.${name}.time_s`, 3, "s")]), [1])];
+      p.fixed ? "keeps its axes: " + p.fixed : p.rejected && p.rejected.length ? make("div", {}, ...grouped(p.rejected)) : "-"]), [2, 3]), ...(free ? polytopeParts(found) : []),
+    free ? table(["Plan", "Time"], Object.keys(found.plans).filter((name) => found.plans[name]).map((name) => [PLAN_TEXT[name] || name.replaceAll("_", " "), figure(`${base}.plans.${name}.time_s`, 3, "s")]), [1])
+      : null].filter(Boolean);
 }
 
 function errorParts(k, jump) {

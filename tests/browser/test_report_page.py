@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from postproc.cli.app import app
-from tests.postproc.page.page_kit import HOSTILE, LINES, Made, refused, reported, small, turned
+from tests.postproc.page.page_kit import HOSTILE, LINES, Made, along, refused, reported, small, turned
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
 BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
@@ -312,6 +312,10 @@ def test_it_prints_on_a4_with_the_picture(opened: Session, tmp_path: Path) -> No
     boxes = re.findall(r"MediaBox \[([^\]]*)\]", data.decode("latin-1"))
     sizes = {tuple(round(float(v)) for v in box.split()[2:]) for box in boxes}
     assert sizes == {(595, 842)}
+    opened.page.emulate_media(media="print")
+    assert opened.page.is_visible("#compare td >> nth=0 >> button"), "which machine and control a row is of"
+    assert opened.page.is_visible("#messages .jump >> nth=0") and not opened.page.is_visible("#print")
+    opened.page.emulate_media(media="screen")
     opened.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     assert opened.page.get_attribute("#printed img", "src").startswith("data:image/png")
     assert opened.said == [], "nothing was complained of to the end"
@@ -355,6 +359,18 @@ def test_errors_and_orientation_are_drawn_and_read_back(opened: Session) -> None
     assert solid["unit"] in drawn and f"chosen axis {shown_rate:g}" in drawn
     edges = sum(len(solid[key]["edges"]) for key in ("cl_file", "chosen"))
     assert page.locator("#polytope svg line").count() == edges + 2 * 2 + 3  # reach and its key, axes x, y, z
+    assert page.evaluate(POOR) == [] and opened.said == []
+
+
+def test_axes_that_turn_along_a_cut_are_shown_and_not_called_fixed(opened: Session) -> None:
+    page = opened.page
+    page.goto(along().page.as_uri())
+    settled(page)
+    keys, said = read_back(page, along()), page.inner_text("#orientation-body")
+    base = "runs.0.conversion.orientation.turning."
+    assert {base + "cuts.0.turned_deg", base + "cuts.0.ball_off_path_mm", base + "on_the_control.gain_percent"} <= keys
+    assert "turned along 1 of 1 cuts" in said and "keeps its axes: the tool axis turns within the pass" in said
+    assert page.locator("#polytope").count() == 0, "of one fixed axis, which this pass has not"
     assert page.evaluate(POOR) == [] and opened.said == []
 
 

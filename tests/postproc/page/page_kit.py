@@ -66,6 +66,15 @@ def turned() -> Made:
 
 
 @cache
+def along() -> Made:
+    """The begin of the blade: a cut of a ball cutter along which the axis swings and may be turned by ten degrees."""
+    setup = Path(mkdtemp()) / "cone.toml"
+    setup.write_text("[orientation]\ncone = 10.0\n[tools.4]\ngauge_length = 130.25\n")
+    lines = (SAMPLES / "blade.cls").read_text().splitlines()
+    return reported("--orient", "auto", "--setup", str(setup), "-c", "siemens-840d", lines=(*lines[:50], *lines[-3:]))
+
+
+@cache
 def small() -> Made:
     """The small path under two controls."""
     return reported("-c", "linuxcnc", "-c", "siemens-840d")
