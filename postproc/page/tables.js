@@ -133,7 +133,7 @@ function turningParts(k) {
   return [make("h3", {}, "Axes that turn along the cuts"),
     make("p", {}, `The tool axis is turned along ${found.turned} of ${found.cuts.length} cuts; the centre of the ball stays on its path.` + (shown.length < found.turned ? ` The first ${shown.length} are shown.` : "")),
     rows.length ? table(["CL lines", "Turned by at most", "Allowed", "Lead, deg", "Tilt, deg", "Ball off its path", "Time", "With the CL file's axes"], rows, [1, 2, 3, 4, 5, 6, 7]) : null,
-    found.turned && now && now.keep && now.turned ? make("p", {}, `Whole program by the model by which they were chosen (${now.model}${time && time.model !== now.model ? `; the time in the summary is by another, ${time.model}` : ""}): `, figure(`${base}.on_the_control.turned.time_s`, 2, "s"), " turned, ",
+    found.turned && now && now.keep && now.turned ? make("p", {}, `Whole program by the model by which they were chosen (${now.model.replace(/^model /, "")}${time && now.model !== "model " + time.model ? `; the time in the summary is by another, ${time.model}` : ""}): `, figure(`${base}.on_the_control.turned.time_s`, 2, "s"), " turned, ",
       figure(`${base}.on_the_control.keep.time_s`, 2, "s"), " with the axes of the CL file, ", figure(`${base}.on_the_control.gain_percent`, 1, "%"), " less.") : null,
     kept.size ? make("ul", {}, ...[...kept].map(([why, n]) => make("li", {}, `${n} ${n === 1 ? "cut keeps its" : "cuts keep their"} axes: ${why}`))) : null].filter(Boolean);
 }
