@@ -62,6 +62,15 @@ function spindleRange(tools) {
   return `${tools.length} tools, ` + (every.length ? `${number(Math.min(...every), 0)} to ${number(Math.max(...every), 0)} rpm` : "spindle off");
 }
 
+// The three limits of axes that hold the program longest.
+function slowest(k) {
+  const time = report.runs[k].conversion.time;
+  if (!time) return "-";
+  const held = Object.entries(time.limiting).flatMap(([axis, by]) => Object.entries(by).map(([key, seconds]) => ({axis, key, seconds}))).filter((one) => one.seconds > 0.005);
+  const most = held.sort((a, b) => b.seconds - a.seconds).slice(0, 3);
+  return most.length ? make("span", {}, ...most.flatMap((one, n) => [(n ? ", " : "") + `${one.axis} ${one.key.replace("_s", "")} `, figure(`runs.${k}.conversion.time.limiting.${one.axis}.${one.key}`, 2, "s")])) : "none";
+}
+
 function headParts(k) {
   const run = report.runs[k], base = `runs.${k}`, c = run.conversion, witness = c.witness;
   const axes = run.axes.map((axis, j) => [axis.letter, axis.used ? make("span", {}, figure(`${base}.axes.${j}.used.0`, 3, ""), " to ", figure(`${base}.axes.${j}.used.1`, 3, axis.unit)) : "-",
@@ -70,7 +79,7 @@ function headParts(k) {
   const feeds = run.feeds || {};
   const facts = [["Time", timeCell(k)], ["95 % of runs", c.cycle_time_s === null ? "-" : bandCell(k)], ["Lower bound", figure(base + ".conversion.lower_bound_s", 2, "s")],
     ["Time model", c.time ? c.time.model : "-"], ["Blocks", figure(base + ".conversion.blocks_out", 0, "")], ["CL points", figure(base + ".conversion.points_in", 0, "")],
-    ["Feeds of cuts", run.feeds ? make("span", {}, figure(base + ".feeds.least_mm_per_min", 0, ""), " to ", figure(base + ".feeds.greatest_mm_per_min", 0, "mm/min")) : "-"],
+    ["Axes that hold longest", slowest(k)], ["Feeds of cuts", run.feeds ? make("span", {}, figure(base + ".feeds.least_mm_per_min", 0, ""), " to ", figure(base + ".feeds.greatest_mm_per_min", 0, "mm/min")) : "-"],
     ["Blocks slowed for an axis", run.feeds ? figure(base + ".feeds.reduced_blocks", 0, "") : "-"],
     ["Spindle", spindleRange(c.tools)],
     ["Collisions", collisionText(run.collisions)],
