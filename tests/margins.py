@@ -1,7 +1,10 @@
-"""By how much the lengths of tools may differ is not looked at by conversions in these rooms, where no test sees it.
+"""What conversions of some rooms do not look for, since no test there sees it: each is looked for in all other rooms.
 
-It is a sixth of a conversion. It is looked at where it is made and proved (`postproc/verification`), in all other rooms
-(every machine and control, reports, commands, hints, pages), and in what rooms share (`kit.sample`).
+By how much the lengths of tools may differ is a sixth of a conversion. It is looked at where it is made and proved
+(`postproc/verification`), in all other rooms (reports, pages), and in what rooms share (`kit.sample`). The second witness
+is another sixth. It hears every conversion on every machine and control, of modes and registers of controls, of compiled
+and written programs, of jobs, hints and pages, and those that rooms share; not those of rooms which choose axes, places and
+times, look at one part of the road by other means, or write reports, nor where LinuxCNC itself reads the program.
 """
 
 from __future__ import annotations
@@ -13,24 +16,46 @@ from typing import Any
 
 import pytest
 
-from postproc.verification import length_limits, read_back
+from postproc.pipeline import stages
+from postproc.verification import length_limits, read_back, second_witness
+from postproc.witness.evidence import Testimony
 
 TESTS = Path(__file__).parent
-ROOMS = frozenset({TESTS / "linuxcnc", *(TESTS / "postproc" / room for room in (
-    "alignment", "collision", "compile", "control", "controllers", "correction", "cycle_time", "joints", "orientation",
-    "path", "placement", "planning", "readback", "reference", "setup_sheet", "witness"))})
-NAME = "length_margins"
+ROOMS = frozenset({TESTS / "hints", TESTS / "linuxcnc", *(TESTS / "postproc" / room for room in (
+    "alignment", "batch", "cli", "collision", "compile", "control", "controllers", "correction", "cycle_time", "differences",
+    "job", "joints", "orientation", "path", "pipeline", "placement", "planning", "readback", "reference", "report",
+    "setup_sheet", "time_study", "witness", "writing"))})
+SEEN = frozenset({"test_golden_programs.py", "test_every_machine_and_control.py", "test_next_modes.py"})
+"""files of these rooms that show them"""
+UNHEARD = frozenset({TESTS / "linuxcnc", *(TESTS / "postproc" / room for room in (
+    "alignment", "batch", "cli", "collision", "controllers", "correction", "cycle_time", "differences", "dossier", "joints",
+    "orientation", "path", "placement", "planning", "readback", "reference", "report", "setup_sheet", "time_fit",
+    "time_study"))})
+"""rooms whose conversions the second witness does not hear"""
+HEARD = frozenset({"test_compensation_points.py", "test_corrected_legs.py", "test_deviation_bound.py",
+                   "test_fed_retracts.py", "test_links_in_plane.py", "test_program_mutation.py",
+                   "test_retract_levels_of_holes.py", "test_shared_tables.py", "test_spin_plan.py", "test_split_plan.py",
+                   "test_turning_axes.py"})
+"""files of these rooms that show what it says"""
+NAME, WITNESS = "length_margins", "second_witness"
 
 
 def _none(*given: Any) -> tuple[()]:
     return ()
 
 
+def _silent(*given: Any) -> tuple[Testimony, list[Any]]:
+    return Testimony((), ()), []
+
+
 @pytest.fixture(autouse=True)
 def lengths_looked_at_where_they_are_seen(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """For every test."""
-    if request.path.parent in ROOMS:
+    """For every test; the second witness too."""
+    room, name = request.path.parent, request.path.name
+    if room in ROOMS and name not in SEEN:
         monkeypatch.setattr(read_back, NAME, _none)
+    if room in UNHEARD and name not in HEARD:
+        monkeypatch.setattr(stages, WITNESS, _silent)
 
 
 @contextmanager
@@ -38,4 +63,5 @@ def looked_at() -> Iterator[None]:
     """For results that other rooms see too."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(read_back, NAME, length_limits.length_margins)
+        patch.setattr(stages, WITNESS, second_witness.second_witness)
         yield

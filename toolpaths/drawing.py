@@ -51,6 +51,8 @@ def image(size: tuple[float, float], title: str, fill: Callable[[Figure], None],
         raise ValueError(f"no figure format {ending!r}; known: {', '.join(FORMATS)}")
     need("matplotlib", "drawings need")
     import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context(_RULES), warnings.catch_warnings():
@@ -60,7 +62,11 @@ def image(size: tuple[float, float], title: str, fill: Callable[[Figure], None],
         fill(sheet)
         _settle(sheet)
         out = io.BytesIO()
-        sheet.savefig(out, format=ending[1:], metadata={"Date": None} if ending == ".svg" else {"Software": None})
+        # As `savefig` does it, but for a drawing without output before, which only layouts that are not settled need.
+        if ending == ".svg":
+            FigureCanvasSVG(sheet).print_svg(out, metadata={"Date": None})
+        else:
+            FigureCanvasAgg(sheet).print_png(out, metadata={"Software": None})
     return out.getvalue()
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 import sys
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -55,6 +56,19 @@ class PlugIn:
 
 def registered(group: PlugInGroup) -> dict[str, list[EntryPoint]]:
     """Entry points of installed packages by their names, none of them imported; the same one twice counts once."""
+    return {name: list(points) for name, points in _registered(group, tuple(map(_as_it_stands, sys.path))).items()}
+
+
+def _as_it_stands(folder: str) -> tuple[str, int]:
+    """A folder that packages are imported from, and ns of its last change: one that is installed later changes it."""
+    try:
+        return folder, Path(folder or ".").stat().st_mtime_ns
+    except OSError:
+        return folder, 0
+
+
+@lru_cache(maxsize=16)  # all metadata of all packages are read for it: ten times a small CL file
+def _registered(group: PlugInGroup, folders: tuple[tuple[str, int], ...]) -> dict[str, list[EntryPoint]]:
     from importlib.metadata import entry_points  # costs the start of commands that ask for none
 
     result: dict[str, list[EntryPoint]] = {}

@@ -68,14 +68,17 @@ class WantedOfChain:
 
 
 @dataclass(frozen=True)
+@arrays(pole_at="R")
 class CertifiedChain:
     """A proof, and where the tool is nearest to lie along a rotary axis."""
 
     machine: Machine
     asked: AskedOfChain
     proved: ProvedChain
-    pole: tuple[float, Floats]
-    """least sine seen, and the rotary positions (R,) rad"""
+    pole: float
+    """least sine seen"""
+    pole_at: Floats
+    """(R,) rad, the rotary positions there"""
 
     @cached_property
     def content(self) -> dict[str, Any]:
@@ -117,13 +120,12 @@ class CertifiedChain:
         found = {"machine": self.machine.name, "key": content["key"], "covers": "region", "region": region,
                  "travel_left_mm": content["proved"]["travel"], "slides_span": content["proved"]["slides"]}
         if asked.chain.turns:
-            value, at = self.pole
             found["free_of_singular_positions"] = asked.margin > 0.0
             if asked.margin > 0.0:
                 found |= {"margin": asked.margin, "proved_pole": content["proved"]["pole"]}
             else:
-                found["singular_at"] = f"{turn_words(asked.chain, at)}: the tool lies along {asked.chain.turns[0].name} " \
-                                       f"(sine {value:.2g})"
+                found["singular_at"] = f"{turn_words(asked.chain, self.pole_at)}: the tool lies along " \
+                                       f"{asked.chain.turns[0].name} (sine {self.pole:.2g})"
         return found | {"boxes": len(self.proved.paths), "boxes_looked_at": self.proved.tried}
 
 
@@ -142,7 +144,7 @@ def certify_chain(machine: Machine, wanted: WantedOfChain) -> CertifiedChain:
     proved = prove_chain(asked)
     if proved.lack:
         raise DiagnosticError([_refusal(machine, asked, proved)])
-    return CertifiedChain(machine, asked, proved, (value, at))
+    return CertifiedChain(machine, asked, proved, value, at)
 
 
 def chain_of(machine: Machine, tool: float) -> ChainOfAxes:

@@ -20,7 +20,7 @@ from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import Span, dotted, spanned, stacked
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.leg_geometry import LegGeometry
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.rotations import unit
 from toolpaths.shapes import arrays
 
@@ -73,7 +73,7 @@ class Gaps:
     gap: Floats
     at: Floats
     share: Floats
-    worst: np.ndarray[tuple[int], np.dtype[np.int64]]
+    worst: Ints
 
 
 @dataclass(frozen=True, eq=False)

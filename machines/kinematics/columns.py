@@ -56,13 +56,10 @@ def across(d: Sequence[float], v: Columns) -> list[Number]:
 
 def dot(a: Columns, b: Columns) -> Floats:
     """a.b; products with a plain 0 are left out."""
-    terms = [x * y for x, y in zip(a, b, strict=True) if not (_is(x, 0.0) or _is(y, 0.0))]
+    terms = [x * y for x, y in zip(a, b, strict=True)
+             if not ((x.__class__ is float and x == 0.0) or (y.__class__ is float and y == 0.0))]
     total: Floats = np.asarray(sum(terms), dtype=np.float64)
     return total
-
-
-def _is(value: Floats | float, number: float) -> bool:
-    return isinstance(value, float) and value == number
 
 
 def cross(a: Columns, b: Columns) -> list[Floats | float]:
@@ -83,7 +80,7 @@ def minus(a: Columns, b: Columns) -> list[Floats | float]:
 
 def times(value: Floats | float, v: Columns) -> list[Floats | float]:
     """value v; a plain 0 stays one."""
-    return [0.0 if _is(x, 0.0) else value * x for x in v]
+    return [0.0 if x.__class__ is float and x == 0.0 else value * x for x in v]
 
 
 def norm(v: Columns) -> Floats:

@@ -100,7 +100,7 @@ def to_tables(file: ModelFile, machine: MachineName, output: Folder, step: Step 
 @errors_app.command("to-linuxcnc", epilog="Example: postproc errors to-linuxcnc e.toml -m mill-3axis -o comp --rest r.toml")
 def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Rest = None, step: Step = None,
                 loss: Loss = 0.1, angle_loss: AngleLoss = 0.1, tool_length: ToolLength = 100.0, json: Json = "") -> None:
-    """Write positioning errors as LinuxCNC's screw compensation, one file per joint, and report what remains."""
+    """Write positioning errors as LinuxCNC's screw compensation, one file per joint; report what is left."""
     refuse_overwriting({"--rest": str(rest or ""), "--json": json},
                        {"the error model": str(file), **own_files(machine)})
     from machines.geometric_error.exchange import exports

@@ -51,7 +51,7 @@ def machine_certify(name: Name = "", output: CertificateFile = None, check: Chec
                     tool: BoxTool = 0.0, margin: MarginOption = None, travel: TravelOption = None,
                     clearance: ClearanceOption = None, turn: TurnOption = None, figure: BoxesFigure = None,
                     json: Json = "") -> None:
-    """Prove that a machine reaches its workspace, or a box, is nowhere near a singular position, and that no parts touch."""
+    """Prove that a machine reaches its workspace, or a box, far from singular positions, no parts touching."""
     if check is not None:
         given = (output, box, turn, figure, margin, travel, clearance)
         _check(name, check, json, any(one is not None and one != "" for one in given))

@@ -108,7 +108,7 @@ def time(machine: MachineName,
                   tuple(what_if or ()), tuple(logs), output, override, options, csv, figure, check is not None, ending,
                   test, plan_seconds)
     with shown_errors(json), progress_bar() as progress:
-        values, text, outputs, found = answer(asked, progress) if files else test_of_the_control(asked)
+        values, text, outputs, found = test_of_the_control(asked, test) if test and not files else answer(asked, progress)
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
 
 

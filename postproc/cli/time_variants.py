@@ -248,7 +248,7 @@ def _variants(all_timed: list[Timed], estimates: list[Estimate]) -> list[side_by
     ]
 
 
-def test_of_the_control(asked: Asked) -> TimeAnswer:
+def test_of_the_control(asked: Asked, test: Path) -> TimeAnswer:
     """The test program that narrows the band of every kind of move on a machine and control, for no program at hand.
 
     Raises:
@@ -259,8 +259,7 @@ def test_of_the_control(asked: Asked) -> TimeAnswer:
     machine, spec = machine_of(asked.machines[0]), read_value(load_controller(asked.controller))
     planner = read_value(load_model(asked.model or model_name(asked.controller, spec.writer))).of_machine(machine)
     one = Timed(Path(), machine, asked.setups[0], AS_IS, None, planner, None, ())
-    assert asked.plan is not None
-    values, text, files = _planned_test(asked, one, None, asked.plan)
+    values, text, files = _planned_test(asked, one, None, test)
     return values, text, files, []
 
 

@@ -19,7 +19,7 @@ _LATER: tuple[tuple[str, ...], ...] = (
     ("hooks",), ("output", "stop_between_tools"), ("output", "program_number"), ("output", "program_name"),
     ("clearance", "index"), ("output", "units"), ("output", "smoothing"), ("output", "rapids_as_feed"),
     ("places",), ("order",), ("clearance", "between"), ("clearance", "in_plane"), ("joints", "spin"), ("joints", "carriers"),
-    ("orientation", "criteria"))
+    ("orientation", "criteria"), ("orientation", "cone"), ("orientation", "operations"))
 """keys that set-ups have not always had: at their defaults they are left out, so that programs keep their fingerprint"""
 _LATER_OF_TOOLS = (*TOOL_LIMITS, "compensation", "contour", "called", "keeps_spin", "cutting_force")
 """likewise, of each tool"""

@@ -19,7 +19,7 @@ from postproc.job.job import Job
 from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.path.model import ARC
 from postproc.readback.comparison.checks import CHUNK, off_line
-from postproc.readback.comparison.compare import Comparison, bound_of_blocks, off_level, place_on_moves
+from postproc.readback.comparison.compare import Comparison, bound_of_blocks, keeps_level, off_level, place_on_moves
 from postproc.readback.comparison.length_margins import MUCH, LengthMargin, length_matters
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
@@ -204,7 +204,7 @@ class _Look:
         begin, share = place_on_moves(self.motion, self.executed, rows, self.c.owner, moves)
         tool = self._tool(rows)
         level = (moves.phase[self.c.owner[rows]] == Phase.POSITION) & (self.motion.code[rows] == 0) & (
-            self.executed.bent(self.motion, rows) | self.job.corrects)
+            self.executed.bent(self.motion, rows) | self.job.corrects) & keeps_level(curves, tolerance)
         for t in self._times(rows, keeps):
             places, guess = self._poses(rows, t, keeps), np.minimum(begin + t * share, 1.0)
 

@@ -84,7 +84,7 @@ def measured_lengths(table: ToolTable, job: Job, file: str) -> tuple[list[Measur
              for (number, register), at in rows.items() for n in at if n in table.lengths]
     unmeasured = {n: table.unusable[n] for at in rows.values() for n in at if n in table.unusable}
     faults = [no_length(unmeasured, ", and the program calls it", file)] if unmeasured else []
-    faults += _lacking(table, job, rows, file)
+    faults += [*_lacking(table, job, rows, file), *_aside(table, job, rows, file)]
     apart = sorted({one.number for one in found for other in found
                     if one.number == other.number and one.measured != other.measured})
     if apart:
@@ -100,7 +100,7 @@ def doubled_lengths(table: ToolTable, job: Job, file: str) -> list[Diagnostic]:
     """Errors for tools whose lengths the control would add to words that hold them already: in its table they are 0."""
     rows, mm = _called_rows(table, job), {**table.unusable, **table.lengths}
     wrong = [f"T{number}: {mm[n]:g} mm" for (number, _), at in rows.items() for n in at if mm.get(n, 0.0) != 0.0]
-    return _lacking(table, job, rows, file) + ([error(
+    return _lacking(table, job, rows, file) + _aside(table, job, rows, file) + ([error(
         "tool.length_twice", "the words of the program hold the lengths of the tools already, and this controller adds "
         f"those of its tool table with every tool change: {', '.join(dict.fromkeys(wrong))}", file=file, count=len(wrong),
         hint="L and DL of these tools must be 0 in the control's tool table")] if wrong else [])
@@ -143,6 +143,14 @@ def _lacking(table: ToolTable, job: Job, rows: dict[tuple[int, int], list[int]],
     return [error("tool-table.missing", f"no length of {said}, which the program calls", file=file,
                   hint=f"tools of the table are called {names}: write the name as `called` into [tools.N]"
                   if table.named else "measure these tools, and write the table once more")]
+
+
+def _aside(table: ToolTable, job: Job, rows: dict[tuple[int, int], list[int]], file: str) -> list[Diagnostic]:
+    """The error of tools that the control would set off along other axes than their length."""
+    said = [f"{_called(table, job, *one)}: {table.aside[n]}" for one, at in rows.items() for n in at if n in table.aside]
+    return [error("tool-table.aside", "the control adds more than a length with a tool, and the program is made for none of "
+                  f"it: {'; '.join(dict.fromkeys(said))}", file=file, count=len(said),
+                  hint="set these offsets to 0 in the tool table: a rotating tool has a length alone")] if said else []
 
 
 def _questionable(found: list[MeasuredLength], job: Job, file: str) -> list[Diagnostic]:

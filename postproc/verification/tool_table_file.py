@@ -4,7 +4,8 @@ LinuxCNC: the tool table itself (`T1 P1 Z120.03 D6 ; remark`). Fanuc and Haas: G
 with P and R (B-63944EN 14.2; Haas "G10 Set Offsets"), in mm or, behind G20, in inches. Haas besides: the file of offsets
 that the control saves (.OFS; no manual shows it, a shop's guide to the HTS400 presetter does): LENGTH_GEOMETRY and
 LENGTH_WEAR of each TOOL1, TOOL2 ...; it states no units, mm are taken. Siemens: $TC_DP3 (length 1), $TC_DP12 (wear) and
-$TC_DP21 (adapter) of edge 1 of a tool archive, and $TC_TP2, the name by which tool management finds a tool. Heidenhain:
+$TC_DP21 (adapter) of edge 1 of a tool archive, and $TC_TP2, the name by which tool management finds a tool. What controls
+add along other axes is read too ($TC_DP4, 5, 13, 14, 22, 23; LinuxCNC: X, Y, A, B, C, U, V, W). Heidenhain:
 TOOL.T, columns T, NAME, L and DL below the names in its header line; numbers have a decimal point or a comma, as the control
 is set (SHB Data Interfaces, April 2010, p. 6-41). Any control: a table of text with the columns `register` or `tool`,
 `length` and, where there is any, `wear`, mm.
@@ -34,6 +35,7 @@ _WORD = re.compile(r"\s*([A-DF-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?=[\sA-Z]|$)", r
 _HAAS_TOOL = re.compile(r"<TOOL(\d+)>(.*?)</TOOL\1>", re.IGNORECASE | re.DOTALL)
 _HAAS_LENGTH = re.compile(r"<LENGTH_(GEOMETRY|WEAR)>([^<]*)</LENGTH_\1>", re.IGNORECASE)
 _SIEMENS = re.compile(r"\$TC_DP(3|12|21)\s*\[\s*(\d+)\s*,\s*1\s*\]\s*=\s*([^\s;$]*)", re.IGNORECASE)
+_ASIDE_OF_SIEMENS = re.compile(r"(\$TC_DP(?:4|5|13|14|22|23))\s*\[\s*(\d+)\s*,\s*1\s*\]\s*=\s*([^\s;$]*)", re.IGNORECASE)
 _NAME_OF_SIEMENS = re.compile(r'\$TC_TP2\s*\[\s*(\d+)\s*\]\s*=\s*"([^"]*)"', re.IGNORECASE)
 _INCH_OF_SIEMENS = re.compile(r"(?<![A-Z0-9_])G7(?:00|0)(?![0-9])", re.IGNORECASE)
 _KLARTEXT = re.compile(r"^\s*BEGIN\s+\S*\s*\.T\s+(MM|INCH)\b", re.IGNORECASE)
@@ -54,6 +56,8 @@ class ToolTable:
     """the control looks for a tool by its name: T5 is the tool whose name is 5"""
     unusable: dict[int, float] = field(default_factory=dict)
     """mm by number: 0, negative or too long"""
+    aside: dict[int, str] = field(default_factory=dict)
+    """by number: what the control adds along other axes with the length"""
 
 
 @dataclass
@@ -65,6 +69,7 @@ class _Rows:
     parts: dict[int, dict[Part, float]] = field(default_factory=dict)
     names: dict[int, str] = field(default_factory=dict)
     named: bool = False
+    aside: dict[int, list[str]] = field(default_factory=dict)
     faults: list[Diagnostic] = field(default_factory=list)
 
     def fault(self, code: str, what: str, line: int, hint: str) -> None:
@@ -120,7 +125,8 @@ def table_of(text: str, controller: ControllerFile, file: str, zeros: bool = Fal
         rows.faults.append(no_length(unusable, "", file) if unusable else error(
             "tool-table.empty", f"no length of a tool as {controller.writer} controls write it", file=file, hint=_HINT))
     require(rows.faults)
-    return ToolTable(found, rows.by, rows.names, rows.named, unusable)
+    aside = {number: ", ".join(words) for number, words in rows.aside.items()}
+    return ToolTable(found, rows.by, rows.names, rows.named, unusable, aside)
 
 
 def no_length(unusable: dict[int, float], who: str, file: str) -> Diagnostic:
@@ -161,6 +167,8 @@ def _linuxcnc(lines: list[str], rows: _Rows) -> None:
         words = _words(line.split(";")[0], n, rows)
         if any(letter == "Z" for letter, _ in words) and (values := _single(words, "TZ", n, rows)):
             rows.add(values["T"], "geometry", values["Z"], n)
+            if aside := [f"{letter} {value:g}" for letter, value in words if letter in "XYABCUVW" and value != 0.0]:
+                rows.aside.setdefault(int(values["T"]), []).extend(aside)
 
 
 def _offsets(lines: list[str], rows: _Rows) -> None:
@@ -211,6 +219,9 @@ def _siemens(lines: list[str], rows: _Rows) -> None:
             value = rows.number(text, n)
             if value is not None:
                 rows.add(float(tool), parts[part], value, n)
+        for name, tool, text in _ASIDE_OF_SIEMENS.findall(block):
+            if rows.number(text, n):
+                rows.aside.setdefault(int(tool), []).append(f"{name.upper()} {text}")
 
 
 def _klartext(lines: list[str], rows: _Rows) -> None:

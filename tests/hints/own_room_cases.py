@@ -11,6 +11,7 @@ from tests.hints.verify_cases import edited
 
 FILES = {"part.apt": START + CUT + "FINI\n", "s.toml": LENGTH}
 ON = "-m mill-3axis -c fanuc-30i --setup s.toml"
+ON_LINUXCNC = ON.replace("fanuc-30i", "linuxcnc")
 NAMED = LENGTH + 'called = "EM10"\n'
 SIDEWAYS = START + "RAPID\nGOTO/0,0,60,0,0,1\nGOTO/0,0,0,0,0.5,0.866025404\nGOTO/9,0,0\nRAPID\nGOTO/9,20,34.641016\n"
 NORMAL = START.replace("LOADTL/1\n", "CUTTER/10,5\nLOADTL/1\n") + "MULTAX/ON\n" + (
@@ -85,6 +86,8 @@ _TABLES = [
          Edit("t.csv", "", "\\1,\\2\n1,110\n"), first=(f"convert part.apt {ON} -o p.nc",)),
     _own("tool-table.missing", f"verify p.nc part.apt {ON} --tool-table t.csv", "measure these tools",
          Edit("t.csv", "7,110", "1,110"), first=(f"convert part.apt {ON} -o p.nc",), t_csv="register,length\n7,110\n"),
+    _own("tool-table.aside", f"verify p.nc part.apt {ON_LINUXCNC} --tool-table t.tbl", "set these offsets to (0)",
+         Edit("t.tbl", "X5", r"X\1"), t_tbl="T1 P1 X5 Z110\n", first=(f"convert part.apt {ON_LINUXCNC} -o p.nc",)),
     _own("tool-table.length", f"verify p.nc part.apt {ON} --tool-table t.csv", "measure the tool",
          Edit("t.csv", "1,0", "1,110"), first=(f"convert part.apt {ON} -o p.nc",), t_csv="register,length\n1,0\n2,90\n"),
     convert("tool.called", START + CUT, r"take `(called)` out of \[tools\.N\]", sheet('called = "EM10"\n', ""), setup=NAMED),

@@ -9,9 +9,9 @@ from pkgutil import resolve_name
 
 import pytest
 
-from machines.analysis import certify
 from machines.geometric_error.exchange import survey
 from machines.layouts import search as layouts
+from postproc.cycle_time import conversion
 from tests.explained_codes import DATA
 from tests.hints.call_cases import CALLS, CallCase
 from tests.hints.case import HintCase, called
@@ -34,10 +34,11 @@ def remedies(hints: list[str]) -> list[str]:
 @pytest.fixture(autouse=True)
 def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a model of errors does at each of many places changes figures of `errors check`, and no hint; so do the boxes
-    after which a certificate gives up, and the layouts that are tried."""
+    after which a certificate gives up, the layouts that are tried, and the band of a program's time."""
     monkeypatch.setattr(survey, "PLACES", 500)
-    monkeypatch.setattr(certify, "MOST", 6_000)
-    monkeypatch.setattr(certify, "FEW", 3_000)
+    monkeypatch.setattr(conversion, "BAND_UP_TO", 0)
+    for name in ("MOST", "FEW"):
+        monkeypatch.setattr(f"machines.analysis.certify.{name}", 2_000)
     for name, value in (("RESTARTS", 1), ("ROUNDS", 12), ("CROWD", 6), ("GRID", (3, 3, 2))):
         monkeypatch.setattr(layouts, name, value)
 

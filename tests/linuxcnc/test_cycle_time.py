@@ -23,7 +23,7 @@ from tests.postproc.time_kit import calibrated
 EACH, MEAN = 0.01, 0.003
 """shares of the time that an estimate may be off, each and on average"""
 seen: dict[str, float] = {}
-SIMULATED = ("arcs, G64 P0.05", "5 axes, G93, G64 P0.01", "5 axes, control's kinematics")
+SIMULATED = ("5 axes, G93, G64 P0.01", "5 axes, control's kinematics")
 """run in the simulator by every `make test`, the others with -m slow: all are compared with its recorded
 times by tests/postproc/cycle_time/test_cycle_time_models.py"""
 
@@ -90,6 +90,7 @@ def test_lines_are_taken_up_when_the_simulator_takes_them_up(recorded, tmp_path:
         assert begin[row] == pytest.approx(measured, abs=0.025)
 
 
+@pytest.mark.slow
 def test_a_generic_model_learns_linuxcnc_from_its_log(recorded, tmp_path: Path) -> None:
     """A look-ahead model fitted to one run foretells another within its band."""
     on = machine("mill-3axis")

@@ -92,10 +92,12 @@ def test_a_package_registers_a_kind_by_its_metadata(tmp_path, monkeypatch) -> No
     assert type(machine.kinematics).__module__ == "shop_machine" and "scissors" in kinds.known()
     assert kinds.code_file("scissors") == package / "shop_machine.py" and kinds.code_file("serial") is None
     (info / "entry_points.txt").write_text(f"[{kinds.GROUP}]\nscissors = shop_machine:Scissors\nserial = no_module:X\n")
+    os.utime(package)  # as an installer does, which puts another folder there
     fault = only(tmp_path)
     assert "is not a KinematicsModel" in fault.message and "register the model" in fault.hint
     assert machines.load("mill-3axis").kinematics.straight_slides  # a built-in kind stays what it is
     (info / "entry_points.txt").write_text(f"[{kinds.GROUP}]\nscissors = gone_module:Model\n")
+    os.utime(package)  # as an installer does, which puts another folder there
     fault = only(tmp_path)
     assert "shop-machine) is not imported: ModuleNotFoundError" in fault.message and "reinstall or" in fault.hint
 

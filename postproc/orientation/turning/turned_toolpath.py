@@ -41,14 +41,17 @@ def turned_toolpath(work: PassContext, fields: Sequence[TiltField]) -> Toolpath:
 
 def _rapids(work: PassContext, made: TiltField) -> list[tuple[Ints, Floats]]:
     """Rows of the Toolpath of rapids next to a run that stand along its first axis, or its last, and their axes (N, 3):
-    those that lead to it, but the one that draws back from the cut before, and the one that draws back from it."""
+    those that lead to it, but the one that draws back from the cut before, and the one that draws back from it. They are
+    of its own operation and tool: others keep their axes, and a ball of another radius is elsewhere."""
     moves, (low, high), run = work.moves, made.run.rows, made.run
+    operation = work.toolpath.operation[moves.row]
+    own = (operation == operation[low]) & (moves.tool == moves.tool[low])
     free = (moves.kind == Kind.RAPID) & (moves.hole < 0)
     first = low - 1
-    while first > 0 and _stands(work, free, first - 1, run.axis[0]) and not (first > 1 and not free[first - 2]):
+    while first > 0 and _stands(work, free & own, first - 1, run.axis[0]) and not (first > 1 and not free[first - 2]):
         first -= 1
     ends, axes = high, made.axes
-    if high < len(moves) and _stands(work, free, high, run.axis[-1]) and (high + 1 == len(moves) or free[high + 1]):
+    if high < len(moves) and _stands(work, free & own, high, run.axis[-1]) and (high + 1 == len(moves) or free[high + 1]):
         ends = high + 1
     parts = ((np.arange(first, low - 1), axes[0]), (np.arange(high, ends), axes[-1]))
     return [(moves.row[rows], np.tile(one, (len(rows), 1))) for rows, one in parts if len(rows)]

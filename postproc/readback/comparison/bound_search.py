@@ -11,7 +11,7 @@ from toolpaths.shapes import arrays
 
 TIGHT = 1.01
 """bound over worst pose that is near enough"""
-GRAIN = 1e-7, 1e-9
+GRAIN = 1e-6, 1e-8
 """mm, rad: bounds below are not looked at more closely"""
 _NO_BOUND = 1e20
 """mm: above it nothing is known"""

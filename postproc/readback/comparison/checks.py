@@ -204,7 +204,8 @@ def check_smoothing_levels(code: Canonical, motion: Motion, job: Job, moves: Mov
     """The level of the control's own smoothing while cutting is that of the blocks asked for, as the same reader reads them:
     an error in an operation of [output.smoothing], a warning in others, whose level no one stated."""
     plan, reader = job.smoothing, reader_for(job.controller, job.machine.axis_names)
-    wanted = np.array([reader.smoothing_level(one.blocks) for one in plan.used] or [np.nan])
+    levels = {blocks: reader.smoothing_level(blocks) for blocks in {one.blocks for one in plan.used}}
+    wanted = np.array([levels[one.blocks] for one in plan.used] or [np.nan])
     if np.isnan(wanted).all():
         return []
     named = np.array([op.name in plan.named for op in job.toolpath.operations] or [False])

@@ -254,14 +254,15 @@ def bound_of_blocks(motion: Motion, executed: BlockPoses, moves: Moves, owner: I
                     corrects: bool, judge: bool = False, ends: tuple[Floats, Floats] | None = None) -> DeviationBound:
     """Bounds of every block of the moves that are no links.
 
-    From hole to hole dog-legs are looked at in height alone; so are all paths where geometric errors are corrected: a
-    control that drills the holes takes up lost motion on its path. `ends`: tips and axes (E, 3) at the ends of all blocks,
-    where they are known.
+    From hole to hole dog-legs that keep their height are looked at in height alone; so are all paths there where geometric
+    errors are corrected: a control that drills the holes takes up lost motion on its path. `ends`: tips and axes (E, 3) at
+    the ends of all blocks, where they are known.
     """
     rows = np.flatnonzero(moves.run_by(owner))
     begin, share = place_on_moves(motion, executed, rows, owner, moves)
     free = executed.bent(motion, rows) | corrects
     level = (moves.phase[owner[rows]] == Phase.POSITION) & (motion.code[rows] == 0) & free
+    level[level] = keeps_level(moves.curves(owner[rows[level]]), allowed[0])
     some = as_slice(np.flatnonzero(~level))
     found = deviation_bound(motion, executed, moves, rows[some], owner[rows[some]], begin[some],
                             share[some], allowed, judge, ends)
@@ -292,6 +293,11 @@ def _unproved(bound: DeviationBound, allowed: tuple[float, float], moves: Moves,
     return found
 
 
+def keeps_level(curve: Curves, tolerance: float) -> Bools:
+    """(K,) whether curves end as high along the tool's axis as they begin."""
+    return np.asarray(np.abs(((curve.end - curve.start) * curve.axis1).sum(axis=1)) <= tolerance)
+
+
 def off_level(curve: Curves, tip: Floats) -> Floats:
     """How far (K,) mm tips are above or below the stretch between the ends of curves, along the tool's axis."""
     height, first, last = ((p * curve.axis1).sum(axis=1) for p in (tip, curve.start, curve.end))
@@ -303,13 +309,14 @@ def _deviations(motion: Motion, executed: BlockPoses, moves: Moves, rows: Ints, 
     """Worst (tip, axis) deviation (K,) over samples of each block from the curve of its move; `within` mm of its tip;
     `places`: see `place_on_moves`.
 
-    Where rapids are dog-legs, those from hole to hole only keep their height.
+    Where rapids are dog-legs, those from hole to hole that keep their height do only that.
     """
     tip_off, axis_off = np.zeros(len(rows)), np.zeros(len(rows))
     if not len(rows):
         return tip_off, axis_off
     begin, share = places
     level = (moves.phase[owner[rows]] == Phase.POSITION) & executed.bent(motion, rows)
+    level[level] = keeps_level(moves.curves(owner[rows[level]]), within)
     for at in range(0, len(rows), CHUNK):
         part = slice(at, at + CHUNK)
         here = rows[part]

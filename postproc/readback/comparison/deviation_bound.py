@@ -83,7 +83,8 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
                 worst.add(pieces, values)
                 for most, bound in zip(whole, (values.tip, values.axis), strict=True):
                     np.maximum.at(most, pieces.k, bound)
-    for divided in range(HALVINGS):
+    halvings = divided = 0
+    while halvings < HALVINGS:
         if divided >= _PATIENCE:
             worst.give_up()
         if worst.judged:
@@ -91,7 +92,8 @@ def deviation_bound(motion: Motion, executed: BlockPoses, moves: Moves, rows: In
         pieces = worst.taken()
         if not len(pieces):
             break
-        pieces = pieces.divided(_AT_ONCE if len(pieces) < _FEW else 2)
+        parts = _AT_ONCE if len(pieces) < _FEW else 2
+        pieces, divided, halvings = pieces.divided(parts), divided + 1, halvings + parts.bit_length() - 1
         for at in range(0, len(pieces), CHUNK):
             part = pieces.take(slice(at, at + CHUNK))
             worst.add(part, _values(motion, executed, moves, ends, part, allowed))

@@ -99,6 +99,7 @@ def test_an_interrupted_batch_says_what_is_kept(tmp_path: Path, monkeypatch: pyt
     assert _batch(jobs)[0] == 0 and _begun(jobs) == Counter(part1=1, part2=1, part3=1)
 
 
+@pytest.mark.slow
 def test_a_worker_killed_with_half_written_files_loses_nothing(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     jobs = batch_folder(tmp_path, parts=4)

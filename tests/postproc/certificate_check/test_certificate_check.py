@@ -6,6 +6,7 @@ import ast
 import json
 from collections.abc import Callable
 from copy import deepcopy
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -33,11 +34,9 @@ LARGE = ("three-arms-three-slides", "hexapod", "hexaslide-cone", "hexaslide-copl
 Content = dict[str, Any]
 
 
+@cache
 def content(name: str = "rotary-delta") -> Content:
     return json.loads(certify(machines.load(name), Wanted()).text)
-
-
-GOOD = content()
 
 
 def sealed(found: Content) -> Content:
@@ -49,7 +48,7 @@ def sealed(found: Content) -> Content:
 
 
 def changed(edit: Callable[[Content], object]) -> Content:
-    found = deepcopy(GOOD)
+    found = deepcopy(content())
     edit(found)
     return found
 
@@ -63,8 +62,8 @@ def with_bound(k: int, column: int, value: float) -> Callable[[Content], object]
 
 
 def test_a_certificate_is_confirmed() -> None:
-    figures = confirmed(deepcopy(GOOD))
-    assert figures["boxes"] == len(GOOD["boxes"]) and figures["direct_at_least"] == GOOD["proved"]["direct"]
+    figures = confirmed(deepcopy(content()))
+    assert figures["boxes"] == len(content()["boxes"]) and figures["direct_at_least"] == content()["proved"]["direct"]
 
 
 @pytest.mark.parametrize("k", [0, 7, -1])
@@ -80,7 +79,7 @@ def test_a_box_that_is_missing_leaves_a_gap(k: int) -> None:
 def test_a_bound_that_says_too_much_is_rejected(k: int, column: int) -> None:
     """Hardly more than there is in the middle of the box, by the code of the search."""
     legs = machines.load("rotary-delta").kinematics.leg_geometry
-    lower, upper = _ends(GOOD, [line.split()[0] for line in GOOD["boxes"]])
+    lower, upper = _ends(content(), [line.split()[0] for line in content()["boxes"]])
     at = enclosed(PosesOfBoxes(legs, np.zeros(3)), spanned(0.5 * (lower + upper)[[k]]))
     free, held = columns(legs)
     there = (np.linalg.svd(at.matrix.lo[0, :3, free].T, compute_uv=False)[-1], at.cosine.lo.min(),
@@ -91,7 +90,7 @@ def test_a_bound_that_says_too_much_is_rejected(k: int, column: int) -> None:
 
 def test_a_bound_below_the_margin_is_rejected() -> None:
     with pytest.raises(Rejected, match="less than the margin"):
-        confirmed(sealed(changed(with_bound(3, 0, 0.5 * GOOD["margin"]))))
+        confirmed(sealed(changed(with_bound(3, 0, 0.5 * content()["margin"]))))
     with pytest.raises(Rejected, match="digest"):
         confirmed(changed(with_bound(3, 0, 0.9999)))
 
@@ -133,30 +132,31 @@ def test_shipped_certificates_are_confirmed_and_about_their_machine(name: str) -
 
 def test_no_certificate_is_shipped_for_nothing() -> None:
     assert set(shipped()) == {hash_of(values_of_machine(machines.load(name))) for name in (*on_legs(), *of_chains())}
-    assert len(builtin()) == len(on_legs()) + len(of_chains())
+    held = {"linuxcnc-pentapod", "tricept", "tripod-head"}  # by more than legs: what is proved of legs does not hold there
+    assert set(builtin()) - held == {*on_legs(), *of_chains()}
 
 
 def test_a_certificate_of_another_machine_is_rejected(tmp_path: Path) -> None:
     run, file = CliRunner(), tmp_path / "c.json"
-    file.write_text(json.dumps(GOOD), encoding="utf-8")
+    file.write_text(json.dumps(content()), encoding="utf-8")
     good = run.invoke(app, ["machine", "certify", "--check", str(file), "--json", "-"])
     assert good.exit_code == 0 and json.loads(good.stdout)["confirmed"] is True
     other = run.invoke(app, ["machine", "certify", "uranesx", "--check", str(file)])
     assert other.exit_code == 1 and "certificate.rejected" in other.stderr
     file.write_text("{}", encoding="utf-8")
     assert "certificate.file" in run.invoke(app, ["machine", "certify", "--check", str(file)]).stderr
-    file.write_text(json.dumps(GOOD | {"machine": "no-such"}), encoding="utf-8")
+    file.write_text(json.dumps(content() | {"machine": "no-such"}), encoding="utf-8")
     assert "certificate.machine" in run.invoke(app, ["machine", "certify", "--check", str(file)]).stderr
 
 
 def test_a_machine_that_has_changed_is_noticed() -> None:
     table = json.loads(json.dumps(values_of_machine(machines.load("rotary-delta"))))
-    about(GOOD, table)
+    about(content(), table)
     for edit in (lambda t: t["kinematics"]["layout"].update(rod=700), lambda t: t["axes"]["A"].update(travel=[-50, 80])):
         other = deepcopy(table)
         edit(other)
         with pytest.raises(Rejected):
-            about(GOOD | {"key": hash_of(other)}, other)
+            about(content() | {"key": hash_of(other)}, other)
 
 
 def _all_bounds(value: float) -> Callable[[Content], object]:
@@ -177,12 +177,12 @@ def test_a_margin_that_lets_any_bound_pass_is_rejected(margin: float) -> None:
     {"covers": "all"}, {"covers": ["workspace"]}], ids=str)
 def test_words_that_the_check_does_not_know_are_rejected(edit: Content) -> None:
     with pytest.raises(Rejected):
-        confirmed(deepcopy(GOOD) | edit)
+        confirmed(deepcopy(content()) | edit)
 
 
 def test_carriers_that_the_machine_has_not_are_rejected() -> None:
     """They would take a part of each place on themselves: the legs were looked at in a smaller workspace."""
-    found = deepcopy(GOOD)
+    found = deepcopy(content())
     found["geometry"]["carriers"] = [{"letter": name, "direction": row, "travel": [None, None]} for name, row in zip(
         "UVW", np.eye(3).tolist(), strict=True)]
     with pytest.raises(Rejected, match="carriers"):
@@ -198,8 +198,8 @@ def test_a_box_of_tips_behind_an_axis_at_the_spindle_is_rejected() -> None:
 
 
 def test_the_check_says_of_what_the_region_is() -> None:
-    region = confirmed(deepcopy(GOOD))["region"]
-    assert region["of"] == "platform" and region["x_mm"] == GOOD["region"]["x_mm"] and region["tilt_deg"] == [0.0, 0.0]
+    region = confirmed(deepcopy(content()))["region"]
+    assert region["of"] == "platform" and region["x_mm"] == content()["region"]["x_mm"] and region["tilt_deg"] == [0.0, 0.0]
 
 
 def test_balls_hold_what_they_stand_for() -> None:

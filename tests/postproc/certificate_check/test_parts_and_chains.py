@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from copy import deepcopy
+from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -37,18 +38,23 @@ def some_boxes(name: str, lower: list[float], upper: list[float]) -> Content:
     return json.loads(certify(machines.load(name), Wanted((np.array(lower), np.array(upper)), 0.0)).text)
 
 
-URANESX = json.loads(certify(machines.load("uranesx"), Wanted()).text)
-BARS = some_boxes("h4-rotary", [-20.0, -20.0, -90.0], [20.0, 20.0, -60.0])
-MIKRON = json.loads(certify_chain(machines.load("mikron-ucp710"), WantedOfChain(tool=100.0)).text)
-TILTED = json.loads(certify_chain(machines.load("mikron-ucp710"), WantedOfChain(turns={"A": (0.2, 0.9)})).text)
+@cache
+def made(which: str) -> Content:
+    """A certificate, which nobody changes."""
+    if which == "uranesx":
+        return json.loads(certify(machines.load("uranesx"), Wanted()).text)
+    if which == "bars":
+        return some_boxes("h4-rotary", [-20.0, -20.0, -90.0], [20.0, 20.0, -60.0])
+    wanted = WantedOfChain(tool=100.0) if which == "mikron" else WantedOfChain(turns={"A": (0.2, 0.9)})
+    return json.loads(certify_chain(machines.load("mikron-ucp710"), wanted).text)
 
 
 def test_parts_bars_and_chains_are_confirmed_and_about_their_machines() -> None:
-    for name, found in (("uranesx", URANESX), ("h4-rotary", BARS)):
+    for name, found in (("uranesx", made("uranesx")), ("h4-rotary", made("bars"))):
         about(deepcopy(found), table_of(name))
         assert confirmed(deepcopy(found))["boxes"] == len(found["boxes"])
-    assert confirmed(deepcopy(URANESX))["parts_at_least"] == URANESX["proved"]["parts"] > 60.0
-    for found in (MIKRON, TILTED):
+    assert confirmed(deepcopy(made("uranesx")))["parts_at_least"] == made("uranesx")["proved"]["parts"] > 60.0
+    for found in (made("mikron"), made("tilted")):
         about(deepcopy(found), table_of("mikron-ucp710"))
         assert chain_confirmed(deepcopy(found))["travel_at_least"] == found["proved"]["travel"]
 
@@ -56,7 +62,7 @@ def test_parts_bars_and_chains_are_confirmed_and_about_their_machines() -> None:
 @pytest.mark.parametrize(("column", "more"), [(3, 8.0), (4, 0.05)])
 def test_a_distance_that_says_too_much_is_rejected(column: int, more: float) -> None:
     """The box of the least one: its bound is within that of what there is in its middle."""
-    found = deepcopy(URANESX)
+    found = deepcopy(made("uranesx"))
     rows = [line.split() for line in found["boxes"]]
     row = min(rows, key=lambda r: float(r[1 + column]))
     row[1 + column] = repr(float(row[1 + column]) * 2.0 + more)
@@ -75,7 +81,7 @@ def test_a_distance_that_says_too_much_is_rejected(column: int, more: float) -> 
     lambda parts: parts.update(carriage_angle=1.0), lambda parts: parts["rods"][0].update(shift=[0.0, 300.0, 0.0]),
     lambda parts: parts.update(rail_ends=[[0.0, 1.0]] * 3)], ids=range(7))
 def test_parts_of_another_machine_are_rejected(edit: Callable[[Content], object]) -> None:
-    found = deepcopy(URANESX)
+    found = deepcopy(made("uranesx"))
     edit(found["geometry"]["parts"])
     with pytest.raises(Rejected, match="machine file"):
         about(found, table_of("uranesx"))
@@ -83,7 +89,7 @@ def test_parts_of_another_machine_are_rejected(edit: Callable[[Content], object]
 
 @pytest.mark.parametrize("edit", [{"bar": -1}, {"kept": [0.0, 0.0, 0.0]}, {"joint": [0.0, 0.0, 0.0]}], ids=str)
 def test_a_platform_with_other_bars_is_rejected(edit: Content) -> None:
-    found = deepcopy(BARS)
+    found = deepcopy(made("bars"))
     found["geometry"]["legs"][1].update(edit)
     with pytest.raises(Rejected, match="machine file"):
         about(found, table_of("h4-rotary"))
@@ -98,7 +104,7 @@ def resealed(found: Content) -> Content:
 
 @pytest.mark.parametrize("k", [0, 30, -1])
 def test_a_chain_with_a_box_removed_is_rejected(k: int) -> None:
-    found = deepcopy(MIKRON)
+    found = deepcopy(made("mikron"))
     found["boxes"].pop(k)
     with pytest.raises(Rejected, match="digest"):
         chain_confirmed(found)
@@ -108,7 +114,7 @@ def test_a_chain_with_a_box_removed_is_rejected(k: int) -> None:
 
 @pytest.mark.parametrize(("column", "by"), [(0, 0.6), (1, 1.06), (2, 200.0)])
 def test_a_chain_with_a_bound_loosened_is_rejected(column: int, by: float) -> None:
-    found = deepcopy(TILTED)
+    found = deepcopy(made("tilted"))
     rows = [line.split() for line in found["boxes"]]
     row = min(rows, key=lambda r: float(r[1 + column]))
     row[1 + column] = repr(float(row[1 + column]) * by if column == 1 else float(row[1 + column]) + by)
@@ -116,7 +122,7 @@ def test_a_chain_with_a_bound_loosened_is_rejected(column: int, by: float) -> No
     with pytest.raises(Rejected, match="states more"):
         chain_confirmed(resealed(found))
     with pytest.raises(Rejected, match="digest"):
-        chain_confirmed(found | {"digest": MIKRON["digest"]})
+        chain_confirmed(found | {"digest": made("mikron")["digest"]})
 
 
 @pytest.mark.parametrize("edit", [
@@ -128,7 +134,7 @@ def test_a_chain_with_a_bound_loosened_is_rejected(column: int, by: float) -> No
     lambda f: f["chain"]["axes"][0].update(point=[0.0, 0.0, 900.0])], ids=range(12))
 def test_other_changes_of_a_chain_are_rejected(edit: Callable[[Content], object]) -> None:
     """By the proof where the geometry is that of the file, else by comparing with the machine file."""
-    found = deepcopy(MIKRON)
+    found = deepcopy(made("mikron"))
     edit(found)
     with pytest.raises((Rejected, KeyError)):
         about(deepcopy(found), table_of("mikron-ucp710"))
@@ -143,9 +149,9 @@ def test_a_chain_of_a_changed_machine_is_rejected(edit: Callable[[Content], obje
     table = table_of("mikron-ucp710")
     edit(table)
     with pytest.raises(Rejected, match="key"):
-        about(deepcopy(MIKRON), table)
+        about(deepcopy(made("mikron")), table)
     with pytest.raises(Rejected, match=r"machine file|outside its travel"):
-        about(deepcopy(MIKRON) | {"key": hash_of(table)}, table)
+        about(deepcopy(made("mikron")) | {"key": hash_of(table)}, table)
 
 
 @pytest.mark.parametrize("name", sorted({hash_of(table_of(n)): n for n in of_chains()}.values())[::4])

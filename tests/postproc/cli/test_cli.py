@@ -266,7 +266,8 @@ def commands(group: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[st
             yield (*words, name), command
 
 
-PAGES = dict(commands(typer.main.get_command(app)))
+ROOT_PAGE = typer.main.get_command(app)
+PAGES = dict(commands(ROOT_PAGE))
 
 
 @pytest.mark.parametrize("words", PAGES, ids=" ".join)
@@ -287,7 +288,6 @@ def test_help_says_what_each_option_takes(words: tuple[str, ...]) -> None:
         assert ", ".join(DIALECTS) in page
 
 
-ROOT_PAGE = typer.main.get_command(app)
 GROUPS = {(): ROOT_PAGE} | {(name,): one for name, one in ROOT_PAGE.commands.items() if hasattr(one, "commands")}
 
 

@@ -14,11 +14,18 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import machines
+from machines.geometric_error.exchange import survey
 from machines.geometric_error.files.loader import load
 from postproc.cli.app import app
 
 SAMPLES = Path(__file__).parents[3] / "samples" / "errors"
 MIKRON = SAMPLES / "mikron-ucp710.toml"
+
+
+@pytest.fixture(autouse=True)
+def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Models are looked at in few places."""
+    monkeypatch.setattr(survey, "PLACES", 1000)
 
 
 def run(*arguments: object, code: int = 0) -> Result:

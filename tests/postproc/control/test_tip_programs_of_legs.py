@@ -62,7 +62,8 @@ def test_a_linear_delta_as_legs_gets_tip_programs(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
-    ('module = "lineardeltakins"', 'module = "pentakins"', "known: lineardeltakins"),
+    ('module = "lineardeltakins"', 'module = "scarakins"', "known: lineardeltakins"),
+    ('module = "lineardeltakins"', 'module = "pentakins"', "five legs with drive"),
     ('module = "lineardeltakins"', 'module = "genhexkins"', "six legs with drive"),
     ('module = "lineardeltakins"', 'module = "rotarydeltakins"', "three legs with drive"),
     ("height = 20", "height = 10", "90, 210, 330 degrees and z = 0"),

@@ -60,7 +60,7 @@ CASES: list[Case] = [
     ("pocket.cls", "head-table", "fanuc-30i", "auto", 13),  # holes next to a steep error
     ("pocket.cls", "mill-4axis", "haas-ngc", "auto", 12),  # holes whose levels need unlike corrections
 ]
-AGAIN = (CASES[0], CASES[1], CASES[2], CASES[3], CASES[4], CASES[6], CASES[9], CASES[10], CASES[14], CASES[15])
+AGAIN = (CASES[0], CASES[1], CASES[2], CASES[3], CASES[4], CASES[6], CASES[7], CASES[9], CASES[10], CASES[14], CASES[15])
 """samples, machines and controls that other cases hold: with -m slow"""
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from postproc.reference.repeated import Repeated, repeated
 from postproc.setup.model import SetupFile, at_places
 from postproc.setup.places import PlaceOrder
 from postproc.verification.read_back import read_back
-from tests.postproc.kit import body, codes, good
+from tests.postproc.kit import body, codes, few_sides, good
 from toolpaths.arrays import Floats, Ints
 
 TOOLS = {str(n): {"gauge_length": 90.0 + 10.0 * n} for n in range(1, 6)}
@@ -35,9 +34,8 @@ NEAR = 2.5e-4
 
 
 def made(file: str, machine: str, control: str, **setup: object) -> PostResult:
-    path, found = toolpaths.read(Path("samples") / file)
-    return postproc.convert(path, machines.load(machine), control, SetupFile.model_validate({"tools": TOOLS, **setup}),
-                            diagnostics=found)
+    path = few_sides(file, (1, 2) if file == "pocket.cls" else None)
+    return postproc.convert(path, machines.load(machine), control, SetupFile.model_validate({"tools": TOOLS, **setup}))
 
 
 def cut_rows(result: PostResult) -> tuple[Ints, Ints]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,7 +39,7 @@ from toolpaths.arrays import Floats
 from toolpaths.diagnostics import error, read_value
 from toolpaths.rotations import angle_between
 from toolpaths.smoothing.smooth import Tolerance
-from toolpaths.toolpath import Kind, Toolpath
+from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
 
 RADIUS = 3.0
@@ -150,6 +151,22 @@ def test_a_field_is_smooth_along_the_cut(best: TiltField) -> None:
     assert np.linalg.norm(bend, axis=1).max() < 12.0 * np.radians(CONE) / step**2
 
 
+def test_what_is_outside_a_limit_is_broken_and_the_own_axes_are_not() -> None:
+    """Each limit by itself: travel of the joints, an angle from the normal, the ball's path between two poses."""
+    search = searched(swing(normals=True), with_cone(lead=(-5.0, 40.0)))
+    limits, axes, q = search.limits, search.run.axis, search.joints(search.kept())
+    assert not limits.broken(axes, q)
+    over = q.copy()
+    over[len(q) // 2, 0] = limits.upper[0] + 1e-3
+    assert limits.broken(axes, over) and limits.broken(axes, np.full_like(q, np.nan))
+    for lean, only in ((-0.6, replace(limits, slack=1e9)), (0.1, limits)):
+        field = np.zeros_like(axes)
+        field[len(axes) // 2, 0] = lean
+        assert only.broken(turned_axes(axes, field), q), "one pose is turned, its neighbours are not"
+    free = replace(limits, row=limits.row[:0], side=limits.side[:0], most=limits.most[:0])
+    assert not replace(free, slack=1e9).broken(turned_axes(axes, np.full_like(axes, 0.3)), q)
+
+
 def test_lead_tilt_and_dead_centre_hold_at_every_pose() -> None:
     """Own axes: 25 degrees off the normal. Inside 24 to 27 with a lead and a tilt that they nearly fill, less is gained."""
     keys = {"off_centre": 24.0, "lead": [-5.0, 25.0], "tilt": [-25.0, 25.0]}
@@ -192,16 +209,35 @@ def test_two_cuts_next_to_each_other_turn_each_by_its_own_field() -> None:
     assert (angle_between(both.axis, path.axis) > 1e-3).all(), "every rapid leads to a cut or draws back from it"
 
 
+@pytest.mark.parametrize("between", [["$$ ->FEATNO/FINISH"], ["CUTTER/10,5", "LOADTL/2"]])
+def test_rapids_of_another_operation_or_tool_keep_their_axes(between: list[str]) -> None:
+    """Two rapids behind the first cut and two before the second, all along the axis that the second begins with."""
+    x = np.linspace(-20.0, 20.0, 9)
+    rows = [f"{np.sin(0.01 * at):.9f},0,{np.cos(0.01 * at):.9f}" for at in x]
+    cut = ["RAPID", f"GOTO/{x[0]},0,0,{rows[0]}", *(f"GOTO/{at},0,0,{row}" for at, row in zip(x[1:], rows[1:], strict=True))]
+    cut.insert(2, "FEDRAT/MMPM,3000")
+    above = ["RAPID", f"GOTO/{x[0]},0,30,{rows[0]}"]
+    records = [*cut, "RAPID", f"GOTO/{x[-1]},0,20,{rows[-1]}", *above, *between, *above, *cut, "RAPID",
+               f"GOTO/{x[-1]},0,20,{rows[-1]}"]
+    first = len(x) + 2  # positions of the first
+    path = toolpath("$$ ->FEATNO/ROUGH", *records, head=BALL)
+    work = context(path, with_cone())
+    last = runs_of(work, Tolerance(OPTIONS.tolerance, OPTIONS.axis_tolerance * DEG), 1.0)[-1]
+    made = turned_toolpath(work, [leaned(last)])
+    assert np.array_equal(made.axis[:first], path.axis[:first]) and np.array_equal(made.tip[:first], path.tip[:first])
+    assert (angle_between(made.axis[first:], path.axis[first:]) > 1e-3).all()
+
+
 FLAT = ["UNITS/MM", "CUTTER/6,1", *BALL[2:]]
 
 
 @pytest.mark.parametrize(("path", "keys", "why"), [
-    (swing(head=FLAT), {}, "no ball|not a ball"), (swing(), {"cone": None}, "states no cone"),
-    (swing("COOLNT/OFF"), {}, ""),
-    (swing(), {"lead": [0.0, 30.0]}, "none is known"), (swing("CUTCOM/LEFT,3"), {}, "compensates the radius")],
+    ({"head": FLAT}, {}, "no ball|not a ball"), ({}, {"cone": None}, "states no cone"),
+    ({"middle": "COOLNT/OFF"}, {}, ""),
+    ({}, {"lead": [0.0, 30.0]}, "none is known"), ({"middle": "CUTCOM/LEFT,3"}, {}, "compensates the radius")],
     ids=["flat", "no cone", "stop", "normals", "cutcom"])
-def test_what_keeps_its_axes_says_why(path: Toolpath, keys: dict[str, object], why: str) -> None:
-    _, run = only_run(path, with_cone(**keys))
+def test_what_keeps_its_axes_says_why(path: dict[str, Any], keys: dict[str, object], why: str) -> None:
+    _, run = only_run(swing(**path), with_cone(**keys))
     assert bool(run.fixed) == bool(why)
     assert any(part in run.fixed for part in why.split("|"))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -78,3 +80,20 @@ def test_the_same_points_and_the_same_worst_with_it_and_without(name: str, inter
         np.testing.assert_array_equal(one, other)
     without, with_it = (sum(looked[at:to]) for at, to in ((0, looked.index(0, 1)), (looked.index(0, 1), None)))
     assert with_it < 0.8 * without
+
+
+@pytest.mark.parametrize("name", ["mikron-ucp710", "fork-head-ab"])
+def test_ends_beside_the_line_and_turns_along_it_are_in_the_cheap_bound(name: str, interpreted: None) -> None:
+    """Lines beside the blocks, lines along which the axis turns at another place, and arcs, of which it says nothing."""
+    kin, b = machine(name).kinematics.with_tool(80.0), blocks(name, 0.3)
+    beside, along = np.array([0.02, -0.01, 0.03]), 0.2 * (b.curves.end - b.curves.start)
+    for first, last in ((beside, beside), (beside, 0.0), (0.0, along), (-along, 0.0)):
+        lines = segments(b.curves.start + first, b.curves.end + last, b.curves.axis0, b.curves.axis1)
+        cheap = coarse_bound.coarse_bounds(kin, lines, (b.q0, b.q1), b.start, b.end, SHORT)
+        assert cheap is not None and np.isfinite(cheap).any()
+        for t in np.linspace(0.0, 1.0, 11):
+            off = lines.deviation(*kin.forward(b.q0 + t * (b.q1 - b.q0)), np.full(len(lines), t))
+            assert (cheap[0] >= off[0]).all() and (cheap[1] >= off[1]).all()
+    arcs = replace(b.curves, is_arc=np.arange(len(b)) % 2 == 0)
+    found = coarse_bound.coarse_bounds(kin, arcs, (b.q0, b.q1), b.start, b.end, SHORT)
+    assert found is not None and np.isinf(found[:, ::2]).all() and np.isfinite(found[:, 1::2]).any()

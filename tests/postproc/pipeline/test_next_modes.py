@@ -182,7 +182,8 @@ def test_auto_converts_all_samples_that_another_mode_converts(machine: str, cont
 
 @pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc"])
 def test_a_program_in_the_next_mode_is_verified_in_it(controller: str, tmp_path: Path) -> None:
-    """Dog-leg rapids are split by the mode; `verify` reads off the program how, and the room of lengths follows."""
+    """In a plane the slides of a head go down aslant, so that dog-legs leave the line; `verify` reads off the program in
+    which mode it is, and the room of lengths follows."""
     y, z = np.array([0.0, 0.5 * np.sqrt(3.0), 0.5]), np.array([0.0, -0.5, 0.5 * np.sqrt(3.0)])
     at = [",".join(f"{v:.6f}" for v in (*(x * np.eye(3)[0] + u * y + h * z), *z)) for x, u, h in (
         (0, 0, 60), *zip(*zip(*PLACES, strict=True), HEIGHTS, strict=True))]
@@ -191,12 +192,13 @@ def test_a_program_in_the_next_mode_is_verified_in_it(controller: str, tmp_path:
              "CYCLE/DRILL,DEPTH,3,CLEAR,2,RETURN,2,MMPM,250", *(f"GOTO/{p}" for p in at[1:]), "CYCLE/OFF", "RAPID",
              f"GOTO/{at[0]}", "FINI", ""]
     path, _ = toolpaths.read_bytes("\n".join(lines))
-    options = Options(error_model=str(both_directions_of_all(tmp_path, "mikron-ucp710", 2)))
-    result = postproc.convert(path, "mikron-ucp710", controller, options=options)
+    options, setup = Options(error_model=str(both_directions_of_all(tmp_path, "head-table", 2))), tmp_path / "setup.toml"
+    setup.write_text("[tools.1]\ngauge_length = 100.0\n")
+    result = postproc.convert(path, "head-table", controller, setup, options)
     assert not errors_of(result) and "output.next_mode" in {d.code for d in result.diagnostics}
     program = tmp_path / "p.nc"
     program.write_text(result.text)
-    verified = postproc.verify(program, path, "mikron-ucp710", controller, options=options)
+    verified = postproc.verify(program, path, "head-table", controller, setup, options)
     assert not has_errors(verified.diagnostics), [str(d) for d in verified.diagnostics]
     job, _ = prepare(path, result.machine, result.controller, result.setup, result.options)
     assert job is not None and result.comparison is not None and result.comparison.lengths

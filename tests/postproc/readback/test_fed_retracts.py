@@ -16,9 +16,11 @@ from postproc.pipeline.result import PostResult
 from postproc.readback.comparison.approaches import leads_down
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.execution.execute import Motion
+from postproc.reference.holes import Phase
 from postproc.verification.second_witness import second_witness
 from tests.postproc.kit import machine, setup_of
 from toolpaths.arrays import Bools
+from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Kind
 
 SETUP = setup_of("[tools.1]\ngauge_length = 120.0\n[tools.2]\ngauge_length = 120.0\n"
@@ -125,3 +127,19 @@ def test_the_second_witness_counts_no_fed_retract_with_a_cut(fed: PostResult) ->
         seen = replace(compared, executed=(compared.executed[0], spoilt))
         found = second_witness(fed.source, fed.asked, fed.options, fed.job, seen)[1]
         assert {d.code for d in found} == expected
+
+
+def test_a_rapid_down_to_a_hole_that_leaves_its_line_is_no_move_from_hole_to_hole() -> None:
+    """The stop on the way down at the level of the retract is on the line of the hole: a dog-leg there is beside it."""
+    holes = "CYCLE/DRILL,RAPTO,2,FEDTO,-3,RTRCTO,8,MMPM,250\nGOTO/-10,-20,-15\nGOTO/-10,10,-15\nCYCLE/OFF\n"
+    result = converted("fork-head-ab", "haas-ngc", holes, "FEDRAT/MMPM,250\n")
+    assert result.ok and result.job is not None
+    motion, compared, *_ = parts(result)
+    moves = result.job.moves.without_pecks()
+    move = np.minimum(compared.owner, len(moves) - 1)
+    fed = (compared.owner < len(moves)) & (moves.phase[move] == Phase.POSITION) & (motion.code == 1)
+    level = np.einsum("ni,ni->n", moves.curves(move).end - moves.curves(move).start, moves.axis[move])
+    down = np.flatnonzero(fed & (moves.hole[move] >= 0) & (level < -1.0))
+    assert len(down)
+    bad = again(result, replace(motion, code=np.where(np.arange(len(motion)) == down[0], 0, motion.code)))
+    assert "verify.tip" in {d.code for d in bad.diagnostics if d.severity is Severity.ERROR}

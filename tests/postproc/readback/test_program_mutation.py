@@ -198,7 +198,7 @@ def test_wrong_preamble(old: str, new: str) -> None:
 
 def test_rapid_into_uncut_metal() -> None:
     """Pecks in single moves: the rapid back into the hole may end above the last depth, not below it."""
-    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,12,RAPTO,3,RTRCTO,20,MANUAL,MMPM,100,STEP,5",
+    path = toolpath("RAPID", "GOTO/0,0,50", "CYCLE/DEEP,DEPTH,12,RAPTO,3,RTRCTO,70,MANUAL,MMPM,100,STEP,5",
                     "GOTO/10,0,0")
     result = good(convert(path, "mill-3axis"))
     lines = result.text.splitlines()

@@ -66,7 +66,8 @@ def margins_hold(result: Any, limits: dict[str, str]) -> int:
 LIMITS = {"tolerance": "verify.tip", "axis": "verify.axis", "travel": "verify.travel", "clearance": "verify.link"}
 
 
-@pytest.mark.parametrize("name", PROGRAMS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name == "six rods" else ())
+                                  for name in PROGRAMS])
 def test_a_program_verifies_with_lengths_inside_its_margins_and_not_outside(name: str) -> None:
     """1.1 um: what rounded words may pass travel by."""
     assert margins_hold(made(name), LIMITS)

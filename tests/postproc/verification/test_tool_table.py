@@ -231,3 +231,23 @@ def test_a_length_is_0_where_the_words_hold_it_and_the_control_adds_its_own(leng
     found = CliRunner().invoke(app, ["verify", str(tmp_path / "p.h"), str(tmp_path / "a.apt"), *on, "--tool-table",
                                      str(tmp_path / "t.csv")])
     assert found.exit_code == code and ("error [tool.length_twice]" in found.stderr) == bool(code)
+
+
+@pytest.mark.parametrize(("name", "table", "aside"), [
+    ("linuxcnc", "T1 P1 X0 Z100 D6\nT2 P2 X5 Z90 C-1.5 I7 D4\n", "X 5, C -1.5"),
+    ("siemens-840d", "$TC_DP3[1,1]=100 $TC_DP4[1,1]=0\n$TC_DP3[2,1]=90 $TC_DP4[2,1]=5 $TC_DP6[2,1]=4\n$TC_DP13[2,1]=.1\n"
+                     "$TC_DP5[1,2]=9\n", "$TC_DP4 5, $TC_DP13 .1")])
+def test_what_the_control_adds_along_other_axes_is_an_error_of_the_tools_called(name: str, table: str, aside: str,
+                                                                                 tmp_path: Path) -> None:
+    """G43 of LinuxCNC and length 2 and 3 of a Siemens tool set the tool off sideways: the program was called proved."""
+    assert read(table, name).aside == {2: aside}
+    (tmp_path / "t.tbl").write_text(table)
+    setup, program = tmp_path / "s.toml", tmp_path / "p.nc"
+    for number, bad in ((1, False), (2, True)):
+        cl = tmp_path / "part.apt"
+        cl.write_text(f"UNITS/MM\nLOADTL/{number}\nSPINDL/RPM,1000,CLW\nRAPID\nGOTO/0,0,20\nFEDRAT/200\nGOTO/0,0,-1\nFINI\n")
+        setup.write_text(f"[tools.{number}]\ngauge_length = {110 - 10 * number}.0\n")
+        on = [str(cl), "-m", "mill-3axis", "-c", name, "--setup", str(setup)]
+        assert CliRunner().invoke(app, ["convert", *on, "-o", str(program)]).exit_code == 0
+        result = CliRunner().invoke(app, ["verify", str(program), *on, "--tool-table", str(tmp_path / "t.tbl")])
+        assert (result.exit_code, "tool-table.aside" in result.output) == (int(bad), bad), result.output
