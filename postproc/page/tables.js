@@ -89,7 +89,7 @@ function headParts(k) {
     make("p", {class: "note"}, "The proof is about the program, the CL file and the machine as its files describe it; not about deflection, heat, wear or following error.")) : null;
   const files = make("div", {}, make("h3", {}, "What it rests on (SHA-256)"), table(["What", "File", "SHA-256"], run.files.map((f) => [f.role.replace("_", " "), f.file, f.sha256]), []));
   files.querySelectorAll("td:last-child").forEach((cell) => cell.classList.add("hash"));
-  const band = c.time && c.band_s ? make("p", {class: "note"}, "95 % of runs of this program are expected in that time, feeds at 100 %; operators' stops are not counted. The band is widened by what is not known of machine and control"
+  const band = c.time && c.band_s ? make("p", {class: "note"}, "95 % of runs on a machine as its files describe it take a time within that band, stops by hand not counted. What no document states of machine and control widens it"
     + (c.time.assumed.length ? ", here " + c.time.assumed.map((name) => name.replaceAll("_", " ")).join(", ") : "") + ".") : null;
   return [make("div", {}, make("h3", {}, "Figures"), table(["", ""], facts, []), band), make("div", {}, make("h3", {}, "Travel used"), table(["Axis", "Used", "Travel", "Share", "Margin"], axes, [1, 2, 3, 4]), proof), files].filter(Boolean);
 }
