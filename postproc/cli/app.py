@@ -177,7 +177,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                      clock=program_clock(model))
         noted, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
-        time = estimate_of(result, model)  # all before a file is written
+        time = estimate_of(result, model, executed=bool(page))  # all before a file is written
         values = summary.as_dict(result, str(output), time)
         text = summary.as_text(result, str(output), time, values)
         more = [] if result.ok else _offers(result, path, machine, controller)

@@ -165,7 +165,7 @@ def _run(path: Toolpath, machine: str, controller: str, options: Options, read: 
         from postproc.setup_sheet.offers import offers
 
         result = replace(result, diagnostics=(*result.diagnostics, *offers(result, path, machine, controller)))
-    return Run(result, estimate_of(result), known or {}, f"{options.name}.nc")
+    return Run(result, estimate_of(result, executed=True), known or {}, f"{options.name}.nc")
 
 
 def _line(run: dict[str, Any]) -> str:

@@ -143,6 +143,6 @@ function whatIf(k) {
     return [`${one.axis} ${one.limit}`, figure(`runs.${k}.what_if.limits.${n}.held_s`, 2, "s"), slider, out];
   });
   made.append(table(["Limit", "Holds for", "Factor 0.5 to 2", "Time"], rows, [1]),
-    make("p", {class: "note"}, "Times at factors 0.5, 0.75, 1, 1.5, 2 are counted by the time model; between them interpolated. One limit at a time."));
+    make("p", {class: "note"}, `Times at factors ${found.factors.join(", ")} are counted by the time model; between them interpolated. One limit at a time.`));
   return made;
 }

@@ -62,6 +62,15 @@ function spindleRange(tools) {
   return `${tools.length} tools, ` + (every.length ? `${number(Math.min(...every), 0)} to ${number(Math.max(...every), 0)} rpm` : "spindle off");
 }
 
+// The three limits of axes that hold the program longest.
+function slowest(k) {
+  const time = report.runs[k].conversion.time;
+  if (!time) return "-";
+  const held = Object.entries(time.limiting).flatMap(([axis, by]) => Object.entries(by).map(([key, seconds]) => ({axis, key, seconds}))).filter((one) => one.seconds > 0.005);
+  const most = held.sort((a, b) => b.seconds - a.seconds).slice(0, 3);
+  return most.length ? make("span", {}, ...most.flatMap((one, n) => [(n ? ", " : "") + `${one.axis} ${one.key.replace("_s", "")} `, figure(`runs.${k}.conversion.time.limiting.${one.axis}.${one.key}`, 2, "s")])) : "none";
+}
+
 function headParts(k) {
   const run = report.runs[k], base = `runs.${k}`, c = run.conversion, witness = c.witness;
   const axes = run.axes.map((axis, j) => [axis.letter, axis.used ? make("span", {}, figure(`${base}.axes.${j}.used.0`, 3, ""), " to ", figure(`${base}.axes.${j}.used.1`, 3, axis.unit)) : "-",
@@ -70,7 +79,7 @@ function headParts(k) {
   const feeds = run.feeds || {};
   const facts = [["Time", timeCell(k)], ["95 % of runs", c.cycle_time_s === null ? "-" : bandCell(k)], ["Lower bound", figure(base + ".conversion.lower_bound_s", 2, "s")],
     ["Time model", c.time ? c.time.model : "-"], ["Blocks", figure(base + ".conversion.blocks_out", 0, "")], ["CL points", figure(base + ".conversion.points_in", 0, "")],
-    ["Feeds of cuts", run.feeds ? make("span", {}, figure(base + ".feeds.least_mm_per_min", 0, ""), " to ", figure(base + ".feeds.greatest_mm_per_min", 0, "mm/min")) : "-"],
+    ["Axes that hold longest", slowest(k)], ["Feeds of cuts", run.feeds ? make("span", {}, figure(base + ".feeds.least_mm_per_min", 0, ""), " to ", figure(base + ".feeds.greatest_mm_per_min", 0, "mm/min")) : "-"],
     ["Blocks slowed for an axis", run.feeds ? figure(base + ".feeds.reduced_blocks", 0, "") : "-"],
     ["Spindle", spindleRange(c.tools)],
     ["Collisions", collisionText(run.collisions)],
@@ -80,7 +89,9 @@ function headParts(k) {
     make("p", {class: "note"}, "The proof is about the program, the CL file and the machine as its files describe it; not about deflection, heat, wear or following error.")) : null;
   const files = make("div", {}, make("h3", {}, "What it rests on (SHA-256)"), table(["What", "File", "SHA-256"], run.files.map((f) => [f.role.replace("_", " "), f.file, f.sha256]), []));
   files.querySelectorAll("td:last-child").forEach((cell) => cell.classList.add("hash"));
-  return [make("div", {}, make("h3", {}, "Figures"), table(["", ""], facts, [])), make("div", {}, make("h3", {}, "Travel used"), table(["Axis", "Used", "Travel", "Share", "Margin"], axes, [1, 2, 3, 4]), proof), files].filter(Boolean);
+  const band = c.time && c.band_s ? make("p", {class: "note"}, "95 % of runs on a machine as its files describe it take a time within that band, stops by hand not counted. What no document states of machine and control widens it"
+    + (c.time.assumed.length ? ", here " + c.time.assumed.map((name) => name.replaceAll("_", " ")).join(", ") : "") + ".") : null;
+  return [make("div", {}, make("h3", {}, "Figures"), table(["", ""], facts, []), band), make("div", {}, make("h3", {}, "Travel used"), table(["Axis", "Used", "Travel", "Share", "Margin"], axes, [1, 2, 3, 4]), proof), files].filter(Boolean);
 }
 
 function operationTable(k) {
@@ -133,7 +144,7 @@ function turningParts(k) {
   return [make("h3", {}, "Axes that turn along the cuts"),
     make("p", {}, `The tool axis is turned along ${found.turned} of ${found.cuts.length} cuts; the centre of the ball stays on its path.` + (shown.length < found.turned ? ` The first ${shown.length} are shown.` : "")),
     rows.length ? table(["CL lines", "Turned by at most", "Allowed", "Lead, deg", "Tilt, deg", "Ball off its path", "Time", "With the CL file's axes"], rows, [1, 2, 3, 4, 5, 6, 7]) : null,
-    found.turned && now && now.keep && now.turned ? make("p", {}, `Whole program by the model by which they were chosen (${now.model}${time && time.model !== now.model ? `; the time in the summary is by another, ${time.model}` : ""}): `, figure(`${base}.on_the_control.turned.time_s`, 2, "s"), " turned, ",
+    found.turned && now && now.keep && now.turned ? make("p", {}, `Whole program by the model by which they were chosen (${now.model.replace(/^model /, "")}${time && now.model !== "model " + time.model ? `; the time in the summary is by another, ${time.model}` : ""}): `, figure(`${base}.on_the_control.turned.time_s`, 2, "s"), " turned, ",
       figure(`${base}.on_the_control.keep.time_s`, 2, "s"), " with the axes of the CL file, ", figure(`${base}.on_the_control.gain_percent`, 1, "%"), " less.") : null,
     kept.size ? make("ul", {}, ...[...kept].map(([why, n]) => make("li", {}, `${n} ${n === 1 ? "cut keeps its" : "cuts keep their"} axes: ${why}`))) : null].filter(Boolean);
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 import re
 import zlib
@@ -159,3 +160,18 @@ def test_a_page_never_replaces_an_input(tmp_path: Path) -> None:
     cl.write_text("\n".join(LINES))
     done = CliRunner().invoke(app, ["report", str(cl), "-m", "mill-3axis", "-c", "linuxcnc", "-o", str(cl)])
     assert done.exit_code == 2 and cl.read_text().startswith("PARTNO")
+
+
+def test_its_time_is_that_of_the_command_time(tmp_path: Path) -> None:
+    """For a control that is executed: by formulas the blade took 224 s, executed 309 s, neither in the band of the other."""
+    cl, said = tmp_path / "part.cls", tmp_path / "t.json"
+    cl.write_text("\n".join(LINES) + "\n")
+    done = CliRunner().invoke(app, ["time", str(cl), "-m", "mikron-ucp710", "-c", "siemens-840d", "--setup",
+                                    str(SAMPLES / "tools.setup.toml"), "--json", str(said)])
+    assert done.exit_code == 0, done.output
+    found, run = json.loads(said.read_text()), small().values["runs"][1]
+    assert run["controller"] == "siemens-840d" and run["conversion"]["time"]["model"] == "control"
+    assert run["conversion"]["cycle_time_s"] == pytest.approx(found["cycle_time_s"])
+    assert run["conversion"]["band_s"] == pytest.approx(found["band_s"])
+    assert all(one["seconds"][run["what_if"]["factors"].index(1.0)] == run["conversion"]["cycle_time_s"]
+               for one in run["what_if"]["limits"])
