@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import machines
-from machines.geometric_error.exchange import survey
+from machines.geometric_error.exchange import exports, survey
 from machines.geometric_error.files.loader import load
 from postproc.cli.app import app
 
@@ -24,8 +24,9 @@ MIKRON = SAMPLES / "mikron-ucp710.toml"
 
 @pytest.fixture(autouse=True)
 def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Models are looked at in few places."""
+    """Models are looked at in few places, the same in all commands."""
     monkeypatch.setattr(survey, "PLACES", 1000)
+    monkeypatch.setattr(exports, "WORST_PLACES", 1000)
 
 
 def run(*arguments: object, code: int = 0) -> Result:
