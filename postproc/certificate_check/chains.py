@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
 from hashlib import sha256
 from itertools import product
 from typing import Any
@@ -17,25 +16,14 @@ from typing import Any
 import numpy as np
 
 from postproc.certificate_check.balls import Ball, FloatArray, ball, cos_sin, scalar, vector
-from postproc.certificate_check.check import FORM, Rejected
+from postproc.certificate_check.boxes import Rejected, StatedBox, covering, halves
+from postproc.certificate_check.check import FORM
 from postproc.witness.machine import chain
 
-LOWER, UPPER, DEEPEST, AT_ONCE = "ab", "AB", 16, 1_000
+LETTERS, DEEPEST, AT_ONCE = "ab", 16, 1_000
 STATED = ("pole", "slides", "travel")
 _LINE = re.compile(r"(\.|[abAB]{1,64}) (\S+) (\S+) (\S+)")
 BallPoint = list[Ball]
-
-
-@dataclass(frozen=True)
-class StatedTurns:
-    """A box of rotary positions of the file, or a part of it: its path, ends (R,), what is stated of it (3,), cuts so
-    far."""
-
-    path: str
-    lower: FloatArray
-    upper: FloatArray
-    stated: FloatArray
-    cuts: int = 0
 
 
 def chain_confirmed(found: dict[str, Any]) -> dict[str, Any]:
@@ -63,7 +51,7 @@ def chain_confirmed(found: dict[str, Any]) -> dict[str, Any]:
         f"{name}_at_least": float(v) for name, v in zip(STATED, least, strict=True)}
 
 
-def _boxes(found: dict[str, Any]) -> list[StatedTurns]:
+def _boxes(found: dict[str, Any]) -> list[StatedBox]:
     lines = found["boxes"]
     if sha256("\n".join(lines).encode()).hexdigest() != found["digest"]:
         raise Rejected("the boxes are not those that its digest was taken of")
@@ -82,34 +70,11 @@ def _boxes(found: dict[str, Any]) -> list[StatedTurns]:
     if len(found["region"]["turns_rad"]) != len(turning) or not (np.isfinite(spans).all() and (
             spans[:, 0] <= spans[:, 1]).all()):
         raise Rejected(f"the ranges of the rotary axes {found['region']['turns_rad']} are none")
-    todo, boxes = [StatedTurns("", spans[:, 0], spans[:, 1], np.zeros(3))], list[StatedTurns]()
-    inner = {path[:k]: LOWER.index(path[k].lower()) for path in stated for k in range(len(path))}
-    while todo:
-        box = todo.pop()
-        if box.path in stated:
-            if box.path in inner:
-                raise Rejected(f"box {box.path or '.'} holds others")
-            boxes.append(StatedTurns(box.path, box.lower, box.upper, stated[box.path]))
-        elif box.path in inner and inner[box.path] < len(turning):
-            todo += _cut(box, inner[box.path])
-        else:
-            middle = ", ".join(f"{name} {math.degrees(v):g}" for name, v in zip(
-                turning, 0.5 * (box.lower + box.upper), strict=True))
-            raise Rejected(f"no box covers {box.path or 'the region'}, round {middle} degrees")
-    if len(boxes) < len(stated):
-        raise Rejected(f"{len(stated) - len(boxes)} boxes are of another division than the others")
-    return boxes
+    return covering(stated, spans, LETTERS, lambda at: ", ".join(
+        f"{name} {math.degrees(v):g}" for name, v in zip(turning, at, strict=True)) + " degrees")
 
 
-def _cut(box: StatedTurns, i: int) -> list[StatedTurns]:
-    middle = 0.5 * (box.lower[i] + box.upper[i])
-    below, above = box.upper.copy(), box.lower.copy()
-    below[i] = above[i] = middle
-    return [StatedTurns(box.path + LOWER[i], box.lower, below, box.stated, box.cuts + 1),
-            StatedTurns(box.path + UPPER[i], above, box.upper, box.stated, box.cuts + 1)]
-
-
-def _prove(found: dict[str, Any], boxes: list[StatedTurns]) -> int:
+def _prove(found: dict[str, Any], boxes: list[StatedBox]) -> int:
     todo, count = list(boxes), 0
     while todo:
         some, todo = todo[-AT_ONCE:], todo[:-AT_ONCE]
@@ -128,7 +93,7 @@ def _prove(found: dict[str, Any], boxes: list[StatedTurns]) -> int:
                                f"{dict(zip(STATED, here[k].round(6).tolist(), strict=True))}, stated {stated[k].tolist()}")
             if box.cuts >= DEEPEST:
                 raise Rejected(f"box {box.path or '.'}, round {where} degrees, is not confirmed: its bounds are too close")
-            todo += _cut(box, int(half[k].argmax()))
+            todo += halves(box, int(half[k].argmax()), LETTERS)
     return count
 
 

@@ -9,19 +9,20 @@ loader. Source of the bound: perturbation of the identity (Golub and Van Loan, 2
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
 import numpy as np
 
 from postproc.certificate_check.balls import Ball, FloatArray, ball, product, spectral
+from postproc.certificate_check.boxes import Rejected, StatedBox, covering, halves
 from postproc.certificate_check.legs import legs_in, moving
 from postproc.certificate_check.parts import apart
 
 DEEPEST, AT_ONCE = 14, 1_000
 """cuts of a box of the file; boxes at a time"""
-LOWER, UPPER = "xyztn", "XYZTN"
+LETTERS = "xyztn"
+"""directions of halves"""
 SPANS = ("x_mm", "y_mm", "z_mm", "tilt_rad", "heading_rad")
 BOUNDS, GAPS = ("direct", "inverse", "held"), ("parts", "stops")
 FORM, COVERS = 2, ("workspace", "region")
@@ -31,23 +32,8 @@ NONE_THERE = 9e5
 _LINE = re.compile(r"(\.|[xyztnXYZTN]{1,64})((?: \S+)+)")
 
 
-class Rejected(ValueError):
-    """The certificate does not prove what it says; the message says where."""
-
-
 NO_CERTIFICATE = (KeyError, TypeError, ValueError, IndexError, AttributeError, ArithmeticError)
 """what reading a file of another form may raise"""
-
-
-@dataclass(frozen=True)
-class StatedBox:
-    """A box of the file, or a part of it: its path, ends (5,), what is stated of it (3,) or (5,), cuts so far."""
-
-    path: str
-    lower: FloatArray
-    upper: FloatArray
-    stated: FloatArray
-    cuts: int = 0
 
 
 def confirmed(found: dict[str, Any]) -> dict[str, Any]:
@@ -122,32 +108,7 @@ def _boxes(found: dict[str, Any]) -> list[StatedBox]:
     spans = np.array([found["region"][name] for name in SPANS], np.float64)
     if not (np.isfinite(spans).all() and (spans[:, 0] <= spans[:, 1]).all()):
         raise Rejected(f"the region {spans.tolist()} is empty")
-    boxes: list[StatedBox] = []
-    todo = [StatedBox("", spans[:, 0], spans[:, 1], np.zeros(len(_names(found))))]
-    inner = {path[:k] for path in stated for k in range(len(path))}
-    letters = {path[:k]: LOWER.index(path[k].lower()) for path in stated for k in range(len(path))}
-    while todo:
-        box = todo.pop()
-        if box.path in stated:
-            if box.path in inner:
-                raise Rejected(f"box {box.path or '.'} holds others")
-            boxes.append(StatedBox(box.path, box.lower, box.upper, stated[box.path]))
-        elif box.path in inner:
-            todo += _cut(box, letters[box.path])
-        else:
-            middle = ", ".join(f"{v:g}" for v in 0.5 * (box.lower + box.upper))
-            raise Rejected(f"no box covers {box.path or 'the region'}, round x, y, z, tilt, heading {middle} (mm, rad)")
-    if len(boxes) < len(stated):
-        raise Rejected(f"{len(stated) - len(boxes)} boxes are of another division than the others")
-    return boxes
-
-
-def _cut(box: StatedBox, i: int) -> list[StatedBox]:
-    middle = 0.5 * (box.lower[i] + box.upper[i])
-    below, above = box.upper.copy(), box.lower.copy()
-    below[i] = above[i] = middle
-    return [StatedBox(box.path + LOWER[i], box.lower, below, box.stated, box.cuts + 1),
-            StatedBox(box.path + UPPER[i], above, box.upper, box.stated, box.cuts + 1)]
+    return covering(stated, spans, LETTERS, lambda at: f"x, y, z, tilt, heading {', '.join(f'{v:g}' for v in at)} (mm, rad)")
 
 
 def _prove(found: dict[str, Any], boxes: list[StatedBox]) -> int:
@@ -168,7 +129,7 @@ def _prove(found: dict[str, Any], boxes: list[StatedBox]) -> int:
                                f"rad): {over[k]}")
             if box.cuts >= DEEPEST:
                 raise Rejected(f"box {box.path or '.'}, round {where} (mm, rad), is not confirmed: its bounds are too close")
-            todo += _cut(box, int(worst[k]))
+            todo += halves(box, int(worst[k]), LETTERS)
     return count
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from postproc.certificate_check.balls import ball
+from postproc.certificate_check.boxes import Rejected
 from postproc.certificate_check.chains import about_chain
-from postproc.certificate_check.check import Rejected
 from postproc.certificate_check.legs import carried, legs_in
 from postproc.witness.machine import legs_of
 

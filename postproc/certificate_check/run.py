@@ -8,8 +8,9 @@ from typing import Any
 
 from machines.loader import builtin
 from machines.user_file import base_chain, values_of
+from postproc.certificate_check.boxes import Rejected
 from postproc.certificate_check.chains import chain_confirmed
-from postproc.certificate_check.check import NO_CERTIFICATE, Rejected, confirmed
+from postproc.certificate_check.check import NO_CERTIFICATE, confirmed
 from postproc.certificate_check.machine_file import about
 from postproc.witness.machine import merged
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error

@@ -24,7 +24,8 @@ from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import spanned
 from machines.loader import builtin, values_of_machine
 from postproc.certificate_check.balls import Ball, ball, cos_sin
-from postproc.certificate_check.check import Rejected, confirmed
+from postproc.certificate_check.boxes import Rejected
+from postproc.certificate_check.check import confirmed
 from postproc.certificate_check.machine_file import about, hash_of
 from postproc.cli.app import app
 from tests.certificates import of_chains, on_legs

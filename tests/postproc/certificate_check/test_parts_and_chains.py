@@ -20,8 +20,9 @@ from machines.analysis.certify import Wanted, certify
 from machines.analysis.certify_chain import WantedOfChain, certify_chain
 from machines.certificate.lookup import key_of, shipped
 from machines.loader import values_of_machine
+from postproc.certificate_check.boxes import Rejected
 from postproc.certificate_check.chains import chain_confirmed
-from postproc.certificate_check.check import Rejected, confirmed
+from postproc.certificate_check.check import confirmed
 from postproc.certificate_check.machine_file import about, hash_of
 from postproc.cli.app import app
 from tests.certificates import of_chains
