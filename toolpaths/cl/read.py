@@ -84,8 +84,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         progress: called with (bytes read, bytes in all)
         tolerance: mm of the program; a share of it may go to arcs and chords in the place of splines
         cubics: "pieces": splines by chords at equal steps between their knots (`Role.CUBIC`), so that they can be written as
-            what they are, or as fewer cubics where the tolerance allows; "uniform": as cubics with equal knots, of which a
-            control knows how they join; else by as few arcs or chords as the tolerance allows
+            what they are; "uniform": as cubics with equal knots; else by as few arcs or chords as the tolerance allows
 
     Raises:
         ValueError: for a dialect or unit that does not exist (wrong use; faults of the file are diagnostics).

@@ -132,4 +132,4 @@ def _refused(stated: list[DialectStatement], points: list[list[DialectStatement]
         return "BSPLINE without the same PL in all its blocks: which step between nodes each is of no page says"
     if len(points) < DEGREE:
         return f"BSPLINE with {len(points)} control points behind the first"
-    return "BSPLINE behind BSPLINE, which may go on or begin anew," if again else ""
+    return "BSPLINE behind BSPLINE, which may go on or begin again," if again else ""
