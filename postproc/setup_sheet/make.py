@@ -98,11 +98,11 @@ def _stated(fit: Fit, at: Callable[[tuple[float, float, float]], Fit],
 
 
 def _asked_once(ask: Callable[[Question], float | str]) -> Callable[[Question], float | str]:
-    """The same, with one answer to each question."""
+    """The same, with one answer to each question; what was left empty may be asked again."""
     said: dict[str, float | str] = {}
 
     def once(question: Question) -> float | str:
-        if question.key not in said:
+        if said.get(question.key, "") == "":
             said[question.key] = ask(question)
         return said[question.key]
 
