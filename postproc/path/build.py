@@ -97,7 +97,8 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         diagnostics.append(info("joints.opened", joint_faults.opened(path.opened, path.split_seconds), file=file))
     diagnostics += cost(modes.tcp_code, longer, file)
     return path, faults.merged(diagnostics) + faults.off_line(path.code, path.u, path.move, path.seconds,
-                                                              given, file, rapids_as_feed)
+                                                              given, file, rapids_as_feed,
+                                                              bool(modes.tcp_code) and any(machine.rotary))
 
 
 def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count: int, turns: Ints,
