@@ -70,8 +70,9 @@ def _sharing(held: HeldLoops, loops: Loops, at: tuple[Floats, Floats], driven: F
     values = np.linalg.svd(np.nan_to_num(g), compute_uv=False)
     own = {field.name: getattr(held, field.name) for field in fields(HeldLoops)} | {"least": values[:, -1]}
     return SharedLoops(**own, spans=span, stretch=np.linalg.norm(stretch, axis=1),
-                       loose=driven / span[:, None] - g @ columns, moved=moved * (np.hypot(1.0, held.arm / loops.lever) / span)[:, None],
-                       size=values[:, 0], shift=np.linalg.norm(loops.twists(columns)[:, :3], axis=1))
+                       loose=driven / span[:, None] - g @ columns, size=values[:, 0],
+                       moved=moved * (np.hypot(1.0, held.arm / loops.lever) / span)[:, None],
+                       shift=np.linalg.norm(loops.twists(columns)[:, :3], axis=1))
 
 
 def errors_in_motion(frame: LegFrame, errors: RodErrors, q: Floats, pose: tuple[Floats, Floats], reach: Floats,
