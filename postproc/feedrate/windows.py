@@ -22,7 +22,7 @@ from toolpaths.arrays import Floats
 from toolpaths.compiled import available
 from toolpaths.shapes import arrays
 
-WINDOW, OVERLAP = 8192, 1024
+WINDOW, OVERLAP = 8192, 512
 """Knots of a window, and on each side beyond it."""
 APART, OVER = 1e-3, 1.002
 """Relative difference of neighbours, and ratio to a limit in the blend, from which the overlap is widened."""
@@ -30,8 +30,9 @@ WIDEST = 16
 """Times the asked overlap beyond which it is not widened."""
 
 
-COLD, WARM = 5.0, 0.03
-"""First gap over time, from a slow start and from a similar motion."""
+COLD, WARM = 5.0, 1.0
+"""First gap over time, from a slow start and from a similar motion; far below it the motion is hemmed in before it can
+grow, and takes up to three times the steps."""
 
 
 @dataclass(frozen=True)
