@@ -15,7 +15,7 @@ from postproc.feedrate.mesh import Marks, Spacing, mesh, ramp_time
 from postproc.feedrate.motion import SAMPLE, MotionPiece, Plan
 from postproc.feedrate.paths import Eased, ParametricPath
 from postproc.feedrate.problem import MotionKnots
-from postproc.feedrate.profile import knots_profile, linear_profile
+from postproc.feedrate.profile import knots_profile, linear_profile, spline_profile
 from postproc.feedrate.rows import forces_bind, rows, steady_force_speed, steady_tool_speed
 from postproc.feedrate.second_order import second_order
 from postproc.feedrate.shares import shares
@@ -79,7 +79,8 @@ def plan(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, st
         sigma = knots if knots is not None else mesh_between(eased, limits, allowed, options.knots)
         felt = limits if forces_bind(eased, sigma, limits, allowed) else replace(limits, forces=None)
         found, report, slower = _solve(MotionKnots(eased, sigma, felt, allowed), options)
-        profile = knots_profile(found.sigma, eased.ease, report.c)
+        profile = (knots_profile(found.sigma, eased.ease, report.c) if report.basis is None else
+                   spline_profile(found.sigma, report.basis, report.c))
         pieces.append(MotionPiece(eased, profile, shares(report.weights, len(limits.velocity), float(profile.times[-1]))))
         reports.append((report.iterations, report.mismatch, report.solved))
         guess.append(slower)
