@@ -27,6 +27,7 @@ class PackedSteps:
         self._inverse = np.ascontiguousarray(np.stack((1.0 / problem.limits.acceleration, 1.0 / problem.limits.jerk)))
         self._w = np.zeros((blocks, COMMON, LANES))
         self._v = np.zeros((blocks, joints, PER_JOINT, LANES))
+        self._middle = np.zeros(LANES if problem.middle is None else blocks * joints * LANES)
         self._zc = self._rc = np.zeros(0)
         self._low, self._force = np.zeros((3, self._room)), np.zeros(self._room)
         self._scratch = np.empty((3, self._room))
@@ -35,6 +36,8 @@ class PackedSteps:
         self._fill(self._w, 13, np.zeros((1, knots)), pad=1.0)
         for j in range(joints):
             self._fill(self._v[:, j], 0, np.stack((problem.dq[j], problem.d2q[j], problem.d3q[j])))
+            if problem.middle is not None:
+                self._fill(self._middle.reshape(blocks, joints, LANES), j, problem.middle[j:j + 1])
 
     @property
     def c(self) -> Floats:
@@ -67,7 +70,7 @@ class PackedSteps:
             self._first(mu)
         compiled(advance)(self._all, self._step, self._zc, self._rc, primal, dual)
         w, v = self._w.reshape(-1), self._v.reshape(-1)
-        gap, time = compiled(assemble)(w, v, self._all, self._inverse, self._blocks, mu, dual)
+        gap, time = compiled(assemble)(w, v, self._all, self._inverse, self._middle, self._blocks, mu, dual)
         gap += compiled(begin)(self._all, self._zc, mu, self._low, self._force)
         compiled(band)(w, self._blocks, self._low, self._force)
         return gap, time
@@ -83,6 +86,6 @@ class PackedSteps:
             return 0.0, 0.0
         ends = compiled(relative)(right, first, last, self._all, self._zc, mu, self._step, self._rc)
         w, v = self._w.reshape(-1), self._v.reshape(-1)
-        inner = compiled(direction)(w, v, self._step, self._inverse, self._blocks, mu)
+        inner = compiled(direction)(w, v, self._step, self._inverse, self._middle, self._blocks, mu)
         fall, loss = (max(pair) for pair in zip(ends, inner, strict=True))
         return (1.0 / fall if fall > 0.0 else np.inf, 1.0 / loss if loss > 0.0 else np.inf)

@@ -58,14 +58,15 @@ def _knots(w: Any, c: Any, b: Any, k: Any, mu: Any, dual: Any) -> None:
 
 
 @loop
-def _joint(w: Any, v: Any, b: Any, q: Any, ia: Any, ij: Any, mu: Any, dual: Any) -> None:
-    """Add the rows of one joint, block q of v, to block b of w; ia, ij one over its limits of acceleration and jerk."""
+def _joint(w: Any, v: Any, m: Any, b: Any, q: Any, r: Any, ia: Any, ij: Any, mu: Any, dual: Any) -> None:
+    """Add the rows of one joint, block q of v and r of m, to block b of w; ia, ij one over its limits of acceleration and
+    jerk."""
     for i in range(L):
         p, o = b + i, q + i
         x, x1, half = w[p + X0], w[p + X1], w[p + HALF]
         scale = ia * w[p + TIGHT_A]
         a0, a1 = v[o + F1] * scale, 0.5 * v[o] * scale
-        use = a0 * x + a1 * x1
+        use = a0 * x + a1 * x1 + m[r + i]
         s0, s1 = 1.0 - use, 1.0 + use
         z0, z1 = v[o + F3] * (1.0 + dual * v[o + F7]), v[o + F4] * (1.0 + dual * v[o + F8])
         v[o + F3], v[o + F4] = z0, z1
@@ -99,18 +100,21 @@ def _joint(w: Any, v: Any, b: Any, q: Any, ia: Any, ij: Any, mu: Any, dual: Any)
 
 
 @loop
-def assemble(w: Any, v: Any, c: Any, inverse: Any, blocks: Any, mu: Any, dual: Any) -> Any:
+def assemble(w: Any, v: Any, c: Any, inverse: Any, middle: Any, blocks: Any, mu: Any, dual: Any) -> Any:
     """Update z by the dual step; leave each knot's part of the Newton equations in G and H. Returns gap and time.
 
-    w, v flat blocks, c coefficients padded to the lanes, inverse (2, J) of the limits of acceleration and jerk.
+    w, v flat blocks, c coefficients padded to the lanes, inverse (2, J) of the limits of acceleration and jerk, middle of the
+    acceleration rows by block and joint, or one block of zeros for all.
     """
     joints = _N(inverse.shape[1])
+    own = _N(0 if middle.shape[0] == LANES else LANES)
     gap, time = 0.0, 0.0
     for block in range(blocks):
         b = block * BLOCK
         _knots(w, c, b, block * L, mu, dual)
         for joint in range(joints):
-            _joint(w, v, b, (block * joints + joint) * F11, inverse[0, joint], inverse[1, joint], mu, dual)
+            at = block * joints + joint
+            _joint(w, v, middle, b, at * F11, at * own, inverse[0, joint], inverse[1, joint], mu, dual)
         for i in range(L):
             p = b + i
             gap += (1.0 - w[p + PAD]) * w[p + GAP]
@@ -188,11 +192,12 @@ def pentadiagonal(low: Any, x: Any, inverse: Any, below: Any) -> Any:
 
 
 @loop
-def direction(w: Any, v: Any, dc: Any, inverse: Any, blocks: Any, mu: Any) -> Any:
+def direction(w: Any, v: Any, dc: Any, inverse: Any, middle: Any, blocks: Any, mu: Any) -> Any:
     """Relative changes of z for the step dc; returns the largest relative decrease of a slack and of a z."""
     # Largest fall of a slack by itself and of a z by itself: one over them are the steps to the nearest bound.
     # One division serves a pair: 1 / (slack z) times z or slack. B0 to B2 hold the changes of x, x', x''.
     joints = _N(inverse.shape[1])
+    own = _N(0 if middle.shape[0] == LANES else LANES)
     primal, dual = 0.0, 0.0
     for block in range(blocks):
         b = block * BLOCK
@@ -213,13 +218,13 @@ def direction(w: Any, v: Any, dc: Any, inverse: Any, blocks: Any, mu: Any) -> An
             w[p + G0], w[p + G1] = fall, -rate
         for joint in range(joints):
             ia, ij = inverse[0, joint], inverse[1, joint]
-            q = (block * joints + joint) * F11
+            q, r = (block * joints + joint) * F11, (block * joints + joint) * own
             for i in range(L):
                 p, o = b + i, q + i
                 x, x1, dx, dx1 = w[p + X0], w[p + X1], w[p + B0], w[p + B1]
                 scale = ia * w[p + TIGHT_A]
                 a0, a1 = v[o + F1] * scale, 0.5 * v[o] * scale
-                use, change = a0 * x + a1 * x1, a0 * dx + a1 * dx1
+                use, change = a0 * x + a1 * x1 + middle[r + i], a0 * dx + a1 * dx1
                 s0, s1, z0, z1 = 1.0 - use, 1.0 + use, v[o + F3], v[o + F4]
                 o0, o1 = 1.0 / (s0 * z0), 1.0 / (s1 * z1)
                 f0, f1 = change * z0 * o0, -change * z1 * o1
