@@ -16,7 +16,8 @@ Limit = Annotated[float, Field(gt=0.0, le=1e12)]
 MassCentre = tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=-1e6, le=1e6)],
               Annotated[float, Field(ge=-1e6, le=1e6)]]
 Inertia = Amount | tuple[Amount, Amount, Amount]
-MassFigure = Literal["mass", "centre", "inertia", "rotor", "force", "balance", "friction", "viscous", "rods", "joint", "length"]
+MassFigure = Literal["mass", "centre", "inertia", "rotor", "force", "balance", "friction", "viscous", "rods", "joint",
+                     "length"]
 StiffnessFigure = Literal["rod", "joint", "drive", "turn"]
 BodyFigure = Literal["mass", "centre", "inertia"]
 
@@ -27,8 +28,8 @@ class BodyModel(UserModel):
     mass: Amount
     """kg; of a platform with its spindle, without what a rotary axis that it carries turns"""
     centre: MassCentre = (0.0, 0.0, 0.0)
-    """mm, its centre of mass, all axes at 0: of platform and head from the reference point of the level platform, of the part
-    in the frame of the table that carries it, of the tool from the gauge point, along the machine's x, y and z"""
+    """mm, its centre of mass, all axes at 0: of platform and head from the reference point of the level platform, of the
+    part in the frame of the table that carries it, of the tool from the gauge point, along the machine's x, y and z"""
     inertia: Inertia = 0.0
     """kg m2 about its centre of mass: one number, or three about the same x, y and z"""
     assumed: tuple[BodyFigure, ...] = ()
@@ -44,7 +45,8 @@ class AxisMassModel(UserModel):
     """kg of the body that this axis moves and no axis beyond it: slide, table, head, carriage, arm; of a leg of changing
     length the part that turns about the foot"""
     centre: MassCentre | None = None
-    """mm, its centre of mass in machine coordinates, all axes at 0; left out: on the line of a rotary axis or an arm's"""
+    """mm, its centre of mass in machine coordinates, all axes at 0 (of an axis between platform and spindle from the
+    reference point of the level platform); left out: on the line of a rotary axis or an arm's"""
     inertia: Inertia = 0.0
     """kg m2 of that body about its centre of mass: one number, or three about the machine's x, y and z, all axes at 0"""
     rotor: Amount = 0.0

@@ -251,8 +251,8 @@ class MachineModel(UserModel):
         axes = list(self._axis_problems(rotary)) or list(self._travel_problems(kinematics))
         yield from axes
         if self.dynamics is not None and not kinematics.chain and kinematics.leg_parts is None:
-            yield KeyProblem("machine.dynamics", ("dynamics",), "masses are known of chains of axes and of platforms on legs that "
-                             "end in joints, not of this machine", "take [dynamics] out")
+            yield KeyProblem("machine.dynamics", ("dynamics",), "masses are known of chains of axes and of platforms on "
+                             "legs that end in joints, not of this machine", "take [dynamics] out")
         elif self.dynamics is not None:
             yield from self.dynamics.problems(*_moving_parts(kinematics))
         if self.stiffness is not None:

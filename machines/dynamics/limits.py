@@ -1,12 +1,14 @@
 """What the forces of the motors allow along a path: the pose-dependent limits of its second order.
 
-Along a path q(s) the motors give F = a s'' + b s'^2 + k s' + c with a = M q_s, b = M q_ss + h(q, q_s), k the viscous friction of
-the drives times q_s and c = g(q) less counterbalances, and their dry friction in the sense of q_s: F is linear in the
-accelerations and square in the rates. Both sides count by themselves, -F_max <= F <= F_max: where gravity or friction helps,
+Along a path q(s) the motors give F = a s'' + b s'^2 + k s' + c with a = M q_s, b = M q_ss + h(q, q_s), k the viscous
+friction of the drives times q_s and c = g(q) less counterbalances, and their dry friction in the sense of q_s: F is linear
+in the accelerations and square in the rates.
+Both sides count by themselves, -F_max <= F <= F_max: where gravity or friction helps,
 there is more to brake or to accelerate with. A force at the tool in its worst direction, |J^T f|, is taken off both.
 
-k s' is not linear in x = s'^2: s' <= v/2 + x/(2 v), equal at the largest speed v that a place allows, stands in its place where
-friction takes force, and x/(2 v), less than s' up to 2 v, where it gives some. So the rows hold more than is needed, never less.
+k s' is not linear in x = s'^2: s' <= v/2 + x/(2 v), equal at the largest speed v that a place allows, stands in its place
+where friction takes force, and x/(2 v), less than s' up to 2 v, where it gives some. So the rows hold more than is needed,
+never less.
 """
 
 from __future__ import annotations
@@ -69,7 +71,7 @@ class ForceLimits:
         return first, second, middle
 
     def room(self, q: Floats, way: Floats) -> tuple[Floats, Floats]:
-        """(N, J) how far what a motion takes may fall and rise at joints q; `way` (N, J) signs of the rates of the joints."""
+        """(N, J) how far what a motion takes may fall and rise at joints q; `way` (N, J) signs of their rates."""
         zero = np.zeros_like(q)
         need = self.dynamics.forces(q, zero, zero) + self.dynamics.drives.friction * way
         most = self.limits - self._cut(q)
@@ -77,14 +79,15 @@ class ForceLimits:
 
     def steady(self, q: Floats, dq: Floats, d2q: Floats) -> Floats:
         """(N, J) largest constant s' of each motor; infinite without a limit."""
-        return self._steady(self.dynamics.forces(q, dq, d2q, 0.0), self.dynamics.drives.viscous * dq, *self.room(q, np.sign(dq)))
+        taken = self.dynamics.forces(q, dq, d2q, 0.0), self.dynamics.drives.viscous * dq
+        return self._steady(*taken, *self.room(q, np.sign(dq)))
 
     def _steady(self, second: Floats, per_speed: Floats, low: Floats, high: Floats) -> Floats:
         return np.minimum(_reach(second, per_speed, high), _reach(-second, -per_speed, low))
 
     def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
-        """(N, J) by how much a motion is to be slowed, as the square of a factor on time, until its motors keep their limits:
-        1 where one is just kept, below it the share of what gravity and friction leave. 0 of motors without a limit."""
+        """(N, J) by how much a motion is to be slowed, as the square of a factor on time, until its motors keep their
+        limits: 1 where one is just kept, below it the share of what gravity and friction leave. 0 without a limit."""
         first, per_speed = self.dynamics.forces(q, rate, acceleration, 0.0), self.dynamics.drives.viscous * rate
         low, high = self.room(q, np.sign(np.where(rate == 0.0, acceleration, rate)))
         taken = first + per_speed

@@ -36,8 +36,8 @@ class MotionAsked:
 
 
 def forces_at(machine: Machine, asked: MotionAsked) -> dict[str, Any]:
-    """What each motor gives at a place, by parts: inertia, rates alone, gravity (counterbalances off it), friction (of an axis that is
-    only about to move: against its acceleration), force at the tip.
+    """What each motor gives at a place, by parts: inertia, rates alone, gravity (counterbalances off it), friction (of an
+    axis that is only about to move: against its acceleration), force at the tip.
 
     Raises:
         DiagnosticError: no masses, or the machine does not reach the place.

@@ -111,8 +111,8 @@ def least_seconds(path: MachinePath, limits: JointLimits, feed: AllowedFeed, s: 
 
 def _force_rows(base: Any, forces: MotorLimits, path: ParametricPath, scaled: tuple[float, Floats],
                 both: Any) -> Any:
-    """Limits of forces for toppra: its limits of acceleration, -1 to 1, of rows (a, b) in the place of (q', q''), and what is
-    added to them; `scaled`: the unit of its parameter, the largest speeds in it at the grid points."""
+    """Limits of forces for toppra: its limits of acceleration, -1 to 1, of rows (a, b) in the place of (q', q''), and what
+    is added to them; `scaled`: the unit of its parameter, the largest speeds in it at the grid points."""
     unit, speed = scaled
 
     def used(_: object, made: object, gridpoints: Floats, *more: Any) -> Any:

@@ -103,8 +103,8 @@ def _joint(w: Any, v: Any, m: Any, b: Any, q: Any, r: Any, ia: Any, ij: Any, mu:
 def assemble(w: Any, v: Any, c: Any, inverse: Any, middle: Any, blocks: Any, mu: Any, dual: Any) -> Any:
     """Update z by the dual step; leave each knot's part of the Newton equations in G and H. Returns gap and time.
 
-    w, v flat blocks, c coefficients padded to the lanes, inverse (2, J) of the limits of acceleration and jerk, middle of the
-    acceleration rows by block and joint, or one block of zeros for all.
+    w, v flat blocks, c coefficients padded to the lanes, inverse (2, J) of the limits of acceleration and jerk, middle of
+    the acceleration rows by block and joint, or one block of zeros for all.
     """
     joints = _N(inverse.shape[1])
     own = _N(0 if middle.shape[0] == LANES else LANES)

@@ -14,8 +14,8 @@ STEPS = 100
 
 @loop
 def sweep(h: Any, dq: Any, d2q: Any, middle: Any, x: Any, flat: Any) -> None:
-    """Both passes. h (N-1,), dq and d2q (N, J) over the acceleration limits, middle (N, J) added to them, or (1, J) of zeros;
-    x (N,) holds the bound, then the result.
+    """Both passes. h (N-1,), dq and d2q (N, J) over the acceleration limits, middle (N, J) added to them, or (1, J) of
+    zeros; x (N,) holds the bound, then the result.
 
     `flat`: part of a limit below which x1 does not count in its row.
     """

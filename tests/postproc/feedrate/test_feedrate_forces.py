@@ -95,10 +95,10 @@ def test_gravity_counterbalance_and_cutting_force_take_their_part() -> None:
 
 @pytest.mark.parametrize("kernel", [False, True])
 @pytest.mark.parametrize("friction", [(0.0, 0.0), (40.0, 300.0)])
-def test_motors_reach_their_limits_on_either_side_of_weight_and_friction(kernel: bool, friction: tuple[float, float]) -> None:
-    """Whole forces of the samples: Z, which hangs on 640 N, gives them upwards, braking downwards it has its weight to help;
-    X and Y reach both limits, with friction of both kinds too. Second order is as fast as toppra's with the same rows."""
-    m = mill(pulls(0.4) + [60.0, 60.0, 580.0], down=1.0, acceleration=3.0)
+def test_motors_reach_their_limits_on_either_side(kernel: bool, friction: tuple[float, float]) -> None:
+    """Whole forces of the samples: Z has 640 N and gives them upwards; braking upwards it has its weight to help. X and Y
+    reach both limits, with friction of both kinds too. Second order is as fast as toppra's with the same rows."""
+    m = mill(pulls(0.4) + np.array([60.0, 60.0, 580.0]), down=1.0, acceleration=3.0)
     assert m.dynamics is not None
     keys = dict(zip(("friction", "viscous"), friction, strict=True))
     axes = {name: table.model_copy(update=keys) for name, table in m.dynamics.axes.items()}
@@ -106,8 +106,8 @@ def test_motors_reach_their_limits_on_either_side_of_weight_and_friction(kernel:
     limits = limits_at_feed(m, m.kinematics)
     made = plan(path(), limits, options=replace(STRICT, method=Method(kernel))).trajectory()
     assert limits.forces is not None
-    dynamics = limits.forces.dynamics
-    share = (dynamics.forces(made.q, made.qd, made.qdd) + dynamics.drives.resisting(made.qd, made.qdd)) / limits.forces.limits
+    of = limits.forces.dynamics
+    share = (of.forces(made.q, made.qd, made.qdd) + of.drives.resisting(made.qd, made.qdd)) / limits.forces.limits
     assert (np.abs(share) <= 1.0 + 1e-9).all() and (share.max(axis=0) > [0.85, 0.85, 0.99]).all()
     assert (share.min(axis=0) < [-0.7, -0.7, 0.65]).all()
     own = plan_second_order(path(), limits, options=PlannerOptions(method=Method(kernel)))
@@ -117,7 +117,8 @@ def test_motors_reach_their_limits_on_either_side_of_weight_and_friction(kernel:
 
 
 def test_axes_that_only_creep_are_slowed_by_what_their_friction_leaves() -> None:
-    """Constant speed along one slide: viscous friction alone bounds it, exactly; `use` says how much a motion is too fast."""
+    """Constant speed along one slide: viscous friction alone bounds it, exactly; `use` says how much a motion is too
+    fast."""
     m = mill(np.full(3, 100.0), down=0.0)
     assert m.dynamics is not None
     axes = {name: table.model_copy(update={"friction": 20.0, "viscous": 160.0}) for name, table in m.dynamics.axes.items()}
