@@ -134,8 +134,8 @@ class ForceLimits:
 
 def _reach(square: Floats, linear: Floats, most: Floats) -> Floats:
     """The least v > 0 with square v^2 + linear v = most > 0; infinite where there is none."""
-    inside = linear**2 + 4.0 * square * most
     with np.errstate(divide="ignore", invalid="ignore"):
+        inside = linear**2 + 4.0 * square * most
         below = linear + np.sqrt(np.where(inside >= 0.0, inside, np.nan))
         return np.where(below > 0.0, 2.0 * most / below, np.inf)
 
