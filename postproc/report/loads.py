@@ -36,7 +36,7 @@ def _cuts(path: JointPath, moves: Moves, tool: int) -> Ints:
 
 def _by_drives(result: PostResult, job: Job, path: JointPath, moves: Moves) -> dict[str, Any]:
     """`weight_um`, `reversal_um`: largest over the tools."""
-    from machines.stiffness.along import drive_moves
+    from machines.dynamics.yielding import drive_moves
 
     worst = dict[str, Any]()
     for tool in np.unique(moves.tool).tolist():

@@ -12,8 +12,8 @@ from scipy.optimize import minimize
 from typer.testing import CliRunner
 
 import machines
+from machines.dynamics.yielding import drive_moves
 from machines.dynamics_models import AxisMassModel, BodyModel, DynamicsModel, StiffnessModel
-from machines.stiffness.along import drive_moves
 from machines.stiffness.statics import Springs, compliance, drive_forces, force_rows, rod_forces, tip_stiffness
 from machines.tolerances.influence import middle_of, poses_over
 from machines.tolerances.report import rods_of
