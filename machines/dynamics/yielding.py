@@ -1,5 +1,5 @@
-"""How the tip moves as drives yield to what they give against weight and friction, by J K^-1 g: weight by another amount from
-place to place, friction to the other side where an axis reverses."""
+"""How the tip moves as drives yield to what they give against weight and friction, by J K^-1 g: weight by another amount
+from place to place, friction to the other side where an axis reverses."""
 
 from __future__ import annotations
 
