@@ -208,7 +208,7 @@ class OnLegs(RedundantLegs):
             return None
         of = self.legs
         return LegParts(self.legs_at, of.points, of.directions, of.lengths, of.arm, of.stretch > 0.0, self.carriers_at,
-                        self.carriers)
+                        self.carriers, self.gauge)
 
     def leg_motion(self, q: Floats, rate: Floats, acceleration: Floats) -> LegMotion:
         """See the base class."""
