@@ -251,7 +251,10 @@ class MachineModel(UserModel):
         rotary = dict(zip(kinematics.axis_names, kinematics.rotary, strict=True))
         axes = list(self._axis_problems(rotary)) or list(self._travel_problems(kinematics))
         yield from axes
-        if self.dynamics is not None:
+        if self.dynamics is not None and not kinematics.chain and kinematics.leg_parts is None:
+            yield KeyProblem("machine.dynamics", ("dynamics",), "masses are known of chains of axes and of platforms on "
+                             "legs that end in joints, not of this machine", "take [dynamics] out")
+        elif self.dynamics is not None:
             yield from self.dynamics.problems(*_moving_parts(kinematics))
         if self.stiffness is not None:
             yield from self.stiffness.problems(kinematics.leg_parts is not None)
@@ -326,7 +329,7 @@ def _moving_parts(kinematics: Kinematics) -> tuple[dict[str, Collection[str]], t
     for at, stretches in zip(parts.legs_at, parts.stretches, strict=True):
         found[names[at]] = ("leg", "length") if stretches else ("leg",)
     found |= {names[at]: ("carrier",) for at in parts.carriers_at}
-    return found, ("platform", "head") if parts.axis is not None and parts.axis.at_spindle else ("platform",)
+    return found, ("platform", "head") if any(axis.at_spindle for axis in parts.axes) else ("platform",)
 
 
 def blanks(numbers: Iterable[float]) -> str:

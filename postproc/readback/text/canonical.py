@@ -14,7 +14,7 @@ import numpy as np
 
 from postproc.control.control import InterpolationMode
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, among
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays
 
@@ -153,7 +153,7 @@ class Canonical:
 
     def without(self, letters: tuple[str, ...]) -> Canonical:
         """The same without the words of some letters."""
-        return replace(self, words=self.words.take(~np.isin(self.words.letter, [ord(letter) for letter in letters])))
+        return replace(self, words=self.words.take(~among(self.words.letter, [ord(letter) for letter in letters])))
 
 
 def placed(found: list[Diagnostic], files: Files) -> list[Diagnostic]:
