@@ -15,9 +15,9 @@ SLIGHT = 1e-6
 
 def tangents(u: Floats, chord: Floats, along: Floats, smooth: Bools) -> tuple[Floats, Floats]:
     """(N, A) derivatives by the parameter at begin and end of each block: of cubic splines through smooth points, of one
-    curvature in the blocks in which they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV): where a curve ends
-    at a corner it bends up to there. Blocks of no curve are straight. Points that turn by more than SHARP have `_local`
-    directions, however the points stand there.
+    curvature in the blocks in which they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV): where a curve
+    ends at a corner it bends up to there. Blocks of no curve are straight. Points that turn by more than SHARP have
+    `_local` directions, however the points stand there.
 
     `u` (N, A) directions of the blocks, `chord` (N,) their lengths, `along` (N,) those of their parameter; `smooth` (N - 1,)
     inner points of curves.
