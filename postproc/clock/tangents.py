@@ -8,7 +8,7 @@ from toolpaths.arrays import Bools, Floats
 
 SHARP = 0.15
 """rad that a point of a curve turns from which its direction is that of its neighbourhood alone: a spline whose curvature is
-continuous there bends the other way before and behind"""
+continuous there bends to the other side before and behind"""
 SLIGHT = 1e-6
 """rad: least turn of a neighbour, so that directions are defined"""
 
