@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, Ints
 
 SHARP = 0.15
 """rad that a point of a curve turns from which its direction is that of its neighbourhood alone: a spline whose curvature is
@@ -46,7 +46,7 @@ def tangents(u: Floats, chord: Floats, along: Floats, smooth: Bools) -> tuple[Fl
     return solved[0::2], solved[1::2]
 
 
-def _local(u: Floats, chord: Floats, along: Floats, turn: Floats, sharp: Floats) -> tuple[Floats, Floats]:
+def _local(u: Floats, chord: Floats, along: Floats, turn: Floats, sharp: Ints) -> tuple[Floats, Floats]:
     """(K, A) derivatives before and behind each sharp point (K,): the mean of the directions of both blocks, each weighed by
     the root of the turn at the other end of the other block and of that block's length: most of a bend is where its
     neighbours turn too (H. Akima, J. ACM 17, 1970, has the turn itself: it follows rounded points). As long as those of an

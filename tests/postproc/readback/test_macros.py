@@ -93,7 +93,8 @@ def test_sinumerik_calls_with_values() -> None:
     ("Q5 = 1\nLBL 1\nL IX+Q5 FMAX\nCALL LBL 1 REP 2\n", [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
     ("FN 8: Q1 = +3 LEN +4\nFN 13: Q2 = +1 ANG +1\nFN 4: Q3 = +9 DIV +2\nL X+Q1 Y+Q2 Z+Q3 FMAX\n", [[5, 45, 4.5]]),
     ("CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+60\nCYCL DEF 7.2 Y+40\nL X+1 Y+2 FMAX\nL IX+5 FMAX\n"
-     "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 IX+10\nL X+1 Y+2 FMAX\nCYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+0\nCYCL DEF 7.2 Y+0\nL X+1 Y+2 FMAX\n",
+     "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 IX+10\nL X+1 Y+2 FMAX\n"
+     "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+0\nCYCL DEF 7.2 Y+0\nL X+1 Y+2 FMAX\n",
      [[61, 42, 0], [66, 42, 0], [71, 42, 0], [1, 2, 0]]),
     ("Q1 = 3\nTRANS DATUM AXIS X+10 Y+Q1\nL X+Q1 Y+0 FMAX\nCC X+8 Y+0\nC X+13 Y+0 DR+ F500\nTRANS DATUM RESET\nL X+0 FMAX\n",
      [[13, 3, 0], [23, 3, 0], [0, 3, 0]])])
