@@ -53,7 +53,9 @@ def optimised(start: PostResult, stages: StagedWhole, clock: ProgramClock) -> Po
         return made
     search = _Search(_Best(start, made, clock(made), measured(clock, made)), written, clock)
     search.modes()
+    search.to("block ends beside the path", _options(partial(replace, beside=True)))
     search.smoothing()
+    search.to("block ends beside the path", _options(partial(replace, beside=True)))
     for moved in (True, False):
         if moved != search.best.start.options.smooth:
             search.to("points moved inside the tolerance" if moved else "points unmoved",
