@@ -52,7 +52,7 @@ class Options:
     """True: errors at the ends of their measured ranges count beyond them too"""
 
     optimise: bool = False
-    """output modes, shares of the tolerance and feed mode chosen for the least time on the control"""
+    """output modes, ends of blocks, shares of the tolerance and feed mode chosen for the least time on the control"""
     beside: bool = False
     """blocks of cuts may end beside the path, within the tolerance, where fewer of them do"""
     smoothing: float = 0.0
