@@ -2,8 +2,8 @@
 
 One choice after the other is changed and kept where the written program takes less time on the control's model: output mode
 of all and of each operation, block ends beside the path where fewer blocks do, how much of the tolerance the control's
-smoothing takes from linearising, points moved inside the tolerance, feed mode. Nothing is slower than without: what is not faster is not taken, by the model's formulas and then
-by the control, executed.
+smoothing takes from linearising, points moved inside the tolerance, feed mode. Nothing is slower than without: what is not
+faster is not taken, by the model's formulas and then by the control, executed.
 """
 
 from __future__ import annotations
