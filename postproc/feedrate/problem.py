@@ -80,9 +80,16 @@ class SpeedProblem:
     def ratios(self, c: Floats) -> Floats:
         """Velocity, acceleration and jerk over their limits at the knots, the worst joint, tightening left out, (3, K)."""
         x = self.basis.values(c)
-        acceleration = self._taken(np.einsum("ijk,ik->jk", self.acceleration_rows(), x[:2])).max(axis=0) / self.tight[0]
-        jerk = np.abs(np.einsum("ijk,ik->jk", self.jerk_rows(), x)).max(axis=0) / self.tight[1]
+        used, jerk = self.used(x)
+        acceleration, jerk = self._taken(used).max(axis=0), np.abs(jerk).max(axis=0)
         return np.array([np.sqrt(x[0] / self.cap), acceleration, jerk * np.sqrt(x[0])])
+
+    def used(self, x: Floats, here: slice = slice(None)) -> tuple[Floats, Floats]:
+        """Of the limits, tightening left out: acceleration, and jerk over x^1/2, each (J, N), at knots `here`; x (3, N)."""
+        dq, d2q, d3q = self.dq[:, here], self.d2q[:, here], self.d3q[:, here]
+        half = 0.5 * dq
+        return ((d2q * x[0] + half * x[1]) / self.limits.acceleration[:, None],
+                (d3q * x[0] + 1.5 * d2q * x[1] + half * x[2]) / self.limits.jerk[:, None])
 
     def _taken(self, used: Floats) -> Floats:
         """(J, K) of what rows (J, K) may use on the side on which they do."""
