@@ -11,7 +11,6 @@ measures: Company 2000, II-24, III.6.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +20,7 @@ from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import Span, spanned
 from machines.kinematics.leg_geometry import LegGeometry
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 CLOSE, MOST, FEW, AT_ONCE = 0.01, 16_000, 5_000, 500

@@ -8,7 +8,7 @@ gravity would help is given away; counterbalances are in c.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from machines.dynamics.build import dynamics_of, force_limits_of
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 LEAST = 0.02

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from itertools import pairwise
 
@@ -24,6 +24,7 @@ from postproc.feedrate.spline import rest_basis
 from postproc.feedrate.tightening import SPLIT, tightened
 from postproc.feedrate.windows import Method, SolvedWindows
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 ROUNDS = 12
 FITS = 0.9995
