@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field
@@ -12,6 +12,7 @@ from machines.key_problem import KeyProblem
 from machines.toml_lines import KeyPath, Values, own_copy
 from machines.user_file import UserFile
 from machines.user_model import UserModel
+from toolpaths.dataclass import dataclass
 
 K = TypeVar("K", bound=str)
 ASSUMED, SOURCE = "assumed", "source"

@@ -10,7 +10,6 @@ it must stop. Where there are as many rows as motions their determinant, V-4 and
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -21,6 +20,7 @@ from machines.kinematics.legs.loops import Loops
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.mobility import LEAST, place_words, sign_fault
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, unit
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

@@ -101,7 +101,7 @@ class LegsModel(KinematicsModel):
     workspace: WorkspaceModel
     """of the platform's reference point, carried; tilt: range of its one turn, of one that turns in every direction [0,
     largest] from z"""
-    clearance: ClearanceModel = ClearanceModel()
+    clearance: ClearanceModel = ClearanceModel.unstated()
 
     @property
     def drives(self) -> dict[str, DriveModel]:

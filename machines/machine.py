@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -16,6 +16,7 @@ from machines.figures import Document
 from machines.hooks import HooksModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:

@@ -231,7 +231,7 @@ class MachineModel(UserModel):
     timing: TimingModel
     control: ControlModel | None = None
     """what the control of this machine does of its own, and which options it has"""
-    hooks: HooksModel = HooksModel()
+    hooks: HooksModel = HooksModel.unstated()
     """blocks of the shop round tool calls, indexing moves, operations and stops"""
     dynamics: DynamicsModel | None = None
     """masses of what the axes move, and what the motors can give"""

@@ -7,12 +7,11 @@ the tip's linearly, dq = G v, and each limit |dq_j| <= l_j is a pair of half-spa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 _SMALL = 1e-12

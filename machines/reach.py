@@ -8,7 +8,6 @@ spindle). Rods that end in one joint (II-16) cannot be distinguished there and a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.kinematics.clearance_geometry import ClearanceGeometry
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between, dot, unit
 from toolpaths.shapes import arrays
 

@@ -96,7 +96,7 @@ class SliderModel(KinematicsModel):
     legs: dict[str, LegModel] = Field(default_factory=dict)
     """by axis letter; where the layout has a leg of that letter, in its place"""
     workspace: WorkspaceModel
-    clearance: ClearanceModel = ClearanceModel()
+    clearance: ClearanceModel = ClearanceModel.unstated()
 
     @property
     def slides(self) -> dict[str, LegModel]:

@@ -10,7 +10,7 @@ import difflib
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path as FilePath
 from typing import Any, TypeVar, get_args, get_origin
@@ -22,6 +22,7 @@ from machines.toml_lines import KEPT, SHORT, KeyPath, Values, own_copy, parsed
 from machines.user_model import SCHEMA_KEY, key_texts
 from machines.value_words import POINT, advice, allowed, decimal_comma
 from toolpaths.cl.text.kinds_of_file import what_is
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import advice as remedy
 from toolpaths.input_files import place, read_input, reason, shown

@@ -11,7 +11,7 @@ import inspect
 import sys
 from functools import cache
 from pathlib import Path
-from typing import Any, Union
+from typing import Any, Self, Union
 
 from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, TypeAdapter
 from pydantic_core import CoreSchema
@@ -24,7 +24,13 @@ SCHEMA_KEY = "$schema"
 class UserModel(BaseModel):
     """Base of every model of a user's file: frozen, no unknown key, no conversion between types, no inf or nan."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, allow_inf_nan=False,
+                              defer_build=True)
+
+    @classmethod
+    def unstated(cls) -> Self:
+        """As it is where a file states none of its keys. Nothing is checked, so nothing that checks is built."""
+        return cls.model_construct()
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:

@@ -31,6 +31,7 @@ BORDERS = {
     "machines/__init__.py": SCHEMA, "machines/loader.py": SCHEMA, "machines/calibration/measurement_file.py": SCHEMA,
     "machines/geometric_error/files/loader.py": SCHEMA,
     "machines/figures.py": TABLES, "machines/toml_lines.py": TABLES, "machines/user_file.py": TABLES,
+    "toolpaths/dataclass.py": "what a field of any class holds",
     "postproc/base/given.py": "what a caller gives, before its type is known",
     "machines/user_model.py": SCHEMA, "postproc/python/calls.py": FIGURES,
     "machines/exchange/draft.py": TABLES, "machines/sheet/file_text.py": TABLES,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from itertools import product
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 Array = npt.NDArray[Any]
+Item = TypeVar("Item", bound=np.generic)
 _CORNERS = np.array(list(product((False, True), repeat=3)))
 
 
@@ -76,14 +77,18 @@ def within(values: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike) -> Ar
     return made
 
 
-def distinct(values: Ints) -> Ints:
-    """(K,) the different numbers in values (N,), ascending: `numpy.unique`, which hashes whole numbers and takes up to
-    thirty times as long as putting them in order, or as seeing that they are."""
+def distinct(values: npt.NDArray[Item]) -> npt.NDArray[Item]:
+    """(K,) the different numbers in values (N,), ascending, NaN once and last: `numpy.unique`, which hashes whole numbers
+    and takes up to thirty times as long as putting them in order, or as seeing that they are; besides, it imports
+    `numpy.ma`, which takes as long as reading a small CL file."""
     if len(values) < 2:
         return values.copy()
-    if (values[1:] < values[:-1]).any():
-        values = np.sort(values)
-    return np.asarray(values[np.append(True, values[1:] != values[:-1])])
+    numbers: Array = values
+    floats = numbers.dtype.kind == "f"
+    if floats or (numbers[1:] < numbers[:-1]).any():
+        numbers = np.sort(numbers)
+    other = numbers[1:] != numbers[:-1]
+    return np.asarray(numbers[np.append(True, other & ~np.isnan(numbers[:-1]) if floats else other)])
 
 
 def without_nan(values: Floats, nan: float = 0.0) -> Floats:

@@ -12,11 +12,12 @@ the same function as machine code, and with it all loops that it calls by their 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from types import FunctionType
 from typing import Any, TypeVar, cast, overload
+
+from toolpaths.dataclass import dataclass
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 Result = TypeVar("Result")

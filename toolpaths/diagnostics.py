@@ -7,9 +7,10 @@ no output file may be written.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import TypeVar
+
+from toolpaths.dataclass import dataclass
 
 _Value = TypeVar("_Value")
 

@@ -17,11 +17,12 @@ import secrets
 import socket
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, info, warning
 
 NEW, OLD, JOURNAL, POINTER = "new", "old", "journal", "pointer"

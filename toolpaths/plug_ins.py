@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
+
+from toolpaths.dataclass import dataclass
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

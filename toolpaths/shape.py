@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints, taken, within
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between, cross, lengths, slerp, whole_turns
 from toolpaths.shapes import arrays
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 from types import CodeType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from toolpaths.arrays import Array, Bools, Ints, taken
+from toolpaths.dataclass import dataclass
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from enum import IntEnum
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from toolpaths.arrays import Array, Floats, Ints, shared
 from toolpaths.choices import CycleKind, GivenDialect, GivenUnit, LengthUnit
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.given_arrays import CLOSE, GivenArrays, given_rows, off_circle, passes, unit_rows
 from toolpaths.plug_ins import PlugIn

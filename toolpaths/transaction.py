@@ -18,10 +18,10 @@ import stat
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import toolpaths.interrupted_runs as leftovers
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 
 READ_ONLY = "it is read-only"

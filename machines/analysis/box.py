@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.machine import Machine
 from machines.reach import is_checked, reach
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 
 POINTS = 9
 """grid points per direction of a box that is tried"""

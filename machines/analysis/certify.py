@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from machines.kinematics.leg_geometry import LegGeometry
 from machines.loader import values_of_machine
 from machines.machine import Machine
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

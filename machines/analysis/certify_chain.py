@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from typing import Any
@@ -31,6 +30,7 @@ from machines.certificate.spans import spanned
 from machines.loader import values_of_machine
 from machines.machine import Machine
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

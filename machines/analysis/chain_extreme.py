@@ -7,13 +7,12 @@ inside its range the condition number is infinite there, and that is the answer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.certificate.chains import ChainOfAxes
 from machines.certificate.spans import Span, spanned
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 CLOSE, MOST, AT_ONCE, SINGULAR = 0.01, 20_000, 1_000, 1e6

@@ -17,7 +17,7 @@ more than the largest value seen are halved (branch and bound). Source of the me
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property
 
 import numpy as np
@@ -27,6 +27,7 @@ from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import Span, spanned
 from machines.kinematics.leg_geometry import LegGeometry
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 CLOSE, MOST, AT_ONCE = 0.01, 16_000, 500

@@ -6,7 +6,6 @@ Source: Company 2000, figures III-12 to III-20 (curves against a parameter, maps
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from machines.analysis.measures import WORDS, studied
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.drawing import image, level
 from toolpaths.shapes import arrays

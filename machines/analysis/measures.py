@@ -8,7 +8,7 @@ force w (eta_bf), a unit moment (eta_bm), and a unit force of inertia at a centr
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +30,7 @@ from machines.stiffness.statics import force_rows
 from machines.tolerances.influence import poses_at
 from machines.tolerances.sensitivity import RodsOfLegs
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.shapes import arrays
 

@@ -7,7 +7,6 @@ For each size the measure is looked at on a grid of the declared workspace, face
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ from machines.analysis.measures import WORDS, studied
 from machines.machine import Machine
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.drawing import image
 from toolpaths.shapes import arrays

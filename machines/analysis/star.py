@@ -11,7 +11,6 @@ No document prints a value of any of them; gravity and inertia in rotation are l
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +23,7 @@ from machines.tolerances.influence import PlatformPoses, poses_over
 from machines.tolerances.sensitivity import RodsOfLegs
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
+from toolpaths.dataclass import dataclass
 from toolpaths.drawing import image
 from toolpaths.shapes import arrays
 

@@ -8,7 +8,6 @@ Source: Company 2000, II-24 (condition number), III.6.2 (speed), III.6.3 (force)
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from machines.kinematics.rod_platform import RodPlatform, Transmission
 from machines.kinematics.sliders import platform_rates
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 Measure = Callable[[Floats, Floats], Floats]
 """(N,) of places (N, 3) and tilts (N,) of the workspace"""

@@ -8,7 +8,7 @@ the instrument is identified along: where the ball stands on the table, how far 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -19,6 +19,7 @@ from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 MeasuredQuantity = Literal["position", "distance", "along"]

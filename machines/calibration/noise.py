@@ -8,12 +8,13 @@ degrees of freedom that it is worth.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import gammainc, gammaincc, stdtrit
 
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 CHANCE = 1e-3
 """of a fit at the stated noise to be called one that misses it, on either side"""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from machines.calibration.noise import CHANCE, Noise
 from machines.calibration.remedies import TableFault
@@ -11,6 +11,7 @@ from machines.calibration.result_figures import CalibrationFigures, parameters
 from machines.calibration.run import CalibrationRun
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.files.implausible_errors import too_large
+from toolpaths.dataclass import dataclass
 
 UNFIT = 5.0
 """the same, where the errors found do not help: no model"""

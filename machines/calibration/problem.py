@@ -8,12 +8,12 @@ one length before ranks are taken, so that mm and rad count alike.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from machines.calibration.noise import Noise, noise_of
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 RANK = 1e-9

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from machines.calibration.noise import Noise
+from toolpaths.dataclass import dataclass
 
 TableChange = Literal["sign", "columns", "unit", "tenfold", "tenth", "toward", "frame", "order", "steps", "indexer"]
 _WORDS: dict[TableChange, str] = {

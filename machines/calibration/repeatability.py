@@ -8,7 +8,6 @@ repeatability of ISO 230-2 (2014), 3.8 to 3.15. The root mean square is with n, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from machines.geometric_error.tables.csv_table import ANGLES, CsvTable, read_csv
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.drawing import image
 from toolpaths.shapes import arrays

@@ -12,12 +12,13 @@ constant of every set-up when the instrument is zeroed again. Source: Oueslati 2
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from machines.calibration.problem import CalibrationProblem, CalibrationResult, solve
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 

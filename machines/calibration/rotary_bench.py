@@ -8,12 +8,13 @@ rotation vector, in the axes of the bed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from machines.geometric_error.actual.transforms import carried, homogeneous
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 MOUNTS = ("C0", "RX0", "RL")

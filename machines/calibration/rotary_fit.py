@@ -8,7 +8,7 @@ is found by rank and left out: it is listed, never divided by.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from machines.geometric_error.actual.serial_errors import Component, ErrorFrame,
 from machines.geometric_error.tables.curves import Fourier
 from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 ENOUGH = 3

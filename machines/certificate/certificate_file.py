@@ -9,7 +9,6 @@ Shipped certificates stand in `shipped`, by their key; a shop's own next to its 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
@@ -20,6 +19,7 @@ from machines.certificate.lookup import WHOLE, key_of
 from machines.certificate.search import GAPS, NAMES, AskedProof, ProvedBoxes
 from machines.kinematics.leg_geometry import LegGeometry
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 FORM = 2
 """of the file; it rises where a key changes its meaning"""

@@ -12,7 +12,7 @@ slides that span no space (`slides`: |det M|). Source: product of exponentials, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Literal
 
@@ -21,6 +21,7 @@ import numpy as np
 from machines.certificate.spans import Span, crossed, dotted, joined, spanned, turned_by
 from machines.kinematics.chain import Joint
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 MOST, AT_ONCE, DEEPEST = 400_000, 4_000, 60

@@ -11,7 +11,6 @@ Optimization, 2.5.1); Company 2000, II.4.2.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from machines.certificate.spans import Span, dotted, spanned, stacked
 from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceSizes
 from machines.kinematics.leg_geometry import LegGeometry
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import unit
 from toolpaths.shapes import arrays
 

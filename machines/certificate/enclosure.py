@@ -14,14 +14,13 @@ others the bar is one with the platform.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import Span, angle_of, crossed, dotted, joined, spanned, stacked, turned_by
 from machines.kinematics.leg_geometry import LegGeometry
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 
 FREEDOMS = "xyzabc"
 

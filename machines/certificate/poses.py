@@ -9,7 +9,6 @@ a bar, which keeps its direction, are at C + R b + k.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from machines.certificate.spans import Span, joined, spanned, stacked, turned_by
 from machines.kinematics.leg_geometry import LegGeometry
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 

@@ -9,7 +9,7 @@ the answer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal
 
 import numpy as np
@@ -19,6 +19,7 @@ from machines.certificate.enclosure import columns, enclosed, least_singular
 from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import Span, spanned
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 MOST, AT_ONCE, DEEPEST = 300_000, 2_000, 48

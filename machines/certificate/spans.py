@@ -6,12 +6,12 @@ with this, rounds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 

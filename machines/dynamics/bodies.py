@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 
 import numpy as np
 
 from machines.dynamics_models import BodyModel, Inertia
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 NEWTON, NEWTON_METRE, KG_M2 = 1e3, 1e6, 1e6

@@ -10,7 +10,6 @@ RigidBody Dynamics Algorithms (2008), chapter 5; the same forces by a Jacobian: 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from machines.dynamics.bodies import GRAVITY, Drives, Dynamics, RigidBody
 from machines.kinematics.chain import Joint
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, dot, rotation
 from toolpaths.shapes import arrays
 

@@ -9,7 +9,7 @@ II-33 (II-31 and II-33 as its errata have them), III-13 to III-17.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from machines.dynamics.chain import AxisBody, MovingFrame, loads_of, side_forces
 from machines.kinematics.base import Kinematics
 from machines.kinematics.leg_motion import LegMotion, LegParts
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, dot, rotation
 from toolpaths.shapes import arrays
 

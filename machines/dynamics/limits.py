@@ -13,7 +13,7 @@ never less.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from machines.dynamics.build import dynamics_of, force_limits_of
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 LEAST = 0.02

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from machines.dynamics.limits import ForceLimits, force_limits
 from machines.dynamics.rods import rod_figures, rod_forces_in_motion
 from machines.machine import Machine
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

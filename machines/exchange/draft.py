@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -13,6 +12,7 @@ from machines.loader import assemble, check
 from machines.machine import Machine
 from machines.toml_lines import Values
 from machines.user_file import UserFile, ValueSource
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.input_files import shown
 

@@ -10,7 +10,6 @@ yxz.mch" (5cc74f79). Speeds are per minute there: 4000 mm/min, 21600 degrees/min
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
@@ -19,6 +18,7 @@ from pydantic import AfterValidator, BaseModel, ValidationError
 from machines.exchange.draft import Draft, Value
 from machines.kinematics.chain import ROTARY
 from machines.models import Vector
+from toolpaths.dataclass import dataclass
 from toolpaths.units import MM_PER_INCH, PER_MINUTE
 
 LENGTHS = {"mm": 1.0, "in": MM_PER_INCH, "inch": MM_PER_INCH}

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
 from machines.exchange.draft import Draft
 from machines.exchange.fusion import LENGTHS
+from toolpaths.dataclass import dataclass
 from toolpaths.units import PER_MINUTE
 
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([a-z]*)(/min)?")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.input_files import is_regular, read_input, reason
 

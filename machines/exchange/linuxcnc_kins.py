@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from machines.exchange.draft import Draft, KeyNames
+from toolpaths.dataclass import dataclass
 
 COORDINATES = {"trivkins": "XYZABCUVW", "xyzac-trt-kins": "XYZAC", "xyzbc-trt-kins": "XYZBC", "5axiskins": "XYZBCW",
                "lineardeltakins": "XYZABCUVW"}

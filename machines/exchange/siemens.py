@@ -10,7 +10,6 @@ Parameter Manual 6FC5397-8EP40 (the first axis turns the second).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -19,6 +18,7 @@ import numpy as np
 from machines.exchange.draft import Draft
 from machines.exchange.siemens_data import MachineDatum, SiemensData, read_data
 from machines.kinematics.chain import ROTARY
+from toolpaths.dataclass import dataclass
 from toolpaths.units import MM_PER_INCH
 
 Carried = Literal["T", "P", "M"]

@@ -6,9 +6,10 @@ Source: SINUMERIK 840D sl, Detailed Machine Data Description (parameter manual):
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from machines.exchange.draft import Draft
+from toolpaths.dataclass import dataclass
 
 _ASSIGNMENT = re.compile(r"(?:N\d+\s+)?\$(?P<name>(?:M[ANC]|TC|S[CNA])_\w+)\s*(?:\[(?P<index>[^\]]*)\])?\s*"
                          r"=\s*(?P<value>[^;]*)")

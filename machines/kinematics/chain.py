@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from toolpaths.arrays import Floats, read_only
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 LINEAR, ROTARY = "XYZUVWPQRE", "ABC"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from machines.kinematics.chain import Joint
 from toolpaths.arrays import Floats, Ints
 from toolpaths.compiled import compiled, loop, wanted
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 _ROWS, _INDEX = ("float64", 2), ("int64", 1)

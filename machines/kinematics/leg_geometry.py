@@ -5,13 +5,13 @@ Source of the law of one leg: Company 2000, II-7, II-8 (slides); the same closur
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal, cast
 
 import numpy as np
 
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 TurnLetters = Literal["", "a", "b", "c", "abc"]

@@ -7,7 +7,7 @@ the move is proved with it, and where it cannot be, there is no bound.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from machines.kinematics.sliders import Legs, solved
 from machines.kinematics.taylor import TaylorAngle, TaylorVector
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 _ROUNDS = 6

@@ -9,11 +9,10 @@ Source: thesis "Machines-outils rapides a structure parallele" (Company 2000), I
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross
 from toolpaths.shapes import arrays
 

@@ -8,7 +8,6 @@ turns of jets are jets again (product rule, triangle inequality), so that a chai
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Self
 
@@ -17,6 +16,7 @@ import numpy as np
 from machines.kinematics import columns
 from machines.kinematics.columns import Columns, Number
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 ZERO: Columns = [0.0, 0.0, 0.0]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from machines.layouts.search import (
 )
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.drawing import image
 

@@ -9,7 +9,7 @@ proved by boxes (`analysis/extremes.py`).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution, minimize
@@ -19,6 +19,7 @@ from machines.kinematics.workspace import Workspace
 from machines.layouts.choices import Goal, SlideLayout
 from machines.layouts.forms import FORMS, RODS, PlacedSlides
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import unit
 from toolpaths.shapes import arrays
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 from machines.figures import ASSUMED, SOURCE
@@ -21,6 +21,7 @@ from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantit
 from machines.sheet.touched import AGREE, apart_by, strange_turns, untold, wrong_sign
 from machines.toml_lines import KeyPath, own_copy
 from machines.user_file import UserFile, ValueSource, read_toml, validate, wrong_keys
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, has_errors
 
 ENDLESS = "endless"

@@ -127,9 +127,9 @@ class DataSheet(UserModel):
     """where the rotary axes lie"""
     touched: TouchedSheet | None = None
     """readings that prove pivots and signs: by them one point of the table must stay one point"""
-    table_top: TableTopSheet = TableTopSheet()
+    table_top: TableTopSheet = TableTopSheet.unstated()
     """distances that prove travel and pivots"""
-    times: TimingSheet = TimingSheet()
+    times: TimingSheet = TimingSheet.unstated()
     """times that no axis gives"""
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import get_args
 
 from machines.sheet.jog import QUESTIONS
@@ -12,6 +12,7 @@ from machines.sheet.make import ALSO_ENDLESS, ENDLESS
 from machines.sheet.model import PivotForm, ZeroEnd, spelt
 from machines.sheet.pivots import names_of
 from machines.sheet.quantity import QuantityKind, angles_of, read_quantity
+from toolpaths.dataclass import dataclass
 
 Check = Callable[[str], str]
 """the text of an answer as it goes into the sheet.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from machines.tolerances.influence import PlatformPoses, poses_at, poses_over
 from machines.tolerances.report import rods_of
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
+from toolpaths.dataclass import dataclass
 from toolpaths.drawing import image
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

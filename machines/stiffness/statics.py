@@ -8,13 +8,12 @@ and the tip moves by C w, C = (T^t M^-1 T)^-1. Source: Company 2000, II-34 to II
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.tolerances.influence import PlatformPoses
 from machines.tolerances.sensitivity import RodsOfLegs, rod_rows
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 

@@ -7,7 +7,7 @@ Source: Company 2000, annex F: by dimension (F.3.1), by point (F.3.2), after an 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol, Self, TypeVar
 
 import numpy as np
@@ -17,6 +17,7 @@ from machines.certificate.spans import spanned
 from machines.kinematics.leg_geometry import LegGeometry
 from machines.tolerances.sensitivity import LegDimension, RodsOfLegs, adjusted, sensitivity
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 LEVELS, TILTS, HEADINGS, AT_ONCE = 5, 4, 8, 1_000

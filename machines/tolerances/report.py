@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from machines.tolerances.sensitivity import LegDimension, RodsOfLegs
 from machines.user_file import nearest
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.drawing import image
 from toolpaths.shapes import arrays

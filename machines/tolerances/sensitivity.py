@@ -11,7 +11,6 @@ Source: Company 2000, II-61, E-10 to E-17, F-1 to F-16 (signs of F-10 and levers
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -20,6 +19,7 @@ from machines.kinematics.leg_geometry import LegGeometry
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import Loops
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, unit
 from toolpaths.shapes import arrays
 

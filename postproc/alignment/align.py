@@ -3,7 +3,7 @@ set-up with the measured place, with which a conversion is proved."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from postproc.pipeline.result import PostResult
 from postproc.setup.model import PartPlacement, load_setup
 from postproc.setup.places import one_part
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
 

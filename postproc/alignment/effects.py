@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.alignment.fit import Alignment
@@ -11,6 +9,7 @@ from postproc.control.control import InterpolationMode
 from postproc.job.job import Job
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import Placement
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Severity
 from toolpaths.rotations import angle_between, lengths
 from toolpaths.toolpath import Kind

@@ -7,8 +7,6 @@ others do not determine stays so. Their weight moves nothing that is determined.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.calibration.noise import Noise, noise_of
@@ -16,6 +14,7 @@ from machines.calibration.problem import CalibrationProblem, solve
 from postproc.alignment.readings import Readings
 from postproc.setup.model import Placement
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, lengths
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from machines.calibration.noise import CHANCE
 from postproc.alignment.fit import Alignment, aligned
 from postproc.alignment.readings import MEASURED, Readings
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, info, warning
 from toolpaths.rotations import lengths
 from toolpaths.units import DEG, MM_PER_INCH

@@ -6,10 +6,10 @@ Controls change comments: capitals, accents, brackets. What is read is looked fo
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from postproc.base.length_text import SAID, LengthText
+from toolpaths.dataclass import dataclass
 from toolpaths.units import MM_PER_INCH
 
 NO_FILE = "without a file"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
+from toolpaths.dataclass import dataclass
 from toolpaths.units import MM_PER_INCH
 
 SAID = 6

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -10,6 +10,7 @@ from postproc.base.given import faults_of
 from postproc.base.header_words import chosen_axes, feed_line, hooks_line, setup_line, smoothing_line
 from postproc.base.length_text import LengthText
 from toolpaths.choices import GivenDialect, GivenUnit, ShopName
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import DiagnosticError
 
 FeedModeChoice = Literal["auto", "per-minute", "inverse-time"]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal
+
+from toolpaths.dataclass import dataclass
 
 Taking = Literal["nothing", "one", "many"]
 """what an option takes: no value, one value, or it may be repeated"""

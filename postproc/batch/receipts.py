@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from pathlib import Path
 from typing import Literal
 
 from postproc.batch.tasks import Task
 from postproc.proof.hashes import sha256
+from toolpaths.dataclass import dataclass
 from toolpaths.input_files import is_regular
 from toolpaths.transaction import write_together
 

@@ -7,12 +7,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
 from typing import Any, cast
 
 from postproc.base.version import VERSION
 from postproc.batch.receipts import BY_CODE, Receipt, kept, written
 from postproc.batch.tasks import Task
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import DiagnosticError, error
 from toolpaths.extras import need
 

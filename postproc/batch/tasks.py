@@ -5,13 +5,13 @@ from __future__ import annotations
 import glob
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
 from machines.user_file import UserFile, nearest
 from postproc.batch.forms import INPUTS, CommandForm, CommandForms
 from postproc.batch.model import BatchFile, JobModel, OptionValue
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import is_regular, place, there_is
 

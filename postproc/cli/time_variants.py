@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +28,7 @@ from postproc.time_study import side_by_side
 from postproc.time_study.tables import TimeTables, as_csv, tables
 from postproc.time_study.tables import as_text as tables_text
 from postproc.time_study.what_if import AS_IS, WhatIf, machine_with, model_with, parsed
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, read_value
 from toolpaths.input_files import there_is
 

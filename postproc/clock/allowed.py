@@ -7,13 +7,12 @@ data recommends). Feeds, blocks taken up and blocks read ahead hold the speed of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.clock.path import SHORTEST, BlendedPath, CommandedPath
 from postproc.clock.settings import ControlSettings
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 AVERAGED = 10

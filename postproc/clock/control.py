@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from postproc.clock.settings import ControlSettings
 from postproc.clock.speed_kernels import run, slow_down
 from toolpaths.arrays import Bools, Floats
 from toolpaths.compiled import chosen
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 COMPILE_FROM = 30

@@ -9,7 +9,7 @@ cases (|du| w/8, k w^2/24).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from postproc.clock.tangents import tangents
 from postproc.feedrate.paths import Derivatives
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 SMOOTH_TURN, SMOOTH_SAG = 1.0, 0.25

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from postproc.setup.bodies import SolidModel as Given
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats
 from toolpaths.choices import LengthUnit
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 
 PART = "the part"

@@ -7,13 +7,14 @@ corner e next to the axis and f over the tip, angles a and b, height h; ISO 4343
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.reference.cutter import ball_radius
 from postproc.setup.bodies import ToolBody
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.toolpath import Tool
 from toolpaths.units import DEG
 

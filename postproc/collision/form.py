@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from postproc.collision.mesh import load_mesh
 from postproc.setup.bodies import HolderSection
 from postproc.setup.model import ToolSetup
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, info, warning
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Tool

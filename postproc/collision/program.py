@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +18,7 @@ from postproc.readback.execution.poses import BlockPoses, begins
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors, info
 from toolpaths.shapes import arrays
 

@@ -11,8 +11,6 @@ than the limit by more than `EXACT`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.collision.revolution import around, bend, lever, middle, raised, support
@@ -20,6 +18,7 @@ from postproc.collision.solid import TriangleSolid
 from postproc.collision.swept import TURN, Swept
 from toolpaths.arrays import Floats, Ints
 from toolpaths.compiled import compiled, wanted
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 EXACT = 1e-3

@@ -9,7 +9,7 @@ program may be taken up, nobody knows how they stand.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from machines.machine import Machine
 from postproc.compile.program import Command, Program
 from toolpaths.arrays import Bools, runs
+from toolpaths.dataclass import dataclass
 
 ClampCommand = Literal["CLAMP", "UNCLAMP"]
 CLAMP: ClampCommand = "CLAMP"

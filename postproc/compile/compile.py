@@ -23,7 +23,7 @@ from postproc.compile.word_rows import WordRows, block_tools, joints_of, with_tu
 from postproc.job.job import Job
 from postproc.path.model import ARC, JointPath
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints, shared, taken
+from toolpaths.arrays import Bools, Floats, Ints, distinct, shared, taken
 from toolpaths.diagnostics import Diagnostic, info
 
 if TYPE_CHECKING:
@@ -133,5 +133,5 @@ def _slowed(feeds: Feeds, moves: Moves, path: JointPath, planned: bool, job: Job
     if planned and any(tool.limited for tool in job.setup.tools.values()):
         excess += ", or the tool a limit of the set-up"
     return [info("feed.reduced", f"feed reduced, down to {100.0 * share.min():.1f} %, where an axis would "
-                 f"{excess}", file=job.toolpath.file, lines=np.unique(moves.line[path.move[rows]])[:6].tolist(),
+                 f"{excess}", file=job.toolpath.file, lines=distinct(moves.line[path.move[rows]])[:6].tolist(),
                  count=len(rows))]

@@ -12,7 +12,7 @@ from postproc.path.model import TRAVERSE, JointPath
 from postproc.reference.cutcom_of_tools import CutcomOfTool
 from postproc.reference.events import CompensationSide, compensation_side, numbers
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Ints
+from toolpaths.arrays import Bools, Ints, distinct
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.toolpath import Event, Kind
 
@@ -168,7 +168,7 @@ class RadiusCompensation:
         turns = np.zeros(len(path), dtype=bool)
         turns[1:] = (np.abs(np.diff(path.q[:, rotary], axis=0)) > STILL).any(axis=1) & (laws[1:] == "axes")
         bad = self._compensated() & (path.code != TRAVERSE) & (leans | turns)
-        return [int(line) for line in np.unique(moves.line[path.move[bad]])]
+        return [int(line) for line in distinct(moves.line[path.move[bad]])]
 
     def _compensated(self) -> Bools:
         """(K,) blocks between a command that begins compensation and the one that ends it."""

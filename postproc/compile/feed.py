@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.controllers.model import FeedRules
 from postproc.path.model import ARC, TRAVERSE, JointPath
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Literal
 
@@ -15,6 +15,7 @@ from postproc.control.rollover import Rollover
 from postproc.reference.coolant import CoolantCommand
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.choices import CycleKind
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 PER_MINUTE, INVERSE = 0, 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,7 +13,8 @@ from postproc.control.word_arcs import PLANE_AXIS
 from postproc.control.word_grid import WordGrid
 from postproc.path.model import ARC, FEED, JointPath
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, distinct
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 SNAP = 2.5
@@ -46,7 +46,7 @@ def word_rows(path: JointPath, moves: Moves, control: Control, kinematics: Calla
     start = np.concatenate([end[:1], end[:-1]])
     before = unrounded_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds)
     start[begins] = grid.rounded(before)
-    return WordRows(end, start, _written(end, start, np.union1d(begins, again), path, control))
+    return WordRows(end, start, _written(end, start, distinct(np.concatenate([begins, again])), path, control))
 
 
 def block_tools(path: JointPath, moves: Moves) -> Ints:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -23,6 +23,7 @@ from machines.machine import Machine
 from postproc.control.planes import Plane
 from postproc.control.rollover import Rollover, parked
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

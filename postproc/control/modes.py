@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, lru_cache
 from typing import Literal, get_args
 
@@ -16,7 +16,8 @@ from postproc.control.planes import Plane, stated
 from postproc.controllers.model import ControllerFile
 from postproc.controllers.output_modes import Mode
 from postproc.setup.model import SetupFile
-from toolpaths.arrays import Array, Floats, Ints
+from toolpaths.arrays import Array, Floats, Ints, distinct
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Toolpath
@@ -211,7 +212,7 @@ def _missing(what: MissingMode, machine: str) -> str:
 def _not_available(modes: OutputModes, toolpath: Toolpath) -> list[Diagnostic]:
     result = []
     can = ", ".join(law for law, why in modes.lacking.items() if not why)
-    for asked in np.unique(modes.asked).tolist():
+    for asked in distinct(modes.asked).tolist():
         law = ASKED[asked]
         missing = modes.lacking[law] if law != "auto" else None
         absent = OPTION_OF.get(law)

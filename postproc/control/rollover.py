@@ -9,7 +9,6 @@ itself says (Siemens DC, ACP, ACN).
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy as np
 from machines.machine import Machine
 from postproc.controllers.model import ControllerFile
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import whole_turns
 

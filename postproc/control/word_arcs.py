@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.control.control import Control
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import whole_turns
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays

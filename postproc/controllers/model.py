@@ -210,37 +210,37 @@ class ControllerFile(UserModel):
     """letters that words of axes may have"""
     sources: tuple[str, ...] = ()
     """documents that the rules come from"""
-    format: Format = Format()
-    units: Units = Units()
+    format: Format = Format.unstated()
+    units: Units = Units.unstated()
     """the words that state mm or inches"""
-    inch: InchFormat = InchFormat()
+    inch: InchFormat = InchFormat.unstated()
     """what is different in a program in inches"""
-    comment: Comment = Comment()
-    program: ProgramBlocks = ProgramBlocks()
-    start: Start = Start()
-    codes: Codes = Codes()
-    tools: Tools = Tools()
-    stops: Stops = Stops()
-    subprograms: SubprogramFormat = SubprogramFormat()
+    comment: Comment = Comment.unstated()
+    program: ProgramBlocks = ProgramBlocks.unstated()
+    start: Start = Start.unstated()
+    codes: Codes = Codes.unstated()
+    tools: Tools = Tools.unstated()
+    stops: Stops = Stops.unstated()
+    subprograms: SubprogramFormat = SubprogramFormat.unstated()
     subprogram_files: SubprogramFormat = SubprogramFormat(place="files")
     """the same in files of their own, which the set-up may ask for"""
-    arcs: ArcRules = ArcRules()
-    splines: SplineRules = SplineRules()
+    arcs: ArcRules = ArcRules.unstated()
+    splines: SplineRules = SplineRules.unstated()
     """blocks of the control for cubics, written where the machine file says that the option is fitted"""
-    cycles: Cycles = Cycles()
-    feed: FeedRules = FeedRules()
-    cutter_compensation: CutterCompensation = CutterCompensation()
-    kinematics: InterpolationRules = InterpolationRules()
-    modes: Modes = Modes()
-    rollover: RolloverRules = RolloverRules()
+    cycles: Cycles = Cycles.unstated()
+    feed: FeedRules = FeedRules.unstated()
+    cutter_compensation: CutterCompensation = CutterCompensation.unstated()
+    kinematics: InterpolationRules = InterpolationRules.unstated()
+    modes: Modes = Modes.unstated()
+    rollover: RolloverRules = RolloverRules.unstated()
     levels: dict[str, SmoothingLevel] = Field(default_factory=dict)
     """the control's own smoothing by kind of operation, for [output.smoothing] of the set-up"""
     smoothing_words: dict[SmoothingText, Annotated[float, Field(ge=0.0)]] = Field(default_factory=dict)
     """further words that set the control's smoothing, and the mm that each may take: "G61.1" = 0.005, or
     "G05 P10000" = 0.005"""
-    links: LinkRules = LinkRules()
-    pivots: PivotNames = PivotNames()
-    alignment: PartAlignment = PartAlignment()
+    links: LinkRules = LinkRules.unstated()
+    pivots: PivotNames = PivotNames.unstated()
+    alignment: PartAlignment = PartAlignment.unstated()
 
     @property
     def keeps_length(self) -> bool:

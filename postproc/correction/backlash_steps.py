@@ -12,13 +12,12 @@ for the sign of its last step sees another machine there. The walk itself is the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.correction.backlash_steps_loop import walk_all
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 COMPILE_FROM = 10_000

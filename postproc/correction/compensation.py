@@ -10,7 +10,7 @@ by more than the share of the tolerance that it gets. Home positions are the mac
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from postproc.correction.reversals import Divided, arcs_cut, inserted, starts_of
 from postproc.path.model import JointPath
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

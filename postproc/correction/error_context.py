@@ -4,7 +4,6 @@ directions of its axes."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +18,7 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.correction.error_sampling import changes
 from postproc.path.model import ARC, TRAVERSE, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 MOMENT = 1e-3

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.correction.arcs import LOOKS as ARC_LOOKS
@@ -12,6 +10,7 @@ from postproc.correction.error_sampling import looks_between
 from postproc.correction.reversals import LOOSE, SHORTEST, Divided, Starts, inserted, reversals, stretches
 from postproc.path.model import ARC, FEED, TRAVERSE, JointPath
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 

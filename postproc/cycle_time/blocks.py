@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import IntEnum
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from machines.machine import Machine
 from postproc.cycle_time.tip_path import TipPath
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, shared
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays, rows_of
 
 OFF = -1.0

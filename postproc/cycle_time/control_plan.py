@@ -7,7 +7,7 @@ path (`postproc.clock`) under those rules, the feed of each block can be run the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +30,7 @@ from postproc.feedrate.plan import PlannerOptions, plan
 from postproc.pipeline.result import PostResult
 from postproc.verification.planned_words import blocks_of_rows
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 
 NEAR = 0.05
 """by which words are above the plan's highest speeds: a control that ramps by itself a little otherwise is not held by them

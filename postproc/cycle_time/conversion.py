@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from postproc.cycle_time.phases import summed
 from postproc.cycle_time.report import as_dict, clock
 from postproc.cycle_time.source import from_conversion
 from postproc.pipeline.result import PostResult
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import read_value
 
 BAND_UP_TO = 20_000

@@ -9,8 +9,6 @@ src/emc/task/emctaskmain.cc; stop and command times are measured on the simulato
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.cycle_time.blocks import Cause, CornerMode, MotionBlocks
@@ -21,6 +19,7 @@ from postproc.cycle_time.phases import BlockTimes, Ramps, ramps, summed
 from postproc.cycle_time.shape import NOTHING, shape
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.compiled import chosen
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 

@@ -8,12 +8,11 @@ line, so that what it may take at one end does not depend on the other end.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.cycle_time.linuxcnc_segments import NORMAL_SHARE, PlannerSegments, clamped, plane_limit
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 KINK = 0.1

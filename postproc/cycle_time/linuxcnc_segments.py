@@ -6,7 +6,7 @@ Described from the source of LinuxCNC 2.9 (src/emc/task/emccanon.cc: `see_segmen
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from postproc.cycle_time.linuxcnc_kernels import chain_ends
 from postproc.cycle_time.shape import Shape, axis_limit, shape
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 NORMAL_SHARE = np.sqrt(3.0) / 2.0

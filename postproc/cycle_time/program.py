@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from postproc.readback.text.clamps import closing, opening
 from postproc.readback.text.modal import columns, fill_values, modal_state
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG, MM_PER_INCH
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.cycle_time.blocks import Axes, MotionBlocks
 from toolpaths.arrays import Bools, Floats, repeated
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import lengths
 from toolpaths.shapes import arrays
 
@@ -60,7 +59,7 @@ def shape(blocks: MotionBlocks) -> Shape:
     length, direction = feed_length(step, axes), unit(xyz)
     if blocks.given is not None:
         length = np.where(blocks.given > NOTHING, blocks.given, length)
-    others = np.setdiff1d(np.arange(step.shape[1]), axes.xyz)
+    others = [k for k in range(step.shape[1]) if k not in axes.xyz]
     turns = (step[:, others] != 0.0).any(axis=1)
     radius = climb = repeated(0.0, len(step))
     first = last = direction

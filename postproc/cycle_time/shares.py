@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.cycle_time.blocks import Cause, CornerMode, MotionBlocks
@@ -11,6 +9,7 @@ from postproc.cycle_time.estimate import Estimate
 from postproc.cycle_time.phases import BlockTimes, summed
 from postproc.cycle_time.shape import shape
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 
 CAUSES = ("feed", "limits", "corners", "stops", "rapids", "indexing", "tool_change", "spindle",
           "dwell", "commands")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from postproc.reference.cutcom_of_tools import radii_of
 from postproc.reference.holes import Phase
 from postproc.setup.model import SetupFile, at_places, part_placement
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, has_errors, warning
 from toolpaths.input_files import read_input, unreadable
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 
 STILL = 1e-9
 """mm or degrees below which an axis does not move"""

@@ -8,7 +8,6 @@ about 1.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from postproc.pipeline.result import PostResult
 from postproc.planning.geometry import MachinePath
 from postproc.planning.planned import pass_feed
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import REPORT, Diagnostic, DiagnosticError, error
 
 BEYOND = 1e-3

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from difflib import SequenceMatcher
 
 import numpy as np
@@ -12,6 +12,7 @@ from postproc.differences.distance import CurveGap, gap
 from postproc.differences.states import BETWEEN, StateDifference, events, states
 from postproc.differences.stretches import ProgramLine, Stretches, line_at, stretches
 from toolpaths.arrays import Ints
+from toolpaths.dataclass import dataclass
 
 _GRID = 1.0
 """mm by which begin and end of stretches are known again where the programs have different ones"""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.differences.order import in_order
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 
 _STEP = 2.0
 """mm, about, between places that are compared"""

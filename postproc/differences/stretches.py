@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.cycle_time.source import ExecutedProgram
 from postproc.readback.execution.execute import Motion
 from postproc.readback.text.canonical import Canonical, in_files
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 PLACES = 4

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ from postproc.controllers.model import ControllerFile
 from postproc.dossier.words import machine_dict
 from postproc.job.pivot_words import pivot_words
 from postproc.proof.hashes import Hashes
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 
 SCHEMA_VERSION = 1

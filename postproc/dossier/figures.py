@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from machines.machine import Machine
 from machines.sheet.drawing import drawing
 from postproc.dossier.content import ErrorsOf
 from toolpaths.choices import FigureEnding
+from toolpaths.dataclass import dataclass
 
 SLICES: tuple[tuple[MapNumber, MapNumber], ...] = (("x", "y"), ("x", "z"))
 MEASURES: tuple[MapMeasure, ...] = ("condition", "speed", "force")

@@ -11,13 +11,13 @@ Debrouwere et al., IEEE T-RO 29 (2013); primal-dual interior point: Nocedal and 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 TAU = 0.99

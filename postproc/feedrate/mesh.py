@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from postproc.feedrate.limits import JointLimits, squared_speed, steady_cap
 from postproc.feedrate.paths import ParametricPath
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 CHUNK = 16384
 RAMP = 32

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property, reduce
 from operator import add
 from typing import NamedTuple
@@ -18,6 +17,7 @@ from postproc.feedrate.rows import at_tool, tool
 from postproc.feedrate.shares import LimitShares
 from postproc.feedrate.trajectory import REST_PAD, JointTrajectory, Usage
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 
 SAMPLE = 1e-3
 """Step of the delivered samples, s."""

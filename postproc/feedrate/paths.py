@@ -8,7 +8,6 @@ differentiable joint with s = sigma - 0.4 d), sigma_dot is finite at rest, and r
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from postproc.feedrate.kernels.splines import spline
 from toolpaths.arrays import Floats
 from toolpaths.compiled import available, compiled
+from toolpaths.dataclass import dataclass
 
 KERNEL_FROM = 64
 """Places at once from which a spline is evaluated by the compiled loop: twice as quick as scipy."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from itertools import pairwise
 
@@ -24,6 +24,7 @@ from postproc.feedrate.solve_again import solved_again
 from postproc.feedrate.strict import strictly
 from postproc.feedrate.windows import Method, SolvedWindows
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +12,7 @@ from postproc.feedrate.paths import Eased
 from postproc.feedrate.rows import LimitRows, rows
 from postproc.feedrate.spline import Basis, rest_basis
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 SHORT = 0.01

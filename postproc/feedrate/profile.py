@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -14,6 +13,7 @@ from postproc.feedrate.kernels.samples import passed
 from postproc.feedrate.spline import Basis, rest_basis
 from toolpaths.arrays import Floats, Ints
 from toolpaths.compiled import available, compiled
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 CHUNK = 16384

@@ -7,13 +7,12 @@ and -dT/dln L is the multiplier z of a row times what it uses of its limit.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.feedrate.interior import Multipliers
 from postproc.feedrate.problem import SpeedProblem
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 

@@ -8,11 +8,10 @@ one unknown: the coefficients c[:REST + 3] are tied to it, and the stencils carr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 REST = 8

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple, get_args
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from machines.choices import MotionOrder
 from postproc.feedrate.limits import JointLimits
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 REST_PAD = 3

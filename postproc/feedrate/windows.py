@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -21,6 +21,7 @@ from postproc.feedrate.shares import weigh
 from postproc.feedrate.spline import Basis
 from toolpaths.arrays import Floats
 from toolpaths.compiled import available
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 WINDOW, OVERLAP = 8192, 512

@@ -6,7 +6,7 @@ import numpy as np
 
 from postproc.control.modes import OutputModes
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Ints
+from toolpaths.arrays import Ints, distinct
 from toolpaths.rotations import angle_between
 
 TURNS = 0.1
@@ -27,6 +27,6 @@ def plane_changes(moves: Moves, operation: Ints, modes: OutputModes, axis_tolera
     run = np.cumsum(moves.link)
     turns = np.append(False, angle_between(moves.axis[:-1], moves.axis[1:]) > TURNS * axis_tolerance) & ~moves.link
     constant = np.bincount(run, turns, minlength=int(run[-1]) + 1)[run] == 0.0
-    laws = {(int(k), c): modes.law(int(k), c) for k in np.unique(operation) for c in (True, False)}
+    laws = {(int(k), c): modes.law(int(k), c) for k in distinct(operation) for c in (True, False)}
     plane = np.array([laws[int(k), bool(c)] == "tilted" for k, c in zip(operation, constant, strict=True)])
     return [k for k in indexed(moves, axis_tolerance) if plane[k - 1] or plane[k]]

@@ -42,7 +42,7 @@ from postproc.reference.stated_feeds import without_feed
 from postproc.reference.unnumbered_tools import measured_length
 from postproc.setup.model import Placement, SetupFile, work_frame
 from postproc.setup.system import upside_down
-from toolpaths.arrays import Floats, Ints, repeated, shared, taken
+from toolpaths.arrays import Floats, Ints, distinct, repeated, shared, taken
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
 from toolpaths.toolpath import Frame, Kind, Role, Toolpath
 from toolpaths.units import DEG
@@ -374,7 +374,7 @@ def _no_inverse_time(controller: ControllerFile, options: Options) -> list[Diagn
 
 def _tool_lengths(job: Job) -> list[Diagnostic]:
     """A missing gauge length is an error where program words depend on it, else a warning: travel leaves it out."""
-    used = sorted({int(t) for t in np.unique(job.moves.tool)})
+    used = sorted({int(t) for t in distinct(job.moves.tool)})
     missing = sorted({max(job.number_of(t), 0) for t in used if job.gauge_length(t) == 0.0})
     missing = [n for n in missing if n > 0 or not job.setup.output.tool_call]
     if not missing:

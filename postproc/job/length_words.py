@@ -13,8 +13,8 @@ def words_depend_on_length(control: Control, kin: Kinematics, axis: Floats) -> b
     """True where a length offset on Z does not make program words free of the tool length (heads, parallel machines)."""
     if control.tip_law:
         return False
-    some = np.unique(axis[np.linspace(0, len(axis) - 1, min(len(axis), 200)).astype(int)], axis=0)
-    some = kin.nearest_axis(some)
+    some = axis[np.linspace(0, len(axis) - 1, min(len(axis), 200)).astype(int)]
+    some = kin.nearest_axis(np.array(sorted(set(map(tuple, some.tolist())))))
     tip = np.tile(kin.forward(control.machine.home[None, :])[0], (len(some), 1))
     short, long = (control.words(tool.inverse(tip, some)[0], tool, length)
                    for tool, length in ((kin, 0.0), (kin.with_tool(1.0), 1.0)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +10,7 @@ from machines.kinematics.chain import Joint
 from machines.machine import Machine
 from postproc.controllers.pivots import VectorKind
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 _TURN = 0.7

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from postproc.setup.model import Placement, SetupFile, at_places, part_placement
 from postproc.setup.places import PlaceOrder
 from postproc.setup.system import standing
 from toolpaths.arrays import Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Frame, Toolpath
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
 
 from machines.machine import Machine
 from postproc.controllers.model import ControllerFile
@@ -14,6 +13,7 @@ from postproc.reference.records import checked_records, plain_records
 from postproc.reference.spindle_defaults import Stated, standing_cuts, stated_by_setup, too_fast, with_defaults
 from postproc.reference.tool_numbers import numbered
 from postproc.setup.model import SetupFile, assumed_values, other_machine
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.toolpath import Toolpath
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -12,7 +12,8 @@ from machines.kinematics.base import Kinematics
 from postproc.base.options import Options
 from postproc.control.control import Control, InterpolationMode
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, distinct
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG
@@ -41,7 +42,7 @@ def rounding_bound(control: Control, kin: Kinematics, moves: Moves, grain: Float
     `grain` (J,) is the last decimal of each word, mm or degrees; `laws` are those that the words may have. Where
     X, Y, Z are the tip, rotary words turn the tool about it.
     """
-    rows = np.unique(np.linspace(0, len(moves) - 1, min(len(moves), 500)).astype(int))
+    rows = distinct(np.linspace(0, len(moves) - 1, min(len(moves), 500)).astype(int))
     some = kin.inverse(moves.tip[rows], kin.nearest_axis(moves.axis[rows]))[0]
     some = some[np.isfinite(some).all(axis=1)]
     if not len(some):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +12,7 @@ from postproc.controllers.model import ControllerFile
 from postproc.controllers.spelling import SmoothingLevel
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Toolpath
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.joints.lattice import Lattice
 from postproc.joints.states import BAD, SECONDS, Segment, leading, rough_segments
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import wrap
 
 

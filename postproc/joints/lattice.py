@@ -7,7 +7,6 @@ joint then stands at value + 2 pi k, and travel allows k from `least` to `most`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +15,7 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Limits
 from postproc.joints.tracks import TRAVEL_SLACK, branches_of, following
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import TWO_PI, wrap
 from toolpaths.shapes import arrays
 

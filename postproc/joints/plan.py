@@ -7,7 +7,7 @@ the preferred axis, time with every axis at its velocity, the moves between the 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from postproc.joints.search import RunPiece, SegmentChoice, cheapest, pieces, wr
 from postproc.joints.states import BAD, NEVER, SECONDS, Segment, least_of, rough_segments, tidy_segments
 from postproc.joints.tracks import TRAVEL_SLACK
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import TWO_PI, whole_turns, wrap
 from toolpaths.shapes import arrays
 

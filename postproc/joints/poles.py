@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats, runs
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays

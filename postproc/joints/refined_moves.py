@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, shared
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays, rows_of
 from toolpaths.toolpath import Arcs, Kind
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from machines.machine import Machine
 from postproc.joints.run_roads import RunRoad
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 SHORTEST, MOST_TIMES, FEWEST = 0.01, 20_000, 8

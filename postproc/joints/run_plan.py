@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,8 @@ from postproc.joints.refined_moves import Refined, cut, with_rewinds
 from postproc.joints.singular_detours import Led, SingularPassage, lead_past, whole
 from postproc.joints.spin import held_joints
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints, repeated, shared, taken
+from toolpaths.arrays import Bools, Floats, Ints, distinct, repeated, shared, taken
+from toolpaths.dataclass import dataclass
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
@@ -132,7 +133,7 @@ def plan_moves(machine: Machine, kinematics: Callable[[int], Kinematics], moves:
                progress: Callable[[int], None] | None = None) -> RunPlan:
     """The joints of all moves (in the table frame), run by run as `moves.link` divides them."""
     starts, parts = np.flatnonzero(moves.link), []
-    tools = {k: kinematics(k) for k in np.unique(moves.tool[starts]).tolist()}
+    tools = {k: kinematics(k) for k in distinct(moves.tool[starts]).tolist()}
     given = _reached(tools, moves, starts, AXIS_SHARE * run_options.tolerance)
     if (plan := _without_choice(machine, tools, moves, starts, given, run_options.tolerance)) is not None:
         return plan

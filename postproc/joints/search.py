@@ -6,8 +6,6 @@ enough: two could be replaced by one that goes along the whole path. It is made 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.joints.lattice import Lattice
@@ -25,6 +23,7 @@ from postproc.joints.states import (
     staying,
 )
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import TWO_PI
 from toolpaths.shapes import arrays
 

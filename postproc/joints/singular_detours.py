@@ -11,7 +11,6 @@ the tolerance the axis is led through it, onto the opposite meridian, so that th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +19,7 @@ from machines.kinematics.base import Kinematics
 from postproc.joints.poles import Pole, passages, poles_of, stretches
 from postproc.joints.taut_string import taut_string
 from toolpaths.arrays import Bools, Floats, Ints, repeated
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays

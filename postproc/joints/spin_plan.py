@@ -13,7 +13,6 @@ out is a proposal: the stages that check reach and deviation bound it as any pat
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from postproc.joints.run_roads import ParameterCurve, RunRoad, columns_of, rest
 from postproc.joints.spin_loop import cheapest_spins
 from toolpaths.arrays import Array, Bools, Floats
 from toolpaths.compiled import chosen
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 

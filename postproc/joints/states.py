@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from postproc.joints.lattice import Lattice
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 BranchState = tuple[int, tuple[int, ...]]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from toolpaths.arrays import Floats, Ints, shared
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 LEVEL = 6

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.choices import MotionOrder
@@ -17,6 +15,7 @@ from postproc.readback.comparison.compare import Comparison, place_on_moves
 from postproc.readback.text.canonical import in_files
 from postproc.report.residuals import residuals
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import lengths
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from postproc.report import summary
 from postproc.report.residuals import residuals, tip_uncertainty
 from postproc.verification.proof_text import statement
 from toolpaths.arrays import Floats, finite
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Severity
 from toolpaths.toolpath import Kind
 from toolpaths.units import DEG

@@ -5,9 +5,9 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, warning
 from toolpaths.plug_ins import PlugIn, PlugInFault, plug_in, registered, said
 

@@ -9,8 +9,6 @@ through at all: here its parameter is the parabola through its values at the blo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.kinematics import columns
@@ -20,6 +18,7 @@ from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from postproc.control.control import Control
 from postproc.path.coarse_bound import coarse_bounds, highest
 from toolpaths.arrays import Bools, Floats, Ints, without_nan
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -23,7 +23,8 @@ from postproc.path.rewinds import RetractPlan
 from postproc.path.solved_runs import SolvedRun, SolvedRuns, solved_runs
 from postproc.path.zero_entry import BELOW_HOME, ZeroEntry, cost, needed, zero_entry
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Array, Floats, Ints, as_slice, taken
+from toolpaths.arrays import Array, Floats, Ints, as_slice, distinct, taken
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors, info
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -107,7 +108,7 @@ def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count:
     singular[parts.origin] = plan.singular
     columns = columns | {"move": parts.origin[columns["move"]], "u": parts.at(columns["move"], columns["u"])}
     return JointPath(**columns, begin=parts.begins(out.begin, count), singular=singular,
-                     turns=np.unique(parts.origin[turns]),
+                     turns=distinct(parts.origin[turns]),
                      worst_tip=float(worst[0]), worst_axis=float(worst[1]), frames=tuple(out.frames),
                      rewinds=parts.origin[parts.rewind], events=plan.events,
                      opened=tuple((name, float(column.min()), float(column.max()))

@@ -6,7 +6,7 @@ They are those of `plan_link` at its first try. Where that fails, or a run is in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +25,7 @@ from postproc.path.model import TRAVERSE
 from postproc.path.solved_runs import SolvedRun, SolvedRuns
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays

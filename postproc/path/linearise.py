@@ -6,7 +6,7 @@ the next: where a shorter block is never worse than a longer one, no division th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from machines.kinematics.base import Kinematics
 from postproc.control.control import Control
 from postproc.joints.joint_path import branch_of, nearest_solution
 from postproc.path.bound import CurveBlocks, settled_bounds
-from toolpaths.arrays import Bools, Floats, Ints, without_nan
+from toolpaths.arrays import Bools, Floats, Ints, distinct, without_nan
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between, wrap
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -83,7 +84,7 @@ def _linearised(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q
     curve = np.concatenate([np.flatnonzero(exact), *front.curve])
     u, q = np.concatenate([np.ones(int(exact.sum())), *front.u]), np.concatenate([q1[exact], *front.q])
     order = np.lexsort((u, curve))
-    broken = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *front.broken]))
+    broken = distinct(np.concatenate([np.zeros(0, dtype=np.int64), *front.broken]))
     return CurvePieces(curve[order], u[order], q[order], broken, float(front.worst[0]), float(front.worst[1]))
 
 

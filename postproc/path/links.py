@@ -6,7 +6,7 @@ while the tool is above everything that is cut, seen along its own axis, or its 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from postproc.path.linearise import linearise
 from postproc.reference.moves import Moves
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Bools, Floats, Ints, box_corners
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays

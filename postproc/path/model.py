@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from postproc.base.group_rows import groups
 from postproc.control.control import Control
 from postproc.control.modes import WordFrame
 from postproc.joints.singular_detours import SingularPassage
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 TRAVERSE, FEED, ARC = 0, 1, 2

@@ -6,7 +6,7 @@ the very pose: no rotary axis turns about a tool in the material.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 
 import numpy as np
@@ -20,6 +20,7 @@ from postproc.path.links import MARGINS, RISE, Link, Pose, SafeSpace, plan_link
 from postproc.setup.joints import Joints
 from postproc.setup.model import Placement, RewindSettings, SetupFile
 from toolpaths.arrays import Floats, box_corners
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 

@@ -7,6 +7,7 @@ import numpy as np
 from postproc.control.control import Control
 from postproc.path.model import JointPath
 from postproc.reference.moves import Moves
+from toolpaths.arrays import distinct
 from toolpaths.diagnostics import Diagnostic, error, info
 
 
@@ -22,7 +23,7 @@ def check_singular(path: JointPath, moves: Moves, control: Control, least: float
     for name, values in zip(names, found.T, strict=True):
         worst = int(np.nanargmin(values))
         line = int(moves.line[path.move[worst]])
-        bad = np.unique(moves.line[path.move[np.flatnonzero(values < least)]])
+        bad = distinct(moves.line[path.move[np.flatnonzero(values < least)]])
         if len(bad):
             lines = [line, *(n for n in bad[:6].tolist() if n != line)]
             result.append(error("singular.distance", f"{name} comes to {values[worst]:.4f} of a singular position, allowed "

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +10,8 @@ import postproc.path.faults as faults
 from machines.kinematics.base import Kinematics
 from postproc.control.modes import CONSTANT, OutputModes, WordFrame, turning_run
 from postproc.joints.run_plan import RunPlan
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, distinct
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between
 from toolpaths.shapes import arrays
@@ -57,7 +57,7 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
     good = machine.kinematics.straight_slides and bool(np.isfinite(plan.q).all()) and not bool((plan.moved > 1e-6).any()) \
         and not bool(np.isfinite(moves.spin).any())
     laws = {(op, s): modes.law(op, s) for op, s in set(zip(owner, still.tolist(), strict=True))}
-    tools = {k: kinematics(k) for k in np.unique(tool).tolist()}
+    tools = {k: kinematics(k) for k in distinct(tool).tolist()}
     q, axis, found, each = plan.q, moves.axis, list[Diagnostic](), list[SolvedRun]()
     for k, (first, last) in enumerate(zip(firsts, lasts, strict=True)):
         kin, law = tools[int(tool[k])], laws[owner[k], bool(still[k])]
@@ -67,7 +67,7 @@ def solved_runs(plan: RunPlan, modes: OutputModes, kinematics: Callable[[int], K
             if has_errors(more):
                 continue
         if law == "tilted" and not still[k]:
-            found.append(turning_run(np.unique(moves.line[first:last]).tolist(), file))
+            found.append(turning_run(distinct(moves.line[first:last]).tolist(), file))
             continue
         own = modes.of(owner[k])
         frame = own.tcp if law == "tcp" else own.base

@@ -13,7 +13,7 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.path.model import ARC, JointPath
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Floats, Ints, distinct
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
@@ -101,7 +101,7 @@ def extremes(path: JointPath, moves: Moves, control: Control, kinematics: Callab
             low_arc, high_arc = low[arcs], high[arcs]
             _arc_extremes(path, law, rows[arcs], before[arcs], low_arc, high_arc)
             low[arcs], high[arcs] = low_arc, high_arc
-        for index in np.unique(tool[k]) if law.tip_law else ():
+        for index in distinct(tool[k]) if law.tip_law else ():
             part = k[tool[k] == index]
             for q in law.bent(before[part], end[part], np.linspace(0.1, 0.9, 9), kinematics(int(index))):
                 low[part], high[part] = np.fmin(low[part], q), np.fmax(high[part], q)

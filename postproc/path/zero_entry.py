@@ -10,8 +10,6 @@ standing as nearly as straight paths of the tip let them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.kinematics.base import Kinematics
@@ -20,6 +18,7 @@ from postproc.control.control import Control
 from postproc.control.modes import table_axes
 from postproc.path.links import Link, SafeSpace, stays_clear
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, info
 from toolpaths.rotations import whole_turns
 from toolpaths.shapes import arrays

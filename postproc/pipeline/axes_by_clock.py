@@ -8,7 +8,7 @@ the control, with that of the CL file's axes, and the fastest of these is taken.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from postproc.orientation.plans.plans import OrientationPlan, StateTable, plans_
 from postproc.pipeline.feeds_by_clock import ProgramClock, measured
 from postproc.pipeline.proved_axes import Convert, Proved
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 LAST = 3
 """fastest programs that are executed, besides that of the CL file's axes"""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from postproc.pipeline.result import PostResult
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import DiagnosticError, Severity, error
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 
 from machines.hooks import HOOK_VALUES, NAMES, filled
@@ -17,6 +16,7 @@ from postproc.readback.text.clamps import clamp_numbers
 from postproc.readback.text.modal import drop_passive
 from postproc.setup.hooks_file import load_hooks
 from postproc.writing.state import NUMBER_ROOM
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, has_errors, read_value
 
 _CODE = re.compile(r"(?<![A-Z0-9_$.{])([GM])(\d+(?:\.\d+)?)(?![A-Z0-9_$.])")

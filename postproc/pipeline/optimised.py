@@ -9,7 +9,7 @@ faster is not taken, by the model's formulas and then by the control, executed.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import get_args
 
@@ -19,6 +19,7 @@ from postproc.base.options import FeedModeChoice, Options, OutputMode
 from postproc.base.program_time import Optimised, OptimisedStep, ProgramTime
 from postproc.pipeline.feeds_by_clock import ProgramClock, StagedWhole, measured, with_compared_feeds
 from postproc.pipeline.result import PostResult
+from toolpaths.dataclass import dataclass
 
 _Change = Callable[[PostResult], PostResult]
 """What a conversion begins with, changed"""

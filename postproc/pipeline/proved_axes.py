@@ -7,7 +7,7 @@ plan is refused, the paths and states that it was refused for are barred, and th
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,7 @@ from postproc.orientation.plans.plans import OrientationPlan, plans_of
 from postproc.pipeline.result import PostResult
 from postproc.readback.comparison.compare import Comparison
 from toolpaths.arrays import Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Literal
 
 from machines.machine import Machine
@@ -17,6 +17,7 @@ from postproc.path.model import JointPath
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors, require
 from toolpaths.toolpath import ClSource, Toolpath
 

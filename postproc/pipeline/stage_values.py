@@ -5,7 +5,6 @@ Each adds fields to the one before, so that a stage states by the type of its ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 from machines.machine import Machine
@@ -22,6 +21,7 @@ from postproc.pipeline.smoothed_stages import ExcludedPasses
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import ClSource, Toolpath
 

@@ -6,7 +6,7 @@ Each stage is a pure function: what the one before has handed on, and progress, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
@@ -59,6 +59,7 @@ from postproc.verification.stated_numbers import check_header, stated_smoothing
 from postproc.writing.unwritable import floating_taps, unwritable
 from postproc.writing.writers import writer_for
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, has_errors
 from toolpaths.units import DEG
 

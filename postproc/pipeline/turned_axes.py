@@ -7,7 +7,7 @@ written as well, and the fastest of all is taken. Runs for which a program is re
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from postproc.orientation.turning.turning_choice import Programs, TurningChoice
 from postproc.pipeline.feeds_by_clock import ProgramClock, measured
 from postproc.pipeline.result import PostResult
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Severity
 
 Write = Callable[[TurningChoice], PostResult]

@@ -6,7 +6,6 @@ placed: that is looked at by the conversion alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +24,7 @@ from postproc.setup.bodies import BodiesModel
 from postproc.setup.bodies import SolidModel as Given
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.extras import need
 

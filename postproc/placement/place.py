@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from postproc.placement.space import ANGLES, Space, space_of
 from postproc.setup.model import PartPlacement, SetupFile, part_placement
 from postproc.setup.places import one_part
 from postproc.setup.system import standing
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from hashlib import blake2b
 
@@ -21,6 +21,7 @@ from postproc.placement.reasons import NearSingular, NoSafePlane, Obstacle, Refu
 from postproc.placement.rigid_move import moved
 from postproc.placement.space import Space
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 _WORTH = 1e-4

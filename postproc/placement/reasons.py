@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from postproc.orientation.passes.reasons import Refusal, Touching
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 
 

@@ -7,7 +7,7 @@ On a parallel machine margins are looked at directly, at poses that stand for al
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +23,7 @@ from postproc.placement.reasons import AxisLacks, Lack, MarginLacks, RefusedPass
 from postproc.placement.rigid_move import moved
 from postproc.placement.space import ANGLES, Space
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 

@@ -7,7 +7,6 @@ R = Rz(turn) Ry(tilt_y) Rx(tilt_x).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import product
 from typing import Literal, get_args
 
@@ -17,6 +16,7 @@ from postproc.placement.reasons import BeyondTable
 from postproc.setup.model import PartPlacement, Placement
 from postproc.setup.place import PlaceBox, PlacementLimits
 from toolpaths.arrays import Floats, box_corners
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import rotation
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

@@ -9,7 +9,7 @@ parallel machines alike.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,7 @@ from postproc.joints.joint_path import nearest_solution
 from postproc.planning.geometry_poles import near_poles, past_poles
 from postproc.planning.geometry_sites import sites
 from toolpaths.arrays import Array, Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.smooth import Smooth

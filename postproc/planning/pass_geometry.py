@@ -7,7 +7,6 @@ stop or switch. Holes are left out: canned cycles and their strokes stop at both
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import groupby, islice, pairwise
 
 import numpy as np
@@ -18,6 +17,7 @@ from postproc.planning.geometry import MachinePath, PathStretch, machine_paths
 from postproc.planning.planned_errors import PlannedCorrection
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves

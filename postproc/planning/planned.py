@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, reduce
 from operator import add
 from typing import get_args
@@ -29,6 +29,7 @@ from postproc.planning.word_feeds import points_between, with_points, word_secon
 from postproc.reference.moves import Moves
 from postproc.setup.model import ToolSetup
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import REPORT, Diagnostic, DiagnosticError, error, require
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.blend import SHARPEST

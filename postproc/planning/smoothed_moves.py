@@ -8,13 +8,14 @@ its place in the order.
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.planning.pass_geometry import chains
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import unit
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.smooth import STILL, Smooth, Tolerance, smooth_all

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,6 +10,7 @@ from postproc.base.version import VERSION
 from postproc.pipeline.result import VerifyResult
 from postproc.proof.file import AGAIN, HashedFile, ProofFile, options_of, read_proof
 from postproc.proof.hashes import FileHash, Hashes, ProofInput, cl_hashes, proof_place, sha256
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, error, info, warning
 from toolpaths.input_files import STANDARD_INPUT, is_regular, read_input
 

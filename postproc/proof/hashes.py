@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,6 +14,7 @@ from postproc.base.options import Options
 from postproc.controllers.model import builtin_files
 from postproc.setup.criteria import criteria_of
 from postproc.setup.files import file_keys, seen_from_here, value_at
+from toolpaths.dataclass import dataclass
 from toolpaths.input_files import read_input
 from toolpaths.toolpath import ClSource
 

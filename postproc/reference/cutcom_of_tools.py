@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 from postproc.reference.events import TOOL_WORDS, compensation_side, numbers
 from postproc.setup.model import Compensation, SetupFile, ToolSetup
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Event, Toolpath
 

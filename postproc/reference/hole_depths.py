@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.controllers.model import ControllerFile
-from toolpaths.arrays import Bools
+from toolpaths.arrays import Bools, distinct
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Cycle, Toolpath
 
@@ -16,7 +16,7 @@ _SAME = 1e-9
 def unfit_holes(toolpath: Toolpath, controller: ControllerFile) -> list[Diagnostic]:
     """Cycles with holes that have no depth in the words of the controller, whose planes are in the wrong
     order, or whose pecks are nothing; all by the line of the CYCLE record."""
-    used = [toolpath.cycles[int(k)] for k in np.unique(toolpath.cycle[toolpath.cycle >= 0])]
+    used = [toolpath.cycles[int(k)] for k in distinct(toolpath.cycle[toolpath.cycle >= 0])]
     if not used:
         return []
     least = controller.grain

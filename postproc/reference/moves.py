@@ -5,7 +5,7 @@ This is the reference that output is made from and that read-back compares with.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from postproc.reference.repeated import Repeated
 from postproc.reference.stated_feeds import feeds_of, follows_speed, slow_feeds
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, repeated, shared, taken
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves

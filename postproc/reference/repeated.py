@@ -7,7 +7,7 @@ states in which the path itself has come there, whatever the copy before has lef
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +25,7 @@ from postproc.reference.events import (
 from postproc.setup.model import Placement
 from postproc.setup.places import PlaceOrder
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays, rows_of
 from toolpaths.toolpath import Arcs, Event, Toolpath
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +22,7 @@ from postproc.reference.events import (
 from postproc.setup.model import SetupFile, ToolSetup
 from postproc.setup.spindle import CoolantKind, Direction, SpindleSetup
 from toolpaths.arrays import Bools, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Event, Toolpath
 

@@ -12,7 +12,7 @@ from postproc.path.model import FEED, JointPath
 from postproc.pipeline.result import PostResult
 from postproc.planning.planned_source import cutting_forces
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Ints
+from toolpaths.arrays import Ints, distinct
 
 AT_ONCE, LOOKS = 65536, 2000
 """poses at a time; blocks at which the forces of the motors are looked at, spread over each tool's cuts"""
@@ -98,7 +98,7 @@ def motor_load(result: PostResult) -> dict[str, Any] | None:
     from machines.dynamics.limits import force_limits
 
     forces, worst = cutting_forces(job), dict[str, Any]()
-    for tool in np.unique(moves.tool).tolist():
+    for tool in distinct(moves.tool).tolist():
         limits = force_limits(result.machine, job.kinematics(tool), forces.get(tool, 0.0))
         if limits is None:
             return None

@@ -190,7 +190,7 @@ def tools_of(result: PostResult) -> list[dict[str, Any]]:
     found: dict[int, dict[str, Any]] = {}
     for k in index[np.argsort(first, kind="stable")].tolist():
         number = job.number_of(k)
-        speeds = np.unique((direction * rpm)[cuts & (path.tool == k)])
+        speeds = distinct((direction * rpm)[cuts & (path.tool == k)])
         tool = found.setdefault(number, {
             "number": number, "name": path.tools[k].name if k >= 0 else "", "gauge_length_mm": job.gauge_length(k) or None,
             "spindle_rpm": [], "of_setup": [what for n, what in job.stated if n == number],

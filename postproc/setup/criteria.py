@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from pydantic import ValidationError
@@ -13,6 +12,7 @@ from machines.user_file import nearest_word
 from machines.user_model import UserModel
 from machines.value_words import AdvisedError
 from toolpaths.arrays import Array, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.plug_ins import PlugIn, PlugInFault, plug_in, registered, said
 
 CriterionValue = bool | float | str | list[float] | list[str]

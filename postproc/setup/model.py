@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -22,6 +21,7 @@ from postproc.setup.place import PlacementLimits
 from postproc.setup.places import REGISTER, PlaceOrder, PlaceSetup
 from postproc.setup.spindle import CoolantKind, SpindleSetup
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Frame, Toolpath
@@ -217,14 +217,14 @@ class SetupFile(UserModel):
     work_offset_code: str = Field(default="G54", pattern=REGISTER)
     """register of the control that holds it: G54 to G59, G59.1 to G59.3 where the control has them, or a
     further one by the control's own name, as "G54.1 P12" (Fanuc), "G154 P40" (Haas), "G520" (Siemens), "preset 12" (TNC)"""
-    part: PartPlacement = PartPlacement()
+    part: PartPlacement = PartPlacement.unstated()
     places: list[PlaceSetup] = Field(default_factory=list, max_length=99)
     """[[places]]: the part stands at several places, each with a work offset of its own; [part] and work_offset_code
     are then those of no place, but what places do not state is as in [part]"""
     order: PlaceOrder = "tool"
     """of the places: tool: all that one tool cuts at every place before the next tool; part: one part after the other"""
-    placement: PlacementLimits = PlacementLimits()
-    clearance: LinkClearance = LinkClearance()
+    placement: PlacementLimits = PlacementLimits.unstated()
+    clearance: LinkClearance = LinkClearance.unstated()
     tools: dict[Annotated[str, Field(pattern=r"^(0|[1-9][0-9]*)$")], ToolSetup] = Field(default_factory=dict)
     """by tool number without leading zeros, e.g. [tools.1]"""
     tool_numbers: dict[Annotated[str, Field(min_length=1)], Annotated[int, Field(ge=1, lt=10**9)]] = Field(
@@ -232,16 +232,16 @@ class SetupFile(UserModel):
     """by name of the tool in the CL file (see inspect), e.g. [tool_numbers] "EM12" = 2: its number, whatever
     the file loads it by, and where it loads none; lengths in [tools.2] are then its. "unnamed" is a tool
     without name and number"""
-    output: OutputSettings = OutputSettings()
+    output: OutputSettings = OutputSettings.unstated()
     control_pivots: dict[Annotated[str, Field(pattern="^[ABC]$")], Pivot] = Field(default_factory=dict)
     """by rotary axis, e.g. [control_pivots.A]: what the control's parameters say; default: as the machine file"""
-    rewind: RewindSettings = RewindSettings()
-    joints: Joints = Joints()
-    hooks: HooksModel = HooksModel()
+    rewind: RewindSettings = RewindSettings.unstated()
+    joints: Joints = Joints.unstated()
+    hooks: HooksModel = HooksModel.unstated()
     """blocks of the shop for this job, as in the machine file: a key that is stated here takes the place of that there"""
     bodies: BodiesModel | None = None
     """part, table and fixtures that the tools must not touch"""
-    orientation: OrientationLimits = OrientationLimits()
+    orientation: OrientationLimits = OrientationLimits.unstated()
 
     @model_validator(mode="after")
     def _places_differ(self) -> SetupFile:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.machine import Machine
 from postproc.setup.system import placed
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between, rotation
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind, Role, Toolpath

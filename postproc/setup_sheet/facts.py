@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
@@ -24,6 +23,7 @@ from postproc.reference.tool_numbers import numbered
 from postproc.reference.unnumbered_tools import UNNAMED, with_tools
 from postproc.setup.model import SetupFile
 from postproc.setup.spindle import Direction
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.toolpath import Event, Kind, Role, Tool, Toolpath
 

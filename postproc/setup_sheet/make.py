@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
@@ -27,6 +27,7 @@ from postproc.setup_sheet.questions import (
     three_numbers,
 )
 from postproc.setup_sheet.text import ORIGIN, TOOL_NUMBERS, SheetHeader, sheet_text, sheet_values
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
 

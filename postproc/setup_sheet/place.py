@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from postproc.setup.system import BEYOND
 from postproc.setup_sheet.attitudes import Attitude, attitudes_of
 from postproc.setup_sheet.odd_record import odd_record
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, info
 from toolpaths.toolpath import Kind, Toolpath
 from toolpaths.units import DEG

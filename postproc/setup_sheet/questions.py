@@ -6,12 +6,13 @@ import json
 import math
 import shlex
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal, get_args
 
 from postproc.setup.spindle import CoolantKind
 from postproc.setup_sheet.facts import NumberedTool, SheetFacts, ToolFacts
 from toolpaths.choices import LengthUnit
+from toolpaths.dataclass import dataclass
 
 QuestionKind = Literal["tool_number", "gauge_length", "spindle", "feed", "coolant", "origin", "units"]
 AnswerSource = Literal["answered", "assumed"]

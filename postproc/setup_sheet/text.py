@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from postproc.pipeline.result import PostResult
@@ -13,6 +12,7 @@ from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import SheetFacts, ToolFacts
 from postproc.setup_sheet.place import Fit
 from postproc.setup_sheet.questions import Answer
+from toolpaths.dataclass import dataclass
 from toolpaths.toolpath import Toolpath
 
 _ASSUMED = "ASSUMED, nobody has stated it: put in yours, and take its name out of `assumed`"

@@ -12,7 +12,6 @@ of that kind out (`left_out.py`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -26,6 +25,7 @@ from postproc.time_fit.executed_fit import own_slopes, refined
 from postproc.time_fit.left_out import structure
 from postproc.time_fit.runs import CLOCK, OTHERS, MeasuredRun
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 from toolpaths.shapes import arrays
 

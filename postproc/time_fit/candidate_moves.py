@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from toolpaths.dataclass import dataclass
 
 FEEDS = (1000.0, 3000.0, 8000.0)
 """mm/min at which moves are tried, up to what the machine's slowest linear axis can do"""

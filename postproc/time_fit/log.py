@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import csv
 import io
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.source import read_file
 from postproc.time_fit.log_exports import is_export, lines_of_export, number_of
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.shapes import arrays
 

@@ -10,7 +10,6 @@ time is spent or nothing is gained.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +31,7 @@ from postproc.time_fit.left_out import KEPT, LEAST_SHARE, MOSTLY
 from postproc.time_fit.log import RunLog
 from postproc.time_fit.runs import MeasuredRun, run_of_log
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, Severity, error, read_value
 from toolpaths.shapes import arrays
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.cycle_time.blocks import Cause, MotionBlocks
@@ -14,6 +12,7 @@ from postproc.cycle_time.phases import BlockTimes, summed
 from postproc.time_fit.log import RunLog, matched, period
 from postproc.time_fit.log_exports import number_of
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from postproc.cycle_time.estimate import Estimate
 from postproc.cycle_time.report import clock
 from postproc.cycle_time.shares import CAUSES, shares
 from postproc.time_study.tables import LEAST
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, info
 from toolpaths.table_text import table_text
 

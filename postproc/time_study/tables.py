@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from postproc.cycle_time.report import clock
 from postproc.cycle_time.shape import shape, tip_travel
 from postproc.cycle_time.shares import CAUSES, TimeShares, losses, operations
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.table_text import table_text
 
 TableRow = dict[str, object]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,7 @@ from postproc.cycle_time.shape import shape
 from postproc.cycle_time.shares import TimeShares
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
+from toolpaths.dataclass import dataclass
 from toolpaths.drawing import ADJACENT, image
 from toolpaths.shapes import arrays
 

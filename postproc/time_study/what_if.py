@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from machines.choices import MotionOrder
 from machines.machine import Machine
 from postproc.cycle_time.model import CycleTimeModel
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import DiagnosticError, error
 
 LIMITS: tuple[MotionOrder, ...] = get_args(MotionOrder)

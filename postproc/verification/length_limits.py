@@ -9,7 +9,7 @@ lengths found, and the bound of its deviation (`deviation_bound`) must keep the 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -31,7 +31,8 @@ from postproc.setup.model import ToolSetup
 from postproc.verification.executed import executed_poses
 from postproc.verification.length_ends import LEAST, SIGNS, Ends
 from postproc.verification.lifted import lifted
-from toolpaths.arrays import Bools, Floats, Ints, without_nan
+from toolpaths.arrays import Bools, Floats, Ints, distinct, without_nan
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import lengths
 from toolpaths.shapes import arrays
 
@@ -99,7 +100,7 @@ class _Places:
 
 def length_margins(trial: LengthTrial, motion: Motion, executed: BlockPoses, c: Comparison) -> tuple[LengthMargin, ...]:
     """Of every tool that moves, in order of their numbers; () where the program calls none."""
-    job, numbers = trial.job, np.unique(motion.tool[motion.tool >= 0])
+    job, numbers = trial.job, distinct(motion.tool[motion.tool >= 0])
     if not job.setup.output.tool_call or not len(numbers):
         return ()
     again, longer = trial.executed(dict.fromkeys(numbers.tolist(), STEP), motion, executed)

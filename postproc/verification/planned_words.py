@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.job.job import Job
@@ -15,6 +13,7 @@ from postproc.readback.comparison.slow_moves import Slack, axis_seconds, feed_ro
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import REPORT, Diagnostic
 from toolpaths.shapes import arrays
 

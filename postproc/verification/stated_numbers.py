@@ -11,6 +11,7 @@ from postproc.base.header_words import HEADER, SETUP_MARK, header_of, read_heade
 from postproc.job.job import Job
 from postproc.readback.comparison.compare import Comparison
 from postproc.readback.dialects.base import as_bytes
+from toolpaths.arrays import distinct
 from toolpaths.diagnostics import Diagnostic, error
 
 _MARK = re.compile(rf"(?i){SETUP_MARK} ([0-9a-f]{{8}})\b")
@@ -67,7 +68,7 @@ def _plain(name: str) -> str:
 
 def _lengths(text: str, job: Job) -> Iterator[tuple[str, str, str]]:
     """The same of the gauge length of each tool that moves."""
-    for number in sorted({job.number_of(k) for k in np.unique(job.moves.tool).tolist()}):
+    for number in sorted({job.number_of(k) for k in distinct(job.moves.tool).tolist()}):
         right, said = job.length_of(number) / job.controller.lengths.unit, re.findall(_LENGTH.format(number), text)
         off = [one for one in said or [NOTHING] if not _same(one, right)]
         if number > (-1 if job.setup.output.tool_call else 0) and off:

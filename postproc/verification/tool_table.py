@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from postproc.readback.comparison.length_margins import MUCH, LengthMargin
 from postproc.reference.events import tool_loads
 from postproc.setup.model import SetupFile, ToolSetup
 from postproc.verification.tool_table_file import ToolTable, no_length, read_tool_table
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.units import MM_PER_INCH
 

@@ -18,11 +18,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Literal
 
 from postproc.controllers.model import ControllerFile, WriterName
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, require
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.units import MM_PER_INCH

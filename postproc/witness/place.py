@@ -77,7 +77,7 @@ class Poses:
         if not (self.case.setup.get("output") or {}).get("tool_call", True):
             number = np.full(len(rows), self.uncalled)
         result = np.zeros(len(rows))
-        for n in np.unique(number).tolist():
+        for n in sorted(set(number.tolist())):
             result[number == n] = float((tools.get(str(int(n))) or {}).get("gauge_length") or 0.0)
         return result
 

@@ -232,7 +232,7 @@ def _coolants(c: Commanded, setup: dict[str, Any]) -> Array:
     begin = _loads(tool)
     later = np.isin(begin, begin[~silent & (c.flowed >= begin) & (c.coolant != 0)])
     others = ~later & (silent | ((c.flowed < begin) & (c.coolant != UNFOLLOWED)))
-    for number in np.unique(tool[np.isin(tool, list(own)) | bool(default)]).tolist():
+    for number in sorted(set(tool[np.isin(tool, list(own)) | bool(default)].tolist())):
         word = own.get(number) or default
         taken = (tool == number) & ((number in own) | silent | (c.coolant == 0))
         result[taken & others] = {"off": 0, "flood": 1, "mist": 11, "through": 12, "air": 13}.get(str(word), 2)
@@ -314,7 +314,7 @@ def _hole_faults(w: Walked, i: int, blocks: Array, cycle: WitnessCycle, rpm: flo
         found.append("rapid motion into uncut material of a hole")
     back = np.append(depth[1:], -np.inf) < deepest - 0.01  # lost motion may be taken up first
     turns = deepest[np.isfinite(deepest) & (depth >= deepest - 0.01) & back]
-    steps = np.diff(np.append(-cycle.depth, np.maximum(np.unique(np.round(turns, 6)), -cycle.depth)))
+    steps = np.diff(np.append(-cycle.depth, np.maximum(sorted(set(np.round(turns, 6).tolist())), -cycle.depth)))
     allowed = [max(cycle.steps[min(k, len(cycle.steps) - 1):], default=np.inf) for k in range(len(steps))]
     if cycle.kind in _PECKED and (steps > np.array(allowed) + 0.01).any():
         found.append("the hole is drilled in deeper pecks than the CL file says")

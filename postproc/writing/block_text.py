@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.compiled import compiled, loop, wanted
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 COMPILE_FROM = 20_000

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.cl.text.log import DiagnosticLog
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Arcs
 

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, distinct
 from toolpaths.cl import indexing
 from toolpaths.cl.arcs import UNIT_ROUNDING, CircleRecords, arcs_of, unit
 from toolpaths.cl.build import ModalValue, ToolpathBuilder
@@ -303,7 +303,7 @@ def _map_arcs(b: ToolpathBuilder, rows: PointRows, row: Ints, center: Floats, no
     index = rows.index[row]
     if rows.common is not None:
         index = np.where(rows.common[row], 0, index)
-    for i in np.unique(index):
+    for i in distinct(index):
         found = b.maps[i]
         if found is not None:
             where = index == i
@@ -314,8 +314,8 @@ def _map_arcs(b: ToolpathBuilder, rows: PointRows, row: Ints, center: Floats, no
 
 def _used_cycles(b: ToolpathBuilder, cycle: Array) -> tuple[Array, tuple[Cycle, ...]]:
     """(index per row, cycles) without the cycles that drill no hole."""
-    used = np.unique(cycle[cycle >= 0])
-    for i in np.setdiff1d(np.arange(len(b.cycles)), used):
+    used = distinct(cycle[cycle >= 0])
+    for i in sorted(set(range(len(b.cycles))) - set(used.tolist())):
         b.log.info("cl.cycle-empty", "no hole follows the CYCLE record", b.cycles[i].line)
     index = np.full(len(b.cycles) + 1, -1, np.int32)
     index[used] = np.arange(len(used))

@@ -7,7 +7,7 @@ Plain points are never touched one by one: a record that changes something notes
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -20,6 +20,7 @@ from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.scan import Points
 from toolpaths.cl.text.statements import COMMENT, Statement, StatementList
 from toolpaths.cl.text.subprograms import Called, Subprograms
+from toolpaths.dataclass import dataclass
 from toolpaths.toolpath import Cycle, Event, FeedMode, Frame, Operation, Role, Tool
 
 Triple = tuple[float, float, float]

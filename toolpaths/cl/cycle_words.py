@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal, TypedDict
 
 from toolpaths.choices import CycleKind
 from toolpaths.cl.feeds import UNITS
 from toolpaths.cl.text.statements import Word
+from toolpaths.dataclass import dataclass
 
 KINDS: dict[str, CycleKind] = {
     "DRILL": "DRILL", "DEEP": "DEEP", "DEEP2": "DEEP", "PECK": "DEEP", "BRKCHP": "BRKCHP", "BREAKCHP": "BRKCHP",

@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterable
-from dataclasses import dataclass
 from itertools import pairwise
 
 from toolpaths.cl.cycle_words import CYCLE_WORDS
@@ -21,6 +20,7 @@ from toolpaths.cl.text.near import nearest
 from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT, Statement, StatementList, statement_of
 from toolpaths.cl.text.subprograms import NAME
 from toolpaths.cl.text.words import BARE_WORDS, NEUTRAL, SILENT, TEXT_WORDS
+from toolpaths.dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -25,6 +25,7 @@ from toolpaths.cl.text.other_formats import APT, other_format
 from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, ReadProgress, scan
 from toolpaths.cl.text.source import normalise
 from toolpaths.cl.text.statements import Lexer, StatementList
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, has_errors
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import ClSource, RecordCounts, Toolpath

@@ -9,11 +9,10 @@ at x = 0: R(0) = 5/32 a.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.members import Members
 

@@ -7,12 +7,12 @@ not overlap, so that one banded system holds them all.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 DEGREE = 5

@@ -6,11 +6,10 @@ off by too much get more weight in the next round; where that does not help the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.bspline import DEGREE, ORDER, KnotVectors
 from toolpaths.smoothing.sweep import WIDTH, Data, Normal, evaluate, sweep_here

@@ -8,12 +8,12 @@ where these meet, one turns into the other within a short distance, or the motio
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import count
 
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.blend import SHARPEST, SegmentBlends, chosen

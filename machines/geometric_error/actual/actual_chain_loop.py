@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.kinematics.chain_loop import turn_vector
 from toolpaths.arrays import Floats, Ints
 from toolpaths.compiled import compiled, loop
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 _ROWS, _NUMBERS = ("float64", 2), ("int64", 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -13,6 +13,7 @@ from machines.geometric_error.actual.model import ErrorModel
 from machines.kinematics.base import Kinematics, as_points
 from machines.kinematics.frames import spin_about
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ spindle those of a spindle.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +29,7 @@ from machines.kinematics.columns import Columns
 from machines.kinematics.frames import tool_x
 from machines.kinematics.legs.on_legs import OnLegs
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 
 UP = np.array([0.0, 0.0, 1.0])
 SERIES = 1e-4

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.geometric_error.actual.actual import EDGE, Actual, ToolPlace
@@ -12,6 +10,7 @@ from machines.geometric_error.actual.serial_errors import SerialErrors
 from machines.geometric_error.tables.lattice import POINT, ErrorMap
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import rotation
 
 STILL = 1e-6

@@ -7,7 +7,7 @@ they stand before and after the platform in the chain.
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -35,6 +35,7 @@ from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.rod_platform import RodPlatform
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import rotation
 
 UP = np.array([0.0, 0.0, 1.0])

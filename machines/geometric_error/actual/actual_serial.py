@@ -7,7 +7,6 @@ tool's own directions by columns, which is the product of the 4 x 4 matrices wit
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +24,7 @@ from machines.kinematics.chain_loop import pays
 from machines.kinematics.columns import Columns
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import rotation
 
 

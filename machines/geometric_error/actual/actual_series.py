@@ -7,7 +7,7 @@ goes aside, C turns the tool a little: the correction takes some steps more.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +28,7 @@ from machines.kinematics.chain import Joint
 from machines.kinematics.columns import Columns
 from machines.kinematics.legs.in_series import LegsInSeries
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import rotation
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from machines.kinematics.chain import Joint
 from machines.kinematics.columns import Columns
 from machines.kinematics.frames import reference_x
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 X, Y, Z = np.eye(3)

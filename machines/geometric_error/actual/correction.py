@@ -16,12 +16,11 @@ Points of one group (3+2, cycles, arcs) get one and the same turn, that of their
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.geometric_error.actual.actual import Actual
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 

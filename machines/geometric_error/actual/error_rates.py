@@ -16,7 +16,7 @@ Arms are those at the pose, and what they may grow to while the joints move (Gro
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from itertools import pairwise
 
 import numpy as np
@@ -26,6 +26,7 @@ from machines.geometric_error.tables.names import SPINDLE
 from machines.kinematics.base import Kinematics
 from machines.kinematics.chain import Joint
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import rotation
 from toolpaths.shapes import arrays
 

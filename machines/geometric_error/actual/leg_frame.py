@@ -19,7 +19,7 @@ its middle, and a bar keeps its direction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -33,6 +33,7 @@ from machines.kinematics.legs.loops import FREEDOMS, Loops, turned
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.with_axis import LegsWithAxis
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import dot, lengths
 from toolpaths.shapes import arrays
 

@@ -10,11 +10,10 @@ between two bounds, so that whole programs are walked in a few passes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, within
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 GRAIN = 5e-5, 1e-6

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal, Self
 
 import numpy as np
@@ -25,6 +25,7 @@ from machines.kinematics.legs.with_axis import LegsWithAxis
 from machines.kinematics.rod_platform import RodPlatform
 from machines.kinematics.serial import Serial
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 CorrectedBy = Literal["post", "control"]

@@ -15,13 +15,12 @@ the difference of J with errors and without, exact at q, and what both may chang
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.geometric_error.actual.error_rates import LARGEST_TURN, AxisSizes, ErrorRates
 from machines.geometric_error.actual.rods import RodErrors, RodFrame, inverted
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 _ROUNDS = 16

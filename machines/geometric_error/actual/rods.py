@@ -13,7 +13,7 @@ which no longer only translates or tilts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Self
 
 import numpy as np
@@ -23,6 +23,7 @@ from machines.geometric_error.actual.transforms import turns
 from machines.kinematics.rod_platform import RodPlatform
 from toolpaths.arrays import Floats, Ints
 from toolpaths.compiled import compiled, wanted
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 RODS = 6

@@ -24,7 +24,7 @@ C: Oueslati 2004, with the chain of 1.11; the formula without errors is `kinemat
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Literal, Self
 
@@ -36,6 +36,7 @@ from machines.geometric_error.tables.curves import Curve, TableCurve
 from machines.geometric_error.tables.names import OWN, ErrorName, parse
 from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 
 ErrorFrame = Literal["fixed", "moving"]
 

@@ -7,7 +7,6 @@ three in the other, times the entries of R; its parameters are theirs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +19,7 @@ from machines.geometric_error.tables.names import DIRECTIONS, ErrorName
 from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import rotation
 from toolpaths.shapes import arrays
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -31,6 +31,7 @@ from machines.geometric_error.tables.screw_tables import LINUXCNC_ROWS, to_linux
 from machines.kinematics.chain import ROTARY, Joint
 from machines.machine import Machine
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.units import DEG
 
 MOST_ROWS = 20_000

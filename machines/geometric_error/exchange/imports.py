@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,7 @@ from machines.geometric_error.tables.table_curves import Fault, table_curve
 from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
 from machines.user_file import nearest
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.input_files import read_input
 

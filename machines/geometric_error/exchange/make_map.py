@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from machines.geometric_error.actual.actual_map import ActualByMap
 from machines.geometric_error.tables.averages import SAME
 from machines.geometric_error.tables.lattice import POINT, ErrorMap
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 STEPS = 8
 """of Newton's method to a node of x y z: the point is an affine function of the slides"""

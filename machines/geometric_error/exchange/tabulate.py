@@ -4,7 +4,7 @@ is reported."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from machines.geometric_error.exchange.bed_frame import RotatedCurve
 from machines.geometric_error.tables.curves import Curve, Fourier, TableCurve
 from machines.geometric_error.tables.names import ErrorName
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 PROBES = 16

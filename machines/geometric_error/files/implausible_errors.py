@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.curves import largest
 from machines.geometric_error.tables.lattice import COLUMNS
+from toolpaths.dataclass import dataclass
 from toolpaths.units import DEG
 
 LARGE = {False: (1.0, 100.0), True: (0.5 * DEG, 10.0 * DEG)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from machines.geometric_error.tables.csv_table import CsvTable
 from machines.geometric_error.tables.table_curves import Fault
 from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.units import DEG
 
 SAME = 1e-6

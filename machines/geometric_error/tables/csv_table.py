@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.input_files import advice, read_input, reason
 from toolpaths.units import DEG, MM_PER_INCH

@@ -8,7 +8,7 @@ are set otherwise.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from machines.geometric_error.tables.choices import TableRule
 from toolpaths.arrays import Bools, Floats, within
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:

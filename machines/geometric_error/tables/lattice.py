@@ -10,7 +10,7 @@ rz), exactly.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import Self
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from machines.kinematics.chain import ROTARY
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 

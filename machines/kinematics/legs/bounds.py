@@ -17,7 +17,6 @@ hold if they come out smaller: by continuity no rod can then leave them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +28,7 @@ from machines.kinematics.rod_loops import UNBOUNDED
 from machines.kinematics.sliders import solved
 from machines.kinematics.taylor import TaylorAngle, TaylorVector
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, dot, lengths
 from toolpaths.shapes import arrays
 

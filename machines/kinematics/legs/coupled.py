@@ -7,13 +7,12 @@ asked, and a point of the platform lies at its target across the carriers.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.kinematics.legs.loops import Loops, PlatformPose, turned
 from machines.kinematics.sliders import solved
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, dot, lengths, unit
 from toolpaths.shapes import arrays
 

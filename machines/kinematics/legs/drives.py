@@ -12,13 +12,13 @@ Source: Company 2000, II-7, II-8, II-12 to II-18 (slides); the same closure for 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from machines.kinematics.sliders import Legs, whole_rows
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import dot, wrap
 from toolpaths.shapes import arrays
 

@@ -17,12 +17,12 @@ Tricept robot: inverse kinematics, manipulability analysis and closed-loop direc
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, dot, lengths
 from toolpaths.shapes import arrays
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from machines.kinematics.legs.series_poses import PlatformFrame, PosesInSeries
 from machines.kinematics.rod_loops import by_parts
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import rotation
 
 UP = np.array([0.0, 0.0, 1.0])

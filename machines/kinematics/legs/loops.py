@@ -9,7 +9,6 @@ its drives set `free` of them, the others follow. A leg on a ring ends where the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, cast
 
@@ -19,6 +18,7 @@ from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.holds import Holds
 from machines.kinematics.sliders import determinant, solved, three_spheres, two_circles, unsolvable
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, dot, lengths, unit
 from toolpaths.shapes import arrays
 

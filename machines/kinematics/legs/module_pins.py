@@ -9,13 +9,14 @@ on rings about the tool; its turn about z is 0.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import Loops
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import lengths
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

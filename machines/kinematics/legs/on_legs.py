@@ -8,7 +8,6 @@ tool about itself too: `inverse` takes that spin, 0 unless asked for. Source of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -28,6 +27,7 @@ from machines.kinematics.rod_loops import RodLoop, by_parts
 from machines.kinematics.singular_distance import distance, distance_between
 from machines.kinematics.taylor import TaylorVector
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 GOLDEN = 2.399963
 """rad, so that no few directions repeat"""

@@ -7,7 +7,6 @@ symmetric H4, turn about z). Platform coordinates are (x, y, z of C in mm, theta
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +17,7 @@ from machines.kinematics.legs.one_turn_modes import candidates
 from machines.kinematics.sliders import determinant, platform_rates, solved
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 
 STEPS = 30
 """Newton steps at most"""

@@ -7,7 +7,6 @@ mm, so that a condition number has a meaning (Company 2000, II-24).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +16,7 @@ from machines.kinematics.legs.attitudes import attitude
 from machines.kinematics.legs.loops import Loops
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross
 
 Posed = Callable[[Floats, Floats, Floats], tuple[Floats, Floats]]

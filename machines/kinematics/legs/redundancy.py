@@ -7,7 +7,7 @@ three translations of its own are a machine in series with a machine: the macro 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Self
 
@@ -16,6 +16,7 @@ import numpy as np
 from machines.kinematics.base import SPIN, as_points
 from machines.kinematics.legs.poses import PosesOfLegs
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 SPUN = np.deg2rad(75.0)
 """rad: beyond it the platforms of six-axis machines are near singular positions (a Gough platform at a quarter turn)"""

@@ -7,7 +7,6 @@ Company 2000, V.5.2 (both machines, tilt about x).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Literal
 
@@ -16,6 +15,7 @@ import numpy as np
 from machines.kinematics.columns import of_one
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import unit, wrap
 from toolpaths.shapes import arrays
 

@@ -10,7 +10,7 @@ whatever they do, which gives C and R, and the axes take the tool from R to wher
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Self
 
@@ -28,6 +28,7 @@ from machines.kinematics.serial import Serial
 from machines.kinematics.singular_distance import NAMES
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import rotation, unit
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -7,7 +7,7 @@ their travel, their speeds, clearances and singular positions are those of the l
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Self
 
 import numpy as np
@@ -19,6 +19,7 @@ from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.serial import Serial
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 LOOKS = np.linspace(0.0, 1.0, 9)

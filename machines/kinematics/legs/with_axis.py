@@ -6,7 +6,7 @@ Company 2000, V.5.2 (both machines of the asymmetric H4), V.7 (model).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Self
 
@@ -29,6 +29,7 @@ from machines.kinematics.singular_distance import NAMES
 from machines.kinematics.taylor import TaylorAngle, TaylorVector
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import unit
 
 

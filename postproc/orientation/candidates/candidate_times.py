@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from math import isnan, sin
 
@@ -22,6 +22,7 @@ from postproc.orientation.passes.reasons import Refusal, Touching
 from postproc.planning.geometry import MachinePath
 from postproc.planning.planned import ORDERS, joint_limits, limits_at_feed
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 

@@ -6,7 +6,6 @@ the pass is takes from rest to rest where only this order is limited. The slowes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -17,6 +16,7 @@ from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.passes.passes import CuttingStretch
 from postproc.planning.planned import ORDERS
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from postproc.orientation.passes.allowed import SAME, AllowedAxes
 from postproc.orientation.passes.passes import Pass
 from postproc.orientation.passes.reasons import BoundTooLong, BrokenLimit, Refusal, RejectionKind, Slower, Touching, Unaimed
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between
 from toolpaths.units import DEG
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from postproc.orientation.passes.passes import Pass
 from postproc.orientation.passes.poses import Solved, held_poses
 from postproc.orientation.passes.reasons import Refusal
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

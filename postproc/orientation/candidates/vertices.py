@@ -8,13 +8,12 @@ steps from a grid find the positions.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.kinematics.base import Kinematics
 from machines.polytope import box_vertices, held_axis_rates
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 _GRID = 24

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -14,6 +13,7 @@ from postproc.orientation.passes.reasons import HALF_TURN, BrokenLimit, LimitedA
 from postproc.setup.criteria import Criterion, criteria_of
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

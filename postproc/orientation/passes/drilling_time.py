@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.feedrate.limits import JointLimits
@@ -11,6 +9,7 @@ from postproc.feedrate.rest_to_rest import PointToPointMode, rest_seconds
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind, Toolpath
 

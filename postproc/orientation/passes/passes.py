@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +24,7 @@ from postproc.reference.moves import Moves, build_moves
 from postproc.reference.tool_numbers import numbered
 from postproc.setup.model import Placement, SetupFile, part_placement
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors
 from toolpaths.rotations import angle_between
 from toolpaths.shape import Curves

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from postproc.collision.touch_words import touch_words
+from toolpaths.dataclass import dataclass
 
 HALF_TURN = 180.0
 """degrees: an angle from a direction is never greater"""

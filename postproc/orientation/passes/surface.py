@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ import numpy as np
 from postproc.orientation.passes.contact import Contact, contact_of
 from postproc.setup.model import Placement, SetupFile
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.extras import need
 from toolpaths.shape import Curves

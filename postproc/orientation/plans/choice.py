@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from postproc.base.options import Orientation
 from postproc.base.program_time import ProgramTime
@@ -11,6 +11,7 @@ from postproc.orientation.candidates.search import PassSearch
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.plans import OrientationPlan, StateTable
 from postproc.orientation.plans.reoriented import reoriented
+from toolpaths.dataclass import dataclass
 from toolpaths.toolpath import Toolpath
 
 

@@ -6,7 +6,7 @@ as the retract axis does above an upright tool, there is no stop between, else e
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.planning.planned import joint_limits
 from postproc.reference.events import tool_changes
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between, whole_turns
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -18,6 +18,7 @@ from postproc.orientation.plans.index_time import PassEnds, all_ends, links_betw
 from postproc.orientation.plans.shortest_sequence import groupwise, shortest
 from postproc.orientation.plans.states import CLUSTER, Axis, groups_of, index, pools_of, ranked, states_of
 from toolpaths.arrays import Bools, Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 _EQUAL = 2e-4

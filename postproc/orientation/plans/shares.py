@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +11,7 @@ from postproc.orientation.candidates.candidate_times import Candidate
 from postproc.orientation.passes.allowed import SAME
 from postproc.orientation.plans.plans import OrientationPlan
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ from postproc.planning.pass_geometry import stops_of
 from postproc.reference.events import compensation_states
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all

@@ -10,7 +10,7 @@ centre, whose path is the same whatever the axes are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from postproc.orientation.turning.tilt_search import TiltField
 from postproc.orientation.turning.tilted_axes import kept_ball
 from postproc.planning.geometry import MachinePath
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 PLACES = 400

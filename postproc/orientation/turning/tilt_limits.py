@@ -6,8 +6,6 @@ axis that is outside already is turned no farther out. The search sees each as a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.machine import Machine
@@ -16,6 +14,7 @@ from postproc.orientation.passes.contact import Contact
 from postproc.orientation.turning.cutting_runs import CuttingRun
 from postproc.orientation.turning.tilted_axes import sagitta
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 

@@ -9,7 +9,6 @@ the own axes until nothing is outside.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -24,6 +23,7 @@ from postproc.orientation.turning.planned_time import PlannedTime
 from postproc.orientation.turning.tilt_limits import TiltLimits
 from postproc.orientation.turning.tilted_axes import TiltBasis, kept_ball, turned_axes
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal
 
 import numpy as np
@@ -18,6 +18,7 @@ from postproc.orientation.turning.tilt_limits import TiltLimits, limits_of
 from postproc.orientation.turning.tilt_search import TiltField, TiltSearch, TimeMeasure
 from postproc.orientation.turning.turned_toolpath import turned_toolpath
 from postproc.planning.planned import limits_at_feed
+from toolpaths.dataclass import dataclass
 from toolpaths.smoothing.smooth import Tolerance
 from toolpaths.toolpath import Toolpath
 from toolpaths.units import DEG

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice
 from toolpaths.compiled import chosen, loop
+from toolpaths.dataclass import dataclass
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 

@@ -9,14 +9,13 @@ in their middle too, so h is half of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, coordinates, signed_sweep
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 LINE, JOINTS, TIP, CIRCLE = range(4)

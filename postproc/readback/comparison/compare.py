@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -41,7 +41,8 @@ from postproc.readback.execution.poses import SAMPLES, BlockPoses, arc_sweeps
 from postproc.readback.text.canonical import Canonical
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints, as_slice, shared, without_nan
+from toolpaths.arrays import Bools, Floats, Ints, as_slice, distinct, shared, without_nan
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves
@@ -148,7 +149,7 @@ def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gco
 def _cuts(moves: Moves, owner: Ints, bound: DeviationBound) -> tuple[int, int]:
     """(moves at feed, those of them of which every block has a bound)."""
     cutting = (moves.kind != Kind.RAPID) & ~moves.link
-    without = np.unique(owner[bound.unbounded_rows])
+    without = distinct(owner[bound.unbounded_rows])
     return int(cutting.sum()), int(cutting.sum() - cutting[without].sum())
 
 

@@ -9,7 +9,7 @@ until bound and worst meet.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,7 +27,8 @@ from postproc.readback.comparison.bound_search import BoundSearch, DeviationBoun
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, alike, coordinates, signed_sweep
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints, taken, without_nan
+from toolpaths.arrays import Bools, Floats, Ints, distinct, taken, without_nan
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between, cross, lengths
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
@@ -233,7 +234,7 @@ class _PieceMotion:
         q0, q1 = (executed.joints(motion, rows, t) for t in (places[0], places[2]))
         for k in groups(motion.tool[rows]):
             kin = executed.kinematics(int(motion.tool[rows[k[0]]]))
-            for kind in np.unique(law[k]).tolist():
+            for kind in distinct(law[k]).tolist():
                 some = k[law[k] == kind]
                 made = _jets(kind, motion, executed, rows[some], pieces.take(some), kin, q0[some], q1[some],
                              [(tip[some], axis[some]) for tip, axis in poses])

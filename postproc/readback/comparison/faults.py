@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, error
 
 

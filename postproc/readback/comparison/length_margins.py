@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from postproc.base.header_words import LENGTHS_PENDING
 from postproc.base.length_text import MM, LengthText
 from postproc.control.modes import table_axes
 from postproc.job.job import Job
+from toolpaths.dataclass import dataclass
 
 MUCH = 50.0
 """mm that no length is wrong by: margins are not looked for beyond"""

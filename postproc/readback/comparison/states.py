@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from postproc.reference.events import (
 )
 from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints, shared
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind

@@ -11,7 +11,7 @@ from postproc.readback.execution.execute import Motion
 from postproc.readback.text.canonical import LOADED, REGISTER, Canonical, in_files
 from postproc.readback.text.modal import codes, fill
 from postproc.reference.events import tool_loads
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Floats, Ints, distinct
 from toolpaths.diagnostics import Diagnostic
 
 AWAY = 0.01
@@ -24,7 +24,7 @@ def check_changes(code: Canonical, motion: Motion, job: Job, home: Floats,
 
     `home` (J,) in machine coordinates, mm and degrees. Spindle and coolant count with the words of the block itself.
     """
-    changes = np.unique(code.words.pick(LOADED)[0])
+    changes = distinct(code.words.pick(LOADED)[0])
     if not len(changes):
         return []
     before = np.searchsorted(motion.block, changes) - 1

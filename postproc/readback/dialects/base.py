@@ -37,7 +37,7 @@ from postproc.readback.text.rollover import unrolled
 from postproc.readback.text.tool_names import numbered_tools
 from postproc.readback.text.words import Words
 from postproc.reference.coolant import ALL, switched_by
-from toolpaths.arrays import Floats, Ints, among
+from toolpaths.arrays import Floats, Ints, among, distinct
 from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
 ParsedProgram = tuple[ProgramText, Structure]
@@ -236,7 +236,7 @@ class Reader(ABC):
         blocks, numbers = codes(words, "M", tuple(self.switches))
         events = [(int(b), 1, *self.switches[float(m)]) for b, m in zip(blocks, numbers, strict=True)]
         if self.changes == "spindle and coolant":
-            events += [(int(b), 0, 0, ALL) for b in np.unique(words.pick(LOADED)[0])]
+            events += [(int(b), 0, 0, ALL) for b in distinct(words.pick(LOADED)[0])]
         if self.stop == "spindle and coolant":
             events += [(b, 0, 0, ALL) for b in _behind_stops(words)]
         new, flowing = [], 0
@@ -250,7 +250,7 @@ class Reader(ABC):
         words = code.words
         stated = codes(words, "G", GROUPS["units"])[0].min(initial=words.lines + 1)
         letters = [ord(a) for axis in self.axes for a in (axis, axis.lower())]
-        blocks = np.unique(words.line[among(words.letter, letters) & (words.line < stated)])
+        blocks = distinct(words.line[among(words.letter, letters) & (words.line < stated)])
         return [self.unstated(file, int(code.line[blocks[0]]), len(blocks))] if len(blocks) else []
 
     def unstated(self, file: str, line: int, count: int = 1) -> Diagnostic:
@@ -294,7 +294,7 @@ def _to_end(words: Words, main: tuple[int, int]) -> tuple[int, int]:
 
 def _behind_stops(words: Words) -> list[int]:
     """The blocks that follow a stop."""
-    return [int(b) + 1 for b in np.unique(codes(words, "M", STOPS)[0]) if b < words.lines]
+    return [int(b) + 1 for b in distinct(codes(words, "M", STOPS)[0]) if b < words.lines]
 
 
 def whole(text: ProgramText) -> Structure:

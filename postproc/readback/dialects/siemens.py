@@ -38,7 +38,7 @@ from postproc.readback.text.flow import Call, Structure
 from postproc.readback.text.modal import GROUPS, Groups, codes, fill, number_of
 from postproc.readback.text.rollover import DIRECTION, NEGATIVE, POSITIVE, SHORTEST
 from postproc.readback.text.words import Words, block_delete, lines_of, read_words
-from toolpaths.arrays import Bools, Ints
+from toolpaths.arrays import Bools, Ints, distinct
 from toolpaths.diagnostics import Diagnostic, error
 
 FORCED = 128
@@ -169,7 +169,7 @@ class SiemensReader(Reader):
     def _feeds_apart(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
         """F while G70 holds: it leaves feeds in the basic system, mm or inches as MD10240 has it (S1, 3.1.6)."""
         state = fill(*codes(words, "G", (70, 71, 700, 710)), words.lines, 0.0) == 70.0
-        blocks = np.unique(words.line[(words.letter == ord("F")) & state[words.line]])
+        blocks = distinct(words.line[(words.letter == ord("F")) & state[words.line]])
         if not len(blocks):
             return []
         return [error("gcode.units", "F while G70 holds, which leaves feeds in the basic system of the control (MD10240)",
@@ -212,7 +212,7 @@ def _apart(text: bytes) -> tuple[bytes, list[tuple[int, str]]]:
     at = np.flatnonzero(_SIGNS[signs] | np.append(letter[:-1] & letter[1:], False))
     ends = np.append(np.flatnonzero(signs == 10), len(text))
     kept, special, done = [], list[tuple[int, str]](), 0
-    for line in np.unique(np.searchsorted(ends, at)).tolist():
+    for line in distinct(np.searchsorted(ends, at)).tolist():
         first, last = int(ends[line - 1]) + 1 if line else 0, int(ends[line])
         special.append((line + 1, text[first:last].decode("ascii", "replace")))
         kept.append(text[done:first])

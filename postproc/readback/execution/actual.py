@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from postproc.correction.error_sampling import changes, looks_between
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import FEW, BlockPoses, alike, begins
 from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 ARC = 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -18,7 +17,8 @@ from postproc.readback.text.canonical import CALL, CURVE, LAW, REST, TURNS, Cano
 from postproc.readback.text.modal import Modal, columns, fill, fill_values, modal_state, number_of
 from postproc.readback.text.words import Words
 from postproc.reference.coolant import FLOOD, MIST
-from toolpaths.arrays import Array, Bools, Floats, Ints, repeated, shared, taken
+from toolpaths.arrays import Array, Bools, Floats, Ints, distinct, repeated, shared, taken
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.shapes import arrays
 from toolpaths.units import MM_PER_INCH
@@ -148,7 +148,7 @@ def _blocks(words: Words, modal: Modal, letters: tuple[str, ...], offsets: Offse
     rest = np.zeros(n + 1, dtype=bool)
     rest[words.pick(REST)[0]] = True
     small = tuple(a.lower() for a in letters)
-    lengths = np.unique(modal.length_register)
+    lengths = distinct(modal.length_register)
     length = shared(np.array([offsets.length(int(r)) for r in lengths])[np.searchsorted(lengths, modal.length_register)])
     steps = columns(words, small)
     return BlockSection(0, modal.motion, modal.plane, modal.machine, modal.level, modal.inch, modal.offset,

@@ -7,7 +7,7 @@ Under "axes" both are the same. Under "tcp" X, Y, Z are the tip in the work offs
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from postproc.control.modes import table_axes
 from postproc.readback.execution.frames_loop import in_frames, on_table
 from postproc.readback.text.canonical import WordMeaning
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.rotations import angle_between, cross, whole_turns
 from toolpaths.shapes import arrays

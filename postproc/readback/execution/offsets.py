@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.control.control import Control
 from postproc.controllers.model import OutsideCorners
 from toolpaths.arrays import Floats, Ints, repeated, shared
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -16,6 +16,7 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.readback.execution import assembly
 from postproc.readback.execution.execute import Motion
 from toolpaths.arrays import Bools, Floats, Ints, repeated, taken
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:

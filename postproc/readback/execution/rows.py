@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from toolpaths.arrays import Array, Bools, Floats, Ints, joined
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays, rows_of
 from toolpaths.units import MM_PER_INCH
 

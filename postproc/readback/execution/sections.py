@@ -17,7 +17,7 @@ from postproc.readback.execution.tool_radius import with_radius
 from postproc.readback.text.canonical import COOLANT, LOADED, REST, STATEMENT, Canonical
 from postproc.readback.text.cycles import CycleLeg
 from postproc.readback.text.modal import CYCLES
-from toolpaths.arrays import Bools, Floats, Ints, among, repeated, shared
+from toolpaths.arrays import Bools, Floats, Ints, among, distinct, repeated, shared
 from toolpaths.diagnostics import Diagnostic, error
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def _state(section: BlockSection, start: Floats, frame: ExecutionFrame, offsets:
         columns = section.columns
     shift = _shift(section, frame, offsets)
     columns = columns + (np.where(section.machine[:, None], 0.0, shift) if section.machine.any() else shift)
-    for plane in np.unique(section.plane[drilling]).tolist():
+    for plane in distinct(section.plane[drilling]).tolist():
         z = int(offsets.xyz[PLANE_AXIS[plane]])
         drills = drilling & (section.plane == plane)
         columns[drills, z] = steps[drills, z] = np.nan

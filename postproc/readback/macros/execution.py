@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from dataclasses import replace as changed
 from typing import TYPE_CHECKING, Literal
 
@@ -13,6 +12,7 @@ import numpy as np
 from postproc.readback.text.canonical import Files, placed
 from postproc.readback.text.words import lines_of, plain
 from toolpaths.arrays import Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.shapes import arrays
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from decimal import Decimal
 
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 
 MacroValue = float | None

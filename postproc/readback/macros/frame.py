@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from itertools import combinations
+
+from toolpaths.dataclass import dataclass
 
 FrameRow = tuple[float, float, float]
 FrameTurn = tuple[FrameRow, FrameRow, FrameRow]

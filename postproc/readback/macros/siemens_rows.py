@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from postproc.readback.macros.expressions import MacroFault
 from postproc.readback.macros.siemens_expressions import NAME
 from postproc.readback.macros.sources import SourceFile
 from postproc.readback.text.words import block_delete, lines_of
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 
 _COMMENT = re.compile(rb'("[^"\n]*")|;[^\n]*')

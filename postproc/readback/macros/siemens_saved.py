@@ -7,10 +7,10 @@ force again behind the subprogram.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from postproc.readback.macros.expressions import MacroFault
 from postproc.readback.macros.frame import CoordinateFrame
+from toolpaths.dataclass import dataclass
 
 _GROUPS = {"code of motion": (0, 1, 2, 3), "plane": (17, 18, 19), "side of the tool radius": (40, 41, 42),
            "G90 or G91": (90, 91), "kind of feed": (93, 94, 95), "work offset": (54, 55, 56, 57, 500, *range(505, 600)),

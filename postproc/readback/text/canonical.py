@@ -7,7 +7,7 @@ RS274/NGC; what NIST has no number for has a sign of its own:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from postproc.control.control import InterpolationMode
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Bools, Floats, Ints, among
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays
 

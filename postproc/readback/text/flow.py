@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from postproc.readback.text.canonical import STATEMENT, ProgramText
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 
 DEEPEST = 10

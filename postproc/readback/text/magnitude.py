@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.readback.text.canonical import SMOOTH, STATEMENT, Canonical, ProgramText
+from toolpaths.arrays import distinct
 from toolpaths.diagnostics import Diagnostic, error
 
 LARGEST = 1e10
@@ -30,7 +31,7 @@ def too_large(text: ProgramText, file: str) -> list[Diagnostic]:
 def negative_smoothing(code: Canonical, file: str) -> list[Diagnostic]:
     """An error where a program asks for corners rounded by less than nothing."""
     blocks, value = code.words.pick(SMOOTH)
-    lines = np.unique(code.line[blocks[value < 0.0]])
+    lines = distinct(code.line[blocks[value < 0.0]])
     if not len(lines):
         return []
     return [error("gcode.smoothing", "a negative tolerance of the control's smoothing", file=file, lines=lines[:6].tolist(),

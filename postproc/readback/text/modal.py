@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.readback.text.canonical import COOLANT, LOADED, OFFSET, REGISTER, SMOOTH, STANDS
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Array, Floats, Ints, among, repeated, shared
+from toolpaths.arrays import Array, Floats, Ints, among, distinct, repeated, shared
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.shapes import arrays
 
@@ -161,7 +161,7 @@ def check_end(words: Words, file: str, called: tuple[tuple[int, int], ...] = ())
     if not len(ends):
         return [error("gcode.no_end", "the program has no end (M2 or M30)", file=file, lines=[words.lines],
                       hint="write M30 in its last line where it is whole; it may have been cut off")]
-    after = np.unique(words.line[outside & (words.line > ends.min())])
+    after = distinct(words.line[outside & (words.line > ends.min())])
     if not len(after):
         return []
     return [error("gcode.after_end", f"blocks behind the end of the program in line {int(ends.min())}: the control never "
@@ -173,17 +173,18 @@ def check_codes(words: Words, groups: Groups, m_codes: tuple[float, ...], letter
     """Codes and words that this reader cannot execute, as errors: nothing is skipped in silence."""
     diagnostics = []
     known_g = [code for numbers in groups.values() for code in numbers]
-    bad = (words.letter == ord("G")) & ~np.isin(words.value, known_g)
-    m = (words.letter == ord("M")) & ~np.isin(words.value, m_codes)
+    bad, m = words.letter == ord("G"), words.letter == ord("M")
+    bad[bad] = ~among(words.value[bad], known_g)
+    m[m] = ~among(words.value[m], m_codes)
     known = among(words.letter, [ord(c) for c in (*axes, *letters)])
     for pick, what in ((bad, "G"), (m, "M")):
-        for value in np.unique(words.value[pick]):
+        for value in distinct(words.value[pick]):
             lines = words.line[pick & (words.value == value)]
             diagnostics.append(error("gcode.unknown_code", f"{what}{value:g} is not executed by this reader", file=file,
                                      lines=lines[:6].tolist(), count=len(lines),
                                      hint="take it out; a code of the shop that moves nothing is named in "
                                      "program.passive of the controller file, or in [hooks] passive (--hooks FILE)"))
-    for code in np.unique(words.letter[~known]):
+    for code in distinct(words.letter[~known]):
         lines = words.line[words.letter == code]
         diagnostics.append(error("gcode.unknown_word", f"word {chr(code)}: the machine has no such axis", file=file,
                                  lines=lines[:6].tolist(), count=len(lines), hint=f"its axes are {', '.join(axes)}"))
@@ -197,7 +198,7 @@ def _repeated(words: Words, groups: Groups, file: str) -> list[Diagnostic]:
     for k, numbers in enumerate(groups.values(), 1):
         group[is_g & among(words.value, numbers)] = k
     twice = [_twice(words.line[part], words.letter[part], group[part]) for part in by_lines(words)]
-    lines = np.unique(np.concatenate([words.line[:0], *twice]))
+    lines = distinct(np.concatenate([words.line[:0], *twice]))
     if not len(lines):
         return []
     return [error("gcode.repeated", "a word, or a code of one group, stands twice in a block", file=file,

@@ -6,15 +6,14 @@ Fundamentals, DC, ACP, ACN; Heidenhain, M126 and M127. Before the first word of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from postproc.control.rollover import LEAST, TURN, Rollover
 from postproc.readback.text.canonical import INCREMENTAL
 from postproc.readback.text.modal import codes, fill
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, among
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.shapes import arrays
 
@@ -125,7 +124,7 @@ def _not_modulo(words: Words, line: Ints, axes: tuple[str, ...], rolls: dict[int
     """Words and codes of roll-over on a machine that has no such axis."""
     blocks, stated = words.pick(DIRECTION)
     known = [ord(axes[j]) for j in rolls]
-    bad = blocks[~np.isin(stated.astype(np.int64) // 8, known)]
+    bad = blocks[~among(stated // 8, known)]
     if by_codes and not rolls:
         bad = np.concatenate([bad, codes(words, "M", (126,))[0]])
     if not len(bad):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.readback.text.word_loop import words_at_once
 from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, warning
 from toolpaths.shapes import arrays
 

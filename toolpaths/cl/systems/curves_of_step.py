@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from toolpaths.arrays import Floats
 from toolpaths.cl.systems.part21 import Instance, Reference, Value
+from toolpaths.dataclass import dataclass
 
 _DEEPEST = 20
 _OFF_CIRCLE = 0.01

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import TypeAlias
+
+from toolpaths.dataclass import dataclass
 
 _TOKEN = re.compile(r"/\*.*?\*/|'(?:[^']|'')*'|#\d+|\.[A-Z_0-9]+\.|[A-Z_][A-Z0-9_-]*|"
                     r"[+-]?\d+\.?\d*(?:E[+-]?\d+)?|[(),$*;=]|\n", re.DOTALL | re.IGNORECASE)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 from toolpaths.choices import DialectName
 from toolpaths.cl.systems.as_statements import EXPORTED, AsStatements
@@ -12,6 +11,7 @@ from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.scan import Points
 from toolpaths.cl.text.source import text_of
 from toolpaths.cl.text.statements import StatementList
+from toolpaths.dataclass import dataclass
 
 FORMS: tuple[DialectName, ...] = ("nci", "freecad", "step-nc")
 """dialects that are no APT text"""

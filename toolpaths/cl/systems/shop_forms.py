@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Protocol, get_args, runtime_checkable
 
 from toolpaths.choices import DialectName, LengthUnit, ShopName
 from toolpaths.cl.systems.as_statements import UP, AsStatements
 from toolpaths.cl.text.log import DiagnosticLog
 from toolpaths.cl.text.source import normalise, text_of
+from toolpaths.dataclass import dataclass
 from toolpaths.plug_ins import PlugIn, PlugInFault, plug_in, registered, said
 from toolpaths.toolpath import ClSource
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 
 from toolpaths.choices import DialectName, LengthUnit
 from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT, Statement, StatementList
+from toolpaths.dataclass import dataclass
 from toolpaths.units import MM_PER_INCH
 
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import re
 import warnings
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.cl.text.scan import Scan
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 Bytes = npt.NDArray[np.uint8]

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.cl.text.goto_loop import lines_at_once
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 CHUNK = 1 << 22

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal
 
 from toolpaths.arrays import Floats
@@ -15,6 +15,7 @@ from toolpaths.cl.text.near import nearest
 from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, Scan
 from toolpaths.cl.text.source import text_of
 from toolpaths.cl.text.words import BARE_WORDS, TEXT_WORDS
+from toolpaths.dataclass import dataclass
 
 Word = str | float
 _NUMBER_ENDS, _NUMBER_STARTS = "0123456789.", "+-.0123456789"

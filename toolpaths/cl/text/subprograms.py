@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from toolpaths.cl.text.statements import Statement
+from toolpaths.dataclass import dataclass
 
 Called = float | str
 NAME = re.compile(r"[A-Z][A-Z0-9_.-]*")
