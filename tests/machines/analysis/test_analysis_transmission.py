@@ -149,7 +149,7 @@ def test_reachable_box_of_a_serial_machine_is_its_travel() -> None:
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few boxes and points: what more of them prove is in test_extremes_and_maps.py."""
     for module, name, value in ((report, "GRID", (3, 3, 3, 2)), (report, "COARSE", (2, 2, 2, 2)), (extremes, "MOST", 20),
-                                (extremes, "FEW", 20), (extremes, "START", 20), (transmission, "ROUNDS", 2)):
+                                (extremes, "START", 20), (transmission, "ROUNDS", 2)):
         monkeypatch.setattr(module, name, value)
 
 
