@@ -27,6 +27,8 @@ _TERMS = re.compile(rf"(?<![A-Z0-9_$])(?:PO\s*\[\s*(?P<of>[A-Z]?)\s*\]\s*=\s*\((
                     rf"|(?P<axis>[A-Z])\s*=\s*PO\s*\((?P<more>[^()]*)\)|(?P<word>PL|PW|SD)\s*=\s*(?P<range>{_NUMBER}))")
 _MOTION = (0, 1, 2, 3)
 NAMES = ("POLY", "PO", "PL", "BSPLINE", "PW", "SD")
+_AMID = {"PL", "PW", "SD", "BSPLINE"}
+"""functions that may stand with the points of a BSPLINE: others change what they mean, or part them"""
 _STATED = {"PW": 1.0, "SD": 3.0}
 """weights and degree of a BSPLINE as they are where no block states them"""
 MOST = 5
@@ -59,6 +61,7 @@ class Polynomials:
 
     def __init__(self, words: Words) -> None:
         self.ended = codes(words, "G", _MOTION)[0]
+        self.waiting = codes(words, "G", (4,))[0]
         self.begun = -1
         self.curves: list[Floats] = []
         self.splines: list[int] = []
@@ -114,7 +117,11 @@ class Polynomials:
             end = int(stops[np.searchsorted(stops, begin, side="right")])
             rows = moving[(moving >= begin) & (moving < end)].tolist()
             stated = [s for b in range(begin, end) for s in blocks.get(b, ())]
-            if why := _refused(stated, [blocks.get(b, []) for b in rows], end in self.polygons):
+            waits = rows and bool(((self.waiting > rows[0]) & (self.waiting < rows[-1])).any())
+            amid = [s for b in range(rows[0] + 1, rows[-1] + 1) for s in blocks.get(b, ())] if rows else []
+            if why := _refused(stated, [blocks.get(b, []) for b in rows], end in self.polygons) or (
+                    "another function, or G4, amid the points of BSPLINE"
+                    if waits or any(s.name not in _AMID for s in amid) else ""):
                 wrong.append((begin, why))
                 continue
             new += [(b, CURVE, float(len(self.curves) + n)) for n, b in enumerate(rows)]

@@ -39,7 +39,7 @@ def with_curves(rows: MotionRows, start: Floats, curve: Floats, curves: Floats, 
     chords[runs] = _chords(bend)
     before = np.concatenate([start[None, :], rows.end[:-1]])
     points = {int(k): _spline_points(before, rows.end, np.flatnonzero(number == k), xyz)
-              for k in np.unique(number[number >= 0])}
+              for k, count in zip(*np.unique(number[number >= 0], return_counts=True), strict=True) if count >= DEGREE}
     for k, ends in points.items():
         at = np.flatnonzero(number == k)
         chords[at] = np.bincount(np.arange(len(ends)) * len(at) // len(ends), minlength=len(at))
