@@ -36,7 +36,7 @@ class RedundantLegs(PosesOfLegs):
     spins: tuple[float, ...] = ()
 
     @cached_property
-    def branches(self) -> int:  # type: ignore[override]  # nothing assigns it
+    def branches(self) -> int:
         """See `PosesOfLegs`; so many for each spin"""
         own = len(self.loops.drives.root_choices()) if self.all_roots else 1
         return own * max(len(self.spins), 1)
