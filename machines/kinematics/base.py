@@ -152,7 +152,7 @@ class Kinematics(ABC):
         return self
 
     def with_spins(self, spins: tuple[float, ...]) -> Self:
-        """The same machine with branches of `inverse` for each of `spins`, rad; as it is where it cannot turn the tool so."""
+        """The same machine with branches of `inverse` for each of `spins`, rad; as it is where it has none."""
         return self
 
     # ---- poses ---------------------------------------------------------------------------------------------

@@ -353,7 +353,7 @@ def axis_positions(path: JointPath, tools: Ints) -> Bools:
 
 
 def one_orientation(stands: Bools, tools: Ints, home: Bools) -> Ints:
-    """(K,) number of the run of blocks that keep their orientation (`stands`) with the same tool; ALONE for single blocks."""
+    """(K,) number of the run of blocks that keep their orientation (`stands`) with one tool; ALONE for single ones."""
     same = stands[1:] & (tools[1:] == tools[:-1]) & ~home[1:] & ~home[:-1]
     run = np.concatenate([[0], np.cumsum(~same)])
     count = np.bincount(run)

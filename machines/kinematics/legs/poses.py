@@ -61,6 +61,7 @@ class PosesOfLegs(Kinematics):
     clearance: ClearanceSizes | None = None
     tool_length: float = 0.0
     all_roots: bool = False
+    spins: tuple[float, ...] = ()
     singular_names = NAMES
 
     @property
@@ -70,8 +71,8 @@ class PosesOfLegs(Kinematics):
 
     @cached_property
     def branches(self) -> int:  # type: ignore[override]  # nothing assigns it
-        """1, or every choice of roots"""
-        return len(self.loops.drives.root_choices()) if self.all_roots else 1
+        """1, or every choice of roots, for each of `spins` (rad; () 0 alone)"""
+        return (len(self.loops.drives.root_choices()) if self.all_roots else 1) * max(len(self.spins), 1)
 
     @cached_property
     def one_turn(self) -> OneTurn | None:
@@ -239,8 +240,7 @@ class PosesOfLegs(Kinematics):
         return float(np.sign(self.loops.side(place[None], turn[None], q[None])[0]))
 
     def _platform(self, q: Floats, near: Floats | None = None) -> PlatformPose:
-        """(C, R) of joints q (N, J) in the mode nearest the pose `near` (6,) or (N, 6), else the home mode; NaN without
-        one."""
+        """(C, R) of joints q (N, J) in the mode nearest the pose `near` (6,) or (N, 6), else the home mode, or NaN."""
         q = as_points(q, self.joints, "q")
         if self.loops.closed_form:
             place = self._modes(q, near)[0]

@@ -30,17 +30,9 @@ class RedundantLegs(PosesOfLegs):
 
     Attributes:
         spin_free: the spin is an open parameter, not held at 0
-        spins: rad, that `inverse` gives branches for; () 0 alone
     """
 
     spin_free: bool = False
-    spins: tuple[float, ...] = ()
-
-    @cached_property
-    def branches(self) -> int:  # type: ignore[override]  # nothing assigns it
-        """See `PosesOfLegs`; so many for each spin"""
-        own = len(self.loops.drives.root_choices()) if self.all_roots else 1
-        return own * max(len(self.spins), 1)
 
     def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0, near: Floats | None = None) -> Floats:
         """See the base class."""

@@ -251,7 +251,7 @@ def test_states_that_touch_are_in_no_plan_but_keep() -> None:
 
 
 def test_axes_are_looked_for_with_the_spin_that_the_setup_allows() -> None:
-    """A leg too short for no spin: none is found at 0 and none at -40 degrees, with the spin planned or at 40 degrees there is."""
+    """A leg may not be long enough for 0 and -40 degrees of spin; at 40, and planned, it is."""
     text = ("TOOL PATH/LINES,TOOL,BALL8\nTLDATA/MILL,8.0,4.0,75.0,0.0,0.0\nLOAD/TOOL,1\nRAPID\n"
             "GOTO/-20,0,30,0,0,1\nFEDRAT/MMPM,900\nGOTO/-20,0,0\nGOTO/20,0,0\nRAPID\nGOTO/20,0,30\nEND-OF-PATH\n")
     toolpath, whole = toolpaths.read_bytes(text)[0], machine("hexapod")
