@@ -303,8 +303,7 @@ def _word(row: str) -> tuple[str, Cursor]:
 
 
 def misplaced(rows: Iterable[tuple[int, str, str]]) -> dict[int, tuple[str, str]]:
-    """O words that do not belong together: (what is wrong, remedy) by row; rows: (row, label, word) of those with O words, in
-    order."""
+    """O words that do not belong together: (what is wrong, remedy) by row; rows: (row, label, word), in order."""
     open_: list[tuple[str, str]] = []
     found: dict[int, tuple[str, str]] = {}
     for k, label, word in rows:

@@ -165,7 +165,7 @@ def test_labels_behind_the_end_and_other_files() -> None:
 
 
 @pytest.mark.parametrize(("block", "code"), [
-    ("CYCL DEF 7.0 DATUM SHIFT", "gcode.cycle"), ("CYCL DEF 10.0 ROTATION", "gcode.cycle"), ("CYCL DEF 19.0 TILT",
+    ("CYCL DEF 10.0 ROTATION", "gcode.cycle"), ("CYCL DEF 10.0 ROTATION", "gcode.cycle"), ("CYCL DEF 19.0 TILT",
     "gcode.cycle"),
     ("CYCL DEF 8.0 MIRROR", "gcode.cycle"), ("FN 18: Q1 = 5", "gcode.expression"), ("L X+Q1", "gcode.variable"), ("RND R5",
     "gcode.syntax"),
