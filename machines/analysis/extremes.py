@@ -1,17 +1,23 @@
 """The largest value of a measure over a workspace, proved: boxes that cannot hold a larger one are left out.
 
 N = Jq^-1 Jx takes rates of the platform to those of the drives (mm per mm: turns by the lever, arms by the path of their
-ends), J its inverse. In a box N = N0 (I + E), with |E| at most e by the rates of N (`certificate/enclosure.py`), so that
-cond N <= cond N0 (1 + e) / (1 - e), a row of N is at most (1 + e) times, a column of J at most 1 / (1 - e) times that in the
-middle, |det N| at least (1 - e)^K times. The acceleration of a slide per speed squared is |I - u j|^2 |j| / L, j a row of N
-and L the rod (III.6.5). Boxes that may hold more than the largest value seen are halved (branch and bound). Source of the
-measures: Company 2000, II-24, III.6.
+ends), J its inverse. In a box N = N0 + D = N0 (I + E), |E| <= e < 1, by the rates of N (`certificate/enclosure.py`). So
+
+    |N| <= |N0| + |D|,  |J| <= |J0| + |E J0| + e^2 / (1 - e) |J0|,  cond N = |N| |J|
+    |n + d| <= |n| + n.d / |n| + |d|^2 / (2 |n|) of a row n of N0, and of a column j of J0 with d = E j, to which
+    e^2 / (1 - e) |j| comes
+    -ln |det (I + E)| <= -tr E + |E|_F^2 / (2 (1 - e)), the series of the logarithm
+    ln |(I + E)^-1 j| <= -j.E j + e^2 / (1 - e) + e^2 / (2 (1 - e)^2) of a unit vector j, a column of J0
+
+whose first terms are those of the derivative: round a place where a measure is flat boxes close quadratically. The
+acceleration of a slide per speed squared is |I - u j|^2 |j| / L, j a row of N and L the rod (III.6.5). Boxes that may hold
+more than the largest value seen are halved (branch and bound). Source of the measures: Company 2000, II-24, III.6.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -23,9 +29,8 @@ from machines.kinematics.leg_geometry import LegGeometry
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.shapes import arrays
 
-CLOSE, MOST, FEW, AT_ONCE = 0.01, 16_000, 5_000, 500
-"""part of the value to which it is found; boxes of a measure at most besides those with which all begin, of products of
-singular values; at a time"""
+CLOSE, MOST, AT_ONCE = 0.01, 16_000, 500
+"""part of the value to which it is found; boxes of a measure at most besides those with which all begin; at a time"""
 FINE, START = 0.5, 60_000
 """e of the boxes with which all measures begin; boxes looked at for them at most"""
 
@@ -42,12 +47,57 @@ class Extreme:
 
 @dataclass(frozen=True)
 class RateMeasure:
-    """A measure of N0 (N, K, K): its value, and the largest, of value, N0 and e (N,), where N = N0 (I + E), |E| <= e."""
+    """A measure of N0 (N, K, K): its value, and the largest in boxes, of value, N0 and what D and E may be."""
 
     value: Callable[[Floats], Floats]
-    most: Callable[[Floats, Floats, Floats], Floats]
-    few: bool = False
-    """whether its bounds are so wide that more than FEW boxes hardly help"""
+    most: Callable[[Floats, Floats, Spread], Floats]
+
+
+@dataclass(frozen=True, eq=False)
+@arrays(e="N", larger="N", back="N", trace="N", turned="N", whole="N", rows="N K", columns="N K")
+class Spread:
+    """Largest over each of N boxes; infinite where nothing is known.
+
+    Attributes:
+        e: |E|
+        larger: |D|
+        back: |E J0| over |J0|
+        trace: |tr E|
+        turned: |tr E - sum of j.E j| of the unit columns j of J0
+        whole: |E|_F
+        rows, columns: (N, K) how much longer each row of N and each column of J becomes, over its length, first order and
+            what d adds of the second
+    """
+
+    e: Floats
+    larger: Floats
+    back: Floats
+    trace: Floats
+    turned: Floats
+    whole: Floats
+    rows: Floats
+    columns: Floats
+
+    def part(self, rows: Bools | Ints) -> Spread:
+        """Some of them."""
+        return Spread(*(getattr(self, name)[rows] for name in SPREAD))
+
+    def with_others(self, others: Spread) -> Spread:
+        """These, then the others."""
+        return Spread(*(np.concatenate([getattr(self, name), getattr(others, name)]) for name in SPREAD))
+
+    @property
+    def bent(self) -> Floats:
+        """(N,) what is left of J beyond the first order, over |J0|."""
+        return np.asarray(self.e**2 / (1.0 - self.e))
+
+    @property
+    def product(self) -> Floats:
+        """(N,) the same of ln |det|."""
+        return np.asarray(self.whole**2 / (2.0 * (1.0 - self.e)))
+
+
+SPREAD = tuple(field.name for field in fields(Spread))
 
 
 def _condition(n: Floats) -> Floats:
@@ -72,12 +122,30 @@ def _lost(n: Floats) -> Floats:
     return np.asarray(np.prod(np.linalg.norm(np.linalg.inv(n), axis=1), axis=1) * np.abs(np.linalg.det(n)))
 
 
+def _most_condition(value: Floats, n: Floats, of: Spread) -> Floats:
+    largest = np.linalg.norm(n, ord=2, axis=(1, 2))
+    return np.asarray(value * (1.0 + of.larger / largest) * (1.0 + of.back + of.bent))
+
+
+def _most_row(value: Floats, n: Floats, of: Spread) -> Floats:
+    return np.asarray((np.linalg.norm(n, axis=2) * (1.0 + of.rows)).max(axis=1))
+
+
+def _most_column(value: Floats, n: Floats, of: Spread) -> Floats:
+    return np.asarray((np.linalg.norm(np.linalg.inv(n), axis=1) * (1.0 + of.columns + of.bent[:, None])).max(axis=1))
+
+
+def _most_lost(value: Floats, n: Floats, of: Spread) -> Floats:
+    columns_bent = n.shape[1] * (of.bent + of.e**2 / (2.0 * (1.0 - of.e) ** 2))
+    return np.asarray(value * np.exp(of.turned + columns_bent + of.product))
+
+
 MEASURES = {
-    "condition_number": RateMeasure(_condition, lambda value, n, e: value * (1.0 + e) / (1.0 - e)),
-    "speed_transmission": RateMeasure(_row, lambda value, n, e: value * (1.0 + e)),
-    "force_transmission": RateMeasure(_column, lambda value, n, e: value / (1.0 - e)),
-    "manipulability": RateMeasure(_volume, lambda value, n, e: value / (1.0 - e) ** n.shape[1], True),
-    "conditioning_lost": RateMeasure(_lost, lambda value, n, e: value * ((1.0 + e) / (1.0 - e)) ** n.shape[1], True),
+    "condition_number": RateMeasure(_condition, _most_condition),
+    "speed_transmission": RateMeasure(_row, _most_row),
+    "force_transmission": RateMeasure(_column, _most_column),
+    "manipulability": RateMeasure(_volume, lambda value, n, of: value * np.exp(of.trace + of.product)),
+    "conditioning_lost": RateMeasure(_lost, _most_lost),
 }
 """by the key of the report; of the conditioning factor one over it, whose largest is its least"""
 
@@ -91,29 +159,34 @@ def slide_acceleration(legs: LegGeometry) -> RateMeasure:
         size = np.linalg.norm(n, axis=2)
         flat = np.linalg.norm(np.eye(u.shape[1]) - u[None, :, :, None] * n[:, :, None, :], ord=2, axis=(2, 3))
         return np.asarray(((flat + size * e[:, None]) ** 2 * size * (1.0 + e)[:, None] / legs.lengths).max(axis=1))
-    return RateMeasure(lambda n: bent(n, np.zeros(len(n))), lambda value, n, e: bent(n, e))
+    return RateMeasure(lambda n: bent(n, np.zeros(len(n))), lambda value, n, of: bent(n, of.e))
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(lower="N 5", upper="N 5", middle="N K K", e="N", share="N 5")
+@arrays(lower="N 5", upper="N 5", middle="N K K", share="N 5")
 class BoxesOfRates:
-    """Boxes of poses with N0 in the middle of each, e over it (infinite where nothing is known), share of each number in
-    e."""
+    """Boxes of poses with N0 in the middle of each, what D and E may be over it, share of each number of the pose in e."""
 
     lower: Floats
     upper: Floats
     middle: Floats
-    e: Floats
+    spread: Spread
     share: Floats
+
+    @property
+    def e(self) -> Floats:
+        """(N,)"""
+        return self.spread.e
 
     def part(self, rows: Bools | Ints) -> BoxesOfRates:
         """Some of them."""
-        return BoxesOfRates(self.lower[rows], self.upper[rows], self.middle[rows], self.e[rows], self.share[rows])
+        return BoxesOfRates(self.lower[rows], self.upper[rows], self.middle[rows], self.spread.part(rows), self.share[rows])
 
     def with_others(self, others: BoxesOfRates) -> BoxesOfRates:
         """These, then the others."""
-        names = ("lower", "upper", "middle", "e", "share")
-        return BoxesOfRates(*(np.concatenate([getattr(self, name), getattr(others, name)]) for name in names))
+        lower, upper, middle, share = (np.concatenate([getattr(self, name), getattr(others, name)])
+                                       for name in ("lower", "upper", "middle", "share"))
+        return BoxesOfRates(lower, upper, middle, self.spread.with_others(others.spread), share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +208,7 @@ class RatesOverWorkspace:
 
     def boxes(self, lower: Floats, upper: Floats) -> BoxesOfRates:
         """Boxes (N, 5) with what is known of them."""
-        middle, e, share = _over(self.poses, self.lever, Span(lower, upper))
-        return BoxesOfRates(lower, upper, middle, e, share)
+        return BoxesOfRates(lower, upper, *_over(self.poses, self.lever, Span(lower, upper)))
 
     @cached_property
     def start(self) -> tuple[BoxesOfRates, int]:
@@ -178,12 +250,12 @@ def largest_over(rates: RatesOverWorkspace, measure: RateMeasure, close: float =
             value = measure.value(some.middle)
             if (k := int(value.argmax()), float(value.max()))[1] > best:
                 best, place = float(value[k]), 0.5 * (some.lower[k] + some.upper[k])
-            with np.errstate(divide="ignore", invalid="ignore"):
-                bound = np.where(some.e < 1.0, measure.most(value, some.middle, some.e), np.inf)
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                bound = np.where(some.e < 1.0, measure.most(value, some.middle, some.spread), np.inf)
             most[fresh] = np.minimum(np.nan_to_num(bound, nan=np.inf, posinf=np.inf), most[fresh])
         keep = most > best
         live, most = live.part(keep), most[keep]
-        if not len(most) or most.max() <= best * (1.0 + close) or more >= (FEW if measure.few else MOST):
+        if not len(most) or most.max() <= best * (1.0 + close) or more >= MOST:
             break
         order = np.argsort(-most)
         first, rest = order[:AT_ONCE], order[AT_ONCE:]
@@ -196,8 +268,8 @@ def largest_over(rates: RatesOverWorkspace, measure: RateMeasure, close: float =
     return Extreme(best, max(best, float(most.max(initial=best))), (x, y, z, tilt, heading), tried + more)
 
 
-def _over(poses: PosesOfBoxes, lever: float, pose: Span) -> tuple[Floats, Floats, Floats]:
-    """(N0 (N, K, K), e (N,), share of each number of the pose (N, 5)); e is infinite where nothing is known."""
+def _over(poses: PosesOfBoxes, lever: float, pose: Span) -> tuple[Floats, Spread, Floats]:
+    """(N0 (N, K, K), what D and E may be, share of each number of the pose in e (N, 5))."""
     legs = poses.legs
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         here, over = enclosed(poses, spanned(pose.middle)), enclosed(poses, pose)
@@ -214,9 +286,36 @@ def _over(poses: PosesOfBoxes, lever: float, pose: Span) -> tuple[Floats, Floats
     safe = np.where(fine[:, None, None], middle, np.eye(count))
     inverse = np.linalg.inv(safe)[:, None]
     by = Span(*(np.where(known[:, None, None, None], end, 0.0) for end in (by.lo, by.hi)))
-    share = np.linalg.norm(inverse @ by.middle, ord=2, axis=(2, 3))
-    share = (share + np.linalg.norm(np.abs(inverse) @ by.radius, axis=(2, 3))) * pose.radius
-    return safe, np.where(known, share.sum(axis=1), np.inf), np.where(known[:, None], share, pose.radius)
+    change, off = inverse @ by.middle, np.abs(inverse) @ by.radius
+    share = (np.linalg.norm(change, ord=2, axis=(2, 3)) + np.linalg.norm(off, axis=(2, 3))) * pose.radius
+    own = inverse[:, 0] / np.linalg.norm(inverse[:, 0], axis=1, keepdims=True)
+    size = np.linalg.norm(inverse[:, 0], ord=2, axis=(1, 2))[:, None]
+    trace = np.einsum("ndkk->nd", change)
+    turned = trace - np.einsum("nik,ndij,njk->nd", own, change, own)
+    off_trace, across = np.einsum("ndkk->nd", off), np.einsum("nik,ndij,njk->nd", np.abs(own), off, np.abs(own))
+    larger = np.linalg.norm(by.middle, ord=2, axis=(2, 3)) + np.linalg.norm(by.radius, axis=(2, 3))
+    back = (np.linalg.norm(change @ inverse, ord=2, axis=(2, 3)) + np.linalg.norm(off @ np.abs(inverse), axis=(2, 3))) / size
+    whole = np.linalg.norm(change, axis=(2, 3)) + np.linalg.norm(off, axis=(2, 3))
+    half = pose.radius
+    rows = _longer(safe, by.middle, by.radius, half)
+    cols = _longer(np.swapaxes(inverse[:, 0], 1, 2), np.swapaxes(change @ inverse, 2, 3),
+                   np.swapaxes(off @ np.abs(inverse), 2, 3), half)
+    rates = (larger, back, np.abs(trace) + off_trace, np.abs(turned) + off_trace + across, whole)
+    found = [share.sum(axis=1), *((rate * pose.radius).sum(axis=1) for rate in rates)]
+    spread = Spread(*(np.where(known, value, np.inf) for value in found),
+                    *(np.where(known[:, None], value, np.inf) for value in (rows, cols)))
+    return safe, spread, np.where(known[:, None], share, pose.radius)
+
+
+def _longer(rows: Floats, middle: Floats, radius: Floats, half: Floats) -> Floats:
+    """(N, K) how much longer rows (N, K, K) become, over their length, that change by `middle` +- `radius` (N, 5, K, K) per
+    number of the pose, which goes `half` (N, 5) to either side."""
+    size = np.linalg.norm(rows, axis=2)
+    unit = rows / size[:, :, None]
+    first = np.abs(np.einsum("nkj,ndkj->ndk", unit, middle)) + np.einsum("nkj,ndkj->ndk", np.abs(unit), radius)
+    whole = np.linalg.norm(middle, axis=3) + np.linalg.norm(radius, axis=3)
+    first, whole = ((one * half[:, :, None]).sum(axis=1) / size for one in (first, whole))
+    return np.asarray(first + 0.5 * whole**2)
 
 
 def _halved(lower: Floats, upper: Floats, share: Floats) -> tuple[Floats, Floats]:

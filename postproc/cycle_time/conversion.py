@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from postproc.base.memory import give_back
 from postproc.base.program_time import ControlPlan, ProgramTime
 from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.model import CycleTimeModel, load_model, model_name
@@ -84,10 +83,7 @@ def estimate_of(result: PostResult, model: str = "", executed: bool = False) -> 
     if not result.ok:
         return None
     planner = _model(result, model) if executed else model_of(result, model)
-    rows = len(result.path) if result.path is not None else 0
-    give_back(rows)
     blocks = from_conversion(result)
-    give_back(rows)
     if not len(blocks):
         return None
     made = estimate(blocks, result.machine, planner, with_band=len(blocks) <= BAND_UP_TO)
@@ -110,4 +106,6 @@ def figures(e: Estimate | None) -> dict[str, Any]:
 def text(e: Estimate) -> str:
     """One line for people."""
     band = f", 95 % between {clock(e.band[0])} and {clock(e.band[1])}" if e.uncertainties else ""
-    return f"time: {clock(e.seconds)}{band} (model {e.model.kind}; lower bound {clock(e.lower_bound)})"
+    about, how = ("about ", "by formulas; `postproc time` runs the control") if e.model.kind == "formulas" else (
+        "", f"model {e.model.kind}")
+    return f"time: {about}{clock(e.seconds)}{band} ({how}; lower bound {clock(e.lower_bound)})"

@@ -28,6 +28,7 @@ class PackedSteps:
         self._inverse = np.ascontiguousarray(np.stack((1.0 / problem.limits.acceleration, 1.0 / problem.limits.jerk)))
         self._w = np.zeros((blocks, COMMON, LANES))
         self._v = np.zeros((blocks, joints, PER_JOINT, LANES))
+        self._middle = _by_block(problem.middle, blocks)
         self._here = np.zeros(HERE * LANES)
         self._zc = self._rc = np.zeros(0)
         self._low, self._force = np.zeros((3, self._room)), np.zeros(self._room)
@@ -50,13 +51,13 @@ class PackedSteps:
     def assemble(self, mu: float, primal: float, dual: float) -> tuple[float, float]:
         """See `interior.NewtonSteps`."""
         if not len(self._zc):
-            compiled(begin_multipliers)(self._w, self._v, self._all, self._inverse, mu)
+            compiled(begin_multipliers)(self._w, self._v, self._all, self._inverse, self._middle, mu)
             self._zc, self._rc = mu / self.c, np.zeros(self._size)
         compiled(advance)(self._all, self._step, self._zc, self._rc, primal, dual)
         w, v = self._w.reshape(-1), self._v.reshape(-1)
         ends = compiled(begin)(self._all, self._zc, mu, self._low, self._force)
-        gap, time = compiled(assemble)(w, v, self._here, self._all, self._inverse, self._blocks, mu, dual,
-                                       self._low, self._force)
+        gap, time = compiled(assemble)(w, v, self._here, self._all, self._inverse, self._middle, self._blocks, mu,
+                                       dual, self._low, self._force)
         return gap + ends, time
 
     def direction(self, mu: float) -> tuple[float, float]:
@@ -70,6 +71,15 @@ class PackedSteps:
             return 0.0, 0.0
         ends = compiled(relative)(right, first, last, self._all, self._zc, mu, self._step, self._rc)
         w, v = self._w.reshape(-1), self._v.reshape(-1)
-        inner = compiled(direction)(w, v, self._here, self._step, self._inverse, self._blocks, mu)
+        inner = compiled(direction)(w, v, self._here, self._step, self._inverse, self._middle, self._blocks, mu)
         fall, loss = (max(pair) for pair in zip(ends, inner, strict=True))
         return (1.0 / fall if fall > 0.0 else np.inf, 1.0 / loss if loss > 0.0 else np.inf)
+
+
+def _by_block(middle: Floats | None, blocks: int) -> Floats:
+    """Middles (J, K) of the acceleration rows by block, joint and lane, (B J LANES,); without any, one block of zeros for all."""
+    if middle is None:
+        return np.zeros(LANES)
+    padded = np.zeros((len(middle), blocks * LANES))
+    padded[:, :middle.shape[1]] = middle
+    return padded.reshape(len(middle), blocks, LANES).transpose(1, 0, 2).reshape(-1)

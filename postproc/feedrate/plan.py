@@ -103,13 +103,13 @@ def plan_second_order(path: ParametricPath, limits: JointLimits, feed: FeedLimit
         sigma = knots if knots is not None else mesh_between(eased, limits, allowed, options.knots)
         at = eased.derivatives(sigma)
         cap = np.minimum(squared_speed(at.dq, limits.velocity), allowed(eased.parameter(sigma)[0]) ** 2)
-        most, dq, d2q = limits.acceleration, at.dq, at.d2q
+        most, dq, d2q, middle = limits.acceleration, at.dq, at.d2q, None
         if limits.tool is not None or limits.forces is not None:
             found = rows(eased, sigma, limits, allowed)
-            most, dq, d2q = found.limits.acceleration, found.dq, found.d2q
+            most, dq, d2q, middle = found.limits.acceleration, found.dq, found.d2q, found.middle
             cap = found.cap if limits.tool is None else np.minimum(
                 found.cap, steady_tool_speed(eased, sigma, limits.tool) ** 2)
-        x = second_order(sigma, dq, d2q, most, cap, options.method.kernel)
+        x = second_order(sigma, dq, d2q, most, cap, options.method.kernel, middle)
         pieces.append(MotionPiece(eased, linear_profile(sigma, x)))
     return Plan(tuple(pieces), limits, allowed, options.step)
 

@@ -87,8 +87,7 @@ def _ratios(grid: MotionKnots, part: Profile, kernel: bool) -> Floats:
     ratios = worst_ratios(at, x, limits, kernel)
     ratios[0] = np.maximum(ratios[0], s[1] * speed / grid.feed(s[0]))
     if limits.forces is not None:
-        first, second = limits.forces.rows(at.q, at.dq, at.d2q)
-        ratios[1] = np.maximum(ratios[1], np.abs(second * x[0][:, None] + 0.5 * first * x[1][:, None]).max(axis=1))
+        ratios[1] = np.maximum(ratios[1], limits.forces.use(at.q, *_in_time(at, x)[:2]).max(axis=1))
     if limits.tool is not None:
         known = tool(grid.eased, sigma, s)
         _, bend, snap = (np.linalg.norm(rate, axis=1) for rate in _in_time(known.tip, x))

@@ -62,14 +62,14 @@ def _knots(w: Any, h: Any, c: Any, b: Any, k: Any, mu: Any, dual: Any) -> None:
 
 
 @loop
-def _joint(h: Any, v: Any, q: Any, ia: Any, ij: Any, mu: Any, dual: Any) -> None:
-    """Add the rows of one joint, block q of v, to h; ia, ij one over its limits of acceleration and jerk."""
+def _joint(h: Any, v: Any, m: Any, q: Any, r: Any, ia: Any, ij: Any, mu: Any, dual: Any) -> None:
+    """Add the rows of one joint, block q of v and r of m, to h; ia, ij one over its limits of acceleration and jerk."""
     for i in range(L):
         o = q + i
         x, x1, half = h[i], h[i + Y1], h[i + YHALF]
         scale = ia * h[i + YA]
         a0, a1 = v[o + F1] * scale, 0.5 * v[o] * scale
-        use = a0 * x + a1 * x1
+        use = a0 * x + a1 * x1 + m[r + i]
         s0, s1 = 1.0 - use, 1.0 + use
         z0, z1 = v[o + F3] * (1.0 + dual * v[o + F7]), v[o + F4] * (1.0 + dual * v[o + F8])
         v[o + F3], v[o + F4] = z0, z1
@@ -129,19 +129,22 @@ def _mapped(w: Any, h: Any, b: Any) -> None:
 
 
 @loop
-def assemble(w: Any, v: Any, h: Any, c: Any, inverse: Any, blocks: Any, mu: Any, dual: Any, low: Any, force: Any) -> Any:
+def assemble(w: Any, v: Any, h: Any, c: Any, inverse: Any, middle: Any, blocks: Any, mu: Any, dual: Any, low: Any,
+             force: Any) -> Any:
     """Update z by the dual step; add the knots' parts of the Newton equations. Returns gap and time.
 
     w, v flat blocks, h room of a block, c coefficients padded to the lanes, inverse (2, J) of the limits of acceleration
-    and jerk; lower band low (3, n) and right side force (n,) in the coefficients, n padded to the lanes.
+    and jerk, middle of the acceleration rows by block and joint, or one block of zeros for all; lower band low (3, n) and right side force (n,) in the coefficients, n padded to the lanes.
     """
     joints = _N(inverse.shape[1])
+    own = _N(0 if middle.shape[0] == LANES else LANES)
     gap, time = 0.0, 0.0
     for block in range(blocks):
         b, k = block * BLOCK, block * L
         _knots(w, h, c, b, k, mu, dual)
         for joint in range(joints):
-            _joint(h, v, (block * joints + joint) * F11, inverse[0, joint], inverse[1, joint], mu, dual)
+            at = block * joints + joint
+            _joint(h, v, middle, at * F11, at * own, inverse[0, joint], inverse[1, joint], mu, dual)
         for i in range(L):
             gap += (1.0 - w[b + i + PAD]) * h[i + GAP]
             time += w[b + i + WEIGHT] * h[i + YROOT]
@@ -210,14 +213,14 @@ def _changes(w: Any, h: Any, dc: Any, b: Any, k: Any, mu: Any) -> None:
 
 
 @loop
-def _joint_changes(h: Any, v: Any, q: Any, ia: Any, ij: Any, mu: Any) -> None:
-    """Relative changes of z of one joint, block q of v; one division serves a pair: 1 / (slack z) times z or slack."""
+def _joint_changes(h: Any, v: Any, m: Any, q: Any, r: Any, ia: Any, ij: Any, mu: Any) -> None:
+    """Relative changes of z of one joint, block q of v and r of m; one division serves a pair: 1 / (slack z) times z or slack."""
     for i in range(L):
         o = q + i
         x, x1, dx, dx1 = h[i], h[i + Y1], h[i + B0], h[i + B1]
         scale = ia * h[i + YA]
         a0, a1 = v[o + F1] * scale, 0.5 * v[o] * scale
-        use, change = a0 * x + a1 * x1, a0 * dx + a1 * dx1
+        use, change = a0 * x + a1 * x1 + m[r + i], a0 * dx + a1 * dx1
         s0, s1, z0, z1 = 1.0 - use, 1.0 + use, v[o + F3], v[o + F4]
         o0, o1 = 1.0 / (s0 * z0), 1.0 / (s1 * z1)
         f0, f1 = change * z0 * o0, -change * z1 * o1
@@ -238,18 +241,20 @@ def _joint_changes(h: Any, v: Any, q: Any, ia: Any, ij: Any, mu: Any) -> None:
 
 
 @loop
-def direction(w: Any, v: Any, h: Any, dc: Any, inverse: Any, blocks: Any, mu: Any) -> Any:
+def direction(w: Any, v: Any, h: Any, dc: Any, inverse: Any, middle: Any, blocks: Any, mu: Any) -> Any:
     """Relative changes of z for the step dc; returns the largest relative decrease of a slack and of a z.
 
     One over them are the steps to the nearest bound. Arguments as of `assemble`.
     """
     joints = _N(inverse.shape[1])
+    own = _N(0 if middle.shape[0] == LANES else LANES)
     primal, dual = 0.0, 0.0
     for block in range(blocks):
         b = block * BLOCK
         _changes(w, h, dc, b, block * L, mu)
         for joint in range(joints):
-            _joint_changes(h, v, (block * joints + joint) * F11, inverse[0, joint], inverse[1, joint], mu)
+            at = block * joints + joint
+            _joint_changes(h, v, middle, at * F11, at * own, inverse[0, joint], inverse[1, joint], mu)
         for i in range(L):
             primal, dual = max(primal, h[i + G0]), max(dual, h[i + G1])
     return primal, dual

@@ -31,9 +31,10 @@ def pack(w: Any, v: Any, stencil: Any, common: Any, dq: Any, d2q: Any, d3q: Any)
 
 
 @loop
-def begin_multipliers(w: Any, v: Any, c: Any, inverse: Any, mu: Any) -> None:
-    """z = mu / slack of every row; c (K + 2, padded), inverse (2, J) of the limits of acceleration and jerk."""
+def begin_multipliers(w: Any, v: Any, c: Any, inverse: Any, middle: Any, mu: Any) -> None:
+    """z = mu / slack of every row; c (K + 2, padded), inverse and middle as of `interior.assemble`."""
     lanes, joints = w.shape[2], v.shape[1]
+    own = 0 if middle.shape[0] == lanes else lanes
     for block in range(w.shape[0]):
         for i in range(lanes):
             k = block * lanes + i
@@ -45,7 +46,7 @@ def begin_multipliers(w: Any, v: Any, c: Any, inverse: Any, mu: Any) -> None:
             for j in range(joints):
                 q1, q2, q3 = v[block, j, 0, i], v[block, j, 1, i], v[block, j, 2, i]
                 scale = inverse[0, j] * w[block, 11, i]
-                use = q2 * scale * x + 0.5 * q1 * scale * x1
+                use = q2 * scale * x + 0.5 * q1 * scale * x1 + middle[(block * joints + j) * own + i]
                 v[block, j, 3, i], v[block, j, 4, i] = mu / (1.0 - use), mu / (1.0 + use)
                 scale = inverse[1, j] * w[block, 12, i]
                 use = q3 * scale * x + 1.5 * q2 * scale * x1 + 0.5 * q1 * scale * x2
