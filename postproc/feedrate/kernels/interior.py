@@ -215,7 +215,7 @@ def _changes(w: Any, h: Any, dc: Any, b: Any, k: Any, mu: Any) -> None:
 
 @loop
 def _joint_changes(h: Any, v: Any, m: Any, q: Any, r: Any, ia: Any, ij: Any, mu: Any) -> None:
-    """Relative changes of z of one joint, block q of v and r of m; one division for a pair: 1 / (slack z) times z or slack."""
+    """Relative changes of z of one joint, block q of v and r of m; one division a pair: 1 / (slack z) times z or slack."""
     for i in range(L):
         o = q + i
         x, x1, dx, dx1 = h[i], h[i + Y1], h[i + B0], h[i + B1]
