@@ -54,8 +54,8 @@ class Options:
 
     optimise: bool = False
     """output modes, ends of blocks, shares of the tolerance and feed mode chosen for the least time on the control"""
-    beside: bool = False
-    """blocks of cuts may end beside the path, within the tolerance, where fewer of them do"""
+    off_path: bool = False
+    """blocks of cuts may end off the path, within the tolerance, where fewer of them do"""
     smoothing: float = 0.0
     """mm of the tolerance that the control's own smoothing may take, where its blocks state it; 0: as the controller file"""
 
@@ -96,8 +96,8 @@ class Options:
             lines.append("points smoothed")
         if self.optimise:
             lines.append("optimised for the time on the control")
-        if self.beside:
-            lines.append("block ends beside the path")
+        if self.off_path:
+            lines.append("block ends off the path")
         if self.smoothing:
             lines.append(smoothing_line(self.smoothing, said))
         if self.error_model:

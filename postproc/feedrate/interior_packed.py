@@ -77,7 +77,7 @@ class PackedSteps:
 
 
 def _by_block(middle: Floats | None, blocks: int) -> Floats:
-    """Middles (J, K) of the acceleration rows by block, joint and lane, (B J LANES,); without any, one block of zeros for all."""
+    """Middles (J, K) of the acceleration rows by block, joint, lane, (B J LANES,); without any one block of zeros."""
     if middle is None:
         return np.zeros(LANES)
     padded = np.zeros((len(middle), blocks * LANES))

@@ -22,8 +22,6 @@ ENOUGH = 1.002
 MORE = 2.0
 """Power of the excess by which rows are tightened: a peak between knots falls by some 60 % of what its knots do."""
 BETWEEN = (0.25, 0.5, 0.75)
-SPLIT = (1.5, 1.5, 1.02, 1.02)
-"""Ratios between knots from which an interval is halved, by the number of tightenings before."""
 CHUNK = 4096
 """intervals looked at together"""
 

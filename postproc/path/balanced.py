@@ -1,4 +1,4 @@
-"""Fewer blocks inside the same tolerance: their ends beside the curve, on the side away from which the blocks bend.
+"""Fewer blocks inside the same tolerance: their ends off the curve, on the side away from which the blocks bend.
 
 While rotary axes turn, a block between two points of a curve bends away from it, all to one side, by e in its middle. With
 its ends moved by -e/2 it is off by e/2 at most, so that each may be longer by a root of two: fewer blocks, where the
@@ -27,7 +27,7 @@ SHORT = 1e-6
 
 def balanced(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats, movable: Bools,
              tolerance: float, axis_tolerance: float, plain: CurvePieces) -> CurvePieces:
-    """Blocks q0 -> q1 (N, J) along `curves` (N), ends moved beside them where `movable` (N,); else those of `plain`.
+    """Blocks q0 -> q1 (N, J) along `curves` (N), ends moved off them where `movable` (N,); else those of `plain`.
 
     The deviation from the curves is bounded as of other blocks, at both ends and all between. `plain` where it does not do.
     """
@@ -68,7 +68,7 @@ def _balanced(control: Control, kin: Kinematics, curves: Curves, joints: tuple[F
 
 
 def _bend(control: Control, kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> Floats:
-    """(N, 3) how far the middle of a block over all of each curve is beside it."""
+    """(N, 3) how far the middle of a block over all of each curve is off it."""
     middle = np.full(len(curves), 0.5)
     tip, _, _ = control.between(q0, q1, middle, kin, np.zeros(len(curves), dtype=bool))
     off = tip - curves.tip_at(middle)

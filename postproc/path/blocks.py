@@ -124,9 +124,9 @@ def _off(tip: Floats, begin: Floats, end: Floats) -> Floats:
 
 
 def add_run(out: PathBuilder, frame: WordFrame, kin: Kinematics, moves: Moves, rows: Ints, curves: Curves, q0: Floats,
-            q1: Floats, tolerance: float, axis_tolerance: float, beside: bool = False) -> tuple[Floats, Ints, Ints]:
+            q1: Floats, tolerance: float, axis_tolerance: float, off_path: bool = False) -> tuple[Floats, Ints, Ints]:
     """The blocks of moves `rows` (N,), of one or many runs, along curves (N) from joints q0 to q1 (N, J):
-    (worst deviations (2,), rows with turns on the spot, broken rows); `beside`: cuts may end beside their curve."""
+    (worst deviations (2,), rows with turns on the spot, broken rows); `off_path`: cuts may end off their curve."""
     control = frame.control
     where, begun = family_turns(kin, curves, q0, q1)
     start = q0.copy()
@@ -136,7 +136,7 @@ def add_run(out: PathBuilder, frame: WordFrame, kin: Kinematics, moves: Moves, r
     main = linearise(control, kin, curves, start, q1, arcs.keep, tolerance, axis_tolerance)
     if not len(where):
         main = balanced(control, kin, curves, start, q1, moves.kind[rows] != Kind.RAPID, tolerance, axis_tolerance,
-                        main) if beside else main
+                        main) if off_path else main
         _emit(out, frame, moves, rows, kin, curves, arcs, main.curve, main.u, main.q, q0, tolerance,
               axis_tolerance)
         return np.array([main.worst_tip, main.worst_axis]), rows[where], rows[main.broken]

@@ -57,7 +57,7 @@ class _Stand:
 def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], moves: Moves, space: SafeSpace,
                home_rows: frozenset[int], operation: Ints, tolerance: float, axis_tolerance: float, file: str = "",
                progress: Progress | None = None, drawing: RetractPlan | None = None,
-               rapids_as_feed: bool = False, beside: bool = False) -> tuple[JointPath | None, list[Diagnostic]]:
+               rapids_as_feed: bool = False, off_path: bool = False) -> tuple[JointPath | None, list[Diagnostic]]:
     """Blocks for all moves (in the table frame).
 
     Args:
@@ -67,7 +67,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         tolerance, axis_tolerance: mm and rad that linearising may use
         drawing: what the set-up says about rewinds and preferred joints; default: its defaults
         rapids_as_feed: rapids that would leave their line may be feed moves
-        beside: blocks of cuts may end beside their curve, within the tolerance, where they are fewer so (`balanced.py`)
+        off_path: blocks of cuts may end off their curve, within the tolerance, where they are fewer so (`balanced.py`)
     """
     machine, given, drawing = modes.control.machine, moves, drawing or RetractPlan.default(space)
     plan = plan_moves(machine, kinematics, moves, drawing.run_options(machine, axis_tolerance),
@@ -80,7 +80,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     runs, diagnostics = solved_runs(plan, modes, kinematics, road.operation, axis_tolerance, file)
     if has_errors(diagnostics):
         return None, faults.merged(diagnostics)
-    runs, worst, turns, more = _add_runs(out, road, runs, tolerance, machine, beside)
+    runs, worst, turns, more = _add_runs(out, road, runs, tolerance, machine, off_path)
     diagnostics += more
     start = _Stand(None, modes.base, kinematics(int(moves.tool[0])))
     stand, longer, more = _add_links(out, road, runs, start, progress)
@@ -117,7 +117,7 @@ def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count:
 
 
 def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float, machine: Machine,
-              beside: bool) -> tuple[SolvedRuns, Floats, list[Ints], list[Diagnostic]]:
+              off_path: bool) -> tuple[SolvedRuns, Floats, list[Ints], list[Diagnostic]]:
     """The blocks of all runs, those of one frame and tool together: (runs as their ends are approached, worst
     deviations (2,), rows with turns, faults)."""
     worst, turns, found = np.zeros(2), [np.zeros(0, dtype=np.int64)], list[Diagnostic]()
@@ -138,7 +138,7 @@ def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,
             q[rows[where]] = joints
             runs = replace(runs, q=q)
         left, turned, broken = add_run(out, some[0].frame, kin, moves, rows, curves, runs.q[starts], runs.q[ends].copy(),
-                                       tolerance, some[0].left, beside)
+                                       tolerance, some[0].left, off_path)
         worst = np.maximum(worst, left)
         turns.append(turned)
         found += faults.broken(machine, moves, broken, runs.q[[broken - 1, broken]], road.file)

@@ -1,7 +1,7 @@
 """`--optimise`: among what a post-processor may choose, the program that the control runs fastest; proved like any other.
 
 One choice after the other is changed and kept where the written program takes less time on the control's model: output mode
-of all and of each operation, block ends beside the path where fewer blocks do, how much of the tolerance the control's
+of all and of each operation, block ends off the path where fewer blocks do, how much of the tolerance the control's
 smoothing takes from linearising, points moved inside the tolerance, feed mode. Nothing is slower than without: what is not
 faster is not taken, by the model's formulas and then by the control, executed.
 """
@@ -54,9 +54,9 @@ def optimised(start: PostResult, stages: StagedWhole, clock: ProgramClock) -> Po
         return made
     search = _Search(_Best(start, made, clock(made), measured(clock, made)), written, clock)
     search.modes()
-    search.to("block ends beside the path", _options(partial(replace, beside=True)))
+    search.to("block ends off the path", _options(partial(replace, off_path=True)))
     search.smoothing()
-    search.to("block ends beside the path", _options(partial(replace, beside=True)))
+    search.to("block ends off the path", _options(partial(replace, off_path=True)))
     for moved in (True, False):
         if moved != search.best.start.options.smooth:
             search.to("points moved inside the tolerance" if moved else "points unmoved",

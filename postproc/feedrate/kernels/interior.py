@@ -134,7 +134,8 @@ def assemble(w: Any, v: Any, h: Any, c: Any, inverse: Any, middle: Any, blocks: 
     """Update z by the dual step; add the knots' parts of the Newton equations. Returns gap and time.
 
     w, v flat blocks, h room of a block, c coefficients padded to the lanes, inverse (2, J) of the limits of acceleration
-    and jerk, middle of the acceleration rows by block and joint, or one block of zeros for all; lower band low (3, n) and right side force (n,) in the coefficients, n padded to the lanes.
+    and jerk, middle of the acceleration rows by block and joint, or one block of zeros for all; lower band low (3, n)
+    and right side force (n,) in the coefficients, n padded to the lanes.
     """
     joints = _N(inverse.shape[1])
     own = _N(0 if middle.shape[0] == LANES else LANES)
@@ -214,7 +215,7 @@ def _changes(w: Any, h: Any, dc: Any, b: Any, k: Any, mu: Any) -> None:
 
 @loop
 def _joint_changes(h: Any, v: Any, m: Any, q: Any, r: Any, ia: Any, ij: Any, mu: Any) -> None:
-    """Relative changes of z of one joint, block q of v and r of m; one division serves a pair: 1 / (slack z) times z or slack."""
+    """Relative changes of z of one joint, block q of v and r of m; one division a pair: 1 / (slack z) times z or slack."""
     for i in range(L):
         o = q + i
         x, x1, dx, dx1 = h[i], h[i + Y1], h[i + B0], h[i + B1]

@@ -1,4 +1,4 @@
-"""Blocks that end beside the curve: fewer of them within the same tolerance, by the tests' own matrices."""
+"""Blocks that end off the curve: fewer of them within the same tolerance, by the tests' own matrices."""
 
 from __future__ import annotations
 
