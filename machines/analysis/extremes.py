@@ -297,13 +297,13 @@ def _over(poses: PosesOfBoxes, lever: float, pose: Span) -> tuple[Floats, Spread
     back = (np.linalg.norm(moves @ inverse, ord=2, axis=(2, 3)) + np.linalg.norm(off @ np.abs(inverse), axis=(2, 3))) / size
     whole = np.linalg.norm(moves, axis=(2, 3)) + np.linalg.norm(off, axis=(2, 3))
     half = pose.radius
-    rows = _longer(safe, by.middle, by.radius, half)
+    longer = _longer(safe, by.middle, by.radius, half)
     cols = _longer(np.swapaxes(inverse[:, 0], 1, 2), np.swapaxes(moves @ inverse, 2, 3),
                    np.swapaxes(off @ np.abs(inverse), 2, 3), half)
     rates = (larger, back, np.abs(trace) + off_trace, np.abs(turned) + off_trace + across, whole)
     found = [share.sum(axis=1), *((rate * pose.radius).sum(axis=1) for rate in rates)]
     spread = Spread(*(np.where(known, value, np.inf) for value in found),
-                    *(np.where(known[:, None], value, np.inf) for value in (rows, cols)))
+                    *(np.where(known[:, None], value, np.inf) for value in (longer, cols)))
     return safe, spread, np.where(known[:, None], share, pose.radius)
 
 
