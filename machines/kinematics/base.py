@@ -68,7 +68,6 @@ class ErrorForms(Protocol[ErrorForm]):
 
 class Kinematics(ABC):
     """Inverse and forward of one machine, vectorised; frozen: `with_tool` gives a changed copy."""
-
     axis_names: tuple[str, ...]
     """one letter per joint, the order of q"""
     rotary: tuple[bool, ...]
@@ -86,7 +85,7 @@ class Kinematics(ABC):
     jets_proved: bool = False
     """True where `jets` bounds the third derivative, False where it only looks at places: then no block has a bound"""
     chain: tuple[Joint, ...] = ()
-    """the axes from the workpiece to the tool, their motions one after the other (`Serial`); () of any other machine"""
+    """the axes from the workpiece to the tool, one after the other (`Serial`); () of any other machine"""
     on_rods: RodPlatform | None = None
     """the platform and its rods, where rods carry the tool"""
     transmits: Transmission | None = None
@@ -128,8 +127,7 @@ class Kinematics(ABC):
 
     @property
     def open_parameters(self) -> tuple[str, ...]:
-        """What a pose leaves open besides branches and the family of `singular`: SPIN, or letters of joints that may stand
-        anywhere; () where the joints follow."""
+        """What a pose leaves open: SPIN, or letters of joints that may stand anywhere; () where the joints follow."""
         return ()
 
     @property
@@ -151,6 +149,10 @@ class Kinematics(ABC):
 
     def with_free_spin(self) -> Self:
         """The same machine with the turn of the tool about itself among the open parameters; as it is where it has none."""
+        return self
+
+    def with_spins(self, spins: tuple[float, ...]) -> Self:
+        """The same machine with branches of `inverse` for each of `spins`, rad; as it is where it cannot turn the tool so."""
         return self
 
     # ---- poses ---------------------------------------------------------------------------------------------
@@ -189,8 +191,7 @@ class Kinematics(ABC):
         return made
 
     def nearest_axis(self, axis: Floats) -> Floats:
-        """The tool directions (N, 3) in reach nearest to `axis` (N, 3); the same where the kind does not know: `inverse`
-        then says what it cannot take."""
+        """The tool directions (N, 3) in reach nearest to `axis` (N, 3); the same where the kind does not know."""
         return as_points(axis, 3, "axis")
 
     def singular(self, q: Floats) -> Bools:
@@ -204,8 +205,7 @@ class Kinematics(ABC):
         return tip[None], axis[None]
 
     def with_all_roots(self) -> Self:
-        """The same machine with every choice of roots of its legs among the branches of `inverse`, its own first, also those
-        to which it is not assembled."""
+        """The same machine with every choice of roots of its legs among the branches of `inverse`, its own first."""
         return self
 
     def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:

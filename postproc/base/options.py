@@ -52,7 +52,9 @@ class Options:
     """True: errors at the ends of their measured ranges count beyond them too"""
 
     optimise: bool = False
-    """output modes, shares of the tolerance and feed mode chosen for the least time on the control"""
+    """output modes, ends of blocks, shares of the tolerance and feed mode chosen for the least time on the control"""
+    beside: bool = False
+    """blocks of cuts may end beside the path, within the tolerance, where fewer of them do"""
     smoothing: float = 0.0
     """mm of the tolerance that the control's own smoothing may take, where its blocks state it; 0: as the controller file"""
 
@@ -93,6 +95,8 @@ class Options:
             lines.append("points smoothed")
         if self.optimise:
             lines.append("optimised for the time on the control")
+        if self.beside:
+            lines.append("block ends beside the path")
         if self.smoothing:
             lines.append(smoothing_line(self.smoothing, said))
         if self.error_model:

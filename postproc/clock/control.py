@@ -26,8 +26,8 @@ SLIGHT = 0.1
 GENTLE = 0.95
 """of the accelerations and jerks has the braking curve, so that the motion can come up to it from below"""
 GENTLER, LAST, AGAIN = (0.94, 0.93, 0.92, 0.9), 30, 160
-"""other such shares; cycles before a rest in which a motion that speeds up again has slowed down too early, and from which it
-is tried again"""
+"""other such shares; cycles before a rest in which a motion that speeds up again has slowed down too early, and from which
+it is tried again"""
 BACKWARD = -0.94
 """cosine of the change of direction below which the axes rest: 160 degrees"""
 NEAR, LEAST = 2, 0.8
@@ -154,9 +154,9 @@ def between_rests(room: Allowed, first: int, last: int, settings: ControlSetting
 
 
 def _moved(part: Allowed, settings: ControlSettings) -> Floats:
-    """(M, 3) the motion from rest to rest under the largest speeds of a part. Where it speeds up again before it rests, since
-    the cycle in which it began to slow down was half a one too late, it slows down otherwise by a little."""
-    moved = _run(part, settings, np.zeros(3) + [part.s[0], 0.0, 0.0], GENTLE)
+    """(M, 3) the motion from rest to rest under the largest speeds of a part. Where it speeds up again before it rests,
+    since the cycle in which it began to slow down was half a one too late, it slows down otherwise by a little."""
+    moved = _run(part, settings, np.array([part.s[0], 0.0, 0.0]), GENTLE)
     late = moved[-LAST:]
     if len(late) and (late[:, 2] > 0.0).any() and late[0, 2] < 0.0:
         begin = max(len(moved) - AGAIN, 0)

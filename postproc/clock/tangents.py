@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools, Floats, Ints
 
 SHARP = 0.15
 """rad that a point of a curve turns from which its direction is that of its neighbourhood alone: a spline whose curvature is
-continuous there bends the other way before and behind"""
+continuous there bends to the other side before and behind"""
 SLIGHT = 1e-6
 """rad: least turn of a neighbour, so that directions are defined"""
 
 
 def tangents(u: Floats, chord: Floats, along: Floats, smooth: Bools) -> tuple[Floats, Floats]:
     """(N, A) derivatives by the parameter at begin and end of each block: of cubic splines through smooth points, of one
-    curvature in the blocks in which they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV): where a curve ends
-    at a corner it bends up to there. Blocks of no curve are straight. Points that turn by more than SHARP have `_local`
-    directions, however the points stand there.
+    curvature in the blocks in which they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV): where a curve
+    ends at a corner it bends up to there. Blocks of no curve are straight. Points that turn by more than SHARP have
+    `_local` directions, however the points stand there.
 
     `u` (N, A) directions of the blocks, `chord` (N,) their lengths, `along` (N,) those of their parameter; `smooth` (N - 1,)
     inner points of curves.
@@ -46,7 +46,7 @@ def tangents(u: Floats, chord: Floats, along: Floats, smooth: Bools) -> tuple[Fl
     return solved[0::2], solved[1::2]
 
 
-def _local(u: Floats, chord: Floats, along: Floats, turn: Floats, sharp: Floats) -> tuple[Floats, Floats]:
+def _local(u: Floats, chord: Floats, along: Floats, turn: Floats, sharp: Ints) -> tuple[Floats, Floats]:
     """(K, A) derivatives before and behind each sharp point (K,): the mean of the directions of both blocks, each weighed by
     the root of the turn at the other end of the other block and of that block's length: most of a bend is where its
     neighbours turn too (H. Akima, J. ACM 17, 1970, has the turn itself: it follows rounded points). As long as those of an

@@ -32,21 +32,26 @@ AT_SPEED = 0.999
 
 
 def control(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
-    """How long the control takes over each block; `found` says where the times are those of `lookahead`: beyond
+    """How long the control takes over each block; `found` says where the times are those of formulas: beyond
     MOST_BLOCKS or MOST_STOPS, and where no motion within the limits was found."""
     form = shape(blocks)
-    stops, target = rests(blocks, form), limits(blocks, form, model)[0]
+    stops, target = rests(blocks, form), feeds(blocks, form, model)
     if len(blocks) > MOST_BLOCKS or np.count_nonzero(stops) > MOST_STOPS:
-        return replace(lookahead(blocks, model), found=(info(
+        return replace(lookahead(blocks, model.quick()), found=(info(
             "time.control", f"{len(blocks)} blocks with {np.count_nonzero(stops)} stops: the control is executed up to "
-            f"{MOST_BLOCKS} blocks and {MOST_STOPS} stops; the times are those of the model lookahead"),))
+            f"{MOST_BLOCKS} blocks and {MOST_STOPS} stops; the times are about those, by formulas"),))
     try:
         moved, owner = motion(blocks, model, form, stops, target)
     except (ValueError, ArithmeticError) as fault:
-        return replace(lookahead(blocks, model), found=(warning(
-            "time.plan", f"the motion of the control cannot be planned, times are those of the model lookahead: {fault}",
+        return replace(lookahead(blocks, model.quick()), found=(warning(
+            "time.plan", f"the motion of the control cannot be planned, times are about those, by formulas: {fault}",
             hint=f"{REPORT}; --model lookahead needs no plan"),))
     return _on_the_clock(blocks, form, moved, owner, stops, target, model.stop_time)
+
+
+def feeds(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Floats:
+    """(E,) largest speed along each block as the control is given it: how fast it takes up blocks is its own, over some."""
+    return limits(blocks, form, model.model_copy(update={"block_time": 0.0}))[0]
 
 
 def motion(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: Bools,

@@ -18,9 +18,8 @@ from postproc.clock.control import between_rests, looked_over
 from postproc.clock.path import BlendedPath
 from postproc.clock.settings import ControlSettings
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.control import MOST_BLOCKS, MOST_STOPS, commanded, rests
+from postproc.cycle_time.control import MOST_BLOCKS, MOST_STOPS, commanded, feeds, rests
 from postproc.cycle_time.estimate import as_used
-from postproc.cycle_time.lookahead import limits
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.shape import shape
 from postproc.cycle_time.source import from_conversion
@@ -57,7 +56,7 @@ def control_plan(made: PostResult, model: CycleTimeModel) -> ControlPlan | None:
     stops = rests(blocks, form)
     if len(blocks) > MOST_BLOCKS or np.count_nonzero(stops) > MOST_STOPS:
         return None
-    given, settings, owner = commanded(blocks, model, form, stops, limits(blocks, form, model)[0])
+    given, settings, owner = commanded(blocks, model, form, stops, feeds(blocks, form, model))
     path, room = looked_over(given, settings)
     if room is None:
         return None

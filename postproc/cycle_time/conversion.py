@@ -106,4 +106,6 @@ def figures(e: Estimate | None) -> dict[str, Any]:
 def text(e: Estimate) -> str:
     """One line for people."""
     band = f", 95 % between {clock(e.band[0])} and {clock(e.band[1])}" if e.uncertainties else ""
-    return f"time: {clock(e.seconds)}{band} (model {e.model.kind}; lower bound {clock(e.lower_bound)})"
+    about, how = ("about ", "by formulas; `postproc time` runs the control") if e.model.kind == "formulas" else (
+        "", f"model {e.model.kind}")
+    return f"time: {about}{clock(e.seconds)}{band} ({how}; lower bound {clock(e.lower_bound)})"

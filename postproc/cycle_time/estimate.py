@@ -87,7 +87,7 @@ def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
         from postproc.cycle_time.control import control  # SciPy, which other models do without
 
         return by_level(blocks, model, control)
-    return lookahead(blocks, model)
+    return by_level(blocks, model, lookahead) if model.kind == "formulas" else lookahead(blocks, model)
 
 
 def total(blocks: MotionBlocks, times: BlockTimes) -> float:
@@ -111,7 +111,7 @@ def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with
     bound = lower_bound(as_used(blocks, model), model)
     if not with_band:
         return Estimate(blocks, model, times, seconds, bound, (seconds, seconds), {}, {})
-    down, up, uncertainties, assumed = _uncertainties(blocks, machine, model.quick(), seconds)
+    down, up, uncertainties, assumed = _uncertainties(blocks, machine, model, seconds)
     low = seconds - down if machine.limits.assumed else max(seconds - down, min(bound, seconds))
     return Estimate(blocks, model, times, seconds, bound, (max(low, 0.0), seconds + up), uncertainties,
                     assumed)
@@ -120,9 +120,10 @@ def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with
 def _uncertainties(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel,
                    seconds: float) -> tuple[float, float, dict[str, float], dict[str, float]]:
     """(s below, s above, standard deviation by origin, that of assumed values by name): every uncertain value is moved by
-    one standard deviation."""
+    one standard deviation, by formulas."""
+    known, model = model, model.quick()
     here = timed(blocks, model)
-    own = own_share(blocks, here, model, seconds)
+    own = own_share(blocks, here, known, seconds)
     low = high = (COVERAGE * own * seconds) ** 2
     begin = total(blocks, here)
     assumed, fitted = _assumed_changes(blocks, machine, model), _fitted_changes(blocks, model)

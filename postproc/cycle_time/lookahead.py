@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from postproc.cycle_time.bends import bend_speed
 from postproc.cycle_time.blocks import CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_kernels import speeds
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE
@@ -60,7 +61,8 @@ def lookahead(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
     first, last = loop(form.length, target, target, rate, through, kink, ahead)
     r = ramps(form.length, first, last, target, rate)
     extra = jerk_time(form.length, first, last, r, rate, jerk, target) if model.jerk else np.zeros(len(blocks))
-    return on_the_clock(blocks, r, extra, first, last, rate, ~through, model.stop_time)
+    settle = model.smoothing if model.kind == "formulas" else 0.0
+    return on_the_clock(blocks, r, extra, first, last, rate, ~through, model.stop_time + settle)
 
 
 def limits(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> tuple[Floats, Floats, Floats]:
@@ -84,14 +86,22 @@ def corner_speed(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Fl
     change = np.abs(travels.first[1:] - travels.last[:-1])
     stated = blocks.tolerance[:-1]
     tolerance = np.where(np.isfinite(stated), stated * model.stated_share, model.corner_tolerance)
+    if model.kind == "formulas" and model.jerk:
+        bent = np.where(blocks.path[:-1] == CornerMode.BLEND, tolerance, 0.0)
+        return np.where(_stops(blocks, change), 0.0, bend_speed(blocks, form, model, travels.first, travels.last, bent))
     bend = np.linalg.norm(np.where(blocks.axes.xyz >= 0, change[:, blocks.axes.xyz], 0.0), axis=1)
     half = np.minimum(form.length[:-1], form.length[1:]) / 2.0
     with np.errstate(divide="ignore"):
         reach = np.minimum(4.0 * tolerance / bend, half)
         speed = np.sqrt(2.0 * reach * (blocks.axes.acceleration / change).min(axis=1))
+    return np.where(_stops(blocks, change), 0.0, speed)
+
+
+def _stops(blocks: MotionBlocks, change: Floats) -> Bools:
+    """(E-1,) where the axes rest behind a block."""
     exact = (blocks.path[:-1] == CornerMode.EXACT) & (change.max(axis=1, initial=0.0) > TANGENT)
-    stop = blocks.forced[:-1] | (blocks.path[:-1] == CornerMode.STOP) | exact | (blocks.rapid[1:] != blocks.rapid[:-1])
-    return np.where(stop, 0.0, speed)
+    return np.asarray(blocks.forced[:-1] | (blocks.path[:-1] == CornerMode.STOP) | exact
+                      | (blocks.rapid[1:] != blocks.rapid[:-1]))
 
 
 def window(length: Floats, rate: Floats, count: int) -> Floats:

@@ -83,9 +83,10 @@ class CycleTimeModel(UserModel):
     """How a control plans."""
 
     description: str = ""
-    kind: Literal["ideal", "lookahead", "control", "linuxcnc"] = "lookahead"
+    kind: Literal["ideal", "lookahead", "control", "formulas", "linuxcnc"] = "lookahead"
     """ideal: as fast as the limits allow inside the corner tolerance; lookahead: a control that sees a number of blocks;
-    control: look-ahead and jerk executed cycle by cycle; linuxcnc: LinuxCNC's planner"""
+    control: look-ahead and jerk executed cycle by cycle; formulas: what such a control takes about; linuxcnc: LinuxCNC's
+    planner"""
     corner_tolerance: float = Field(default=0.01, gt=0.0, le=10.0)
     """mm that corners may be rounded off where the program does not say"""
     stated_share: float = Field(default=1.0, gt=0.0, le=1000.0)
@@ -139,13 +140,13 @@ class CycleTimeModel(UserModel):
         stays. Only of a control with look-ahead."""
         stated = {"lookahead": machine.look_ahead, "block_time": None if self.calibration else machine.block_time}
         known = {name: value for name, value in stated.items() if value is not None}
-        if self.kind not in ("lookahead", "control") or not known:
+        if self.kind not in ("lookahead", "control", "formulas") or not known:
             return self
         return self.model_copy(update={**known, "assumed": tuple(name for name in self.assumed if name not in known)})
 
     def quick(self) -> CycleTimeModel:
-        """The model whose times are formulas: "lookahead" with the same parameters where this one executes a control."""
-        return self.model_copy(update={"kind": "lookahead"}) if self.kind == "control" else self
+        """The model whose times are formulas, with the same parameters, where this one executes a control."""
+        return self.model_copy(update={"kind": "formulas"}) if self.kind == "control" else self
 
     def values(self) -> Floats:
         """(8,) logarithms of PARAMETERS."""

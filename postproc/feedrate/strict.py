@@ -20,8 +20,8 @@ NEAR = 1.002
 
 
 class StrictMotion(NamedTuple):
-    """Knots, without their tightening, and report of a solve; the factor on time that it still needs between its knots, and its
-    seconds with that."""
+    """Knots, without their tightening, and report of a solve; the factor on time that it still needs between its knots, and
+    its seconds with that."""
 
     grid: MotionKnots
     report: SolvedWindows

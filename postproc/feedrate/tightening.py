@@ -51,7 +51,7 @@ def seen_between(grid: MotionKnots, c: Floats, kernel: bool = False) -> tuple[Ra
 def slowdown(seen: Ratios) -> float:
     """Factor on time that brings what is seen between the knots to 1."""
     velocity, acceleration, jerk = seen.max(axis=1).tolist()
-    return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0))
+    return float(max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0)))
 
 
 def tighter(grid: MotionKnots, seen: Ratios, split_from: float) -> Tighter | None:

@@ -105,7 +105,8 @@ def solved(knots: MotionKnots, method: Method, near: Floats | None = None) -> So
         for i in again:
             wide[i] *= 2
     return SolvedWindows(_held(knots, c, inner) if bad else c, max(one.iterations for one in found), worst,
-                         not bad and all(one.solved for one in found), np.sum([one.weights for one in found], axis=0), found[0].basis)
+                         not bad and all(one.solved for one in found), np.sum([one.weights for one in found], axis=0),
+                         found[0].basis)
 
 
 def _held(knots: MotionKnots, c: Floats, inner: Sequence[int]) -> Floats:

@@ -11,6 +11,7 @@ from postproc.control.control import Control
 from postproc.control.modes import WordFrame
 from postproc.control.word_arcs import PLANE_COLUMNS, WordArcs, word_arcs
 from postproc.joints.joint_path import nearest_solution
+from postproc.path.balanced import balanced
 from postproc.path.linearise import family_turns, linearise
 from postproc.path.model import ARC, FEED, TRAVERSE
 from postproc.reference.holes import Phase
@@ -123,9 +124,9 @@ def _off(tip: Floats, begin: Floats, end: Floats) -> Floats:
 
 
 def add_run(out: PathBuilder, frame: WordFrame, kin: Kinematics, moves: Moves, rows: Ints, curves: Curves, q0: Floats,
-            q1: Floats, tolerance: float, axis_tolerance: float) -> tuple[Floats, Ints, Ints]:
+            q1: Floats, tolerance: float, axis_tolerance: float, beside: bool = False) -> tuple[Floats, Ints, Ints]:
     """The blocks of moves `rows` (N,), of one or many runs, along curves (N) from joints q0 to q1 (N, J):
-    (worst deviations (2,), rows with turns on the spot, broken rows)."""
+    (worst deviations (2,), rows with turns on the spot, broken rows); `beside`: cuts may end beside their curve."""
     control = frame.control
     where, begun = family_turns(kin, curves, q0, q1)
     start = q0.copy()
@@ -134,6 +135,8 @@ def add_run(out: PathBuilder, frame: WordFrame, kin: Kinematics, moves: Moves, r
     arcs = replace(arcs, keep=arcs.keep & (np.linalg.norm(curves.start - curves.center, axis=1) <= control.arc_limit))
     main = linearise(control, kin, curves, start, q1, arcs.keep, tolerance, axis_tolerance)
     if not len(where):
+        main = balanced(control, kin, curves, start, q1, moves.kind[rows] != Kind.RAPID, tolerance, axis_tolerance,
+                        main) if beside else main
         _emit(out, frame, moves, rows, kin, curves, arcs, main.curve, main.u, main.q, q0, tolerance,
               axis_tolerance)
         return np.array([main.worst_tip, main.worst_axis]), rows[where], rows[main.broken]

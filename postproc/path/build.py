@@ -56,8 +56,7 @@ class _Stand:
 def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], moves: Moves, space: SafeSpace,
                home_rows: frozenset[int], operation: Ints, tolerance: float, axis_tolerance: float, file: str = "",
                progress: Progress | None = None, drawing: RetractPlan | None = None,
-               rapids_as_feed: bool = False) -> tuple[JointPath | None,
-                                                                                              list[Diagnostic]]:
+               rapids_as_feed: bool = False, beside: bool = False) -> tuple[JointPath | None, list[Diagnostic]]:
     """Blocks for all moves (in the table frame).
 
     Args:
@@ -67,6 +66,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         tolerance, axis_tolerance: mm and rad that linearising may use
         drawing: what the set-up says about rewinds and preferred joints; default: its defaults
         rapids_as_feed: rapids that would leave their line may be feed moves
+        beside: blocks of cuts may end beside their curve, within the tolerance, where they are fewer so (`balanced.py`)
     """
     machine, given, drawing = modes.control.machine, moves, drawing or RetractPlan.default(space)
     plan = plan_moves(machine, kinematics, moves, drawing.run_options(machine, axis_tolerance),
@@ -79,7 +79,7 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     runs, diagnostics = solved_runs(plan, modes, kinematics, road.operation, axis_tolerance, file)
     if has_errors(diagnostics):
         return None, faults.merged(diagnostics)
-    runs, worst, turns, more = _add_runs(out, road, runs, tolerance, machine)
+    runs, worst, turns, more = _add_runs(out, road, runs, tolerance, machine, beside)
     diagnostics += more
     start = _Stand(None, modes.base, kinematics(int(moves.tool[0])))
     stand, longer, more = _add_links(out, road, runs, start, progress)
@@ -115,8 +115,8 @@ def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count:
                      split_seconds=plan.split_seconds)
 
 
-def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,
-              machine: Machine) -> tuple[SolvedRuns, Floats, list[Ints], list[Diagnostic]]:
+def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float, machine: Machine,
+              beside: bool) -> tuple[SolvedRuns, Floats, list[Ints], list[Diagnostic]]:
     """The blocks of all runs, those of one frame and tool together: (runs as their ends are approached, worst
     deviations (2,), rows with turns, faults)."""
     worst, turns, found = np.zeros(2), [np.zeros(0, dtype=np.int64)], list[Diagnostic]()
@@ -137,7 +137,7 @@ def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,
             q[rows[where]] = joints
             runs = replace(runs, q=q)
         left, turned, broken = add_run(out, some[0].frame, kin, moves, rows, curves, runs.q[starts], runs.q[ends].copy(),
-                                       tolerance, some[0].left)
+                                       tolerance, some[0].left, beside)
         worst = np.maximum(worst, left)
         turns.append(turned)
         found += faults.broken(machine, moves, broken, runs.q[[broken - 1, broken]], road.file)

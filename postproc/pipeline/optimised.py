@@ -1,9 +1,9 @@
 """`--optimise`: among what a post-processor may choose, the program that the control runs fastest; proved like any other.
 
 One choice after the other is changed and kept where the written program takes less time on the control's model: output mode
-of all and of each operation, how much of the tolerance the control's smoothing takes from linearising, points moved inside
-the tolerance, feed mode. Nothing is slower than without: what is not faster is not taken, by the model's formulas and then
-by the control, executed.
+of all and of each operation, block ends beside the path where fewer blocks do, how much of the tolerance the control's
+smoothing takes from linearising, points moved inside the tolerance, feed mode. Nothing is slower than without: what is not
+faster is not taken, by the model's formulas and then by the control, executed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from postproc.pipeline.result import PostResult
 
 _Change = Callable[[PostResult], PostResult]
 """What a conversion begins with, changed"""
-SHARES = (0.05, 0.15, 0.45, 0.6, 0.75)
+SHARES = (0.05, 0.15, 0.45, 0.6, 0.75, 0.9)
 """of the tolerance for the control's smoothing, tried first; then half as far on both sides of the best, NEARER times"""
 NEARER = 3
 LEAST = 1e-4
@@ -53,7 +53,9 @@ def optimised(start: PostResult, stages: StagedWhole, clock: ProgramClock) -> Po
         return made
     search = _Search(_Best(start, made, clock(made), measured(clock, made)), written, clock)
     search.modes()
+    search.to("block ends beside the path", _options(partial(replace, beside=True)))
     search.smoothing()
+    search.to("block ends beside the path", _options(partial(replace, beside=True)))
     for moved in (True, False):
         if moved != search.best.start.options.smooth:
             search.to("points moved inside the tolerance" if moved else "points unmoved",

@@ -11,7 +11,7 @@ from postproc.orientation.passes.passes import work_of
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import bettered, planned_choice, unsolved
 from postproc.orientation.turning.turning_choice import TurningChoice, turning_choice
-from postproc.orientation.turning.turning_report import noted
+from postproc.orientation.turning.turning_report import noted, unused
 from postproc.pipeline.axes_by_clock import fastest
 from postproc.pipeline.feeds_by_clock import ProgramClock
 from postproc.pipeline.proved_axes import proved
@@ -47,6 +47,8 @@ def oriented(start: PostResult, stages: Stages, progress: Progress | None = None
     if clock is not None and plan == "auto":
         made = fastest(made, program_of, clock)
     choice, found = bettered(made.choice), [*found, *more, *unsolved(made.choice, plan)]
+    if plan != "auto":
+        found += unused(start.setup.orientation, f"--orient {plan} is of 3+2 passes alone", start.options.setup)
     begun = replace(start.with_found(found), toolpath=choice.toolpath(plan), choice=choice)
     if plan != "auto" or not made.program.ok or not choice.work.setup.orientation.turns:
         return begun, made.program
@@ -75,8 +77,8 @@ def common(options: Options) -> Options:
     """The options by which tool axes are chosen and proved."""
     plain = Options()
     return replace(options, feed_mode=plain.feed_mode, output=plain.output, feed=plain.feed, merge_feeds=plain.merge_feeds,
-                   optimise=plain.optimise, smoothing=plain.smoothing, smooth=plain.smooth, error_model=plain.error_model,
-                   error_beyond=plain.error_beyond)
+                   optimise=plain.optimise, beside=plain.beside, smoothing=plain.smoothing, smooth=plain.smooth,
+                   error_model=plain.error_model, error_beyond=plain.error_beyond)
 
 
 def written(start: PostResult, program: PostResult | None) -> PostResult | None:

@@ -155,7 +155,7 @@ def solved(made: PlacedStage, progress: Progress | None) -> tuple[PlacedStage | 
     job, shares = made.job, made.shares
     path, found = build_path(job.modes, job.kinematics, made.moves, job.space, job.home_rows(), job.operation,
                              shares["linearising"], shares["axis_linearising"] * DEG, made.toolpath.file, progress,
-                             made.drawing, made.setup.output.rapids_as_feed)
+                             made.drawing, made.setup.output.rapids_as_feed, made.options.beside)
     found = with_system(found, job.work_system, job.placement, job.moves.axis)
     if path is None:
         return made, found

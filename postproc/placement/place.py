@@ -17,6 +17,7 @@ from postproc.cycle_time.conversion import program_clock
 from postproc.job.job import prepare
 from postproc.orientation.candidates.ranking import load_compiler
 from postproc.orientation.passes.passes import PassContext, work_of
+from postproc.orientation.turning.turning_report import unused
 from postproc.path.links import safe_space
 from postproc.pipeline.feeds_by_clock import ProgramClock, measured
 from postproc.placement.bodies import StationaryBodies, adjacent
@@ -123,6 +124,8 @@ def place(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Optio
         best, program = result.now, (program[0], program[0])
     times = proof.time(result.now), proof.time(best)
     more += _lifted(space, best, options.setup)
+    if options.orient != "keep":
+        more += unused(setup.orientation, "places are compared by 3+2 passes alone", options.setup)
     return PlacementChoice(work, space, result, best, timer.planned, timer.looked, timer.pruned, timer.refused,
                            tuple(timer.known()), program, times), [*found, *more]
 

@@ -211,8 +211,8 @@ def answered(questions: list[Question], given: GivenAnswers, ask: Callable[[Ques
             result[question.key] = Answer(value, "answered")
         elif assume and question.assumed is not None:
             result[question.key] = Answer(question.assumed, "assumed")
-        elif ask is not None and (value := ask(question)) != "":
-            result[question.key] = Answer(value, "answered")
+        elif ask is not None and (said := ask(question)) != "":
+            result[question.key] = Answer(said, "answered")
         elif not question.optional:
             left.append(question)
     return result, left

@@ -37,7 +37,7 @@ PRIOR = {"corner_tolerance": 1.2, "block_time": 1.5, "rapid": 0.4, "override": 0
 """standard deviation of each logarithm before a run is looked at"""
 STATED = 0.05
 """the same of the share of accelerations and jerks that the machine file states"""
-FREE = {"lookahead": PARAMETERS, "control": PARAMETERS,
+FREE = {"lookahead": PARAMETERS, "control": PARAMETERS, "formulas": PARAMETERS,
         "ideal": tuple(name for name in PARAMETERS if name != "block_time"),
         "linuxcnc": ("rapid", "override", "acceleration_share", "spindle_time")}
 CREDIBLE = 1.5

@@ -75,7 +75,7 @@ def zigzag(folder: Path, controller: str | Path, machine: str | Path = DELTA) ->
 
 
 def test_lineardeltakins_at_the_points_of_a_posted_program(standstill) -> None:
-    """Cartesian words of pocket.cls, and places all about its home: LinuxCNC's joints at rest there are ours, within 1e-6 mm."""
+    """Cartesian words of pocket.cls, and places about its home: LinuxCNC's joints at rest there are ours, within 1e-6 mm."""
     result = converted("pocket.cls", DELTA, "tools")
     assert result.job is not None and "tool-centre-point control" in result.text
     machine, motion = result.machine, outputs.read(result)[1]

@@ -10,7 +10,7 @@ import pytest
 
 import machines
 from machines.machine import Machine
-from tests.linuxcnc import config, simulator
+from tests.linuxcnc import simulator
 from tests.linuxcnc.simulator import Run
 from toolpaths.arrays import Floats
 

@@ -37,7 +37,7 @@ def model(name: str) -> CycleTimeModel:
     """A built-in model; "lookahead" by its formulas, which take no path to be executed."""
     loaded, found = load_model(name)
     assert loaded is not None and not found
-    return loaded.quick() if name == "lookahead" else loaded
+    return loaded.model_copy(update={"kind": "lookahead"}) if name == "lookahead" else loaded
 
 
 def blocks(text: str, on: Machine | None = None, controller: str = "linuxcnc") -> MotionBlocks:

@@ -29,9 +29,23 @@ class RedundantLegs(PosesOfLegs):
 
     Attributes:
         spin_free: the spin is an open parameter, not held at 0
+        spins: rad, that `inverse` gives branches for; () 0 alone
     """
 
     spin_free: bool = False
+    spins: tuple[float, ...] = ()
+
+    @cached_property
+    def branches(self) -> int:  # type: ignore[override]  # nothing assigns it
+        """See `PosesOfLegs`; so many for each spin"""
+        own = len(self.loops.drives.root_choices()) if self.all_roots else 1
+        return own * max(len(self.spins), 1)
+
+    def inverse(self, tip: Floats, axis: Floats, spin: float | Floats = 0.0, near: Floats | None = None) -> Floats:
+        """See the base class."""
+        if not self.spins:
+            return super().inverse(tip, axis, spin, near)
+        return np.concatenate([super(RedundantLegs, self).inverse(tip, axis, spin + more, near) for more in self.spins])
 
     @cached_property
     def open_parameters(self) -> tuple[str, ...]:
@@ -65,3 +79,7 @@ class RedundantLegs(PosesOfLegs):
     def with_free_spin(self) -> Self:
         """See the base class: of a platform that turns in every direction."""
         return replace(self, spin_free=True) if self.loops.turns == "abc" and self.loops.holds is None else self
+
+    def with_spins(self, spins: tuple[float, ...]) -> Self:
+        """See the base class: of a platform that turns in every direction."""
+        return replace(self, spins=spins) if self.loops.turns == "abc" and self.loops.holds is None else self

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -32,6 +32,8 @@ from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all
 from toolpaths.toolpath import Kind, Role, Toolpath
 from toolpaths.units import DEG
 
+SPINS = (0.0, *(sign * angle * DEG for angle in (20.0, 40.0, 60.0) for sign in (1.0, -1.0)))
+"""rad, turns of the tool about itself that are tried where the set-up leaves them open"""
 TURNS = 1e-6
 """rad: axes that differ by less are one"""
 
@@ -137,8 +139,10 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
             turning: bool = True) -> tuple[PassContext | None, list[Diagnostic]]:
     """The passes of a toolpath on a machine; errors where a pass could be turned but its cutter is not known.
 
-    Where none will be turned (`turning` False) the form of the cutter does not matter.
+    Where none will be turned (`turning` False) the form of the cutter does not matter. A machine that can turn the tool
+    about itself is seen with branches for the spins that the set-up allows (`[joints] spin`).
     """
+    machine = _with_spins(machine, setup)
     placement, found = part_placement(setup, options.setup)
     if placement is None:
         return None, found
@@ -165,6 +169,13 @@ def work_of(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
     work = PassContext(toolpath, machine, setup, placement, moves, safe_space(moves, setup, placement),
                        tuple(passes), surface)
     return (None if unknown else work), [*found, *more, *faults, *unknown]
+
+
+def _with_spins(machine: Machine, setup: SetupFile) -> Machine:
+    asked = setup.joints.spin
+    spins = SPINS if asked in ("needed", "planned") else () if asked == "zero" else (float(asked) * DEG,)
+    spun = machine.kinematics.with_spins(spins) if spins else machine.kinematics
+    return machine if spun is machine.kinematics else replace(machine, kinematics=spun)
 
 
 @dataclass(frozen=True)

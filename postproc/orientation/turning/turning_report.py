@@ -11,6 +11,7 @@ from postproc.orientation.passes.contact import Contact
 from postproc.orientation.turning.reach_along import ReachAlong, reach_along
 from postproc.orientation.turning.turning_choice import RunChoice, TurningChoice
 from postproc.planning.planned import limits_at_feed
+from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Floats, finite
 from toolpaths.diagnostics import Diagnostic, info
 from toolpaths.rotations import angle_between
@@ -45,6 +46,13 @@ def noted(choice: TurningChoice) -> list[Diagnostic]:
         found.append(info("orient.turn_refused", "cuts whose program is refused with axes that turn along them keep theirs: "
                           f"{choice.passed[0]}", file=file, count=len(choice.passed)))
     return found
+
+
+def unused(limits: OrientationLimits, what: str, file: str) -> list[Diagnostic]:
+    """Where the set-up has a cone, that `what` leaves the axes along cuts as they are."""
+    if not limits.turns:
+        return []
+    return [info("orient.cone_unused", f"the set-up has a cone, and {what}: no axis turns along its cut", file=file)]
 
 
 def as_dict(choice: TurningChoice) -> dict[str, Any]:

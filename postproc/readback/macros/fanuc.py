@@ -21,6 +21,7 @@ from postproc.readback.macros.expressions import (
 )
 from postproc.readback.macros.fanuc_variables import Variables
 from postproc.readback.macros.held import Held
+from postproc.readback.macros.plane_words import PlaneWords
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks, Word, coded
 from postproc.readback.text.flow import DEEPEST
@@ -70,6 +71,7 @@ class FanucMacros:
         self.blocks = Blocks(held, False, sources.read[0].name)
         self.levels: list[Level] = []
         self.modal: ModalCall | None = None
+        self.plane = PlaneWords(self.blocks.track)
         self.variables = Variables(self.blocks, held)
         self.expressions = Expressions(FANUC, self.variable, self._unknown)
         self.words_of: dict[str, list[Word]] = {}
@@ -250,10 +252,15 @@ class FanucMacros:
         elif call == ("M", 99.0):
             self.returned(words)
             return
-        moved = self.blocks.block(words, self.line) if words else False
+        moved = self.written(words) if words else False
         self.ended = bool({("M", 2.0), ("M", 30.0)} & codes)
         if moved and self.modal is not None and not self.levels[-1].modal:
             self.call(self.modal.program, self.modal.times, self.modal.local, modal=True)
+
+    def written(self, words: Sequence[Word]) -> bool:
+        """A block without calls; True where it moves an axis."""
+        made = self.plane.taken(words)
+        return bool(made) and self.blocks.block(made, self.line)
 
     def subprogram(self, words: Sequence[Word], code: float) -> None:
         """M98 P L, M198 (of another folder or store: a file next to the program), and Haas' M97; other words come first."""
@@ -262,7 +269,7 @@ class FanucMacros:
             raise MacroFault("gcode.subprogram", f"M{code:g} without P", "state the number of the program: M98 P1000")
         rest = [w for w in words if w.letter not in "PLN" and w.value != code]
         if rest:
-            self.blocks.block(rest, self.line)
+            self.written(rest)
         number, times = int(stated["P"]), int(stated.get("L", 1.0))
         if code == 97.0:
             level = self.levels[-1]
@@ -315,7 +322,7 @@ class FanucMacros:
         target = next((int(w.value) for w in words if w.letter == "P"), None)
         rest = [w for w in words if w.letter not in "PLN" and (w.letter, w.value) != ("M", 99.0)]
         if rest:
-            self.blocks.block(rest, self.line)
+            self.written(rest)
         level = self.levels[-1]
         if len(self.levels) == 1:
             if target is None:

@@ -15,6 +15,7 @@ from pathlib import PurePath
 
 from postproc.readback.macros.expressions import Cursor, MacroFault, applied, unsure, written
 from postproc.readback.macros.held import Held
+from postproc.readback.macros.klartext_datum import DatumShift
 from postproc.readback.macros.klartext_strings import NUMBERS, Strings
 from postproc.readback.macros.klartext_system import SystemData
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
@@ -117,6 +118,7 @@ class KlartextMacros:
         self.levels = [KlartextLevel(sources.read[0], 0, False)]
         self.parameters: dict[tuple[str, int], float] = {}
         self.strings, self.system = Strings(self.term), SystemData(held)
+        self.datum = DatumShift()
         self.units = ""
         self.line, self.ended = 0, False
 
@@ -172,7 +174,9 @@ class KlartextMacros:
         row = self.filled(row, row.startswith("CYCL DEF"))
         if row.startswith("TOOL CALL"):
             self.system.called(row)
-        self.blocks.write(row, self.line)
+        if self.datum.stated(row):
+            return
+        self.blocks.write(self.datum.shifted(row), self.line)
         self.ended = len(self.levels) >= 1 and bool(_END.search(row)) and not row.startswith("CYCL")
 
     def _frame(self, level: KlartextLevel, row: str, which: str, units: str) -> None:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from postproc.readback.macros.expressions import LINUXCNC, Cursor, Expressions, MacroFault, ValueLater, plain
 from postproc.readback.macros.held import Held
-from postproc.readback.macros.linuxcnc_nesting import misplaced
 from postproc.readback.macros.linuxcnc_parameters import OLevel, Parameters
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks, Word, coded
@@ -24,6 +23,9 @@ _DIGITS = re.compile(r"\d+")
 _NAME = re.compile(r"<[^<>]*>")
 _ENDS = {"IF": ("ELSEIF", "ELSE", "ENDIF"), "ELSEIF": ("ENDIF",), "ELSE": ("ENDIF",), "WHILE": ("ENDWHILE",),
          "REPEAT": ("ENDREPEAT",), "SUB": ("ENDSUB",)}
+_OPENS = ("SUB", "IF", "DO", "REPEAT")
+_CLOSES = {"ENDSUB": ("SUB",), "ELSEIF": ("IF",), "ELSE": ("IF",), "ENDIF": ("IF",), "ENDREPEAT": ("REPEAT",),
+           "ENDWHILE": ("WHILE",)}
 ARGUMENTS = 30
 
 
@@ -298,3 +300,27 @@ def _word(row: str) -> tuple[str, Cursor]:
         raise c.fault("not an O word")
     c.at = m.end()
     return m[2], c
+
+
+def misplaced(rows: Iterable[tuple[int, str, str]]) -> dict[int, tuple[str, str]]:
+    """O words that do not belong together: (what is wrong, remedy) by row; rows: (row, label, word) of those with O words, in
+    order."""
+    open_: list[tuple[str, str]] = []
+    found: dict[int, tuple[str, str]] = {}
+    for k, label, word in rows:
+        if word in _OPENS or (word == "WHILE" and (label, "DO") not in open_):
+            open_.append((label, word))
+        elif word in _CLOSES or word == "WHILE":
+            begins = [(label, begin) for begin in _CLOSES.get(word, ("DO",))]
+            where = next((n for n in range(len(open_) - 1, -1, -1) if open_[n] in begins), -1)
+            if where < 0:
+                begin = begins[0][1].lower()
+                found[k] = f"o{label.lower()} {word.lower()} without {begin}", f"begin it with {begin}, or take it out"
+                continue
+            if where < len(open_) - 1:
+                inner = open_[-1]
+                found[k] = (f"o{label.lower()} {word.lower()} before the end of o{inner[0].lower()} {inner[1].lower()}, "
+                            "which began within it", f"end o{inner[0].lower()} first")
+            if word not in ("ELSEIF", "ELSE"):
+                del open_[where]
+    return found

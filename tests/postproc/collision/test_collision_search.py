@@ -141,6 +141,7 @@ def random_case(rng: np.random.Generator) -> tuple[Swept, Floats]:
     return moving, np.array([[r0, r0, r0, r0, r0], [r1, 10.0, r2, 60.0, 0.0]])
 
 
+@pytest.mark.slow  # make numeric runs it; numpy's search next to dense points is held below
 @pytest.mark.numeric
 def test_compiled_loops_find_what_numpy_finds(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(8)

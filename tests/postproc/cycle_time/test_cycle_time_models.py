@@ -162,6 +162,7 @@ def test_window_of_few_blocks_is_slower() -> None:
     assert peak == pytest.approx(np.sqrt(2 * 3000 * 0.2 * 5 + 3000 * 0.2), rel=1e-9)
 
 
+@pytest.mark.slow  # make numeric runs it; the plain loops have tests of their own
 @pytest.mark.numeric
 @pytest.mark.parametrize("seed", range(3))
 def test_compiled_loops_are_the_plain_ones(seed: int) -> None:

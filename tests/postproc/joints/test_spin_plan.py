@@ -6,6 +6,7 @@ import itertools
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,12 @@ LEANING = ["MULTAX/ON", "RAPID", "GOTO/-139,-24,-80,0.20167,-0.45442,0.86766", "
 """where legs with less travel than the catalogue's reach only with the tool turned about itself"""
 LEVEL = ["GOTO/0,0,-170", "FEDRAT/MMPM,900", "GOTO/10,0,-180", "GOTO/30,20,-180"]
 LENGTH = "[tools.1]\ngauge_length = 60\n"
+
+
+@cache
+def level(text: str) -> PostResult:
+    """A level path on the hexapod with a set-up."""
+    return good(convert(toolpath("RAPID", *LEVEL), "hexapod", setup=setup_of(text)))
 
 
 @pytest.fixture(scope="module")
@@ -118,16 +125,13 @@ def test_a_path_that_needs_another_spin_at_its_end_than_at_its_beginning(short_l
 
 
 def test_what_converts_without_is_left_byte_for_byte() -> None:
-    path = toolpath("RAPID", *LEVEL)
-    one, other = (good(convert(path, "hexapod", setup=setup_of(text + LENGTH)))
-                  for text in ('', '[joints]\nspin = "zero"\n'))
+    one, other = (level(text + LENGTH) for text in ("", '[joints]\nspin = "zero"\n'))
     assert one.text.split("G54\n")[1] == other.text.split("G54\n")[1] and one.path is not None and one.path.opened == ()
 
 
 @pytest.mark.parametrize("spin", ["25", '"planned"'])
 def test_the_spin_that_is_asked_for(spin: str) -> None:
-    path = toolpath("RAPID", *LEVEL)
-    result = good(convert(path, "hexapod", setup=setup_of(f"[joints]\nspin = {spin}\n{LENGTH}")))
+    result = level(f"[joints]\nspin = {spin}\n{LENGTH}")
     assert result.path is not None and result.job is not None
     cuts = np.isfinite(result.path.u)
     found = np.degrees(result.job.kinematics(0).parameters_at(result.path.q[cuts]))
@@ -135,19 +139,18 @@ def test_the_spin_that_is_asked_for(spin: str) -> None:
 
 
 def test_a_tool_that_keeps_its_spin_is_not_turned() -> None:
-    free = good(convert(toolpath("RAPID", *LEVEL), "hexapod",
-                        setup=setup_of(f'[joints]\nspin = 25\n{LENGTH}keeps_spin = true\n')))
+    free = level(f"[joints]\nspin = 25\n{LENGTH}keeps_spin = true\n")
     assert free.path is not None and free.path.opened[0][1:] == (0.0, 0.0)
 
 
 def test_the_second_witness_holds_the_spin_of_a_tool_that_keeps_it() -> None:
     """A program made for a round tool turned by 25 degrees, held against the set-up of one that is not round."""
     path, kept = toolpath("RAPID", *LEVEL), setup_of(f"{LENGTH}keeps_spin = true\n")
-    turned = good(convert(path, "hexapod", setup=setup_of(f"[joints]\nspin = 25\n{LENGTH}")))
+    turned = level(f"[joints]\nspin = 25\n{LENGTH}")
     assert turned.job is not None and turned.comparison is not None
     found = second_witness(path.source, kept, turned.options, turned.job, turned.comparison)[1]
     assert any(d.code == "witness.spin" and "25.0" in d.message for d in found), [str(d) for d in found]
-    held = good(convert(path, "hexapod", setup=kept))
+    held = level(f"{LENGTH}keeps_spin = true\n")
     assert held.witness is not None and "turns of tools about themselves" in [one.what for one in held.witness.compared]
 
 

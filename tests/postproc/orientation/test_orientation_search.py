@@ -248,3 +248,17 @@ def test_states_that_touch_are_in_no_plan_but_keep() -> None:
     plans = plans_of(table_of(made, results, allowed, workers=1)).named
     assert plans["keep"].touches and not any(plans[name].touches for name in ("per-pass", "whole-part", "auto"))
     assert all(one.gains[0] == np.inf for one in results)
+
+
+def test_axes_are_looked_for_with_the_spin_that_the_setup_allows() -> None:
+    """A leg too short for no spin: none is found at 0 and none at -40 degrees, with the spin planned or at 40 degrees there is."""
+    text = ("TOOL PATH/LINES,TOOL,BALL8\nTLDATA/MILL,8.0,4.0,75.0,0.0,0.0\nLOAD/TOOL,1\nRAPID\n"
+            "GOTO/-20,0,30,0,0,1\nFEDRAT/MMPM,900\nGOTO/-20,0,0\nGOTO/20,0,0\nRAPID\nGOTO/20,0,30\nEND-OF-PATH\n")
+    toolpath, whole = toolpaths.read_bytes(text)[0], machine("hexapod")
+    narrow = replace(whole, limits=replace(whole.limits, upper=np.append(170.0, whole.limits.upper[1:])))
+
+    def found(spin: str | float) -> bool:
+        setup = SetupFile.model_validate({"part": {"origin": (0.0, 0.0, -100.0)}, "tools": {"1": {"gauge_length": 100.0}},
+                                          "joints": {"spin": spin}})
+        return orient(toolpath, narrow, setup, Options(max_tilt=10.0))[0] is not None
+    assert [found(spin) for spin in ("zero", -40.0, 40.0, "planned")] == [False, False, True, True]

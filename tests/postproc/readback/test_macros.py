@@ -36,12 +36,33 @@ def track(control: str, body: str, **others: bytes) -> list[list[float]]:
     ("G52 X10.\nG0 X1.\nG91 X1.\nG90\nG52 X0.\nX1.\nG92 X5. Y2.\nX6. Y2.\n", [[11, 0, 0], [12, 0, 0], [1, 0, 0], [2, 0, 0]]),
     ("G0 X4. Y3.\n#1=#5001 #2=#4001\nG0 Y[#1*2+#2]\n", [[4, 3, 0], [4, 8, 0]]),
     ("#1=#0\nG0 X1.\nX-#1 Y[POW[2.,3.]]\n", [[1, 0, 0], [1, 8, 0]]),
+    ("G15 G50\nG90 G16\nG0 X100. Y90.\nG91 Y90.\nG90 X50.\nG15\nG0 X1. Y2.\n",
+     [[0, 100, 0], [-100, 0, 0], [-50, 0, 0], [1, 2, 0]]),
+    ("G68 X10. Y10. R90.\nG0 X20. Y10.\nY20.\nG1 X30. F100.\nG2 X40. Y20. I5. J0.\nG69\nG0 X1. Y1.\n",
+     [[10, 20, 0], [0, 20, 0], [0, 30, 0], [0, 40, 0], [1, 1, 0]]),
     ("#1=2.\nPOPEN\nDPRNT[X#1[32]]\nPCLOS\nSETVN #100[LAST]\nG0 X#1\n", [[2, 0, 0]])])
 @pytest.mark.parametrize("control", [FANUC, HAAS])
 def test_custom_macro_b(control: str, body: str, ends: list[list[float]]) -> None:
     if control == HAAS:
         body = body.replace("P20077", "P77 L2")
-    assert track(control, body) == ends
+    assert track(control, body) == [pytest.approx(end, abs=1e-12) for end in ends]
+
+
+def test_a_bolt_hole_circle_by_radius_and_angle() -> None:
+    """The example of Fanuc's manual (16/18, 9.2): holes at 30, 150 and 270 degrees on a radius of 100."""
+    body = "G90 G16\nG81 X100. Y30. Z-20. R5. F200\nY150.\nY270.\nG15 G80\nG0 X5. Y5.\n"
+    holes = [end for end in track(FANUC, body) if end[2] == -20.0]
+    assert holes == [pytest.approx([x, y, -20.0]) for x, y in ((86.60254, 50.0), (-86.60254, 50.0), (0.0, -100.0))]
+
+
+@pytest.mark.parametrize(("control", "text"), [
+    (FANUC, "G16\nG0 X10.\n"), (FANUC, "G16\nG1 X9. Y0. F9\nG2 X9. Y90. I-9. J0.\n"), (HAAS, "G16\nG91 G0 X9. Y9.\n"),
+    (FANUC, "G68 R30.\n"), (FANUC, "G68 X1. Y1. R30.\nG0 X4.\n"), (FANUC, "G68 X1. Y1. R30.\nG0 X4. Y4.\nG91 X1.\n"),
+    (FANUC, "G68 X1. Y1. R30.\nG28 Z0.\n"), (TNC, "TRANS DATUM TABLE TABLINE5\n"), (TNC, "CYCL DEF 7.1 #5\n"),
+    (TNC, "TRANS DATUM AXIS X+1\nPLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY\n")])
+def test_what_of_planes_and_datums_is_not_executed_is_said(control: str, text: str) -> None:
+    tnc = f"BEGIN PGM A MM\nL X+0 Y+0 Z+0 R0 FMAX\n{text}L M30\nEND PGM A MM\n"
+    assert faults(control, tnc if control == TNC else f"{HEAD}{text}M30\n%\n")
 
 
 @pytest.mark.parametrize(("body", "ends"), [
@@ -70,7 +91,13 @@ def test_sinumerik_calls_with_values() -> None:
     ("FN 0: Q1 = +3\nLBL 1\nL IX+1 FMAX\nFN 2: Q1 = +Q1 - +1\nFN 11: IF +Q1 GT +0 GOTO LBL 1\n",
      [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
     ("Q5 = 1\nLBL 1\nL IX+Q5 FMAX\nCALL LBL 1 REP 2\n", [[1, 0, 0], [2, 0, 0], [3, 0, 0]]),
-    ("FN 8: Q1 = +3 LEN +4\nFN 13: Q2 = +1 ANG +1\nFN 4: Q3 = +9 DIV +2\nL X+Q1 Y+Q2 Z+Q3 FMAX\n", [[5, 45, 4.5]])])
+    ("FN 8: Q1 = +3 LEN +4\nFN 13: Q2 = +1 ANG +1\nFN 4: Q3 = +9 DIV +2\nL X+Q1 Y+Q2 Z+Q3 FMAX\n", [[5, 45, 4.5]]),
+    ("CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+60\nCYCL DEF 7.2 Y+40\nL X+1 Y+2 FMAX\nL IX+5 FMAX\n"
+     "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 IX+10\nL X+1 Y+2 FMAX\n"
+     "CYCL DEF 7.0 DATUM SHIFT\nCYCL DEF 7.1 X+0\nCYCL DEF 7.2 Y+0\nL X+1 Y+2 FMAX\n",
+     [[61, 42, 0], [66, 42, 0], [71, 42, 0], [1, 2, 0]]),
+    ("Q1 = 3\nTRANS DATUM AXIS X+10 Y+Q1\nL X+Q1 Y+0 FMAX\nCC X+8 Y+0\nC X+13 Y+0 DR+ F500\nTRANS DATUM RESET\nL X+0 FMAX\n",
+     [[13, 3, 0], [23, 3, 0], [0, 3, 0]])])
 def test_klartext(body: str, ends: list[list[float]]) -> None:
     assert track(TNC, body)[:len(ends)] == ends
 

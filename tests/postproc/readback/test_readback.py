@@ -275,6 +275,7 @@ def walked(data: tuple, blocks: slice = slice(None)) -> tuple[np.ndarray, np.nda
     return align.align(tips[blocks], axes[blocks], swept[blocks], curves, kinds == 2, 0.01, 1e-3)
 
 
+@pytest.mark.slow  # make numeric runs it too; the plain walk alone is held below
 @pytest.mark.numeric
 def test_compiled_walk_is_the_plain_walk(monkeypatch: pytest.MonkeyPatch) -> None:
     cases = [random_walk(np.random.default_rng(seed), 150) for seed in range(8)]
