@@ -100,7 +100,8 @@ def certify(machine: Machine, wanted: Wanted) -> Certified:
     legs = machine.kinematics.leg_geometry
     if legs is None:
         raise DiagnosticError([error("certificate.legs", f"no workspace of {machine.name} is proved: it is neither a chain "
-                                     "of axes nor a platform on legs", file=machine.file)])
+                                     "of axes nor a platform that legs with joints of their own hold alone",
+                                     file=machine.file)])
     if wanted.box is not None and legs.head:
         raise DiagnosticError([error("certificate.head", f"no box of tips of {machine.name} is proved: an axis between "
                                      "platform and spindle moves the tip about", file=machine.file,

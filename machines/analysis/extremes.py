@@ -287,24 +287,24 @@ def _over(poses: PosesOfBoxes, lever: float, pose: Span) -> tuple[Floats, Spread
     safe = np.where(fine[:, None, None], middle, np.eye(count))
     inverse = np.linalg.inv(safe)[:, None]
     by = Span(*(np.where(known[:, None, None, None], end, 0.0) for end in (by.lo, by.hi)))
-    change, off = inverse @ by.middle, np.abs(inverse) @ by.radius
-    share = (np.linalg.norm(change, ord=2, axis=(2, 3)) + np.linalg.norm(off, axis=(2, 3))) * pose.radius
+    moves, off = inverse @ by.middle, np.abs(inverse) @ by.radius
+    share = (np.linalg.norm(moves, ord=2, axis=(2, 3)) + np.linalg.norm(off, axis=(2, 3))) * pose.radius
     own = inverse[:, 0] / np.linalg.norm(inverse[:, 0], axis=1, keepdims=True)
     size = np.linalg.norm(inverse[:, 0], ord=2, axis=(1, 2))[:, None]
-    trace = np.einsum("ndkk->nd", change)
-    turned = trace - np.einsum("nik,ndij,njk->nd", own, change, own)
+    trace = np.einsum("ndkk->nd", moves)
+    turned = trace - np.einsum("nik,ndij,njk->nd", own, moves, own)
     off_trace, across = np.einsum("ndkk->nd", off), np.einsum("nik,ndij,njk->nd", np.abs(own), off, np.abs(own))
     larger = np.linalg.norm(by.middle, ord=2, axis=(2, 3)) + np.linalg.norm(by.radius, axis=(2, 3))
-    back = (np.linalg.norm(change @ inverse, ord=2, axis=(2, 3)) + np.linalg.norm(off @ np.abs(inverse), axis=(2, 3))) / size
-    whole = np.linalg.norm(change, axis=(2, 3)) + np.linalg.norm(off, axis=(2, 3))
+    back = (np.linalg.norm(moves @ inverse, ord=2, axis=(2, 3)) + np.linalg.norm(off @ np.abs(inverse), axis=(2, 3))) / size
+    whole = np.linalg.norm(moves, axis=(2, 3)) + np.linalg.norm(off, axis=(2, 3))
     half = pose.radius
-    rows = _longer(safe, by.middle, by.radius, half)
-    cols = _longer(np.swapaxes(inverse[:, 0], 1, 2), np.swapaxes(change @ inverse, 2, 3),
+    longer = _longer(safe, by.middle, by.radius, half)
+    cols = _longer(np.swapaxes(inverse[:, 0], 1, 2), np.swapaxes(moves @ inverse, 2, 3),
                    np.swapaxes(off @ np.abs(inverse), 2, 3), half)
     rates = (larger, back, np.abs(trace) + off_trace, np.abs(turned) + off_trace + across, whole)
     found = [share.sum(axis=1), *((rate * pose.radius).sum(axis=1) for rate in rates)]
     spread = Spread(*(np.where(known, value, np.inf) for value in found),
-                    *(np.where(known[:, None], value, np.inf) for value in (rows, cols)))
+                    *(np.where(known[:, None], value, np.inf) for value in (longer, cols)))
     return safe, spread, np.where(known[:, None], share, pose.radius)
 
 

@@ -39,7 +39,7 @@ def moments(inertia: Inertia) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 @arrays(rotor="J", balance="J", friction="J", viscous="J")
-class Drives:
+class AxisDrives:
     """Of the motors of J axes, in kg mm/s2 and mm, of rotary axes kg mm2/s2 and rad.
 
     Attributes:
@@ -56,14 +56,14 @@ class Drives:
 
     def resisting(self, rate: Floats, acceleration: Floats) -> Floats:
         """(N, J) what the motors give against friction at rates (N, J); an axis at rest that is accelerated breaks loose."""
-        way = np.sign(np.where(rate == 0.0, acceleration, rate))
-        return np.asarray(self.friction * way + self.viscous * rate, dtype=np.float64)
+        sense = np.sign(np.where(rate == 0.0, acceleration, rate))
+        return np.asarray(self.friction * sense + self.viscous * rate, dtype=np.float64)
 
 
 class Dynamics(ABC):
     """Inverse dynamics of one machine: joints in mm and rad, forces in kg mm/s2, torques in kg mm2/s2."""
 
-    drives: Drives
+    drives: AxisDrives
     """its motors"""
 
     @abstractmethod

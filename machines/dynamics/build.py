@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from machines.dynamics.bodies import NEWTON, NEWTON_METRE, Drives, Dynamics, RigidBody, body, moments
+from machines.dynamics.bodies import NEWTON, NEWTON_METRE, AxisDrives, Dynamics, RigidBody, body, moments
 from machines.dynamics.chain import AxisBody, ChainDynamics
 from machines.dynamics.legs import LegDynamics, LegMasses
 from machines.dynamics_models import AxisMassModel, BodyModel, DynamicsModel
@@ -42,10 +42,10 @@ def dynamics_of(machine: Machine) -> Dynamics | None:
     return ChainDynamics((part, _at_end(sides[1.0], _loose(model.tool, gauge))), _drives(machine, model), down)
 
 
-def _drives(machine: Machine, model: DynamicsModel) -> Drives:
+def _drives(machine: Machine, model: DynamicsModel) -> AxisDrives:
     tables = [model.axes.get(name, NOTHING) for name in machine.axis_names]
     per_speed = np.where(machine.rotary, NEWTON_METRE, 1.0)
-    return Drives(np.array([t.rotor for t in tables]) * inertia_units(machine),
+    return AxisDrives(np.array([t.rotor for t in tables]) * inertia_units(machine),
                   np.array([t.balance for t in tables]) * force_units(machine),
                   np.array([t.friction for t in tables]) * force_units(machine),
                   np.array([t.viscous for t in tables]) * per_speed)

@@ -14,7 +14,7 @@ from typing import Self
 
 import numpy as np
 
-from machines.dynamics.bodies import GRAVITY, Drives, Dynamics, RigidBody
+from machines.dynamics.bodies import GRAVITY, AxisDrives, Dynamics, RigidBody
 from machines.kinematics.chain import Joint
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
@@ -63,7 +63,7 @@ class ChainDynamics(Dynamics):
     """
 
     sides: tuple[tuple[AxisBody, ...], ...]
-    drives: Drives
+    drives: AxisDrives
     down: Floats
 
     def forces(self, q: Floats, rate: Floats, acceleration: Floats, gravity: float = GRAVITY) -> Floats:

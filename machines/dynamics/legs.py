@@ -13,7 +13,7 @@ from dataclasses import field
 
 import numpy as np
 
-from machines.dynamics.bodies import GRAVITY, Drives, Dynamics, RigidBody
+from machines.dynamics.bodies import GRAVITY, AxisDrives, Dynamics, RigidBody
 from machines.dynamics.chain import AxisBody, MovingFrame, loads_of, side_forces
 from machines.kinematics.base import Kinematics
 from machines.kinematics.leg_motion import LegMotion, LegParts
@@ -69,7 +69,7 @@ class LegDynamics(Dynamics):
     parts: LegParts
     masses: LegMasses
     platform: tuple[RigidBody, ...]
-    drives: Drives
+    drives: AxisDrives
     down: Floats
     table: tuple[AxisBody, ...] = field(default=())
     head: tuple[AxisBody, ...] = field(default=())

@@ -71,10 +71,10 @@ class ForceLimits:
             first, second, middle = (np.nan_to_num(part / half) for part in (first, second, 0.5 * (low - high)))
         return first, second, middle
 
-    def room(self, q: Floats, way: Floats) -> tuple[Floats, Floats]:
-        """(N, J) how far what a motion takes may fall and rise at joints q; `way` (N, J) signs of their rates."""
+    def room(self, q: Floats, direction: Floats) -> tuple[Floats, Floats]:
+        """(N, J) how far what a motion takes may fall and rise at joints q; `direction` (N, J) signs of their rates."""
         zero = np.zeros_like(q)
-        need = self.dynamics.forces(q, zero, zero) + self.dynamics.drives.friction * way
+        need = self.dynamics.forces(q, zero, zero) + self.dynamics.drives.friction * direction
         most = self.limits - self._cut(q)
         return np.maximum(most + need, LEAST * self.limits), np.maximum(most - need, LEAST * self.limits)
 

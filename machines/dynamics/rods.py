@@ -63,4 +63,4 @@ def rod_figures(machine: Machine, dynamics: LegDynamics) -> dict[str, Any]:
         most = np.linalg.norm(rates, axis=2)
         k, rod = np.unravel_index(int(most.argmax()), most.shape)
         found[key] = {"largest": float(most[k, rod]), "rod": rods.names[int(rod)], "at_mm": poses.pose[k, :3].tolist()}
-    return {"rod_force": found}
+    return {"rod_force": {"of": f"largest at {len(poses.place)} poses of the workspace", **found}}

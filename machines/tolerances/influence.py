@@ -24,7 +24,7 @@ LEVELS, TILTS, HEADINGS, AT_ONCE = 5, 4, 8, 1_000
 """places per direction, tilts, directions of tilt; poses at a time"""
 
 
-class Poses(Protocol):
+class ToolPoses(Protocol):
     """Where a machine stands, N times."""
 
     @property
@@ -37,7 +37,7 @@ class Poses(Protocol):
         ...
 
 
-P = TypeVar("P", bound=Poses)
+P = TypeVar("P", bound=ToolPoses)
 
 
 @dataclass(frozen=True, eq=False)

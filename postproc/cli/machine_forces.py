@@ -116,6 +116,6 @@ def machine_star(names: StarNames, tool: StarTool = 100.0, rod: RodsOption = Non
         outputs[csv] = star_csv(stars)
     if figure is not None and ending is not None:
         outputs[figure] = star_figure(stars, ending)
-    found = {"tool_mm": tool, "of": "largest over the workspace; speeds and forces at the tip", "machines": [
+    found = {"tool_mm": tool, "of": "largest on a grid of the workspace; speeds and forces at the tip", "machines": [
         one.figures for one in stars]}
     report((), json, found, "\n\n".join(analysis_text(one.figures) for one in stars), outputs)

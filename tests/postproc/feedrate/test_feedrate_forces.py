@@ -19,6 +19,7 @@ from postproc.feedrate.motion import Plan
 from postproc.feedrate.paths import SplinePath
 from postproc.feedrate.plan import PlannerOptions, plan, plan_second_order
 from postproc.feedrate.windows import Method
+from postproc.orientation.candidates.ranking import StretchKnots
 from postproc.planning.planned import limits_at_feed
 from toolpaths.arrays import Floats
 
@@ -129,6 +130,22 @@ def test_axes_that_only_creep_are_slowed_by_what_their_friction_leaves() -> None
     assert forces.use(q, 500.0 * along, 0.0 * q)[:, 0] == pytest.approx([1.0, 1.0])
     assert forces.use(q, 1000.0 * along, 0.0 * q)[:, 0] == pytest.approx([4.0, 4.0])
     assert forces.use(q, 1000.0 * along, -3600.0 * along)[0, 0] < 1.0
+
+
+@pytest.mark.parametrize("jerky", [False, True])
+def test_candidates_of_orient_and_place_are_ranked_with_what_motors_allow(jerky: bool) -> None:
+    """The quick planner of both: weak motors cost it what they cost the whole plan, on either side of a hanging head."""
+    s = np.linspace(0.0, 60.0, 60)
+    q = path().derivatives(s).q
+    seconds = {}
+    for name, m in (("free", mill(acceleration=3.0)),
+                    ("weak", mill(pulls(0.4) + np.array([0.0, 0.0, 580.0]), down=1.0, acceleration=3.0))):
+        limits = limits_at_feed(m, m.kinematics)
+        knots = StretchKnots(s, np.linspace(0.0, 60.0, 241), lambda at: np.full(len(at), 1e6), jerky, Method(False))
+        whole = plan(path(), limits) if jerky else plan_second_order(path(), limits)
+        seconds[name] = knots.seconds(q, limits), whole.seconds
+    quick, whole = (seconds["weak"][k] / seconds["free"][k] for k in (0, 1))
+    assert quick == pytest.approx(whole, rel=0.05) and quick > (1.03 if jerky else 1.2)
 
 
 def delta(force: float) -> Machine:
