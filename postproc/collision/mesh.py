@@ -108,6 +108,13 @@ def _broken(mesh: Trimesh, path: str) -> tuple[Diagnostic, ...]:
     """What stands against reading the vertices at all."""
     if not hasattr(mesh, "faces") or not len(mesh.faces):
         return (error("mesh.empty", "holds no triangle", file=path, hint="export the solid as a triangle mesh"),)
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    if vertices.ndim != 2 or faces.ndim != 2 or vertices.shape[1] != 3 or faces.shape[1] != 3:
+        return (error("mesh.format", "has vertices without three coordinates, or faces that are no triangles", file=path,
+                      hint="export it again"),)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        return (error("mesh.format", f"has {len(vertices)} vertices, and a triangle names one that is none of them",
+                      file=path, hint="export it again"),)
     bad = np.flatnonzero(~np.isfinite(mesh.vertices).all(axis=1))
     if len(bad):
         return (error("mesh.number", f"{len(bad)} of {len(mesh.vertices)} vertices are not finite numbers", file=path,

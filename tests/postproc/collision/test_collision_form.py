@@ -320,3 +320,15 @@ def test_vertices_beyond_counting_are_refused(tmp_path: Path, far: str) -> None:
     path.write_text(f"OFF\n4 4 0\n0 0 0\n{far} 0 0\n0 9 0\n0 0 9\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n")
     mesh, found = load_mesh(path)
     assert mesh is None and [d.code for d in found] == ["mesh.number"] and "at most 1e+07" in found[0].message
+
+
+@pytest.mark.parametrize(("ending", "text"), [
+    (".obj", "v 0 0 0\nv 9 0 0\nv  9 0\nv 0 0 9\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf -1 2 3\n"),
+    (".ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+             "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n9 0 0\n0 9 0\n3 0 1 5\n"),
+    (".off", "OFF\n3 1 0\n0 0 0\n9 0 0\n0 9 0\n3 0 1 5\n")])
+def test_triangles_of_vertices_that_are_not_there_are_refused(ending: str, text: str, tmp_path: Path) -> None:
+    path = tmp_path / f"solid{ending}"
+    path.write_text(text, encoding="ascii")
+    mesh, found = load_mesh(path)
+    assert mesh is None and [d.code for d in found] == ["mesh.format"]

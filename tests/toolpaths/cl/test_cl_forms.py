@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 
 from toolpaths.cl.forms import FORMS
 from toolpaths.cl.interpret import HANDLERS
 from toolpaths.cl.read import ReadResult, read_bytes
-from toolpaths.cl.text.near import one_edit
+from toolpaths.cl.text.near import nearest, one_edit
 from toolpaths.cl.text.words import NEUTRAL, UNSUPPORTED_MOTION
 from toolpaths.diagnostics import Severity, has_errors
 from toolpaths.toolpath import Cycle, Toolpath
@@ -133,3 +135,10 @@ def test_a_name_may_end_with_the_bare_word_of_any_record(before: str) -> None:
         for behind in ("", "/", " ,"):
             read = read_bytes(f"{before}{word}{behind}\nGOTO/1,2,3\n".encode())
             assert has_errors(read.diagnostics) or len(read.toolpath) == 1, word
+
+
+def test_the_nearest_word_is_the_first_that_is_one_edit_away() -> None:
+    rng = random.Random(1)
+    words = ["".join(rng.choices("ABC", k=rng.randint(0, 5))) for _ in range(60)]
+    for word in ("".join(rng.choices("ABCD", k=rng.randint(0, 6))) for _ in range(300)):
+        assert nearest(word, words) == next((known for known in words if one_edit(word, known)), "")

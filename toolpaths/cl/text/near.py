@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
+
+_ANY = "\0"
+"""in the place of one letter"""
 
 
 def one_edit(a: str, b: str) -> bool:
@@ -17,4 +21,25 @@ def one_edit(a: str, b: str) -> bool:
 
 def nearest(word: str, vocabulary: Iterable[str]) -> str:
     """The first word of the vocabulary that is one edit away, "" where there is none."""
-    return next((known for known in vocabulary if one_edit(word, known)), "")
+    words = tuple(vocabulary)
+    known = _by_form(words)
+    return next((words[k] for k in sorted({k for form in _forms(word) for k in known.get(form, ())})
+                 if one_edit(word, words[k])), "")
+
+
+@lru_cache(maxsize=64)
+def _by_form(words: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
+    """Which words have a form: of those one edit apart one is shared, so that a word is not held against them all."""
+    result: dict[str, tuple[int, ...]] = {}
+    for k, word in enumerate(words):
+        for form in _forms(word):
+            result[form] = (*result.get(form, ()), k)
+    return result
+
+
+def _forms(word: str) -> Iterator[str]:
+    """The word, with any one letter another, and without it."""
+    yield word
+    for i in range(len(word)):
+        yield word[:i] + _ANY + word[i + 1:]
+        yield word[:i] + word[i + 1:]
